@@ -1,0 +1,189 @@
+"""The catalogue of cell types: names, reference nodes, edges, faces, orders.
+
+Node order is that of VTK (and of meshio) throughout. Faces are listed with their nodes turned
+outward for a cell of positive Jacobian. Reference cells: the unit simplex, the unit square and
+cube, triangle × [0, 1]; pyramids stand on [-1, 1]² with their apex at (0, 0, 1).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Face:
+    """One face of a cell: its type and the cell's local nodes, in the face type's node order."""
+
+    type: str
+    nodes: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CellType:
+    """One cell type.
+
+    `nodes` (n_nodes, dim) are the reference coordinates; `edges` the vertex pairs, in the order of
+    the mid-edge nodes; `mirror` the node permutation that reverses the orientation; `skeleton` the
+    name of the linear type with the same vertices.
+    """
+
+    name: str
+    meshio: str
+    vtk: int
+    order: int
+    skeleton: str
+    nodes: np.ndarray
+    edges: tuple[tuple[int, int], ...]
+    faces: tuple[Face, ...]
+    mirror: tuple[int, ...]
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the reference cell."""
+        return self.nodes.shape[1]
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.nodes)
+
+    @cached_property
+    def n_vertices(self) -> int:
+        """Number of vertices; they come first in the node order."""
+        return len(_SHAPES[_shape_of(self.name)].vertices)
+
+    @cached_property
+    def boundary(self) -> tuple[int, ...]:
+        """The nodes of a 2D cell, or the two ends of a line, as a closed polygon (mid-nodes in)."""
+        if self.dim == 1:
+            return (0, 1) if self.order == 1 else (0, 2, 1)
+        n = self.n_vertices
+        if self.order == 1:
+            return tuple(range(n))
+        return tuple(k for i in range(n) for k in (i, n + i))
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What the types of one shape share: vertices, edges, faces and mirror image of vertices."""
+
+    vertices: tuple[tuple[float, ...], ...]
+    edges: tuple[tuple[int, int], ...]
+    faces: tuple[tuple[int, ...], ...]
+    mirror: tuple[int, ...]
+
+
+_SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
+_RING = ((0, 1), (1, 2), (2, 3), (3, 0))
+_SHAPES = {
+    "SEG": _Shape(((0,), (1,)), ((0, 1),), (), (1, 0)),
+    "TRIA": _Shape(
+        ((0, 0), (1, 0), (0, 1)),
+        ((0, 1), (1, 2), (2, 0)),
+        ((0, 1), (1, 2), (2, 0)),
+        (0, 2, 1),
+    ),
+    "QUAD": _Shape(_SQUARE, _RING, _RING, (0, 3, 2, 1)),
+    "TETRA": _Shape(
+        ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+        ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+        ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
+        (0, 2, 1, 3),
+    ),
+    # The faces of a hexahedron stand in the order of HEXA27's face-centre nodes.
+    "HEXA": _Shape(
+        tuple((*v, z) for z in (0, 1) for v in _SQUARE),
+        (*_RING, *((a + 4, b + 4) for a, b in _RING), (0, 4), (1, 5), (2, 6), (3, 7)),
+        ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)),
+        (0, 3, 2, 1, 4, 7, 6, 5),
+    ),
+    "PENTA": _Shape(
+        tuple((*v, z) for z in (0, 1) for v in ((0, 0), (1, 0), (0, 1))),
+        ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+        ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+        (0, 2, 1, 3, 5, 4),
+    ),
+    "PYRA": _Shape(
+        ((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (0, 0, 1)),
+        (*_RING, (0, 4), (1, 4), (2, 4), (3, 4)),
+        ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+        (0, 3, 2, 1, 4),
+    ),
+}
+
+# name: (meshio's name, VTK's number, order, has face centres, has a cell centre)
+_TYPES = {
+    "SEG2": ("line", 3, 1, False, False),
+    "SEG3": ("line3", 21, 2, False, False),
+    "TRIA3": ("triangle", 5, 1, False, False),
+    "TRIA6": ("triangle6", 22, 2, False, False),
+    "QUAD4": ("quad", 9, 1, False, False),
+    "QUAD8": ("quad8", 23, 2, False, False),
+    "QUAD9": ("quad9", 28, 2, False, True),
+    "TETRA4": ("tetra", 10, 1, False, False),
+    "TETRA10": ("tetra10", 24, 2, False, False),
+    "HEXA8": ("hexahedron", 12, 1, False, False),
+    "HEXA20": ("hexahedron20", 25, 2, False, False),
+    "HEXA27": ("hexahedron27", 29, 2, True, True),
+    "PENTA6": ("wedge", 13, 1, False, False),
+    "PENTA15": ("wedge15", 26, 2, False, False),
+    "PYRA5": ("pyramid", 14, 1, False, False),
+    "PYRA13": ("pyramid13", 27, 2, False, False),
+}
+
+
+def _shape_of(name: str) -> str:
+    return name.rstrip("0123456789")
+
+
+def _face_type(n_vertices: int, order: int, centred: bool) -> str:
+    linear = {2: "SEG2", 3: "TRIA3", 4: "QUAD4"}
+    quadratic = {2: "SEG3", 3: "TRIA6", 4: "QUAD9" if centred else "QUAD8"}
+    return (linear if order == 1 else quadratic)[n_vertices]
+
+
+def _build(name: str) -> CellType:
+    meshio_name, vtk, order, face_centres, cell_centre = _TYPES[name]
+    shape = _SHAPES[_shape_of(name)]
+    vertices = np.array(shape.vertices, dtype=float)
+    # Each node is known by the set of vertices whose mean it is.
+    owners = [frozenset([i]) for i in range(len(vertices))]
+    if order == 2:
+        owners += [frozenset(edge) for edge in shape.edges]
+    if face_centres:
+        owners += [frozenset(face) for face in shape.faces]
+    if cell_centre:
+        owners.append(frozenset(range(len(vertices))))
+    number = {owner: i for i, owner in enumerate(owners)}
+    mirrored = [frozenset(shape.mirror[i] for i in owner) for owner in owners]
+    faces = []
+    for face in shape.faces:
+        parts = [frozenset([i]) for i in face]
+        if order == 2:
+            rim = zip(face, (*face[1:], face[0]), strict=True)
+            parts += [frozenset(e) for e in (rim if len(face) > 2 else [face])]
+        if face_centres:
+            parts.append(frozenset(face))
+        nodes = tuple(number[p] for p in parts)
+        faces.append(Face(_face_type(len(face), order, face_centres), nodes))
+    return CellType(
+        name=name,
+        meshio=meshio_name,
+        vtk=vtk,
+        order=order,
+        skeleton=next(t for t in _TYPES if _shape_of(t) == _shape_of(name)),
+        nodes=np.array([vertices[sorted(owner)].mean(axis=0) for owner in owners]),
+        edges=shape.edges,
+        faces=tuple(faces),
+        mirror=tuple(number[m] for m in mirrored),
+    )
+
+
+BY_NAME: dict[str, CellType] = {name: _build(name) for name in _TYPES}
+BY_MESHIO: dict[str, CellType] = {t.meshio: t for t in BY_NAME.values()}
+
+
+def cell_type(name: str) -> CellType:
+    """The cell type of that name, the field's (`HEXA20`) or meshio's (`hexahedron20`)."""
+    return BY_NAME[name] if name in BY_NAME else BY_MESHIO[name]
