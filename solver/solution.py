@@ -1,0 +1,112 @@
+"""What a simulation hands on: fields, contact state, balance and cost of one solve.
+
+Lengths, forces and stresses are in the case's own units. `n` counts the nodes of the cut mesh, `m`
+the macro-elements of a zone. Contact pressure is positive in compression, gaps are positive when
+open, stress is positive in tension.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import meshio
+
+    from solver.case import Case
+
+STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
+
+
+@dataclass
+class BodyInfo:
+    """One body as it was meshed, before any cut.
+
+    `cells` maps cell type to number of cells; `faces` counts its faces on contact surfaces; `role`
+    is slave, master, both or none.
+    """
+
+    name: str
+    cells: dict[str, int]
+    faces: int
+    role: str
+
+
+@dataclass
+class ZoneResult:
+    """The contact state of one zone, by macro-element, and the stress on both surfaces.
+
+    `faces`: the slave sub-faces by cell type: (type, connectivity (s, nodes) into the mesh's
+    points, macro-element number (s,)); `master_faces`: (type, connectivity). `centre` and `normal`
+    (m, dim), `area`, `multiplier` (pressure ≥ 0), `gap`, `closed` (bool) and `coverage`
+    (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
+    `slave_nodes` and `master_nodes`, taken from the body of that surface alone.
+    """
+
+    name: str
+    faces: list[tuple[str, np.ndarray, np.ndarray]]
+    master_faces: list[tuple[str, np.ndarray]]
+    centre: np.ndarray
+    normal: np.ndarray
+    area: np.ndarray
+    multiplier: np.ndarray
+    gap: np.ndarray
+    closed: np.ndarray
+    coverage: np.ndarray
+    stress_slave: np.ndarray
+    stress_master: np.ndarray
+    slave_nodes: np.ndarray
+    master_nodes: np.ndarray
+
+
+@dataclass
+class StepResult:
+    """One load step: load factor, cost of the status iteration, and what was observed.
+
+    `observations` holds one mapping per observed macro-element, in the order of the case file:
+    zone, macro_element (number), pressure, gap, status (0 or 1), coverage.
+    """
+
+    factor: float
+    iterations: int
+    status_changes: int
+    residual: float
+    observations: list[dict[str, Any]]
+
+
+@dataclass
+class Solution:
+    """One solve, complete: everything the result file, the checks and the report need.
+
+    `mesh` is the cut mesh (volume cells only; slave sub-faces are in the zones). `displacement`
+    (n, dim), `stress` (n, 6) in the order of STRESS_COMPONENTS and averaged per body, `body` (n,).
+    `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone. `balance`
+    names relative imbalances (of forces and moments, relative to the load). `length` is the largest
+    extent of the mesh, `load_scale` the largest pressure of the load. `seconds` is wall time by
+    stage, `peak_memory_mb` the process's largest resident size.
+    """
+
+    case: Case
+    swapped: bool
+    hexahedra: str | None
+    mesh: meshio.Mesh
+    displacement: np.ndarray
+    stress: np.ndarray
+    body: np.ndarray
+    bodies: list[BodyInfo]
+    zones: list[ZoneResult]
+    nodal_normal_stress: np.ndarray
+    balance: dict[str, float]
+    steps: list[StepResult]
+    length: float
+    load_scale: float
+    dofs: int
+    macro_elements: int
+    iterations: int
+    linear_solver: str
+    plan: list[tuple[str, str]]
+    seconds: dict[str, float] = field(default_factory=dict)
+    cpu_seconds: float = float("nan")
+    peak_memory_mb: float = float("nan")
