@@ -1,0 +1,276 @@
+"""The case file as typed objects: what to solve, and what it is checked against.
+
+`load_case` reads a file, holds it against the schema, and then against what a schema cannot say.
+What can only be known with the mesh at hand is checked in `solver.groups`.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from solver.errors import InputError
+from solver.expressions import Expression
+from solver.schemas import CASE_SCHEMA, hint, key_path, validate
+from solver.strict_yaml import parse_mapping, read_text
+
+Scalar = float | Expression
+Vector = tuple[Scalar, ...]
+LOAD_KINDS = ("pressure", "traction", "body_force")
+SWAPPED = "-swapped"
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elasticity: Young's modulus (stress) and Poisson's ratio."""
+
+    young: float
+    poisson: float
+
+
+@dataclass(frozen=True)
+class Support:
+    """Imposed displacements of a group: direction (x, y, z, normal) to value."""
+
+    group: str
+    fix: dict[str, Scalar]
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load on a group: `kind` is one of LOAD_KINDS; a pressure is a scalar, positive inwards."""
+
+    group: str
+    kind: str
+    value: Scalar | Vector
+
+
+@dataclass(frozen=True)
+class Zone:
+    """One contact zone: its slave and master face groups, and how the slave side is treated."""
+
+    slave: str
+    master: str
+    name: str = "contact"
+    hexahedra: str = "pyramids"
+    treatment: str = "lac"
+    normal: str = "element"
+    interference: float = 0.0
+
+
+@dataclass(frozen=True)
+class Observation:
+    """The macro-element of a zone nearest to a point, to be reported at every step."""
+
+    zone: str
+    nearest: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case: one file, ready to be solved once its mesh is there.
+
+    `mesh` is the file's mapping, the key `file` replaced by `path`, relative to the case file.
+    `tolerance` holds the overrides by check name, under `all` where one number was given.
+    `source` is the file's text. `family` is the name of the file's folder.
+    """
+
+    name: str
+    family: str
+    path: Path
+    title: str
+    source: str
+    mesh: dict[str, Any]
+    materials: dict[str, Material]
+    supports: tuple[Support, ...]
+    loads: tuple[Load, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    rigid: frozenset[str] = frozenset()
+    transform: dict[str, Any] | None = None
+    plane: str | None = None
+    directions: str = "first"
+    steps: tuple[float, ...] = (1.0,)
+    observe: tuple[Observation, ...] = ()
+    reference: dict[str, Scalar | Vector] = field(default_factory=dict)
+    reference_kind: str | None = None
+    solution: str | None = None
+    tolerance: dict[str, float] = field(default_factory=dict)
+    counts: dict[str, dict[str, int]] = field(default_factory=dict)
+
+
+def load_case(path: str | Path) -> Case:
+    """The case in a file; `InputError` names the file, the key, the value and what is allowed."""
+    path = Path(path)
+    return parse_case(read_text(path), path)
+
+
+def parse_case(text: str, path: Path) -> Case:
+    """The case in a text; `path` serves its family, its relative paths and the messages."""
+    content = parse_mapping(text, path)
+    validate(content, CASE_SCHEMA, path)
+    case = _Reader(path, content).case(text)
+    _check(case)
+    return case
+
+
+class _Reader:
+    """Turns a mapping that the schema has passed into typed objects."""
+
+    def __init__(self, path: Path, content: dict[str, Any]):
+        self.path = path
+        self.content = content
+
+    def case(self, source: str) -> Case:
+        content = self.content
+        reference = dict(content.get("reference", {}))
+        # Left out where the file does not give them, for the defaults of `Case` to hold.
+        given: dict[str, Any] = {
+            key: content[key]
+            for key in ("transform", "plane", "directions", "counts")
+            if key in content
+        }
+        if "steps" in content:
+            given["steps"] = tuple(map(float, content["steps"]))
+        return Case(
+            name=content["name"],
+            family=self.path.resolve().parent.name or "cases",
+            path=self.path,
+            title=content.get("title", ""),
+            source=source,
+            mesh=self.mesh(),
+            materials={
+                group: Material(float(m["young"]), float(m["poisson"]))
+                for group, m in content["materials"].items()
+            },
+            supports=tuple(map(self.support, range(len(content["supports"])))),
+            loads=tuple(map(self.load, range(len(content.get("loads", []))))),
+            zones=tuple(map(self.zone, content.get("contact", []))),
+            rigid=frozenset(
+                group for group, body in content.get("bodies", {}).items() if body.get("rigid")
+            ),
+            observe=tuple(
+                Observation(item["zone"], tuple(map(float, item["nearest"])))
+                for item in content.get("observe", [])
+            ),
+            reference_kind=reference.pop("kind", None),
+            solution=reference.pop("solution", None),
+            reference={key: self.value("reference", key) for key in reference},
+            tolerance=self.tolerance(),
+            **given,
+        )
+
+    def mesh(self) -> dict[str, Any]:
+        mesh = dict(self.content["mesh"])
+        if "file" in mesh:
+            mesh["path"] = self.path.parent / mesh.pop("file")
+        return mesh
+
+    def support(self, index: int) -> Support:
+        item = self.content["supports"][index]
+        if isinstance(item["fix"], list):
+            return Support(item["group"], dict.fromkeys(item["fix"], 0.0))
+        keys = ("supports", index, "fix")
+        return Support(item["group"], {axis: self.value(*keys, axis) for axis in item["fix"]})
+
+    def zone(self, item: dict[str, Any]) -> Zone:
+        if "interference" in item:
+            item = item | {"interference": float(item["interference"])}
+        return Zone(**item)
+
+    def load(self, index: int) -> Load:
+        item = self.content["loads"][index]
+        kind = next((kind for kind in LOAD_KINDS if kind in item))
+        return Load(item["group"], kind, self.value("loads", index, kind))
+
+    def tolerance(self) -> dict[str, float]:
+        given = self.content.get("tolerance", {})
+        given = given if isinstance(given, dict) else {"all": given}
+        return {check: float(value) for check, value in given.items()}
+
+    def value(self, *keys: str | int) -> Any:
+        """The number, expression or tuple of them that stands under the keys."""
+        value: Any = self.content
+        for key in keys:
+            value = value[key]
+        if isinstance(value, list):
+            return tuple(self.value(*keys, i) for i in range(len(value)))
+        if isinstance(value, str):
+            return Expression(value, where=str(self.path), key=key_path(keys))
+        return float(value)
+
+
+def _check(case: Case) -> None:
+    """What the schema cannot say and the mesh need not say."""
+    if case.name.endswith(SWAPPED):
+        allowed = f"must not end in {SWAPPED}: that is the name of the other direction"
+        raise InputError(case.path, "name", case.name, allowed)
+    _check_names(case)
+    for before, after in zip(case.steps, case.steps[1:], strict=False):
+        if after <= before:
+            allowed = "load factors must increase"
+            raise InputError(case.path, "steps", list(case.steps), allowed)
+    if case.plane:
+        _check_plane(case)
+
+
+def _check_names(case: Case) -> None:
+    names: set[str] = set()
+    for i, zone in enumerate(case.zones):
+        if zone.slave == zone.master:
+            allowed = "the slave is its own master: they must be two groups"
+            raise InputError(case.path, f"contact[{i}].master", zone.master, allowed)
+        if zone.name in names:
+            allowed = "the name is given to two zones; each needs its own"
+            raise InputError(case.path, f"contact[{i}].name", zone.name, allowed)
+        names.add(zone.name)
+    for i, item in enumerate(case.observe):
+        if item.zone not in names:
+            allowed = f"no such zone; {hint(item.zone, names)}"
+            raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
+
+
+def _check_plane(case: Case) -> None:
+    """Nothing in a plane case may speak of z."""
+    check_dimension(case, 2)
+
+
+def check_dimension(case: Case, dim: int) -> None:
+    """Raise `InputError` for a vector, direction or expression that does not fit the dimension."""
+    allowed = f"must have {dim} components, as the mesh has"
+    for key, vector in _vectors(case):
+        if len(vector) != dim:
+            shown = [v.text if isinstance(v, Expression) else v for v in vector]
+            raise InputError(case.path, key, shown, allowed)
+    if dim == 3:
+        return
+    for i, support in enumerate(case.supports):
+        if "z" in support.fix:
+            allowed = "z in a plane case; allowed are x, y and normal"
+            raise InputError(case.path, f"supports[{i}].fix", "z", allowed)
+    for expression in _expressions(case):
+        if "z" in expression.names:
+            allowed = "z in a plane case; allowed are x, y and r"
+            raise InputError(case.path, expression.key, expression.text, allowed)
+
+
+def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
+    """Every vector of the case, with its key."""
+    for i, load in enumerate(case.loads):
+        if isinstance(load.value, tuple):
+            yield f"loads[{i}].{load.kind}", load.value
+    for i, item in enumerate(case.observe):
+        yield f"observe[{i}].nearest", item.nearest
+    for key, value in case.reference.items():
+        if isinstance(value, tuple):
+            yield f"reference.{key}", value
+
+
+def _expressions(case: Case) -> Iterable[Expression]:
+    """Every expression of the case."""
+    values: list[Any] = [value for support in case.supports for value in support.fix.values()]
+    values += [load.value for load in case.loads]
+    values += case.reference.values()
+    for value in values:
+        for scalar in value if isinstance(value, tuple) else (value,):
+            if isinstance(scalar, Expression):
+                yield scalar
