@@ -1,0 +1,362 @@
+"""The checks of a solve against its reference: one table, one small function per quantity.
+
+A check compares values with the reference at the places where they live: macro-element centres,
+nodes, or load steps. `error` is the largest deviation over the check's scale: the largest magnitude
+of the reference, or, where the reference is zero everywhere, the quantity's own measure (load for
+stresses, load / stiffness × size for displacements). A gap is always measured against the block
+size, status, coverage and balance against one. A value that is not a number fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from solver.expressions import evaluate
+from solver.solution import STRESS_COMPONENTS, Solution, ZoneResult
+
+RELATIVE = 1e-3
+GAP = 2e-5
+ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """The last accepted extremes of a check, kept apart from its reference."""
+
+    minimum: float
+    maximum: float
+
+
+@dataclass(frozen=True)
+class Regression:
+    """How far a check's extremes lie from the accepted ones, over the check's scale."""
+
+    minimum: float
+    maximum: float
+    change: float
+    tolerance: float
+    passed: bool
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """One check of one zone (None: of the whole solve).
+
+    `value` and `reference` are those of the place `where` the deviation is largest; `regression` is
+    None while no value has been accepted. `passed` asks that the error be within the tolerance and
+    that no accepted value has changed.
+    """
+
+    name: str
+    alias: str | None
+    zone: str | None
+    norm: str
+    minimum: float
+    maximum: float
+    value: float
+    reference: float
+    where: str
+    scale: float
+    error: float
+    tolerance: float
+    regression: Regression | None
+    passed: bool
+
+    @property
+    def title(self) -> str:
+        """The check's name with its zone: the key of its accepted values."""
+        return f"{self.name} {self.zone}" if self.zone else self.name
+
+    @property
+    def reason(self) -> str:
+        """Why the check failed, in one line; empty where it holds."""
+        if not self.error <= self.tolerance:
+            return (
+                f"{self.title}: {self.value:.9g} at {self.where}, reference {self.reference:.9g}: "
+                f"error {self.error:.2e}, tolerance {self.tolerance:.1e}"
+            )
+        if self.regression and not self.regression.passed:
+            old = self.regression
+            return (
+                f"{self.title}: {self.minimum:.12g} … {self.maximum:.12g}, accepted "
+                f"{old.minimum:.12g} … {old.maximum:.12g}: change {old.change:.2e}, tolerance "
+                f"{old.tolerance:.1e}"
+            )
+        return ""
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """Values (n,) and their reference (n,), with the places they were taken at."""
+
+    values: np.ndarray
+    reference: np.ndarray
+    kind: str
+    places: Sequence[Any]
+
+
+Reference = Any  # a scalar; for vectors and tensors a sequence or a mapping of scalars
+# Called with the solution, the zone (None for checks of the whole solve) and the reference.
+_Sampler = Callable[[Solution, Any, Reference], _Sample | None]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One row of the table.
+
+    `alias` is the reference code's name, `key` the reference that feeds the check (None: always
+    run), `tolerance` the default one (None: the relative one, which a case's single `tolerance`
+    replaces), `scale` the measure of the quantity, `fixed` whether that measure holds even where
+    the reference is not zero, `accepted` the tolerance against the accepted value.
+    """
+
+    name: str
+    alias: str | None
+    key: str | None
+    sample: _Sampler
+    scale: Callable[[Solution], float]
+    tolerance: float | None = None
+    fixed: bool = False
+    by_zone: bool = True
+    accepted: float = ROUND_OFF
+    norm: str = "max"
+
+    def tolerance_in(self, overrides: Mapping[str, float]) -> float:
+        """The tolerance under a case's overrides: by check, or `all` for the relative ones."""
+        if self.name in overrides:
+            return overrides[self.name]
+        return overrides.get("all", RELATIVE) if self.tolerance is None else self.tolerance
+
+
+def block_size(solution: Solution) -> float:
+    """The largest extent of the smallest body: what gaps are measured against."""
+    bodies = [solution.mesh.points[solution.body == b] for b in range(len(solution.bodies))]
+    return min(float(np.ptp(points, axis=0).max()) for points in bodies if len(points))
+
+
+def _load(solution: Solution) -> float:
+    return float(solution.load_scale)
+
+
+def _elongation(solution: Solution) -> float:
+    stiffness = min(m.young for m in solution.case.materials.values())
+    return float(solution.load_scale / stiffness * block_size(solution))
+
+
+def _unit(solution: Solution) -> float:
+    return 1.0
+
+
+def _by_macro_element(values: str, factor: str | None = None) -> _Sampler:
+    """Sample one array of the zone, times another, against a reference at the centres."""
+
+    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
+        array = np.asarray(getattr(zone, values), dtype=float)
+        if factor is not None:
+            array = array * getattr(zone, factor)
+        return _Sample(
+            array, evaluate(reference, zone.centre), "macro-element", range(len(zone.centre))
+        )
+
+    return sample
+
+
+def _status(solution: Solution, zone: ZoneResult, pressure: Reference) -> _Sample:
+    """In contact wherever the reference presses."""
+    sample = _by_macro_element("closed")(solution, zone, pressure)
+    return replace(sample, reference=(sample.reference > 0).astype(float))
+
+
+def _coverage(solution: Solution, zone: ZoneResult, pressure: Reference) -> _Sample:
+    """Covered in full wherever there is a pressure to compare."""
+    return _by_macro_element("coverage")(solution, zone, 1.0)
+
+
+def _surface_stress(side: str) -> _Sampler:
+    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
+        nodes = getattr(zone, f"{side}_nodes")
+        values = np.asarray(getattr(zone, f"stress_{side}"), dtype=float)
+        return _Sample(values, evaluate(reference, solution.mesh.points[nodes]), "node", nodes)
+
+    return sample
+
+
+def _nodal_stress(solution: Solution, zone: None, reference: Reference) -> _Sample:
+    nodes = np.flatnonzero(solution.body >= 0)
+    values = solution.nodal_normal_stress[nodes]
+    return _Sample(values, evaluate(reference, solution.mesh.points[nodes]), "node", nodes)
+
+
+def _by_component(array: str, names: Sequence[str]) -> _Sampler:
+    """Sample the referenced components of a nodal field, all on the scale of the largest."""
+
+    def sample(solution: Solution, zone: None, reference: Reference) -> _Sample:
+        given = (
+            reference
+            if isinstance(reference, Mapping)
+            else dict(zip(names, reference, strict=False))
+        )
+        nodes = np.flatnonzero(solution.body >= 0)
+        points = solution.mesh.points[nodes]
+        field_ = getattr(solution, array)
+        values = [field_[nodes, names.index(name)] for name in given]
+        expected = [evaluate(scalar, points) for scalar in given.values()]
+        places = [f"{node} ({name})" for name in given for node in nodes]
+        return _Sample(np.concatenate(values), np.concatenate(expected), "node", places)
+
+    return sample
+
+
+def _balance(solution: Solution, zone: None, reference: Reference) -> _Sample:
+    values = np.array(list(solution.balance.values()), dtype=float)
+    return _Sample(values, np.zeros(len(values)), "the balance of", list(solution.balance))
+
+
+def _observed(quantity: str) -> _Sampler:
+    """Sample what was observed in a zone at every step; pressure grows with the load factor."""
+
+    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample | None:
+        rows = [
+            (step.factor, o["macro_element"], float(o[quantity]))
+            for step in solution.steps
+            for o in step.observations
+            if o["zone"] == zone.name
+        ]
+        if not rows:
+            return None
+        factors, elements, values = (np.array(column) for column in zip(*rows, strict=True))
+        expected = evaluate(reference, zone.centre[elements])
+        if quantity == "pressure":
+            expected = expected * factors
+        places = [f"{e}, load factor {f:g}" for f, e in zip(factors, elements, strict=True)]
+        return _Sample(values, expected, "macro-element", places)
+
+    return sample
+
+
+_PRESSURE, _STRESS = "contact_pressure", "normal_stress"
+CHECKS: tuple[Check, ...] = (
+    Check("multiplier", "LAGS_C", _PRESSURE, _by_macro_element("multiplier"), _load),
+    Check("nodal_stress", "SIEF_NOEU", _STRESS, _nodal_stress, _load, by_zone=False),
+    Check("surface_stress_slave", None, _STRESS, _surface_stress("slave"), _load),
+    Check("surface_stress_master", None, _STRESS, _surface_stress("master"), _load),
+    Check("element_pressure", "CONT_ELEM/PRES", _PRESSURE, _by_macro_element("multiplier"), _load),
+    Check(
+        "element_gap", "CONT_ELEM/JEU", "gap", _by_macro_element("gap"), block_size, GAP, fixed=True
+    ),
+    Check("element_status", "CONT_ELEM/CONT", _PRESSURE, _status, _unit, 0.0, fixed=True),
+    Check("coverage", "CONT_ELEM/COEFSURF", _PRESSURE, _coverage, _unit, 1e-6, fixed=True),
+    Check(
+        "covered_pressure",
+        "CONT_ELEM/PRESCOOR",
+        _PRESSURE,
+        _by_macro_element("multiplier", "coverage"),
+        _load,
+        accepted=1e-6,
+    ),
+    Check(
+        "displacement",
+        "DEPL",
+        "displacement",
+        _by_component("displacement", "xyz"),
+        _elongation,
+        by_zone=False,
+    ),
+    Check(
+        "stress_components",
+        None,
+        "stress",
+        _by_component("stress", STRESS_COMPONENTS),
+        _load,
+        by_zone=False,
+    ),
+    Check("balance", None, None, _balance, _unit, 1e-10, fixed=True, by_zone=False),
+    Check("observation", "OBSERVATION/PRES", _PRESSURE, _observed("pressure"), _load),
+    Check(
+        "observation_gap", "OBSERVATION/JEU", "gap", _observed("gap"), block_size, GAP, fixed=True
+    ),
+)
+
+
+def run_checks(
+    solution: Solution, accepted: Mapping[str, Accepted] | None = None
+) -> list[CheckResult]:
+    """Run every check of the table whose reference the case gives, zone by zone.
+
+    `accepted` maps check titles to the accepted extremes. Raises `InputError` when a reference
+    expression has no finite value at one of the places.
+    """
+    accepted = accepted or {}
+    results = []
+    for check in CHECKS:
+        reference = solution.case.reference.get(check.key) if check.key else 0.0
+        if reference is None:
+            continue
+        for zone in solution.zones if check.by_zone else [None]:
+            sample = check.sample(solution, zone, reference)
+            if sample is not None:
+                results.append(_judge(check, solution, zone, sample, accepted))
+    return results
+
+
+def _judge(
+    check: Check,
+    solution: Solution,
+    zone: ZoneResult | None,
+    sample: _Sample,
+    accepted: Mapping[str, Accepted],
+) -> CheckResult:
+    name = zone.name if zone else None
+    magnitude = float(np.abs(sample.reference).max(initial=0.0))
+    scale = check.scale(solution) if check.fixed or magnitude == 0 else magnitude
+    deviation = np.abs(sample.values - sample.reference)
+    if deviation.size:
+        worst = int(np.argmax(deviation))  # the first that is not a number, if there is one
+        error = _over(deviation[worst], scale)
+        extremes = float(sample.values.min()), float(sample.values.max())
+        value, reference = float(sample.values[worst]), float(sample.reference[worst])
+        where = f"{sample.kind} {sample.places[worst]}"
+    else:
+        error = value = reference = float("nan")
+        extremes, where = (value, value), "no place at all"
+    old = accepted.get(f"{check.name} {name}" if name else check.name)
+    regression = None if old is None else _compare(extremes, old, scale, check.accepted)
+    tolerance = check.tolerance_in(solution.case.tolerance)
+    return CheckResult(
+        name=check.name,
+        alias=check.alias,
+        zone=name,
+        norm=check.norm,
+        minimum=extremes[0],
+        maximum=extremes[1],
+        value=value,
+        reference=reference,
+        where=where,
+        scale=scale,
+        error=error,
+        tolerance=tolerance,
+        regression=regression,
+        passed=error <= tolerance and (regression is None or regression.passed),
+    )
+
+
+def _compare(
+    extremes: tuple[float, float], old: Accepted, scale: float, tolerance: float
+) -> Regression:
+    changes = [
+        _over(abs(new - was), scale)
+        for new, was in zip(extremes, (old.minimum, old.maximum), strict=True)
+    ]
+    change = float(np.max(changes))
+    return Regression(old.minimum, old.maximum, change, tolerance, change <= tolerance)
+
+
+def _over(deviation: float, scale: float) -> float:
+    """The deviation over the scale; with no scale at all only no deviation is none."""
+    if scale == 0:
+        return 0.0 if deviation == 0 else float("inf") if deviation > 0 else float("nan")
+    return float(deviation / scale)
