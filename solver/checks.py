@@ -96,7 +96,7 @@ class _Sample:
     values: np.ndarray
     reference: np.ndarray
     kind: str
-    places: Sequence[Any]
+    places: Sequence[Any] | np.ndarray
 
 
 Reference = Any  # a scalar; for vectors and tensors a sequence or a mapping of scalars
@@ -147,33 +147,36 @@ def _elongation(solution: Solution) -> float:
     return float(solution.load_scale / stiffness * block_size(solution))
 
 
-def _unit(solution: Solution) -> float:
+def _unit(_: Solution) -> float:
     return 1.0
 
 
-def _by_macro_element(values: str, factor: str | None = None) -> _Sampler:
-    """Sample one array of the zone, times another, against a reference at the centres."""
-
-    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
-        array = np.asarray(getattr(zone, values), dtype=float)
-        if factor is not None:
-            array = array * getattr(zone, factor)
-        return _Sample(
-            array, evaluate(reference, zone.centre), "macro-element", range(len(zone.centre))
-        )
-
-    return sample
+def _at_macro_elements(zone: ZoneResult, values: np.ndarray, reference: Reference) -> _Sample:
+    numbers = range(len(zone.centre))
+    return _Sample(np.asarray(values), evaluate(reference, zone.centre), "macro-element", numbers)
 
 
-def _status(solution: Solution, zone: ZoneResult, pressure: Reference) -> _Sample:
+def _pressure(_: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
+    return _at_macro_elements(zone, zone.multiplier, reference)
+
+
+def _gap(_: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
+    return _at_macro_elements(zone, zone.gap, reference)
+
+
+def _status(_: Solution, zone: ZoneResult, pressure: Reference) -> _Sample:
     """In contact wherever the reference presses."""
-    sample = _by_macro_element("closed")(solution, zone, pressure)
+    sample = _at_macro_elements(zone, zone.closed.astype(float), pressure)
     return replace(sample, reference=(sample.reference > 0).astype(float))
 
 
-def _coverage(solution: Solution, zone: ZoneResult, pressure: Reference) -> _Sample:
+def _coverage(_: Solution, zone: ZoneResult, __: Reference) -> _Sample:
     """Covered in full wherever there is a pressure to compare."""
-    return _by_macro_element("coverage")(solution, zone, 1.0)
+    return _at_macro_elements(zone, zone.coverage, 1.0)
+
+
+def _covered_pressure(_: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
+    return _at_macro_elements(zone, zone.coverage * zone.multiplier, reference)
 
 
 def _surface_stress(side: str) -> _Sampler:
@@ -185,7 +188,7 @@ def _surface_stress(side: str) -> _Sampler:
     return sample
 
 
-def _nodal_stress(solution: Solution, zone: None, reference: Reference) -> _Sample:
+def _nodal_stress(solution: Solution, _: None, reference: Reference) -> _Sample:
     nodes = np.flatnonzero(solution.body >= 0)
     values = solution.nodal_normal_stress[nodes]
     return _Sample(values, evaluate(reference, solution.mesh.points[nodes]), "node", nodes)
@@ -194,7 +197,7 @@ def _nodal_stress(solution: Solution, zone: None, reference: Reference) -> _Samp
 def _by_component(array: str, names: Sequence[str]) -> _Sampler:
     """Sample the referenced components of a nodal field, all on the scale of the largest."""
 
-    def sample(solution: Solution, zone: None, reference: Reference) -> _Sample:
+    def sample(solution: Solution, _: None, reference: Reference) -> _Sample:
         given = (
             reference
             if isinstance(reference, Mapping)
@@ -211,7 +214,7 @@ def _by_component(array: str, names: Sequence[str]) -> _Sampler:
     return sample
 
 
-def _balance(solution: Solution, zone: None, reference: Reference) -> _Sample:
+def _balance(solution: Solution, _: None, __: Reference) -> _Sample:
     values = np.array(list(solution.balance.values()), dtype=float)
     return _Sample(values, np.zeros(len(values)), "the balance of", list(solution.balance))
 
@@ -240,21 +243,19 @@ def _observed(quantity: str) -> _Sampler:
 
 _PRESSURE, _STRESS = "contact_pressure", "normal_stress"
 CHECKS: tuple[Check, ...] = (
-    Check("multiplier", "LAGS_C", _PRESSURE, _by_macro_element("multiplier"), _load),
+    Check("multiplier", "LAGS_C", _PRESSURE, _pressure, _load),
     Check("nodal_stress", "SIEF_NOEU", _STRESS, _nodal_stress, _load, by_zone=False),
     Check("surface_stress_slave", None, _STRESS, _surface_stress("slave"), _load),
     Check("surface_stress_master", None, _STRESS, _surface_stress("master"), _load),
-    Check("element_pressure", "CONT_ELEM/PRES", _PRESSURE, _by_macro_element("multiplier"), _load),
-    Check(
-        "element_gap", "CONT_ELEM/JEU", "gap", _by_macro_element("gap"), block_size, GAP, fixed=True
-    ),
+    Check("element_pressure", "CONT_ELEM/PRES", _PRESSURE, _pressure, _load),
+    Check("element_gap", "CONT_ELEM/JEU", "gap", _gap, block_size, GAP, fixed=True),
     Check("element_status", "CONT_ELEM/CONT", _PRESSURE, _status, _unit, 0.0, fixed=True),
     Check("coverage", "CONT_ELEM/COEFSURF", _PRESSURE, _coverage, _unit, 1e-6, fixed=True),
     Check(
         "covered_pressure",
         "CONT_ELEM/PRESCOOR",
         _PRESSURE,
-        _by_macro_element("multiplier", "coverage"),
+        _covered_pressure,
         _load,
         accepted=1e-6,
     ),

@@ -1,0 +1,76 @@
+"""Where a result came from: versions, revision, hashes of its inputs, machine and time."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import subprocess
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "gmsh")
+_THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+
+def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
+    """Provenance of a solve: plain texts and numbers, empty where something is not known.
+
+    `case` and `mesh` are the files that were read; `mesh` is None where it was made in memory.
+    """
+    return {
+        "python": platform.python_version(),
+        **{package: _version(package) for package in PACKAGES},
+        "revision": _revision(),
+        "case_sha256": _sha256(case),
+        "mesh_sha256": _sha256(mesh),
+        "cpu": _cpu(),
+        "cores": _cores(),
+        "threads": next((os.environ[name] for name in _THREADS if name in os.environ), ""),
+        "platform": platform.platform(),
+        "time_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def _revision() -> str:
+    """The git revision of the project, marked where files differ from it."""
+    command = ["git", "describe", "--always", "--abbrev=12", "--dirty"]
+    try:
+        done = subprocess.run(
+            command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=5
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def _sha256(path: Path | None) -> str:
+    if path is None or not path.is_file():
+        return ""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _cpu() -> str:
+    """The processor's name; Linux tells it in a file only."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor())
+
+
+def _cores() -> int:
+    """The cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

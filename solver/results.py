@@ -1,0 +1,319 @@
+"""The result file: one HDF5 file that is also a VTKHDF grid, written whole or not at all.
+
+`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; beside it lies everything that
+the checks need again, so that a file can be judged without solving:
+
+    /case          source text, name, family, path, swapped, hexahedra
+    /solve         lengths, sizes, cost and the linear solver of the solve
+    /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces
+    /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
+    /provenance    versions, revision, hashes, machine
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import meshio
+import numpy as np
+
+from solver.case import Case, case_of
+from solver.checks import CheckResult
+from solver.errors import InputError
+from solver.files import replacing
+from solver.mesh.catalogue import cell_type
+from solver.mesh.vtkhdf import read_grid, write_grid
+from solver.solution import BodyInfo, Solution, StepResult, ZoneResult
+from solver.strict_yaml import parse_mapping
+
+GRID = "VTKHDF"
+_SCALARS = (
+    "length",
+    "load_scale",
+    "dofs",
+    "macro_elements",
+    "iterations",
+    "linear_solver",
+    "cpu_seconds",
+    "peak_memory_mb",
+)
+_BY_MACRO_ELEMENT = {  # data set: attribute of ZoneResult
+    "centre": "centre",
+    "normal": "normal",
+    "area": "area",
+    "multiplier": "multiplier",
+    "gap": "gap",
+    "status": "closed",
+    "coverage": "coverage",
+}
+_BY_NODE = ("stress_slave", "stress_master", "slave_nodes", "master_nodes")
+_ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
+_OBSERVED = ("pressure", "gap", "status", "coverage")
+
+
+@dataclass
+class Result:
+    """What a result file gives back: the solution, and where it came from."""
+
+    solution: Solution
+    provenance: dict[str, Any]
+
+
+def write_result(
+    path: str | Path,
+    solution: Solution,
+    checks: Iterable[CheckResult],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Write a solution, its checks and its provenance to a `.vtkhdf` file."""
+    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+        _write_grid(file.create_group(GRID), solution)
+        _write_case(file.create_group("case"), solution)
+        file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
+        contact = file.create_group("contact")
+        for number, zone in enumerate(solution.zones):
+            _write_zone(contact.create_group(zone.name), zone, number)
+        _write_bodies(file.create_group("bodies"), solution.bodies)
+        _write_steps(file, solution.steps)
+        _write_table(file.create_group("balance"), _pairs("name", "value", solution.balance))
+        _write_table(file.create_group("timings"), _pairs("stage", "seconds", solution.seconds))
+        _write_table(file.create_group("plan"), _pairs("what", "why", dict(solution.plan)))
+        _write_table(file.create_group("checks"), [_flat(check) for check in checks])
+        file.create_group("provenance").attrs.update(provenance)
+
+
+def read_result(path: str | Path) -> Result:
+    """Read a result file back; `InputError` for a file that is none."""
+    try:
+        with h5py.File(path) as file:
+            return Result(_read_solution(file), _plain(file["provenance"].attrs))
+    except (OSError, KeyError) as error:
+        reason = "cannot be opened as HDF5" if isinstance(error, OSError) else str(error.args[0])
+        allowed = f"must be a result written by `solve` ({reason})"
+        raise InputError(path, "file", None, allowed) from None
+
+
+def _read_solution(file: h5py.File) -> Solution:
+    grid, point_data, cell_data = read_grid(file[GRID])
+    names = sorted(file["contact"], key=lambda name: file["contact"][name].attrs["number"])
+    volumes = [i for i, block in enumerate(grid.cells) if block.dim == grid.points.shape[1]]
+    case = file["case"]
+    return Solution(
+        case=_read_case(case),
+        swapped=bool(case.attrs["swapped"]),
+        hexahedra=case.attrs["hexahedra"] or None,
+        mesh=meshio.Mesh(
+            grid.points,
+            [grid.cells[i] for i in volumes],
+            cell_sets={k: [sets[i] for i in volumes] for k, sets in grid.cell_sets.items()},
+        ),
+        displacement=point_data["displacement"][:, : grid.points.shape[1]],
+        stress=point_data["stress"],
+        body=point_data["body"],
+        bodies=_read_bodies(file["bodies"]),
+        zones=[
+            _read_zone(file["contact"][name], name, _sub_faces(grid, cell_data, number))
+            for number, name in enumerate(names)
+        ],
+        nodal_normal_stress=point_data["normal_stress"],
+        balance=_mapping(file["balance"], "name", "value"),
+        steps=_read_steps(file),
+        plan=list(_mapping(file["plan"], "what", "why").items()),
+        seconds=_mapping(file["timings"], "stage", "seconds"),
+        **{key: _plain(file["solve"].attrs)[key] for key in _SCALARS},
+    )
+
+
+# The grid
+
+
+def _write_grid(group: h5py.Group, solution: Solution) -> None:
+    """The volume cells, then the sub-faces of all zones, one block for each cell type."""
+    mesh, dim = solution.mesh, solution.mesh.points.shape[1]
+    volumes = [i for i, block in enumerate(mesh.cells) if block.dim == dim]
+    cells = [(mesh.cells[i].type, mesh.cells[i].data) for i in volumes]
+    sizes = [len(data) for _, data in cells]
+    data = {name: [np.full(n, np.nan) for n in sizes] for name in _ON_FACES}
+    data |= {name: [np.full(n, -1) for n in sizes] for name in ("macro_element", "zone")}
+    parts = [
+        (name, number, zone, connectivity, owner)
+        for number, zone in enumerate(solution.zones)
+        for name, connectivity, owner in zone.faces
+    ]
+    for name in dict.fromkeys(part[0] for part in parts):
+        same = [part for part in parts if part[0] == name]
+        cells.append((cell_type(name).meshio, np.concatenate([part[3] for part in same])))
+        data["macro_element"].append(np.concatenate([part[4] for part in same]))
+        data["zone"].append(np.concatenate([np.full(len(part[4]), part[1]) for part in same]))
+        for key, attribute in _ON_FACES.items():
+            values = [getattr(zone, attribute)[owner] for _, _, zone, _, owner in same]
+            data[key].append(np.concatenate(values).astype(float))
+    nothing = [np.empty(0, dtype=int)] * (len(cells) - len(volumes))
+    sets = {name: [of[i] for i in volumes] + nothing for name, of in mesh.cell_sets.items()}
+    padding = np.zeros((len(mesh.points), 3 - dim))
+    point_data = {
+        "displacement": np.hstack([solution.displacement, padding]),
+        "stress": solution.stress,
+        "normal_stress": solution.nodal_normal_stress,
+        "body": solution.body,
+    }
+    write_grid(group, meshio.Mesh(mesh.points, cells, cell_sets=sets), point_data, data)
+
+
+def _sub_faces(
+    grid: meshio.Mesh, cell_data: Mapping[str, Sequence[np.ndarray]], zone: int
+) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    faces = []
+    for i, block in enumerate(grid.cells):
+        mine = np.flatnonzero(cell_data["zone"][i] == zone)
+        if mine.size:
+            owner = cell_data["macro_element"][i][mine]
+            faces.append((cell_type(block.type).name, block.data[mine], owner))
+    return faces
+
+
+# Case, zones, bodies, steps
+
+
+def _write_case(group: h5py.Group, solution: Solution) -> None:
+    case = solution.case
+    group["source"] = case.source
+    group.attrs.update(
+        name=case.name,
+        family=case.family,
+        path=str(case.path.resolve()),
+        swapped=solution.swapped,
+        hexahedra=solution.hexahedra or "",
+    )
+
+
+def _read_case(group: h5py.Group) -> Case:
+    source, path = group["source"].asstr()[()], Path(group.attrs["path"])
+    return case_of(parse_mapping(source, path), path, source)
+
+
+def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
+    group.attrs["number"] = number
+    for name, attribute in _BY_MACRO_ELEMENT.items():
+        group[name] = getattr(zone, attribute)
+    for name in _BY_NODE:
+        group[name] = getattr(zone, name)
+    faces = group.create_group("master_faces")
+    for kind, connectivity in zone.master_faces:
+        faces[kind] = connectivity
+
+
+def _read_zone(
+    group: h5py.Group, name: str, faces: list[tuple[str, np.ndarray, np.ndarray]]
+) -> ZoneResult:
+    return ZoneResult(
+        name=name,
+        faces=faces,
+        master_faces=[(kind, data[()]) for kind, data in group["master_faces"].items()],
+        **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
+        **{key: group[key][()] for key in _BY_NODE},
+    )
+
+
+def _write_bodies(group: h5py.Group, bodies: Sequence[BodyInfo]) -> None:
+    _write_table(group, [{"name": b.name, "role": b.role, "faces": b.faces} for b in bodies])
+    cells = [
+        {"body": number, "type": kind, "count": count}
+        for number, body in enumerate(bodies)
+        for kind, count in body.cells.items()
+    ]
+    _write_table(group.create_group("cells"), cells)
+
+
+def _read_bodies(group: h5py.Group) -> list[BodyInfo]:
+    cells = _read_table(group["cells"])
+    return [
+        BodyInfo(
+            name=row["name"],
+            role=row["role"],
+            faces=row["faces"],
+            cells={cell["type"]: cell["count"] for cell in cells if cell["body"] == number},
+        )
+        for number, row in enumerate(_read_table(group))
+    ]
+
+
+def _write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
+    """The cost of every step, and what was observed as arrays (steps, observed places)."""
+    rows = [asdict(step) for step in steps]
+    observed = [row.pop("observations") for row in rows]
+    _write_table(file.create_group("steps"), rows)
+    group = file.create_group("observation")
+    group["factor"] = [step.factor for step in steps]
+    first = observed[0] if observed else []
+    group["zone"] = _column([o["zone"] for o in first])
+    group["macro_element"] = np.array([o["macro_element"] for o in first], dtype=int)
+    for name in _OBSERVED:
+        values = [[float(o[name]) for o in row] for row in observed]
+        group[name] = np.reshape(values, (len(steps), len(first)))
+
+
+def _read_steps(file: h5py.File) -> list[StepResult]:
+    group = file["observation"]
+    zones, elements = group["zone"].asstr()[()], group["macro_element"][()].tolist()
+    values = {name: group[name][()] for name in _OBSERVED}
+    return [
+        StepResult(
+            **row,
+            observations=[
+                {"zone": zone, "macro_element": element}
+                | {name: float(values[name][i, j]) for name in _OBSERVED}
+                for j, (zone, element) in enumerate(zip(zones, elements, strict=True))
+            ],
+        )
+        for i, row in enumerate(_read_table(file["steps"]))
+    ]
+
+
+# Tables: a group with one data set for each column
+
+
+def _flat(check: CheckResult) -> dict[str, Any]:
+    row = asdict(check)
+    accepted = row.pop("regression") or {}
+    return row | {f"accepted_{key}": accepted.get(key) for key in ("minimum", "maximum")}
+
+
+def _pairs(key: str, value: str, mapping: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [{key: k, value: v} for k, v in mapping.items()]
+
+
+def _mapping(group: h5py.Group, key: str, value: str) -> dict[str, Any]:
+    return {row[key]: row[value] for row in _read_table(group)}
+
+
+def _write_table(group: h5py.Group, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write the rows' columns; nothing at all where there are no rows."""
+    for key in rows[0] if rows else ():
+        group[key] = _column([row[key] for row in rows])
+
+
+def _column(values: list[Any]) -> np.ndarray:
+    """An array of numbers, None as NaN, or of texts, None as an empty one."""
+    if not values or any(isinstance(value, str) for value in values):
+        return np.array([value or "" for value in values], dtype=h5py.string_dtype())
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def _read_table(group: h5py.Group) -> list[dict[str, Any]]:
+    columns = {
+        name: (data.asstr()[()] if h5py.check_string_dtype(data.dtype) else data[()]).tolist()
+        for name, data in group.items()
+        if isinstance(data, h5py.Dataset)
+    }
+    rows = zip(*columns.values(), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes as plain Python values."""
+    return {k: v.item() if isinstance(v, np.generic) else v for k, v in attributes.items()}
