@@ -21,14 +21,13 @@ import h5py
 import meshio
 import numpy as np
 
-from solver.case import Case, case_of
+from solver.case import Case, parse_case
 from solver.checks import CheckResult
 from solver.errors import InputError
 from solver.files import replacing
 from solver.mesh.catalogue import cell_type
 from solver.mesh.vtkhdf import read_grid, write_grid
 from solver.solution import BodyInfo, Solution, StepResult, ZoneResult
-from solver.strict_yaml import parse_mapping
 
 GRID = "VTKHDF"
 _SCALARS = (
@@ -79,9 +78,13 @@ def write_result(
             _write_zone(contact.create_group(zone.name), zone, number)
         _write_bodies(file.create_group("bodies"), solution.bodies)
         _write_steps(file, solution.steps)
-        _write_table(file.create_group("balance"), _pairs("name", "value", solution.balance))
-        _write_table(file.create_group("timings"), _pairs("stage", "seconds", solution.seconds))
-        _write_table(file.create_group("plan"), _pairs("what", "why", dict(solution.plan)))
+        _write_table(
+            file.create_group("balance"), _pairs("name", "value", solution.balance.items())
+        )
+        _write_table(
+            file.create_group("timings"), _pairs("stage", "seconds", solution.seconds.items())
+        )
+        _write_table(file.create_group("plan"), _pairs("what", "why", solution.plan))
         _write_table(file.create_group("checks"), [_flat(check) for check in checks])
         file.create_group("provenance").attrs.update(provenance)
 
@@ -120,10 +123,10 @@ def _read_solution(file: h5py.File) -> Solution:
             for number, name in enumerate(names)
         ],
         nodal_normal_stress=point_data["normal_stress"],
-        balance=_mapping(file["balance"], "name", "value"),
+        balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=_read_steps(file),
-        plan=list(_mapping(file["plan"], "what", "why").items()),
-        seconds=_mapping(file["timings"], "stage", "seconds"),
+        plan=_read_pairs(file["plan"], "what", "why"),
+        seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
         **{key: _plain(file["solve"].attrs)[key] for key in _SCALARS},
     )
 
@@ -192,8 +195,7 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
 
 
 def _read_case(group: h5py.Group) -> Case:
-    source, path = group["source"].asstr()[()], Path(group.attrs["path"])
-    return case_of(parse_mapping(source, path), path, source)
+    return parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
 
 
 def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
@@ -283,12 +285,12 @@ def _flat(check: CheckResult) -> dict[str, Any]:
     return row | {f"accepted_{key}": accepted.get(key) for key in ("minimum", "maximum")}
 
 
-def _pairs(key: str, value: str, mapping: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [{key: k, value: v} for k, v in mapping.items()]
+def _pairs(key: str, value: str, pairs: Iterable[tuple[str, Any]]) -> list[dict[str, Any]]:
+    return [{key: k, value: v} for k, v in pairs]
 
 
-def _mapping(group: h5py.Group, key: str, value: str) -> dict[str, Any]:
-    return {row[key]: row[value] for row in _read_table(group)}
+def _read_pairs(group: h5py.Group, key: str, value: str) -> list[tuple[str, Any]]:
+    return [(row[key], row[value]) for row in _read_table(group)]
 
 
 def _write_table(group: h5py.Group, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
+def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
+    """The name of one solve of a case: direction and variant, where they are not the case's own."""
+    return "-".join([name, *(["swapped"] if swapped else []), *([hexahedra] if hexahedra else [])])
+
+
 @dataclass
 class BodyInfo:
     """One body as it was meshed, before any cut.
@@ -110,3 +115,8 @@ class Solution:
     seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")
+
+    @property
+    def job(self) -> str:
+        """The name of this solve, as of its folder and its file of accepted values."""
+        return job_name(self.case.name, self.swapped, self.hexahedra)
