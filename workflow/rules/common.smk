@@ -1,0 +1,113 @@
+"""What is run: the case files found, the jobs they stand for, and the sources jobs depend on."""
+
+import re
+import shlex
+import sys
+from collections import namedtuple
+from pathlib import Path
+
+import yaml
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import validate
+
+validate(config, "../schemas/config.schema.yaml")
+
+# One line a job is printed when it ends; two more for each that is chosen and started are too many.
+logger.addFilter(lambda record: not record.getMessage().startswith(("Select jobs", "Execute ")))
+
+PYTHON = shlex.quote(sys.executable)
+
+# One solve. `mesh`: the user's mesh file, or None where a recipe generates it; `hexahedra`: how
+# hexahedra are cut, None for the case's own way.
+Job = namedtuple("Job", "family case name file mesh swap hexahedra")
+
+
+def sources(*patterns):
+    """Source files of the solver, as inputs: whoever depends on them runs again on a change."""
+    return sorted(str(f) for p in patterns for f in Path("solver").glob(p) if f.is_file())
+
+
+REPORT_SOURCES = sources("report/**/*.py", "report/**/*.jinja")
+MESH_SOURCES = sources("errors.py", "case.py", "expressions.py", "schemas/*", "mesh/*.py")
+SOLVER_SOURCES = sorted({*sources("**/*.py", "schemas/*")} - {*REPORT_SOURCES})
+
+
+def listed(value):
+    """A configured list, whether given as a list or as one text with commas."""
+    return value.split(",") if isinstance(value, str) and value else list(value)
+
+
+def case_files():
+    """All case files: ours, a folder a family, and those of the configured folders."""
+    files = sorted(Path("cases").glob("*/*.yaml"))
+    for folder in listed(config["cases"]):
+        found = sorted(Path(folder).expanduser().glob("*.yaml"))
+        if not found:
+            raise WorkflowError(f"cases = {folder}: no case file (*.yaml) in this folder")
+        files += found
+    return [f for f in files if f.name != "family.yaml"]
+
+
+def peek(file):
+    """The few keys needed here; a broken file still becomes one job, which the solver refuses."""
+    try:
+        content = yaml.load(file.read_text(), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    except (yaml.YAMLError, UnicodeDecodeError):
+        content = None
+    return content if isinstance(content, dict) else {}
+
+
+def jobs_of(file):
+    """The jobs of one case file: both directions where asked for, and the variants."""
+    content = peek(file)
+    family = file.resolve().parent.name
+    name = str(content.get("name"))
+    if "name" not in content or not re.fullmatch(r"[A-Za-z0-9][\w.+-]*", name):
+        name = re.sub(r"[^\w.+-]", "_", f"{family}-{file.stem}")
+    mesh = content.get("mesh")
+    mesh_file = (
+        file.parent / str(mesh["file"]) if isinstance(mesh, dict) and "file" in mesh else None
+    )
+    cuts = [None]
+    if config["variants"] and (mesh_file or "HEXA" in str(mesh)):
+        own = re.search(r"\bhexahedra: *(\w+)", str(content.get("contact")).replace("'", ""))
+        cuts.append("pyramids" if own and own[1] == "hexahedra" else "hexahedra")
+    for cut in cuts:
+        for swap in [False, True] if content.get("directions") == "both" else [False]:
+            job = name + "-swapped" * swap + (f"-{cut}" if cut else "")
+            yield Job(family, name, job, str(file), mesh_file, swap, cut)
+
+
+def find_jobs():
+    """Jobs by (family, name), as configured."""
+    jobs = {}
+    for job in (job for file in case_files() for job in jobs_of(file)):
+        other = jobs.setdefault((job.family, job.name), job)
+        if other is not job:
+            raise WorkflowError(
+                f"{job.file}: name = {job.case}: already taken by {other.file}; "
+                "each case of a family needs a name of its own"
+            )
+    chosen = listed(config["family"])
+    known = {job.family for job in jobs.values()}
+    if unknown := set(chosen) - known:
+        raise WorkflowError(
+            f"family = {', '.join(sorted(unknown))}: unknown; there are {', '.join(sorted(known))}"
+        )
+    return {key: job for key, job in jobs.items() if not chosen or job.family in chosen}
+
+
+def verdict_of(job):
+    return f"results/{job.family}/{job.name}/verdict.json"
+
+
+BATCH = find_jobs()
+RUN = {k: j for k, j in BATCH.items() if config["case"] in ("", j.name)}
+if not RUN:
+    raise WorkflowError(f"case = {config['case']}: unknown; a case is named as in its file")
+
+
+wildcard_constraints:
+    family="[^/]+",
+    case="[^/]+",
+    job="[^/]+",

@@ -1,0 +1,20 @@
+RECIPES = {(job.family, job.case): job.file for job in BATCH.values() if not job.mesh}
+
+
+# The mesh of a recipe, one for all directions and variants of a case. Where meshing fails the file
+# holds the reason instead, so that the solve refuses it and the batch goes on.
+rule mesh:
+    input:
+        case=lambda w: RECIPES[w.family, w.case],
+        sources=MESH_SOURCES,
+    output:
+        mesh="results/{family}/{case}/mesh.vtkhdf",
+    log:
+        "results/{family}/{case}/mesh.log",
+    benchmark:
+        "results/{family}/{case}/mesh.benchmark"
+    message:
+        "mesh {wildcards.case}"
+    shell:
+        "{PYTHON} -m solver mesh {input.case:q} -o {output.mesh:q} > {log:q} 2>&1"
+        " || tail -n 1 {log:q} > {output.mesh:q}"

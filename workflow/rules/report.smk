@@ -1,0 +1,42 @@
+# Verdicts of the batch that are shown but not run: where one case is asked for, all others there.
+SHOWN = [verdict_of(job) for key, job in BATCH.items() if key not in RUN]
+
+
+rule report:
+    input:
+        verdicts=[verdict_of(job) for job in RUN.values()],
+        sources=REPORT_SOURCES,
+    output:
+        report(
+            "results/report/summary.html",
+            category="Verification",
+            caption="../report/summary.rst",
+        ),
+        multiext("results/report/summary", ".json", ".md", ".csv"),
+        "results/report/junit.xml",
+        "results/report/failures.txt",
+    log:
+        "results/report/log",
+    benchmark:
+        "results/report/benchmark"
+    params:
+        shown=[verdict for verdict in SHOWN if Path(verdict).is_file()],
+    message:
+        "report of all cases"
+    shell:
+        "{PYTHON} -m solver report {input.verdicts:q} {params.shown:q} -o results/report 2>&1"
+        " | tee {log:q}"
+
+
+# The gate: the exit status of the batch. The report is there by then, whatever it says.
+rule gate:
+    input:
+        "results/report/failures.txt",
+    output:
+        touch("results/report/passed"),
+    params:
+        line=f"^{config['case']}: " if config["case"] else "^",
+    message:
+        "all cases passed?"
+    shell:
+        "! grep --quiet {params.line:q} {input:q}"
