@@ -1,0 +1,53 @@
+"""Meshes: made by recipe, read, written, moved. The container is `meshio.Mesh` everywhere.
+
+Points (n, dim) with dim 2 or 3; at most one block per cell type, volume cells first, in VTK's node
+order and with positive Jacobian; groups of cells in `cell_sets`, of nodes in `point_sets`.
+What needs gmsh, h5py or meshio is imported when it is called.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from solver.errors import InputError
+from solver.files import replacing
+
+if TYPE_CHECKING:
+    import meshio
+
+__all__ = ["generate", "read_mesh", "transform", "write_mesh"]
+
+
+def generate(recipe: Mapping[str, Any], where: str) -> meshio.Mesh:
+    """The mesh of a case file's `mesh:` mapping with the key `recipe`; see `recipes`."""
+    from solver.mesh import recipes
+
+    return recipes.generate(recipe, where)
+
+
+def transform(mesh: meshio.Mesh, spec: Mapping[str, Any], where: str = "transform") -> meshio.Mesh:
+    """The mesh changed as a case file's `transform:` mapping says; see `transforms`."""
+    from solver.mesh import transforms
+
+    return transforms.transform(mesh, spec, where)
+
+
+def read_mesh(path: str | os.PathLike[str]) -> meshio.Mesh:
+    """The mesh in a file, by its extension; see `formats`. Raises InputError naming the file."""
+    from solver.mesh import formats
+
+    return formats.read(Path(path))
+
+
+def write_mesh(mesh: meshio.Mesh, path: str | os.PathLike[str]) -> None:
+    """Write the mesh as VTKHDF, whole or not at all; the same mesh gives the same bytes."""
+    from solver.mesh import vtkhdf
+
+    path = Path(path)
+    if path.suffix != ".vtkhdf":
+        raise InputError(path, "extension", path.suffix, "must be .vtkhdf")
+    with replacing(path) as temporary:
+        vtkhdf.write(mesh, temporary)

@@ -1,0 +1,179 @@
+"""The recipe `blocks`: two rectangular blocks, one on the other, each meshed in its own way.
+
+    recipe: blocks
+    size: [50, 50]         # of each block along x, y (and z in 3D); one number for a cube
+    bottom: {cells: QUAD4, divisions: [12, 12]}
+    top: {cells: TRIA3, divisions: [10, 8], far: 6, algorithm: frontal, seed: 3}
+
+`cells` is the cell type, in both blocks of the same dimension. `divisions` says how many pieces
+the edges have along each axis; blocks of QUAD and HEXA cells are regular grids. Blocks of TRIA and
+TETRA cells are unstructured inside; there `far` (the lateral edges on the side away from the
+interface, by default as the others), `algorithm` and `seed` (any whole number) shape the mesh.
+Blocks of PENTA and PYRA cells are a single cube cut in pieces (see `hybrid`).
+
+The interface lies in y = 0 (2D) or z = 0 (3D), the corner of both blocks at x = 0 (and y = 0).
+Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (the lower side of the
+bottom block), `press` (the upper side of the top block), `symx` (x = 0) and `symy` (y = 0, 3D).
+"""
+
+from itertools import chain, pairwise
+
+import gmsh
+import meshio
+import numpy as np
+
+from solver.mesh.catalogue import BY_NAME, CellType
+from solver.mesh.gmsh_session import current_model, session
+from solver.mesh.recipes import Keys
+
+# gmsh's algorithms for surfaces, in the words of the recipe.
+_ALGORITHMS = {"meshadapt": 1, "delaunay": 5, "frontal": 6, "bamg": 7, "packing": 9}
+_CELLS = [name for name, cell in BY_NAME.items() if cell.dim > 1]
+
+
+def blocks(keys: Keys) -> meshio.Mesh:
+    """Both blocks, which share no nodes."""
+    sections = {name: keys.section(name) for name in ("bottom", "top")}
+    types = {name: BY_NAME[section.choice("cells", _CELLS)] for name, section in sections.items()}
+    dim = types["bottom"].dim
+    if types["top"].dim != dim:
+        raise keys.refuse("top.cells", types["top"].name, f"must be of dimension {dim} as bottom")
+    size = keys.numbers("size", dim)
+    meshes = [_Block(name, types[name], size, sections[name]).mesh() for name in sections]
+    keys.finish()
+    return _joined(meshes)
+
+
+class _Block:
+    """One block: a rectangle or a box, its corners and sides those of QUAD4 or HEXA8."""
+
+    def __init__(self, name: str, cell: CellType, size: list[float], keys: Keys):
+        self.name, self.cell, self.keys = name, cell, keys
+        self.solid = BY_NAME["QUAD4" if cell.dim == 2 else "HEXA8"]
+        self.regular = cell.name.startswith(("QUAD", "HEXA"))
+        self.size = np.array(size)
+        self.origin = np.zeros(cell.dim)
+        if name == "bottom":
+            self.origin[-1] = -size[-1]
+        self.divisions = keys.integers("divisions", cell.dim)
+        self.far = self.divisions[:-1]
+        options = {}
+        if not self.regular:
+            self.far = keys.integers("far", cell.dim - 1, self.far)
+            options["Mesh__Algorithm"] = _ALGORITHMS[
+                keys.choice("algorithm", _ALGORITHMS, "frontal")
+            ]
+            options["Mesh__RandomSeed"] = keys.integers("seed", 1, [1])[0]
+        self.options = options
+        keys.finish()
+
+    def mesh(self) -> meshio.Mesh:
+        """The block's mesh, with its groups."""
+        complete = self.cell.name in ("QUAD9", "HEXA27")
+        with session(Mesh__SecondOrderIncomplete=not complete, **self.options):
+            edges = self._edges(self._corners())
+            self._volume(self._surfaces(edges))
+            gmsh.model.mesh.generate(self.cell.dim)
+            self._straighten()
+            gmsh.model.mesh.setOrder(self.cell.order)
+            return current_model(unnamed=False)
+
+    def _corners(self) -> list[int]:
+        places = np.zeros((self.solid.n_nodes, 3))
+        places[:, : self.cell.dim] = self.origin + self.solid.nodes * self.size
+        return [gmsh.model.geo.addPoint(*place) for place in places]
+
+    def _edges(self, corners: list[int]) -> list[int]:
+        edges = []
+        for start, end in self.solid.edges:
+            edge = gmsh.model.geo.addLine(corners[start], corners[end])
+            axis = int(np.abs(self.solid.nodes[end] - self.solid.nodes[start]).argmax())
+            height = self.solid.nodes[[start, end], -1].mean()
+            is_far = height == (0 if self.name == "bottom" else 1)
+            count = self.far[axis] if is_far else self.divisions[axis]
+            gmsh.model.geo.mesh.setTransfiniteCurve(edge, count + 1)
+            edges.append(edge)
+        return edges
+
+    def _surfaces(self, edges: list[int]) -> list[int]:
+        """The sides in 3D, with their groups; the edges themselves in 2D."""
+        numbers = {}
+        for edge, (a, b) in zip(edges, self.solid.edges, strict=True):
+            numbers[a, b], numbers[b, a] = edge, -edge
+        sides = []
+        for face in self.solid.faces:
+            rim = [numbers[pair] for pair in pairwise((*face.nodes, face.nodes[0]))]
+            sides.append(rim[0] if self.cell.dim == 2 else self._surface(rim))
+        return sides
+
+    def _surface(self, rim: list[int]) -> int:
+        surface = gmsh.model.geo.addPlaneSurface([gmsh.model.geo.addCurveLoop(rim)])
+        if self.regular:
+            gmsh.model.geo.mesh.setTransfiniteSurface(surface)
+            gmsh.model.geo.mesh.setRecombine(2, surface)
+        return surface
+
+    def _volume(self, sides: list[int]) -> None:
+        dim = self.cell.dim
+        if dim == 2:
+            volume = self._surface(sides)
+        else:
+            volume = gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(sides)])
+            if self.regular:
+                gmsh.model.geo.mesh.setTransfiniteVolume(volume)
+        gmsh.model.geo.synchronize()
+        gmsh.model.addPhysicalGroup(dim, [volume], name=self.name)
+        for side, face in zip(sides, self.solid.faces, strict=True):
+            name = side_name(self.name, self.solid.nodes[list(face.nodes)])
+            if name:
+                gmsh.model.addPhysicalGroup(dim - 1, [abs(side)], name=name)
+
+    def _straighten(self) -> None:
+        """Put the nodes of edges, and of regular grids, exactly where the divisions say.
+
+        gmsh measures curves numerically, which leaves the nodes 1e-12 of the size away.
+        """
+        for dim, entity in chain.from_iterable(map(gmsh.model.getEntities, range(1, 4))):
+            if dim > 1 and not self.regular:
+                continue
+            tags, flat, _ = gmsh.model.mesh.getNodes(dim, entity)
+            for tag, place in zip(tags, flat.reshape(-1, 3), strict=True):
+                share = (place[: self.cell.dim] - self.origin) / self.size
+                n = self._divisions_at(share)
+                place[: self.cell.dim] = self.origin + np.round(share * n) * self.size / n
+                gmsh.model.mesh.setNode(tag, place, [])
+
+    def _divisions_at(self, share: np.ndarray) -> np.ndarray:
+        far = abs(share[-1] - (0 if self.name == "bottom" else 1)) < 1e-9
+        return np.array([*(self.far if far else self.divisions[:-1]), self.divisions[-1]])
+
+
+def side_name(block: str, corners: np.ndarray) -> str:
+    """The group of a side of the unit square or cube, from its corners (n, dim); "" if none."""
+    for axis in range(corners.shape[1]):
+        if np.ptp(corners[:, axis]) == 0:
+            break
+    lower = corners[0, axis] == 0
+    if axis < corners.shape[1] - 1:
+        return f"sym{'xyz'[axis]}" if lower else ""
+    if lower == (block == "top"):
+        return f"{block}_contact"
+    return "base" if block == "bottom" else "press"
+
+
+def _joined(meshes: list[meshio.Mesh]) -> meshio.Mesh:
+    """The meshes side by side in one; groups of the same name become one."""
+    offsets = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    cells = [
+        (block.type, block.data + offset)
+        for mesh, offset in zip(meshes, offsets, strict=False)
+        for block in mesh.cells
+    ]
+    sets = {}
+    for name in sorted({name for mesh in meshes for name in mesh.cell_sets}):
+        sets[name] = [
+            ids
+            for mesh in meshes
+            for ids in mesh.cell_sets.get(name, [np.arange(0)] * len(mesh.cells))
+        ]
+    return meshio.Mesh(np.concatenate([mesh.points for mesh in meshes]), cells, cell_sets=sets)

@@ -1,0 +1,57 @@
+"""Orientation: every cell right side out."""
+
+import numpy as np
+
+from solver.mesh.catalogue import CellType
+
+# Below this share of the product of the edges that span it, a corner counts as flat.
+_FLAT = 1e-12
+
+
+def vertex_jacobians(points: np.ndarray, cells: np.ndarray, cell: CellType) -> np.ndarray:
+    """Jacobian at the vertices, as a share of the product of the edge tangents that span it.
+
+    points (n, dim), cells (n_cells, n_nodes) of a type of the same dimension; returns
+    (n_cells, n_corners), positive for a cell in the catalogue's orientation. The tangents are
+    those of the cell's own interpolation, mid-edge nodes included. The apex of a pyramid, where
+    the Jacobian has no value, is left out.
+    """
+    columns = []
+    for vertex in range(cell.n_vertices):
+        ends = [
+            (sum(edge) - vertex, cell.n_vertices + i)
+            for i, edge in enumerate(cell.edges)
+            if vertex in edge
+        ]
+        if len(ends) != cell.dim:
+            continue
+        sign = np.sign(np.linalg.det([cell.nodes[end] - cell.nodes[vertex] for end, _ in ends]))
+        tangents = np.stack([_tangent(points, cells, cell, vertex, *end) for end in ends], axis=1)
+        size = np.linalg.norm(tangents, axis=2).prod(axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            columns.append(sign * np.nan_to_num(np.linalg.det(tangents) / size))
+    return np.stack(columns, axis=1)
+
+
+def _tangent(
+    points: np.ndarray, cells: np.ndarray, cell: CellType, vertex: int, end: int, middle: int
+) -> np.ndarray:
+    start, stop = points[cells[:, vertex]], points[cells[:, end]]
+    if cell.order == 1:
+        return stop - start
+    return 4 * (points[cells[:, middle]] - start) - (stop - start)
+
+
+def right_side_out(
+    points: np.ndarray, cells: np.ndarray, cell: CellType
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cells with mirrored ones renumbered, and a mask (n_cells,) of the cells that are no cells.
+
+    The latter have a Jacobian that is zero at a vertex or changes its sign from one to another.
+    """
+    jacobian = vertex_jacobians(points, cells, cell)
+    mirrored = (jacobian < 0).all(axis=1)
+    bad = (np.abs(jacobian) <= _FLAT).any(axis=1) | ((jacobian < 0).any(axis=1) & ~mirrored)
+    turned = cells.copy()
+    turned[mirrored] = cells[mirrored][:, list(cell.mirror)]
+    return turned, bad

@@ -1,0 +1,158 @@
+"""From a mesh as its file gives it to the mesh the solver works on."""
+
+import meshio
+import numpy as np
+
+from solver.errors import InputError
+from solver.mesh.catalogue import BY_MESHIO, BY_NAME, CellType
+from solver.mesh.orient import right_side_out
+
+_RANK = {cell.name: i for i, cell in enumerate(BY_NAME.values())}
+_SHOWN = 5
+
+
+def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
+    """One block per cell type, volumes first, right side out; 2D points in two columns.
+
+    `raw` has any blocks, groups in its cell and point sets, and, if its file numbers the cells,
+    these numbers as cell data `number`. Cells written twice become one. Cells of lower dimension
+    stay when their nodes belong to volume cells and they are faces or in a group; nodes of no cell
+    go. Point cells become node groups. Raises InputError naming the file `where`.
+    """
+    table = _Table(raw, where)
+    dim = max((cell.dim for cell in table.cells), default=0)
+    if dim < 2:
+        raise InputError(where, "cells", None, "the mesh has no cells of dimension 2 or 3")
+    points = _flattened(raw.points, dim, where)
+    blocks = [table.merged(cell) for cell in sorted(table.cells, key=lambda c: _order(c, dim))]
+    blocks = _attached(blocks, dim, len(points), where)
+    for block in blocks:
+        if block.cell.dim == dim:
+            block.turn(points, where)
+    return _compact(points, blocks, table.node_groups)
+
+
+class _Block:
+    """All cells of one type: connectivity, numbers in the file, and a mask per group."""
+
+    def __init__(
+        self, cell: CellType, nodes: np.ndarray, number: np.ndarray, groups: dict[str, np.ndarray]
+    ):
+        self.cell, self.nodes, self.number, self.groups = cell, nodes, number, groups
+
+    def taken(self, keep: np.ndarray) -> "_Block":
+        groups = {name: mask[keep] for name, mask in self.groups.items()}
+        return _Block(self.cell, self.nodes[keep], self.number[keep], groups)
+
+    def named(self) -> np.ndarray:
+        return np.any([np.zeros(len(self.nodes), dtype=bool), *self.groups.values()], axis=0)
+
+    def turn(self, points: np.ndarray, where: object) -> None:
+        self.nodes, bad = right_side_out(points, self.nodes, self.cell)
+        if bad.any():
+            numbers = ", ".join(str(n) for n in self.number[bad][:_SHOWN])
+            more = f" and {bad.sum() - _SHOWN} more" if bad.sum() > _SHOWN else ""
+            centre = points[self.nodes[bad][0]].mean(axis=0)
+            raise InputError(
+                where,
+                f"{self.cell.name} {numbers}{more}",
+                None,
+                "flat or folded: the Jacobian must not vanish or change its sign at the cell's "
+                f"vertices (the first lies around {', '.join(f'{x:.6g}' for x in centre)})",
+            )
+
+
+class _Table:
+    """The file's blocks sorted by cell type, its groups as masks over each block."""
+
+    def __init__(self, raw: meshio.Mesh, where: object):
+        self.blocks: list[_Block] = []
+        self.node_groups = {n: np.asarray(ids, dtype=np.int64) for n, ids in raw.point_sets.items()}
+        numbers = raw.cell_data.get("number")
+        for i, block in enumerate(raw.cells):
+            groups = {name: sets[i] for name, sets in raw.cell_sets.items() if _len(sets[i])}
+            if block.type == "vertex":
+                for name, ids in groups.items():
+                    nodes = np.r_[self.node_groups.get(name, []), block.data[ids, 0]]
+                    self.node_groups[name] = np.unique(nodes.astype(np.int64))
+                continue
+            if block.type not in BY_MESHIO:
+                raise InputError(where, "cell type", block.type, f"allowed: {', '.join(BY_NAME)}")
+            nodes = np.asarray(block.data, dtype=np.int64)
+            number = np.arange(1, len(nodes) + 1) if numbers is None else numbers[i]
+            masks = {name: np.isin(np.arange(len(nodes)), ids) for name, ids in groups.items()}
+            self.blocks.append(_Block(BY_MESHIO[block.type], nodes, number, masks))
+        self.cells = {block.cell for block in self.blocks if len(block.nodes)}
+
+    def merged(self, cell: CellType) -> _Block:
+        parts = [block for block in self.blocks if block.cell is cell]
+        nodes = np.concatenate([part.nodes for part in parts])
+        key = np.sort(nodes, axis=1)
+        _, first, same = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        # Position in the merged block of each cell of the file, in the order of first appearance.
+        rank = np.argsort(np.argsort(first))[same.ravel()]
+        groups = {}
+        for name in sorted({name for part in parts for name in part.groups}):
+            mask = [part.groups.get(name, np.zeros(len(part.nodes), bool)) for part in parts]
+            groups[name] = np.isin(np.arange(len(first)), rank[np.concatenate(mask)])
+        number = np.concatenate([part.number for part in parts])
+        first = np.sort(first)
+        return _Block(cell, nodes[first], number[first], groups)
+
+
+def _len(ids: object) -> int:
+    return 0 if ids is None else len(ids)  # type: ignore[arg-type]
+
+
+def _order(cell: CellType, dim: int) -> tuple[int, int]:
+    return dim - cell.dim, _RANK[cell.name]
+
+
+def _flattened(points: np.ndarray, dim: int, where: object) -> np.ndarray:
+    points = np.asarray(points, dtype=float)
+    if not np.isfinite(points).all():
+        raise InputError(where, "node coordinates", None, "must be finite numbers")
+    if dim == 2 and points.shape[1] == 3:
+        if np.ptp(points[:, 2]) > 0:
+            raise InputError(where, "node coordinates", None, "a mesh of 2D cells must have z = 0")
+        points = points[:, :2]
+    return np.ascontiguousarray(points)
+
+
+def _attached(blocks: list[_Block], dim: int, n_points: int, where: object) -> list[_Block]:
+    inside = np.zeros(n_points, dtype=bool)
+    for block in blocks:
+        if block.cell.dim == dim:
+            inside[block.nodes] = True
+    kept = []
+    for block in blocks:
+        on_volume = inside[block.nodes].all(axis=1)
+        for name, mask in block.groups.items():
+            if mask.any() and on_volume[mask].any() and not on_volume[mask].all():
+                loose = (mask & ~on_volume).sum()
+                raise InputError(
+                    where, f"group {name}", None, f"{loose} of its {block.cell.name} touch no cell"
+                )
+        wanted = on_volume if block.cell.dim >= dim - 1 else on_volume & block.named()
+        if wanted.any():
+            kept.append(block.taken(wanted))
+    return kept
+
+
+def _compact(
+    points: np.ndarray, blocks: list[_Block], node_groups: dict[str, np.ndarray]
+) -> meshio.Mesh:
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
+    new = np.full(len(points), -1)
+    new[used] = np.arange(len(used))
+    names = sorted({name for block in blocks for name in block.groups})
+    sets = {
+        name: [np.flatnonzero(block.groups.get(name, ())) for block in blocks] for name in names
+    }
+    node_sets = {name: np.unique(new[ids]) for name, ids in sorted(node_groups.items())}
+    return meshio.Mesh(
+        points[used],
+        [(block.cell.meshio, new[block.nodes]) for block in blocks],
+        cell_sets={name: ids for name, ids in sets.items() if any(len(i) for i in ids)},
+        point_sets={n: ids[ids >= 0] for n, ids in node_sets.items() if (ids >= 0).any()},
+    )
