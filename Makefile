@@ -1,0 +1,77 @@
+# Everything is run from here: `make help` lists the targets.
+# Settings: CORES=4 (all), MKL=no (without Intel MKL), PYTHON=python3.12, ARGS='-n' (for Snakemake).
+
+PYTHON ?= python3
+CORES ?= all
+MKL ?=
+ARGS ?=
+
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-print-directory
+export PATH := $(CURDIR)/.venv/bin:$(PATH)
+INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
+SNAKEMAKE := .venv/bin/python -m snakemake --cores $(CORES) $(ARGS)
+
+.PHONY: help all-cases family case report test accept format lint lock clean clean-all
+.PHONY: environment test-environment lint-environment
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
+
+all-cases: environment ## mesh, solve and check what is not up to date, then report
+	@$(SNAKEMAKE) all_cases
+
+family: environment ## the same for one family: make family FAMILY=ssnp170
+	@test -n "$(FAMILY)" || { echo "make family: name a folder of cases/, FAMILY=…"; exit 2; }
+	@$(SNAKEMAKE) all_cases --config family=$(FAMILY)
+
+case: environment ## solve one case again, then report: make case CASE=ssnp170-e-swapped
+	@test -n "$(CASE)" || { echo "make case: name a case as the report does, CASE=…"; exit 2; }
+	@$(SNAKEMAKE) all_cases --forcerun solve --config case=$(CASE)
+
+report: environment ## write the report again from the results there are
+	@$(SNAKEMAKE) report
+
+test: test-environment ## run the tests
+	@.venv/bin/python -m pytest -n auto $(ARGS)
+
+accept: environment ## accept the results as the new regression values, showing the difference
+	@.venv/bin/python -m solver accept
+
+format: lint-environment ## format the sources
+	@.venv/bin/python -m ruff check --quiet --fix-only .
+	@.venv/bin/python -m ruff format .
+	@.venv/bin/snakefmt workflow
+
+lint: lint-environment ## check format, style and types of the sources
+	.venv/bin/python -m ruff format --check .
+	.venv/bin/python -m ruff check .
+	.venv/bin/snakefmt --check workflow
+	.venv/bin/python -m mypy
+
+environment:
+	@$(INSTALL) run
+
+test-environment:
+	@$(INSTALL) run test
+
+lint-environment:
+	@$(INSTALL) run test lint
+
+LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 3.11 \
+	--generate-hashes --no-emit-index-url --no-annotate --custom-compile-command 'make lock'
+
+lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
+	@$(INSTALL) lock
+	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
+	@for group in build mkl test lint lock; do \
+	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
+	    --output-file requirements-$$group.txt || exit; done
+
+clean: ## remove results and caches
+	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +
+	@rm -rf .snakemake .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	@find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+clean-all: clean ## remove the environment too
+	@rm -rf .venv

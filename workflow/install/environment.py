@@ -1,0 +1,112 @@
+"""The virtual environment `.venv`: made, filled from hash-locked files, and stamped with them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from errors import InstallError
+
+ROOT = Path(__file__).resolve().parents[2]
+VENV = ROOT / ".venv"
+PYTHON = VENV / "bin" / "python"
+STAMP = VENV / "installed.json"
+
+
+def lock_file(group: str) -> Path:
+    """Path of a group's lock file."""
+    name = "requirements.txt" if group == "run" else f"requirements-{group}.txt"
+    if not (ROOT / name).is_file():
+        raise InstallError(f"there is no group {group!r}: {name} is not in {ROOT}")
+    return ROOT / name
+
+
+def digest(group: str) -> str:
+    """Hash of a group's lock file."""
+    return hashlib.sha256(lock_file(group).read_bytes()).hexdigest()
+
+
+def installed() -> dict:
+    """Return what the stamp says: the interpreter, the groups with their hashes, the MKL choice."""
+    try:
+        stamp = json.loads(STAMP.read_text())
+    except (OSError, ValueError):
+        return {"groups": {}, "mkl": ""}
+    same = stamp.get("python") == interpreter() and PYTHON.exists()
+    return stamp if same else {"groups": {}, "mkl": stamp.get("mkl", "")}
+
+
+def interpreter() -> str:
+    """Name the interpreter an environment is made for: another one makes it stale."""
+    return f"{platform.python_implementation()} {platform.python_version()} {sys.platform}"
+
+
+def wanted(groups: list[str], mkl: str) -> dict[str, str]:
+    """Hashes of the groups to have: those asked for, those there already, and MKL's if wanted."""
+    before = installed()
+    names = dict.fromkeys(["build", "run", *groups, *before["groups"]])
+    names.pop("mkl", None)
+    if (mkl or before["mkl"] or "yes") == "yes":
+        names["mkl"] = None
+    return {name: digest(name) for name in names}
+
+
+def current(groups: dict[str, str]) -> bool:
+    """Tell whether exactly these groups are installed from exactly these lock files."""
+    return installed()["groups"] == groups
+
+
+def install(groups: dict[str, str]) -> None:
+    """Make the environment if need be and install the groups' packages into it."""
+    start = time.monotonic()
+    if "mkl" in installed()["groups"] and "mkl" not in groups or not installed()["groups"]:
+        make()
+    locks = [lock_file(group) for group in groups if group != "build"]
+    print(f"Installing {', '.join(lock.name for lock in locks)} into .venv …", flush=True)
+    pip([lock_file("build")], ["--only-binary", ":all:"])
+    # One package is published as source only; it is built with the tools just installed.
+    source = ["--no-binary", "connection-pool", "--no-build-isolation"]
+    pip(locks, ["--only-binary", ":all:", *source])
+    compile_bytecode()
+    print(f"Packages installed ({time.monotonic() - start:.0f} s)", flush=True)
+
+
+def pip(locks: list[Path], options: list[str]) -> None:
+    """Install the packages of lock files with pip."""
+    command = [PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    command += ["--no-input", "--no-compile", "--require-hashes", *options]
+    for lock in locks:
+        command += ["--requirement", lock]
+    if subprocess.run(command).returncode:
+        raise InstallError("pip could not install the packages (its reason stands above)")
+
+
+def make() -> None:
+    """Make an empty environment; what an old one held is removed."""
+    try:
+        import ensurepip  # noqa: F401  Debian ships Python without it
+        import venv
+    except ImportError:
+        raise InstallError(
+            f"{sys.executable} cannot make virtual environments: install your system's package "
+            "for it (on Debian and Ubuntu python3-venv) and run make again"
+        ) from None
+    venv.create(VENV, clear=True, with_pip=True, symlinks=True)
+
+
+def compile_bytecode() -> None:
+    """Compile every package on all cores: otherwise each start of Snakemake pays for it."""
+    # Packages hold templates and samples that are no valid Python: the status says nothing.
+    subprocess.run([PYTHON, "-m", "compileall", "-q", "-q", "-j", "0", VENV / "lib"])
+
+
+def stamp(groups: dict[str, str]) -> None:
+    """Write down what has been installed; the last act of an installation."""
+    mkl = "yes" if "mkl" in groups else "no"
+    content = {"python": interpreter(), "mkl": mkl, "groups": groups}
+    STAMP.write_text(json.dumps(content, indent=1) + "\n")
