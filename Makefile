@@ -35,8 +35,10 @@ report: environment ## write the report again from the results there are
 test: test-environment ## run the tests
 	@.venv/bin/python -m pytest -n auto $(ARGS)
 
-accept: environment ## accept the results as the new regression values, showing the difference
-	@.venv/bin/python -m solver accept
+RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
+accept: environment ## take results as the accepted values, showing the difference: all or CASE=…
+	@test -n "$(RESULTS)" || { echo "make accept: there is no such result; solve first"; exit 2; }
+	@.venv/bin/python -m solver accept $(RESULTS)
 
 format: lint-environment ## format the sources
 	@.venv/bin/python -m ruff check --quiet --fix-only .
