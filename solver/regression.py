@@ -51,9 +51,9 @@ def accept(solution: Solution, checks: Sequence[CheckResult]) -> list[str]:
     has no number to accept.
     """
     path, old = regression_file(solution), accepted_values(solution)
-    new, lines = dict(old), []
-    for title in old.keys() - {check.title for check in checks}:
-        lines.append(f"{title}: {_shown(new.pop(title))} → none")
+    gone = old.keys() - {check.title for check in checks}
+    new = {title: value for title, value in old.items() if title not in gone}
+    lines = [f"{title}: {_shown(old[title])} → none" for title in gone]
     for check in checks:
         if not all(map(math.isfinite, (check.minimum, check.maximum))):
             raise InputError(path, check.title, check.minimum, "not a number: cannot be accepted")
@@ -80,7 +80,7 @@ def _accepted(path: Path, title: str, value: object) -> Accepted:
 
 
 def _number(value: object) -> bool:
-    return type(value) in (int, float) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _rounded(value: float, scale: float) -> float:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -139,22 +140,23 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
     mesh, dim = solution.mesh, solution.mesh.points.shape[1]
     volumes = [i for i, block in enumerate(mesh.cells) if block.dim == dim]
     cells = [(mesh.cells[i].type, mesh.cells[i].data) for i in volumes]
-    sizes = [len(data) for _, data in cells]
-    data = {name: [np.full(n, np.nan) for n in sizes] for name in _ON_FACES}
-    data |= {name: [np.full(n, -1) for n in sizes] for name in ("macro_element", "zone")}
+    n_volumes = sum(len(data) for _, data in cells)
+    data = {name: [np.full(n_volumes, np.nan)] for name in _ON_FACES}
+    data |= {name: [np.full(n_volumes, -1)] for name in ("macro_element", "zone")}
     parts = [
         (name, number, zone, connectivity, owner)
         for number, zone in enumerate(solution.zones)
         for name, connectivity, owner in zone.faces
     ]
-    for name in dict.fromkeys(part[0] for part in parts):
-        same = [part for part in parts if part[0] == name]
+    parts.sort(key=lambda part: part[0])  # stable: one block a type, its zones in their order
+    for name, group_ in groupby(parts, key=lambda part: part[0]):
+        same = list(group_)
         cells.append((cell_type(name).meshio, np.concatenate([part[3] for part in same])))
-        data["macro_element"].append(np.concatenate([part[4] for part in same]))
-        data["zone"].append(np.concatenate([np.full(len(part[4]), part[1]) for part in same]))
-        for key, attribute in _ON_FACES.items():
-            values = [getattr(zone, attribute)[owner] for _, _, zone, _, owner in same]
-            data[key].append(np.concatenate(values).astype(float))
+        for _, number, zone, _, owner in same:
+            data["macro_element"].append(owner)
+            data["zone"].append(np.full(len(owner), number))
+            for key, attribute in _ON_FACES.items():
+                data[key].append(getattr(zone, attribute)[owner].astype(float))
     nothing = [np.empty(0, dtype=int)] * (len(cells) - len(volumes))
     sets = {name: [of[i] for i in volumes] + nothing for name, of in mesh.cell_sets.items()}
     padding = np.zeros((len(mesh.points), 3 - dim))
@@ -164,17 +166,19 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
         "normal_stress": solution.nodal_normal_stress,
         "body": solution.body,
     }
-    write_grid(group, meshio.Mesh(mesh.points, cells, cell_sets=sets), point_data, data)
+    cell_data = {name: np.concatenate(arrays) for name, arrays in data.items()}
+    write_grid(group, meshio.Mesh(mesh.points, cells, cell_sets=sets), point_data, cell_data)
 
 
 def _sub_faces(
-    grid: meshio.Mesh, cell_data: Mapping[str, Sequence[np.ndarray]], zone: int
+    grid: meshio.Mesh, cell_data: Mapping[str, np.ndarray], zone: int
 ) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    faces = []
-    for i, block in enumerate(grid.cells):
-        mine = np.flatnonzero(cell_data["zone"][i] == zone)
-        if mine.size:
-            owner = cell_data["macro_element"][i][mine]
+    faces, start = [], 0
+    for block in grid.cells:
+        rows = slice(start, start := start + len(block.data))
+        mine = cell_data["zone"][rows] == zone
+        if mine.any():
+            owner = cell_data["macro_element"][rows][mine]
             faces.append((cell_type(block.type).name, block.data[mine], owner))
     return faces
 

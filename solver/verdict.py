@@ -110,18 +110,22 @@ def to_json(content: Any) -> str:
 
 
 def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[str, Any]:
-    known = isinstance(case, Case)
-    name = case.name if known else case.stem
+    if isinstance(case, Case):
+        name, family, title, kind = case.name, case.family, case.title, case.reference_kind
+        zones = _zones(case, swapped)
+    else:
+        name, family, title, kind = case.stem, case.resolve().parent.name, "", None
+        zones = []
     return {
         "case": name,
-        "family": case.family if known else case.resolve().parent.name,
-        "title": case.title if known else "",
+        "family": family,
+        "title": title,
         "job": job_name(name, swapped, hexahedra),
         "swapped": swapped,
         "direction": "swapped" if swapped else "first",
         "variant": hexahedra or "",
-        "reference_kind": case.reference_kind if known else None,
-        "zones": _zones(case, swapped) if known else [],
+        "reference_kind": kind,
+        "zones": zones,
     }
 
 
@@ -177,7 +181,9 @@ def _worst(checks: Iterable[CheckResult]) -> dict[str, Any] | None:
         return math.inf if check.error > 0 else 0.0
 
     worst = max(checks, key=share, default=None)
-    return worst and {"name": worst.name, "zone": worst.zone, "error": worst.error}
+    if worst is None:
+        return None
+    return {"name": worst.name, "zone": worst.zone, "error": worst.error}
 
 
 def _strict(value: Any) -> Any:
