@@ -1,0 +1,178 @@
+"""Solutions written by hand: two blocks pressed together with 25, exact to the last digit."""
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from solver.case import load_case
+from solver.solution import BodyInfo, Solution, StepResult, ZoneResult
+
+PLANE = """\
+name: two-blocks
+title: Two blocks, plane strain
+mesh: {file: blocks.msh}
+plane: strain
+materials: {all: {young: 2000.0, poisson: 0.3}}
+supports:
+  - {group: sym, fix: [x]}
+  - {group: base, fix: [y]}
+loads: [{group: press, pressure: 25.0}]
+contact: [{name: interface, slave: lower, master: upper}]
+directions: both
+steps: [0.5, 1.0]
+observe: [{zone: interface, nearest: [0, 0]}]
+reference:
+  kind: analytical
+  contact_pressure: 25.0
+  normal_stress: -25.0
+  gap: 0.0
+  displacement: [0.004875*x, -0.011375*(y + 50)]
+  stress: {xx: 0.0, yy: -25.0, zz: -7.5, xy: 0.0}
+counts: {bottom: {cells: 2, faces: 2}, top: {cells: 3, faces: 3}}
+"""
+SOLID = """\
+name: hexahedron-on-wedges
+mesh: {file: blocks.msh}
+materials: {all: {young: 2000.0, poisson: 0.3}}
+supports: [{group: base, fix: [z]}]
+loads: [{group: press, pressure: 25.0}]
+contact: [{name: interface, slave: lower, master: upper}]
+reference:
+  kind: analytical
+  contact_pressure: 25.0
+  normal_stress: -25.0
+  gap: 0.0
+  displacement: [0.00375*x, 0.00375*y, -0.0125*(z + 10)]
+"""
+
+
+def plane(folder: Path, text: str = PLANE) -> Solution:
+    """Blocks of 50 × 50: six QUAD4 under three, two slave macro-elements of three sub-faces."""
+    points, cells = [], []
+    for columns, low in ((6, -50.0), (3, 0.0)):
+        start = len(points)
+        rows = [(x, y) for y in (low, low + 50) for x in np.linspace(0, 50, columns + 1)]
+        points += rows
+        cells += [
+            (start + i, start + i + 1, start + i + columns + 2, start + i + columns + 1)
+            for i in range(columns)
+        ]
+    x = np.array(points)
+    slave, master = np.arange(7, 14), np.arange(14, 18)
+    stress = np.tile([0.0, -25.0, -7.5, 0.0, 0.0, 0.0], (len(x), 1))
+    zone = ZoneResult(
+        name="interface",
+        faces=[("SEG2", np.c_[slave[1:], slave[:-1]], np.repeat([0, 1], 3))],
+        master_faces=[("SEG2", np.c_[master[:-1], master[1:]])],
+        centre=np.array([[12.5, 0.0], [37.5, 0.0]]),
+        normal=np.array([[0.0, 1.0]] * 2),
+        area=np.full(2, 25.0),
+        multiplier=np.full(2, 25.0),
+        gap=np.zeros(2),
+        closed=np.ones(2, dtype=bool),
+        coverage=np.ones(2),
+        stress_slave=np.full(7, -25.0),
+        stress_master=np.full(4, -25.0),
+        slave_nodes=slave,
+        master_nodes=master,
+    )
+    seen = {"zone": "interface", "macro_element": 0, "gap": 0.0, "status": 1, "coverage": 1.0}
+    return Solution(
+        case=_case(folder, text),
+        swapped=False,
+        hexahedra=None,
+        mesh=meshio.Mesh(
+            x,
+            [("quad", np.array(cells))],
+            cell_sets={"bottom": [np.arange(6)], "top": [np.arange(6, 9)]},
+        ),
+        displacement=np.c_[0.004875 * x[:, 0], -0.011375 * (x[:, 1] + 50)],
+        stress=stress,
+        body=np.repeat([0, 1], [14, 8]),
+        bodies=[
+            BodyInfo("bottom", {"QUAD4": 2}, 2, "slave"),
+            BodyInfo("top", {"QUAD4": 3}, 3, "master"),
+        ],
+        zones=[zone],
+        nodal_normal_stress=stress[:, 1].copy(),
+        balance={"zone interface: force": 1e-15, "reactions: moment": 0.0},
+        steps=[
+            StepResult(0.5, 1, 0, 1e-16, [{**seen, "pressure": 12.5}]),
+            StepResult(1.0, 1, 0, 1e-16, [{**seen, "pressure": 25.0}]),
+        ],
+        length=50.0,
+        load_scale=25.0,
+        dofs=44,
+        macro_elements=2,
+        iterations=1,
+        linear_solver="by hand",
+        plan=[("refinement", "none: by hand"), ("refinement", "said twice")],
+        seconds={"mesh": 0.25, "solve": 0.5},
+        cpu_seconds=0.75,
+        peak_memory_mb=1.0,
+    )
+
+
+def solid(folder: Path) -> Solution:
+    """A cube of 10, one HEXA8, under two PENTA6; one macro-element of four TRIA3 and one QUAD4."""
+    square = np.array([(0, 0), (10, 0), (10, 10), (0, 10)], dtype=float)
+    layers = [np.c_[square, np.full(4, z)] for z in (-10.0, 0.0, 0.0, 10.0)]
+    x = np.vstack([*layers, [[5.0, 5.0, 0.0]]])
+    stress = np.tile([0.0, 0.0, -25.0, 0.0, 0.0, 0.0], (len(x), 1))
+    lower, upper = np.array([4, 5, 6, 7, 16]), np.array([8, 9, 10, 11])
+    triangles = np.array([(4, 5, 16), (5, 6, 16), (6, 7, 16), (7, 4, 16)])
+    zone = ZoneResult(
+        name="interface",
+        faces=[("QUAD4", lower[None, :4], np.array([1])), ("TRIA3", triangles, np.zeros(4, int))],
+        master_faces=[("TRIA3", np.array([(8, 10, 9), (8, 11, 10)]))],
+        centre=np.array([[5.0, 5.0, 0.0]] * 2),
+        normal=np.array([[0.0, 0.0, 1.0]] * 2),
+        area=np.full(2, 100.0),
+        multiplier=np.array([25.0, 24.0]),
+        gap=np.array([0.0, 0.5]),
+        closed=np.array([True, False]),
+        coverage=np.array([1.0, 0.75]),
+        stress_slave=np.full(5, -25.0),
+        stress_master=np.full(4, -25.0),
+        slave_nodes=lower,
+        master_nodes=upper,
+    )
+    wedges = np.array([(8, 9, 10, 12, 13, 14), (8, 10, 11, 12, 14, 15)])
+    return Solution(
+        case=_case(folder, SOLID),
+        swapped=True,
+        hexahedra="hexahedra",
+        mesh=meshio.Mesh(
+            x,
+            [("hexahedron", np.arange(8)[None]), ("wedge", wedges)],
+            cell_sets={
+                "bottom": [np.array([0]), np.empty(0, int)],
+                "top": [np.empty(0, int), np.array([0, 1])],
+            },
+        ),
+        displacement=np.c_[0.00375 * x[:, :2], -0.0125 * (x[:, 2] + 10)],
+        stress=stress,
+        body=np.array([0] * 8 + [1] * 8 + [0]),
+        bodies=[
+            BodyInfo("bottom", {"HEXA8": 1}, 1, "slave"),
+            BodyInfo("top", {"PENTA6": 2}, 2, "master"),
+        ],
+        zones=[zone],
+        nodal_normal_stress=stress[:, 2].copy(),
+        balance={"reactions: force": 0.0},
+        steps=[StepResult(1.0, 1, 0, 1e-16, [])],
+        length=20.0,
+        load_scale=25.0,
+        dofs=51,
+        macro_elements=2,
+        iterations=1,
+        linear_solver="by hand",
+        plan=[],
+    )
+
+
+def _case(folder: Path, text: str):
+    path = folder / "case.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_case(path)
