@@ -91,7 +91,7 @@ class Case:
     directions: str = "first"
     steps: tuple[float, ...] = (1.0,)
     observe: tuple[Observation, ...] = ()
-    reference: dict[str, Scalar | Vector] = field(default_factory=dict)
+    reference: dict[str, Scalar | Vector | dict[str, Scalar]] = field(default_factory=dict)
     reference_kind: str | None = None
     solution: str | None = None
     tolerance: dict[str, float] = field(default_factory=dict)
@@ -179,7 +179,7 @@ class _Reader:
 
     def load(self, index: int) -> Load:
         item = self.content["loads"][index]
-        kind = next((kind for kind in LOAD_KINDS if kind in item))
+        kind = next(kind for kind in LOAD_KINDS if kind in item)
         return Load(item["group"], kind, self.value("loads", index, kind))
 
     def tolerance(self) -> dict[str, float]:
@@ -188,12 +188,14 @@ class _Reader:
         return {check: float(value) for check, value in given.items()}
 
     def value(self, *keys: str | int) -> Any:
-        """The number, expression or tuple of them that stands under the keys."""
+        """The number, expression, tuple or mapping of them that stands under the keys."""
         value: Any = self.content
         for key in keys:
             value = value[key]
         if isinstance(value, list):
             return tuple(self.value(*keys, i) for i in range(len(value)))
+        if isinstance(value, dict):
+            return {key: self.value(*keys, key) for key in value}
         if isinstance(value, str):
             return Expression(value, where=str(self.path), key=key_path(keys))
         return float(value)
@@ -209,8 +211,9 @@ def _check(case: Case) -> None:
         if after <= before:
             allowed = "load factors must increase"
             raise InputError(case.path, "steps", list(case.steps), allowed)
+    _check_listed_twice(case)
     if case.plane:
-        _check_plane(case)
+        check_dimension(case, 2)
 
 
 def _check_names(case: Case) -> None:
@@ -229,9 +232,19 @@ def _check_names(case: Case) -> None:
             raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
 
 
-def _check_plane(case: Case) -> None:
-    """Nothing in a plane case may speak of z."""
-    check_dimension(case, 2)
+def _check_listed_twice(case: Case) -> None:
+    """A direction of a group is fixed once, a kind of load on a group is given once."""
+    fixed = [
+        (f"supports[{i}]", s.group, axis) for i, s in enumerate(case.supports) for axis in s.fix
+    ]
+    loaded = [(f"loads[{i}]", load.group, load.kind) for i, load in enumerate(case.loads)]
+    for given in (fixed, loaded):
+        seen: set[tuple[str, str]] = set()
+        for key, group, what in given:
+            if (group, what) in seen:
+                allowed = f"the group is listed twice with {what}"
+                raise InputError(case.path, f"{key}.group", group, allowed)
+            seen.add((group, what))
 
 
 def check_dimension(case: Case, dim: int) -> None:
@@ -267,10 +280,12 @@ def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
 
 def _expressions(case: Case) -> Iterable[Expression]:
     """Every expression of the case."""
-    values: list[Any] = [value for support in case.supports for value in support.fix.values()]
+    values: list[Any] = [support.fix for support in case.supports]
     values += [load.value for load in case.loads]
     values += case.reference.values()
     for value in values:
+        if isinstance(value, dict):
+            value = tuple(value.values())
         for scalar in value if isinstance(value, tuple) else (value,):
             if isinstance(scalar, Expression):
                 yield scalar

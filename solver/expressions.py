@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 MAX_LENGTH = 1000
 MAX_DEPTH = 100
 MAX_EXPONENT = 32.0
+MAX_NUMBER = 1e300
 
 ALLOWED = "a number or an expression of x, y, z, r, pi, sqrt, sin, cos, + - * / **, parentheses"
 _COORDINATES = ("x", "y", "z")
-_FUNCTIONS = ("sqrt", "sin", "cos")
 _BINARY: dict[type, Callable] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -48,6 +48,7 @@ class Expression:
     _tree: ast.expr = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        """Parse the text."""
         object.__setattr__(self, "_tree", self._parse())
 
     @property
@@ -63,7 +64,7 @@ class Expression:
         names = dict(zip(_COORDINATES, points.T, strict=False))
         if "z" in self.names and "z" not in names:
             raise self._error("z in a plane case; allowed are x, y and r")
-        names |= {"r": np.linalg.norm(points, axis=1), "pi": math.pi}
+        names |= {"r": np.linalg.norm(points, axis=1), "pi": np.float64(math.pi)}
         with np.errstate(all="ignore"):
             values = np.broadcast_to(_value(self._tree, names), len(points)).astype(float)
         bad = np.flatnonzero(~np.isfinite(values))
@@ -94,9 +95,7 @@ class Expression:
     def _operands(self, node: ast.expr) -> list[ast.expr]:
         """The sub-expressions of an allowed node; refuses any other node."""
         match node:
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                if not abs(number) < 1e300:
-                    raise self._error("a number in it is too large")
+            case ast.Constant() if _number(node) is not None:
                 return []
             case ast.Name(id="x" | "y" | "z" | "r" | "pi"):
                 return []
@@ -128,11 +127,16 @@ def evaluate(scalar: float | Expression, points: "np.ndarray") -> "np.ndarray":
 
 def _number(node: ast.expr) -> float | None:
     """The value of a signed number literal; None for anything else."""
-    if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
-        inner = _number(node.operand) if isinstance(node.operand, ast.Constant) else None
-        return None if inner is None else _UNARY[type(node.op)](inner)
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-        return float(node.value) if abs(node.value) < 1e300 else math.inf
+    match node:
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant() as operand):
+            inner = _number(operand)
+            return None if inner is None else -inner
+        case ast.UnaryOp(op=ast.UAdd(), operand=ast.Constant() as operand):
+            return _number(operand)
+        case ast.Constant(value=bool()):
+            return None
+        case ast.Constant(value=int() | float() as number) if abs(number) < MAX_NUMBER:
+            return float(number)
     return None
 
 
@@ -140,8 +144,8 @@ def _value(node: ast.expr, names: dict[str, Any]) -> Any:
     import numpy as np
 
     match node:
-        case ast.Constant(value=number):
-            return np.float64(number)
+        case ast.Constant():
+            return np.float64(_number(node))
         case ast.Name(id=name):
             return names[name]
         case ast.UnaryOp(op=op, operand=operand):
