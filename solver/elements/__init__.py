@@ -1,0 +1,13 @@
+"""Shape functions of every cell type in the file's node order, and quadrature that suffices."""
+
+from solver.elements.quadrature import face_rule, mortar_degree, simplex_rule, volume_rule
+from solver.elements.shape import ShapeFunctions, shape_functions
+
+__all__ = [
+    "ShapeFunctions",
+    "face_rule",
+    "mortar_degree",
+    "shape_functions",
+    "simplex_rule",
+    "volume_rule",
+]

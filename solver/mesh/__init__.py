@@ -2,7 +2,7 @@
 
 Points (n, dim) with dim 2 or 3; at most one block per cell type, volume cells first, in VTK's node
 order and with positive Jacobian; groups of cells in `cell_sets`, of nodes in `point_sets`.
-What needs gmsh, h5py or meshio is imported when it is called.
+What needs gmsh or h5py is imported when it is called.
 """
 
 from __future__ import annotations
@@ -10,13 +10,16 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import meshio
+from meshio._mesh import topological_dimension
 
 from solver.errors import InputError
 from solver.files import replacing
 
-if TYPE_CHECKING:
-    import meshio
+# meshio counts the nodes of this type, but its table of dimensions has no line for it.
+topological_dimension.setdefault("pyramid13", 3)
 
 __all__ = ["generate", "read_mesh", "transform", "write_mesh"]
 

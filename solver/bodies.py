@@ -1,0 +1,80 @@
+"""Bodies: connected parts of a mesh, their rigid motions, and what holds them."""
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+# Eigenvalues below this share of the largest belong to motions that nothing resists.
+_FREE = 1e-12
+
+
+def body_numbers(n_nodes: int, cells: dict[str, np.ndarray]) -> np.ndarray:
+    """Body number (n_nodes,) of each node: parts that share no node are different bodies."""
+    first = np.concatenate([np.repeat(c[:, 0], c.shape[1] - 1) for c in cells.values()])
+    others = np.concatenate([c[:, 1:].ravel() for c in cells.values()])
+    graph = sparse.coo_matrix((np.ones(len(first)), (first, others)), shape=(n_nodes, n_nodes))
+    return connected_components(graph, directed=False)[1]
+
+
+def rigid_motions(points: np.ndarray, body: np.ndarray) -> sparse.csc_matrix:
+    """Rigid motions (n_dofs, n_bodies · 3 or 6): translations, then turns about body centres.
+
+    Turns are scaled by the body's size, so that all columns are of the same order.
+    """
+    n, dim = points.shape
+    count = np.bincount(body)
+    centre = np.stack([np.bincount(body, points[:, d]) / count for d in range(dim)], axis=1)
+    arm = points - centre[body]
+    size = np.zeros(len(count))
+    np.maximum.at(size, body, np.linalg.norm(arm, axis=1))
+    arm /= size[body][:, None]
+    fields = [np.tile(np.eye(dim)[d], (n, 1)) for d in range(dim)]
+    if dim == 2:
+        fields.append(np.stack([-arm[:, 1], arm[:, 0]], axis=1))
+    else:
+        fields += [np.cross(np.eye(3)[d], arm) for d in range(3)]
+    per_body = len(fields)
+    rows = np.tile(np.arange(n * dim), per_body)
+    columns = np.concatenate([np.repeat(body * per_body + k, dim) for k in range(per_body)])
+    values = np.concatenate([f.ravel() for f in fields])
+    return sparse.csc_matrix((values, (rows, columns)), shape=(n * dim, len(count) * per_body))
+
+
+def unheld_motion(
+    motions: sparse.csc_matrix,
+    basis: sparse.csr_matrix,
+    constraints: sparse.csr_matrix,
+    n_bodies: int,
+) -> tuple[int, str] | None:
+    """A rigid motion that neither supports nor `constraints` resist: (body, description), or None.
+
+    `basis` spans the displacements that the supports leave free; `constraints` (m, n_dofs) are
+    those of closed contact, per unit of area.
+    """
+    held = motions - basis @ (basis.T @ motions)
+    contact = constraints @ motions
+    resistance = (held.T @ held + contact.T @ contact).toarray()
+    weight = 1 / np.sqrt(np.maximum(np.diag(resistance), np.finfo(float).tiny))
+    dead = np.diag(resistance) <= _FREE * max(np.diag(resistance).max(initial=0.0), 1e-300)
+    weight[dead] = 1.0
+    values, vectors = np.linalg.eigh(resistance * np.outer(weight, weight))
+    if values[0] > _FREE:
+        return None
+    motion = (vectors[:, 0] * weight).reshape(n_bodies, -1)
+    body = int(np.abs(motion).max(axis=1).argmax())
+    return body, _describe(motion[body])
+
+
+def _describe(motion: np.ndarray) -> str:
+    dim = 2 if len(motion) == 3 else 3
+    move, turn = motion[:dim], motion[dim:]
+    if np.abs(turn).max() > np.abs(move).max():
+        return "turn" if dim == 2 else f"turn about {_direction(turn)}"
+    return f"move along {_direction(move)}"
+
+
+def _direction(vector: np.ndarray) -> str:
+    unit = vector / vector[np.abs(vector).argmax()]
+    if np.abs(unit).sum() < 1 + 1e-6:
+        return "xyz"[int(np.abs(unit).argmax())]
+    return "(" + ", ".join(f"{x:.3g}" for x in unit) + ")"

@@ -1,0 +1,193 @@
+"""Linear elasticity over mixed cells: stiffness, internal forces, stress at nodes.
+
+One block per cell type; every degree of freedom belongs to a node (`dof = dim · node + component`).
+Source: Bathe, Finite Element Procedures, §5.3. Works on arrays alone.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from solver.batch import invert
+from solver.elements import shape_functions, volume_rule
+from solver.errors import SolveError
+from solver.mesh.catalogue import CellType
+
+# Bytes of gradients handled at once: small enough to stay in the processor's cache.
+_CHUNK_BYTES = 8 << 20
+
+
+@dataclass(frozen=True)
+class Block:
+    """Cells of one type with their material.
+
+    `cells` (n, n_nodes) node numbers; `lame` and `shear` (n,) Lamé's λ and μ, in units of stress
+    (plane strain in 2D).
+    """
+
+    type: CellType
+    cells: np.ndarray
+    lame: np.ndarray
+    shear: np.ndarray
+
+
+def lame_parameters(young: np.ndarray, poisson: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lamé's λ and μ from Young's modulus and Poisson's ratio (3D and plane strain)."""
+    shear = young / (2 * (1 + poisson))
+    return 2 * shear * poisson / (1 - 2 * poisson), shear
+
+
+def physical_gradients(
+    points: np.ndarray, cells: np.ndarray, kind: CellType, reference: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gradients (n, q, n_nodes, dim) and Jacobian determinants (n, q) at reference points (q, dim).
+
+    Raises SolveError where a Jacobian is not positive, naming how many cells.
+    """
+    dn = shape_functions(kind.name).gradients(reference)
+    corner = points[cells]
+    corner = corner - corner[:, :1]
+    jacobian = np.einsum("cai,qaj->cqij", corner, dn, optimize=True)
+    determinant, inverse = invert(jacobian)
+    bad = (determinant <= 0).any(axis=1)
+    if bad.any():
+        raise SolveError(f"{int(bad.sum())} {kind.name} cells are inverted or degenerate")
+    return np.matmul(dn, inverse), determinant
+
+
+def _chunks(block: Block, dim: int) -> Iterator[slice]:
+    points, _ = volume_rule(block.type.name)
+    size = len(points) * block.type.n_nodes * dim * 8
+    step = max(1, _CHUNK_BYTES // size)
+    for start in range(0, len(block.cells), step):
+        yield slice(start, start + step)
+
+
+def element_matrices(points: np.ndarray, block: Block) -> np.ndarray:
+    """Stiffness matrices (n, dim · n_nodes, dim · n_nodes) of a block's cells."""
+    dim = points.shape[1]
+    nodes = block.type.n_nodes
+    reference, weights = volume_rule(block.type.name)
+    matrices = np.empty((len(block.cells), nodes, dim, nodes, dim))
+    for part in _chunks(block, dim):
+        gradient, determinant = physical_gradients(
+            points, block.cells[part], block.type, reference
+        )
+        flat = gradient.reshape(*gradient.shape[:2], nodes * dim)
+        weighted = flat * (weights * determinant)[:, :, None]
+        products = np.matmul(np.swapaxes(weighted, 1, 2), flat)
+        products = products.reshape(-1, nodes, dim, nodes, dim)
+        shear = block.shear[part, None, None, None, None]
+        stiffness = matrices[part]
+        np.multiply(products, block.lame[part, None, None, None, None], out=stiffness)
+        stiffness += shear * np.swapaxes(products, 2, 4)
+        trace = block.shear[part, None, None] * np.einsum("caibi->cab", products)
+        for i in range(dim):
+            stiffness[:, :, i, :, i] += trace
+    return matrices.reshape(len(block.cells), nodes * dim, nodes * dim)
+
+
+def degrees_of_freedom(cells: np.ndarray, dim: int) -> np.ndarray:
+    """Degrees of freedom (n, dim · n_nodes) of cells (n, n_nodes)."""
+    return (dim * cells[:, :, None] + np.arange(dim)).reshape(len(cells), -1)
+
+
+def stiffness(points: np.ndarray, blocks: list[Block]) -> sparse.csr_matrix:
+    """The stiffness matrix (n_dofs, n_dofs), symmetric, both halves stored."""
+    n, dim = points.shape
+    total = sparse.csr_matrix((n * dim, n * dim))
+    for block in blocks:
+        values = element_matrices(points, block)
+        dofs = degrees_of_freedom(block.cells, dim).astype(np.int32)
+        rows = np.repeat(dofs, dofs.shape[1], axis=1)
+        columns = np.tile(dofs, dofs.shape[1])
+        entries = (values.ravel(), (rows.ravel(), columns.ravel()))
+        total = total + sparse.coo_matrix(entries, shape=total.shape).tocsr()
+    return total
+
+
+def internal_force(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> np.ndarray:
+    """Internal forces (n_nodes, dim) of a displacement (n_nodes, dim), summed cell by cell.
+
+    Strains are taken from differences of displacement within the cell: the large common part of a
+    displacement, which carries no strain, then costs no digits, as it would in the assembled
+    product K·u.
+    """
+    n, dim = points.shape
+    force = np.zeros(n * dim)
+    for block in blocks:
+        reference, weights = volume_rule(block.type.name)
+        for part in _chunks(block, dim):
+            cells = block.cells[part]
+            gradient, determinant = physical_gradients(points, cells, block.type, reference)
+            stress = _stress(gradient, displacement[cells], block.lame[part], block.shear[part])
+            stress *= (weights * determinant)[:, :, None, None]
+            nodal = np.einsum("cqaj,cqij->cai", gradient, stress, optimize=True)
+            dofs = degrees_of_freedom(cells, dim)
+            force += np.bincount(dofs.ravel(), nodal.ravel(), minlength=n * dim)
+    return force.reshape(n, dim)
+
+
+def _stress(
+    gradient: np.ndarray, nodal: np.ndarray, lame: np.ndarray, shear: np.ndarray
+) -> np.ndarray:
+    """In-plane or 3D stress tensors (n, q, dim, dim) from nodal displacements (n, n_nodes, dim)."""
+    difference = nodal - nodal[:, :1]
+    slope = np.einsum("cai,cqaj->cqij", difference, gradient, optimize=True)
+    stress = shear[:, None, None, None] * (slope + np.swapaxes(slope, 2, 3))
+    pressure = lame[:, None] * np.einsum("cqii->cq", slope)
+    for i in range(slope.shape[-1]):
+        stress[:, :, i, i] += pressure
+    return stress
+
+
+def nodal_stress(
+    points: np.ndarray, blocks: list[Block], displacement: np.ndarray
+) -> np.ndarray:
+    """Stress (n_nodes, 6) as xx, yy, zz, xy, yz, xz, the mean over the cells around each node.
+
+    In each cell the stress at the points of a low-order rule is fitted by the linear shape
+    functions of its vertices (least squares) and read at its nodes; gradients at a node itself
+    would not exist at a pyramid's apex.
+    """
+    n = len(points)
+    total, count = np.zeros((n, 6)), np.zeros(n)
+    for block in blocks:
+        reference, _ = volume_rule(block.type.name)
+        fit = _extrapolation(block.type, reference)
+        for part in _chunks(block, points.shape[1]):
+            cells = block.cells[part]
+            gradient, _ = physical_gradients(points, cells, block.type, reference)
+            stress = _stress(gradient, displacement[cells], block.lame[part], block.shear[part])
+            full = _voigt(stress, block.lame[part], block.shear[part])
+            nodal = np.einsum("aq,cqs->cas", fit, full, optimize=True)
+            for s in range(6):
+                total[:, s] += np.bincount(cells.ravel(), nodal[:, :, s].ravel(), minlength=n)
+            count += np.bincount(cells.ravel(), minlength=n)
+    return total / np.maximum(count, 1)[:, None]
+
+
+def _extrapolation(kind: CellType, reference: np.ndarray) -> np.ndarray:
+    """Matrix (n_nodes, q): values at quadrature points to values at nodes, by a linear fit."""
+    if len(reference) == 1:
+        return np.ones((kind.n_nodes, 1))
+    linear = shape_functions(kind.skeleton)
+    vertices = linear.type.n_nodes
+    at_nodes = np.vstack([np.eye(vertices), linear.values(kind.nodes[vertices:])])
+    return at_nodes @ np.linalg.pinv(linear.values(reference))
+
+
+def _voigt(stress: np.ndarray, lame: np.ndarray, shear: np.ndarray) -> np.ndarray:
+    """(n, q, dim, dim) tensors as (n, q, 6); in plane strain σ_zz = ν (σ_xx + σ_yy)."""
+    full = np.zeros((*stress.shape[:2], 6))
+    for i in range(stress.shape[-1]):
+        full[:, :, i] = stress[:, :, i, i]
+    full[:, :, 3] = stress[:, :, 0, 1]
+    if stress.shape[-1] == 3:
+        full[:, :, 4], full[:, :, 5] = stress[:, :, 1, 2], stress[:, :, 0, 2]
+    else:
+        poisson = (lame / (2 * (lame + shear)))[:, None]
+        full[:, :, 2] = poisson * (full[:, :, 0] + full[:, :, 1])
+    return full

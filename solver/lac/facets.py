@@ -1,0 +1,135 @@
+"""Faces as the mortar module sees them: frames, sizes, shape, and points found along a line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.batch import invert
+from solver.elements import shape_functions
+from solver.errors import SolveError
+from solver.faces import area_vectors
+from solver.mesh.catalogue import CellType
+
+# Below these shares of a face's size, its bending and the skew of its map are round-off.
+_FLAT = 1e-9
+_AFFINE = 1e-12
+_NEWTON_STEPS = 30
+
+
+@dataclass(frozen=True)
+class Facets:
+    """Faces of one type with what the pairing and the intersections need, per face.
+
+    `nodes` (n, n_nodes); `number` (n,) the caller's number; `corner` (n, n_nodes, dim) coordinates;
+    `centre` (n, dim); `radius` (n,); `normal` (n, dim) outward at the centre; `tangents`
+    (n, dim − 1, dim) completing it to a right-handed frame; `straight` (n,): planar with straight
+    edges; `affine` (n,): straight, and the image of the reference face under an affine map.
+    """
+
+    type: CellType
+    nodes: np.ndarray
+    number: np.ndarray
+    corner: np.ndarray
+    centre: np.ndarray
+    radius: np.ndarray
+    normal: np.ndarray
+    tangents: np.ndarray
+    straight: np.ndarray
+    affine: np.ndarray
+
+
+def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.ndarray) -> Facets:
+    """Faces of one type from points (n_points, dim) and node numbers (n, n_nodes)."""
+    corner = points[nodes]
+    centre = corner[:, : kind.n_vertices].mean(axis=1)
+    radius = np.linalg.norm(corner - centre[:, None], axis=2).max(axis=1)
+    middle = kind.nodes[: kind.n_vertices].mean(axis=0)
+    slope = shape_functions(kind.name).gradients(middle[None])
+    normal = area_vectors(points, nodes, slope)[:, 0]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    straight, affine = _shape(kind, corner - centre[:, None], radius, normal)
+    return Facets(
+        kind,
+        nodes,
+        number,
+        corner,
+        centre,
+        radius,
+        normal,
+        _tangents(normal),
+        straight,
+        affine,
+    )
+
+
+def _tangents(normal: np.ndarray) -> np.ndarray:
+    if normal.shape[1] == 2:
+        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
+    axis = np.zeros_like(normal)
+    axis[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
+    first = np.cross(axis, normal)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def _shape(
+    kind: CellType, corner: np.ndarray, radius: np.ndarray, normal: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which faces are straight (planar, straight-edged) and which are affine images."""
+    bend = np.abs(np.einsum("fad,fd->fa", corner, normal)).max(axis=1)
+    n, edges = kind.n_vertices, np.array(kind.edges)
+    if kind.order == 2 and kind.dim == 2:
+        ends = corner[:, edges]
+        chord = ends[:, :, 1] - ends[:, :, 0]
+        offset = corner[:, n : n + len(edges)] - ends.mean(axis=2)
+        across = np.einsum("fed,fed->fe", offset, chord) / np.einsum("fed,fed->fe", chord, chord)
+        sideways = np.linalg.norm(offset - across[..., None] * chord, axis=2).max(axis=1)
+        bend = np.maximum(bend, sideways)
+    first = corner[:, :1]
+    sides = corner[:, [1, n - 1]] - first if kind.dim == 2 else corner[:, [1]] - first
+    image = first + np.einsum("ar,frd->fad", kind.nodes - kind.nodes[0], sides)
+    skew = np.linalg.norm(image - corner, axis=2).max(axis=1)
+    return bend <= _FLAT * radius, (bend <= _FLAT * radius) & (skew <= _AFFINE * radius)
+
+
+def shift(face: Facets, chosen: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    """Node coordinates (c, n_nodes, dim) of the chosen faces, seen from origins (c, dim)."""
+    return face.corner[chosen] - origin[:, None]
+
+
+def locate(
+    kind: CellType, corner: np.ndarray, target: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where lines through points meet faces: reference points (f, q, dim − 1), distances (f, q).
+
+    One face `corner` (f, n_nodes, dim) for each row of `target` (f, q, dim) and unit `direction`
+    (f, q, dim); the meeting point is target + distance · direction. Newton from the affine face
+    through the vertices, which is exact at once for affine faces. Raises SolveError where it does
+    not converge.
+    """
+    shape, n = shape_functions(kind.name), kind.n_vertices
+    sides = corner[:, [1, n - 1]] if kind.dim == 2 else corner[:, [1]]
+    sides = np.swapaxes(sides - corner[:, :1], 1, 2)[:, None]
+    sides = np.broadcast_to(sides, (*target.shape[:2], *sides.shape[2:]))
+    _, inverse = invert(np.concatenate([sides, -direction[..., None]], axis=-1))
+    step = np.einsum("fqij,fqj->fqi", inverse, target - corner[:, :1])
+    place, distance = step[..., :-1], step[..., -1]
+    for _ in range(_NEWTON_STEPS):
+        values, slopes = shape.both(place)
+        reached = np.einsum("fqa,fad->fqd", values, corner)
+        error = reached - target - distance[..., None] * direction
+        tangent = np.einsum("fad,fqat->fqdt", corner, slopes, optimize=True)
+        _, inverse = invert(np.concatenate([tangent, -direction[..., None]], axis=-1))
+        step = np.einsum("fqij,fqj->fqi", inverse, error)
+        # Far outside a bent face the full step may overshoot; one face length at a time is safe.
+        length = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+        step /= np.maximum(length, 1.0)[..., None]
+        place, distance = place - step[..., :-1], distance - step[..., -1]
+        if not np.abs(step[..., :-1]).max(initial=0.0) > 1e-13:
+            break
+    else:
+        if np.abs(step[..., :-1]).max() > 1e-8:
+            raise SolveError(f"a point could not be projected onto a {kind.name} contact face")
+    if not np.isfinite(place).all():
+        raise SolveError(f"a {kind.name} contact face is degenerate: no projection onto it exists")
+    return place, distance

@@ -1,0 +1,173 @@
+"""Mortar segments: the pieces of the slave surface that lie over one master face each.
+
+Straight slave faces are cut in their own plane, seen along their normal; bent ones in their
+reference face, into which the master's outline is projected. Every quadrature point of a segment
+knows its place on both faces, found along the slave's normal at that point, so that both sides of
+an integral share one normal and one surface measure. Source: Puso, Laursen, A mortar
+segment-to-segment contact method, CMAME 193 (2004) 601–629, for segments; Abbas et al. (2018), §4.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.elements import mortar_degree, shape_functions, simplex_rule
+from solver.faces import area_vectors
+from solver.lac.clipping import clip, overlap, triangles
+from solver.lac.facets import Facets, locate, shift
+from solver.lac.pairing import candidate_pairs
+from solver.mesh.catalogue import CellType
+
+# A master face may meet a slave face only where their normals oppose at least this much.
+_FACING = 0.2
+# Extra degrees where a face is not the affine image of its reference face: its functions are then
+# no polynomials in the plane.
+_BENT_DEGREES = 4
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Segments between slave faces of one type and master faces of one type.
+
+    `slave`, `master` (s,) index the two Facets; at each of q points: `slave_values`,
+    `master_values` (s, q, n_nodes) shape functions, `weight` (s, q) surface measure × quadrature
+    weight, `normal` (s, q, dim) the slave's and `gap` (s, q) the distance along it, positive when
+    open.
+    """
+
+    slave: np.ndarray
+    master: np.ndarray
+    slave_values: np.ndarray
+    master_values: np.ndarray
+    weight: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+
+
+def intersect(slave: Facets, master: Facets, reach: float) -> list[Segments]:
+    """All segments between two blocks of faces, looked for within `reach` (a length)."""
+    i, j = candidate_pairs(slave.centre, slave.radius, master.centre, master.radius, reach)
+    facing = np.einsum("pd,pd->p", slave.normal[i], master.normal[j]) < -_FACING
+    i, j = i[facing], j[facing]
+    straight = slave.straight[i]
+    parts = []
+    for chosen, chart in ((straight, _in_plane), (~straight, _in_reference)):
+        if chosen.any():
+            parts.append(chart(slave, master, i[chosen], j[chosen], reach))
+    return [part for part in parts if len(part.slave)]
+
+
+def _in_plane(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray, reach: float) -> Segments:
+    """Segments of straight slave faces, cut in the plane of the slave face."""
+    tangents = slave.tangents[i]
+    outline = _outline(slave.type, bent=False)
+    window = _plane(shift(slave, i, slave.centre[i])[:, outline], tangents)
+    outline = _outline(master.type, bent=not master.straight[j].all())
+    subject = _plane(shift(master, j, slave.centre[i])[:, outline[::-1]], tangents)
+    degree = _degree(slave, master, i, j)
+    pair, places, weight = _cut_pieces(window, subject, degree)
+    i, j = i[pair], j[pair]
+    points = np.einsum("sqt,std->sqd", places, slave.tangents[i])
+    normal = np.broadcast_to(slave.normal[i][:, None], points.shape)
+    place, height = locate(slave.type, shift(slave, i, slave.centre[i]), points, normal)
+    points = points + height[..., None] * normal
+    return _with_master(slave, master, (i, j), place, points, weight, normal, reach)
+
+
+def _in_reference(
+    slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray, reach: float
+) -> Segments:
+    """Segments of bent slave faces, cut in the reference face of the slave."""
+    kind = slave.type
+    corner = shift(slave, i, slave.centre[i])
+    outline = _outline(master.type, bent=True)
+    rim = shift(master, j, slave.centre[i])[:, outline[::-1]]
+    direction = np.broadcast_to(slave.normal[i][:, None], rim.shape)
+    subject, _ = locate(kind, corner, rim, direction)
+    window = kind.nodes[_outline(kind, bent=False)]
+    window = np.broadcast_to(window, (len(i), *window.shape))
+    pair, place, weight = _cut_pieces(window, subject, _degree(slave, master, i, j))
+    i, j = i[pair], j[pair]
+    values, slopes = shape_functions(kind.name).both(place)
+    corner = shift(slave, i, slave.centre[i])
+    points = np.einsum("sqa,sad->sqd", values, corner)
+    vectors = _area_vectors_at(corner, slopes)
+    stretch = np.linalg.norm(vectors, axis=-1)
+    normal = vectors / stretch[..., None]
+    return _with_master(slave, master, (i, j), place, points, weight * stretch, normal, reach)
+
+
+def _area_vectors_at(corner: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Normal × surface measure (s, q, dim) where every face has its own points."""
+    s, q, n_nodes, _ = slopes.shape
+    points = np.repeat(corner, q, axis=0).reshape(s * q * n_nodes, -1)
+    nodes = np.arange(len(points)).reshape(s * q, n_nodes)
+    tangent = np.einsum("fad,fat->ftd", points[nodes], slopes.reshape(s * q, n_nodes, -1))
+    if points.shape[1] == 2:
+        vectors = np.stack([tangent[:, 0, 1], -tangent[:, 0, 0]], axis=-1)
+    else:
+        vectors = np.cross(tangent[:, 0], tangent[:, 1])
+    return vectors.reshape(s, q, -1)
+
+
+def _with_master(
+    slave: Facets,
+    master: Facets,
+    pair: tuple[np.ndarray, np.ndarray],
+    place: np.ndarray,
+    points: np.ndarray,
+    weight: np.ndarray,
+    normal: np.ndarray,
+    reach: float,
+) -> Segments:
+    """Find each point's partner on the master face; leave out segments beyond the reach."""
+    i, j = pair
+    partner, gap = locate(master.type, shift(master, j, slave.centre[i]), points, normal)
+    near = np.abs(gap).max(axis=1, initial=0.0) <= reach
+    return Segments(
+        i[near],
+        j[near],
+        shape_functions(slave.type.name).values(place[near]),
+        shape_functions(master.type.name).values(partner[near]),
+        weight[near],
+        normal[near],
+        gap[near],
+    )
+
+
+def _outline(kind: CellType, bent: bool) -> list[int]:
+    """The face's rim as a closed polygon: vertices, with mid-nodes where edges may be bent."""
+    if kind.dim == 1:
+        return [0, 1]
+    return list(kind.boundary) if bent else list(range(kind.n_vertices))
+
+
+def _plane(corner: np.ndarray, tangents: np.ndarray) -> np.ndarray:
+    return np.einsum("fad,ftd->fat", corner, tangents)
+
+
+def _degree(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> int:
+    degree = max(mortar_degree(slave.type.name), mortar_degree(master.type.name))
+    affine = slave.affine[i].all() and master.affine[j].all()
+    return degree if affine else degree + _BENT_DEGREES
+
+
+def _cut_pieces(
+    window: np.ndarray, subject: np.ndarray, degree: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pieces of the subjects within the windows: pair (s,), points (s, q, d), weights (s, q).
+
+    Polygons (n, v, 2) in 3D; intervals (n, 2, 1) in 2D.
+    """
+    dim = window.shape[2]
+    reference, weights = simplex_rule(dim, degree)
+    if dim == 1:
+        ends, length = overlap(np.sort(window[..., 0], axis=1), np.sort(subject[..., 0], axis=1))
+        pair = np.flatnonzero(length > 0)
+        points = ends[pair, :1] + length[pair, None] * reference[:, 0]
+        return pair, points[..., None], length[pair, None] * weights
+    count = np.full(len(subject), subject.shape[1])
+    pair, corner, area = triangles(*clip(subject, count, window))
+    barycentric = np.column_stack([1 - reference.sum(axis=1), reference])
+    points = np.einsum("qk,skt->sqt", barycentric, corner)
+    return pair, points, 2 * area[:, None] * weights

@@ -1,0 +1,146 @@
+"""Elasticity under closed contact constraints, condensed to a positive definite system.
+
+Each closed macro-element owns a degree of freedom that no other constraint sees. It is expressed by
+the others through the constraint, x = Z v + c, and the multiplier follows from the equilibrium of
+that degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from solver.errors import SolveError
+from solver.linear.direct import Factor, factorise
+
+# Each refinement must at least halve the residual, or it has reached round-off.
+_MIN_GAIN = 0.5
+_MAX_REFINEMENTS = 6
+# A residual below this multiple of the machine precision, relative to the forces, is round-off.
+_ROUND_OFF = 8 * np.finfo(float).eps
+# A macro-element's own coefficient must not be smaller than this share of its row's largest.
+_SMALLEST_PIVOT = 1e-6
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """x = Z v + shift · b for constraints G x = b, and the factor of ZᵀKZ.
+
+    `pivot` (m,) the eliminated unknowns, `kept` (n − m,) the others, `coefficient` (m,) of the
+    pivots in G.
+    """
+
+    expansion: sparse.csr_matrix
+    pivot: np.ndarray
+    coefficient: np.ndarray
+    factor: Factor
+    matrix: sparse.csr_matrix
+
+    def particular(self, right: np.ndarray) -> np.ndarray:
+        """An x (n,) with G x = `right` (m,): the pivots alone move."""
+        x = np.zeros(self.expansion.shape[0])
+        x[self.pivot] = right / self.coefficient
+        return x
+
+
+def choose_pivots(
+    constraints: sparse.csr_matrix, own: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For each row the largest entry in a column that is its own: pivot, coefficient, found (m,).
+
+    `own` (n,) marks the columns that may serve (unknowns of slave nodes). Rows without one, or with
+    a negligible one, have found = False.
+    """
+    m, n = constraints.shape
+    seen = np.bincount(constraints.indices, minlength=n)
+    rows = np.repeat(np.arange(m), np.diff(constraints.indptr))
+    size = np.abs(constraints.data)
+    usable = np.flatnonzero(own[constraints.indices] & (seen[constraints.indices] == 1))
+    # Sorted by row, then size: the last of each row is its largest.
+    order = usable[np.lexsort((size[usable], rows[usable]))]
+    last = np.flatnonzero(np.diff(rows[order], append=m + 1))
+    best = order[last]
+    found, pivot, coefficient = np.zeros(m, dtype=bool), np.zeros(m, dtype=int), np.zeros(m)
+    largest = np.zeros(m)
+    np.maximum.at(largest, rows, size)
+    row = rows[best]
+    found[row] = size[best] > _SMALLEST_PIVOT * largest[row]
+    pivot[row], coefficient[row] = constraints.indices[best], constraints.data[best]
+    return pivot, coefficient, found
+
+
+def condense(
+    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, own: np.ndarray
+) -> Condensed:
+    """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
+
+    Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
+    """
+    n = matrix.shape[0]
+    pivot, coefficient, found = choose_pivots(constraints, own)
+    if not found.all():
+        raise SolveError(
+            f"{int((~found).sum())} closed macro-elements have no unknown of their own to condense"
+        )
+    kept = np.ones(n, dtype=bool)
+    kept[pivot] = False
+    kept_columns = np.flatnonzero(kept)
+    rest = constraints[:, kept_columns]
+    follow = sparse.diags(-1 / coefficient) @ rest if len(pivot) else rest
+    expansion = _expansion(n, kept_columns, pivot, follow.tocsr())
+    if len(pivot):
+        among = matrix[kept_columns][:, kept_columns]
+        coupling = (matrix[pivot][:, kept_columns].T @ follow).tocsr()
+        among = among + coupling + coupling.T + follow.T @ (matrix[pivot][:, pivot] @ follow)
+    else:
+        among = matrix
+    return Condensed(expansion, pivot, coefficient, factorise(among.tocsr()), matrix)
+
+
+def _expansion(
+    n: int, kept: np.ndarray, pivot: np.ndarray, follow: sparse.csr_matrix
+) -> sparse.csr_matrix:
+    identity = sparse.csr_matrix(
+        (np.ones(len(kept)), (kept, np.arange(len(kept)))), shape=(n, len(kept))
+    )
+    place = sparse.csr_matrix(
+        (np.ones(len(pivot)), (pivot, np.arange(len(pivot)))), shape=(n, len(pivot))
+    )
+    return (identity + place @ follow).tocsr()
+
+
+def solve(
+    condensed: Condensed,
+    start: np.ndarray,
+    residual: Callable[[np.ndarray], np.ndarray],
+    violation: Callable[[np.ndarray], np.ndarray],
+    scale: float,
+    refine: bool = True,
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Solve from `start` (n,); return x (n,), multipliers (m,) and the relative residual.
+
+    `residual(x)` (n,) is f − K x summed as exactly as the caller can; `violation(x)` (m,) is
+    b − G x; `scale` is the size of the forces. Newton's method with a fixed factor: one step
+    solves, further ones refine until the residual no longer falls (Higham, Accuracy and Stability
+    of Numerical Algorithms, §12).
+    """
+    x, expansion = start.copy(), condensed.expansion
+    force = residual(x)
+    best, last = None, np.inf
+    for _ in range(_MAX_REFINEMENTS if refine else 1):
+        change = condensed.particular(violation(x))
+        moved = force - condensed.matrix @ change if change.any() else force
+        x = x + change + expansion @ condensed.factor.solve(expansion.T @ moved)
+        force = residual(x)
+        size = float(np.abs(expansion.T @ force).max(initial=0.0)) / scale
+        if size < last:
+            best = (x, force)
+        if size <= _ROUND_OFF or size > _MIN_GAIN * last:
+            last = min(size, last)
+            break
+        last = size
+    if best is None or not np.isfinite(best[0]).all():
+        raise SolveError("the solution is not finite")
+    x, force = best
+    return x, -force[condensed.pivot] / condensed.coefficient, last

@@ -1,0 +1,27 @@
+"""What a solve left out, and why: read by the engineer in the result and in the report."""
+
+from collections.abc import Sequence
+
+from solver.contact import Equilibrium
+from solver.lac.cut import needs_cut
+from solver.scene import Scene
+
+
+def made_plan(scene: Scene, states: Sequence[Equilibrium]) -> list[tuple[str, str]]:
+    """Pairs (what was left out or decided, why), in the order of the work."""
+    plan = []
+    for zone in scene.zones:
+        name = zone.zone.name
+        kinds = sorted({block.type.name for block in zone.slave_faces})
+        whole = [kind for kind in kinds if not needs_cut(kind)]
+        if whole:
+            plan.append((f"{name}: no cut", f"{', '.join(whole)} faces own an inner node"))
+        if zone.operator.closed_faces:
+            why = "some faces are no affine images of their reference face"
+            plan.append((f"{name}: closure of {zone.operator.closed_faces} face integrals", why))
+        else:
+            plan.append((f"{name}: plain Gauss rules", "every face is an affine image"))
+    if all(state.status.iterations == 1 for state in states):
+        why = "the first status already fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0"
+        plan.append(("no second active-set solve", why))
+    return plan

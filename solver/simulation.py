@@ -1,0 +1,203 @@
+"""Solve a case on a mesh: from case and mesh to a Solution."""
+
+import resource
+import time
+from collections.abc import Callable
+from typing import Any
+
+import meshio
+import numpy as np
+
+from solver.balance import imbalances
+from solver.case import Case
+from solver.clock import Clock
+from solver.contact import ContactProblem, Equilibrium
+from solver.elasticity import nodal_stress
+from solver.faces import nodal_normals
+from solver.mesh.catalogue import BY_NAME
+from solver.naming import body_infos
+from solver.plan import made_plan
+from solver.scene import Scene, ZoneScene, build_scene
+from solver.solution import Solution, StepResult, ZoneResult
+
+Log = Callable[[str], Any]
+
+
+def simulate(
+    case: Case,
+    mesh: meshio.Mesh,
+    swapped: bool = False,
+    hexahedra: str | None = None,
+    log: Log = lambda line: None,
+) -> Solution:
+    """Solve a case on its mesh.
+
+    `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
+    Raises InputError where the case and its mesh do not fit, SolveError where no solution is found.
+    """
+    started = time.process_time()
+    clock = Clock()
+    scene = build_scene(case, mesh, swapped, hexahedra, clock)
+    log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
+    with clock.stage("assembly"):
+        problem = ContactProblem(scene)
+    with clock.stage("solve"):
+        states = _walk(problem, case.steps, log)
+    with clock.stage("recovery"):
+        solution = _recover(scene, problem, states, swapped, hexahedra)
+    solution.seconds = clock.seconds
+    solution.cpu_seconds = time.process_time() - started
+    solution.peak_memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return solution
+
+
+def _walk(problem: ContactProblem, steps: tuple[float, ...], log: Log) -> list[Equilibrium]:
+    """Solve the load factors in turn, each from the status of the one before."""
+    states: list[Equilibrium] = []
+    for factor in steps:
+        start = states[-1].status.closed if states else None
+        state = problem.solve(factor, start)
+        states.append(state)
+        log(
+            f"load factor {factor:g}: {state.status.iterations} iterations, "
+            f"{int(state.status.closed.sum())} closed, residual {state.residual:.1e}"
+        )
+    return states
+
+
+def _recover(
+    scene: Scene,
+    problem: ContactProblem,
+    states: list[Equilibrium],
+    swapped: bool,
+    hexahedra: str | None,
+) -> Solution:
+    last = states[-1]
+    stress = nodal_stress(scene.points, scene.blocks, last.displacement)
+    zones = [_zone_result(scene, problem, zone, last, stress) for zone in scene.zones]
+    return Solution(
+        case=scene.case,
+        swapped=swapped,
+        hexahedra=hexahedra,
+        mesh=_output_mesh(scene),
+        displacement=last.displacement,
+        stress=stress,
+        body=scene.body,
+        bodies=body_infos(scene),
+        zones=zones,
+        nodal_normal_stress=_along(stress, _contact_direction(scene)),
+        balance=imbalances(scene, last),
+        steps=_step_results(scene, problem, states),
+        length=scene.length,
+        load_scale=_load_scale(scene),
+        dofs=scene.n_dofs,
+        macro_elements=sum(zone.count for zone in scene.zones),
+        iterations=sum(state.status.iterations for state in states),
+        linear_solver=problem.linear_solver,
+        plan=made_plan(scene, states),
+    )
+
+
+def _output_mesh(scene: Scene) -> meshio.Mesh:
+    cells = [(_meshio_name(name), data) for name, data in scene.mesh.cells.items()]
+    sets = {
+        group: [np.flatnonzero(scene.mesh.members(name, mask)) for name in scene.mesh.cells]
+        for group, mask in scene.volume_groups.items()
+        if any(m.any() for m in mask.values())
+    }
+    return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)
+
+
+def _meshio_name(name: str) -> str:
+    return BY_NAME[name].meshio
+
+
+def _contact_direction(scene: Scene) -> np.ndarray:
+    """Unit mean normal of the first zone's slave surface; the last axis where there is no zone."""
+    dim = scene.points.shape[1]
+    if not scene.zones:
+        return np.eye(dim)[-1]
+    operator = scene.zones[0].operator
+    mean = operator.area @ operator.normal
+    return mean / np.linalg.norm(mean)
+
+
+def _along(stress: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """d·σ·d (n,) from stress (n, 6) and unit directions (dim,) or (n, dim)."""
+    d = np.zeros((*direction.shape[:-1], 3))
+    d[..., : direction.shape[-1]] = direction
+    x, y, z = d[..., 0], d[..., 1], d[..., 2]
+    xx, yy, zz, xy, yz, xz = stress.T
+    return x * x * xx + y * y * yy + z * z * zz + 2 * (x * y * xy + y * z * yz + x * z * xz)
+
+
+def _zone_result(
+    scene: Scene, problem: ContactProblem, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
+) -> ZoneResult:
+    operator, part = zone.operator, zone.numbers
+    slave_nodes, slave_normal = _nodal_normals(scene, [(f.type.name, f.nodes) for f in zone.sub_faces])
+    master = [(b.type.name, b.nodes) for b in zone.master_faces]
+    master_nodes, master_normal = _nodal_normals(scene, master)
+    return ZoneResult(
+        name=zone.zone.name,
+        faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
+        master_faces=master,
+        centre=operator.centre + scene.origin,
+        normal=operator.normal,
+        area=operator.area,
+        multiplier=state.pressure[part],
+        gap=state.gap[part],
+        closed=state.status.closed[part],
+        coverage=problem.coverage[part],
+        stress_slave=_along(stress[slave_nodes], slave_normal),
+        stress_master=_along(stress[master_nodes], master_normal),
+        slave_nodes=slave_nodes,
+        master_nodes=master_nodes,
+    )
+
+
+def _nodal_normals(
+    scene: Scene, faces: list[tuple[str, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The nodes of a surface and its unit normals there, the mean over the faces around each."""
+    total = nodal_normals(scene.points, faces)
+    nodes = np.unique(np.concatenate([nodes.ravel() for _, nodes in faces]))
+    return nodes, total[nodes]
+
+
+def _step_results(
+    scene: Scene, problem: ContactProblem, states: list[Equilibrium]
+) -> list[StepResult]:
+    results = []
+    for factor, state in zip(scene.case.steps, states, strict=True):
+        seen = []
+        for wanted in scene.case.observe:
+            zone = next(z for z in scene.zones if z.zone.name == wanted.zone)
+            offset = zone.operator.centre + scene.origin - np.array(wanted.nearest)
+            local = int(np.linalg.norm(offset, axis=1).argmin())
+            number = zone.first + local
+            seen.append(
+                {
+                    "zone": wanted.zone,
+                    "macro_element": local,
+                    "pressure": float(state.pressure[number]),
+                    "gap": float(state.gap[number]),
+                    "status": int(state.status.closed[number]),
+                    "coverage": float(problem.coverage[number]),
+                }
+            )
+        changes = sum(state.status.changes)
+        results.append(
+            StepResult(factor, state.status.iterations, changes, state.residual, seen)
+        )
+    return results
+
+
+def _load_scale(scene: Scene) -> float:
+    """The largest pressure of the loads, else the largest nodal force."""
+    values = [
+        abs(load.value)
+        for load in scene.case.loads
+        if load.kind == "pressure" and isinstance(load.value, float)
+    ]
+    return max(values, default=float(np.abs(scene.force).max()))
