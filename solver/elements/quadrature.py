@@ -64,7 +64,13 @@ def mortar_degree(name: str) -> int:
 
 @cache
 def simplex_rule(dim: int, degree: int) -> Rule:
-    """Points (n, dim) and weights (n,) on the unit simplex, exact to `degree`."""
+    """Points (n, dim) and weights (n,) on the unit simplex, exact to `degree`.
+
+    Raises ValueError for tetrahedra above degree 4: from 5 on, scikit-fem 12.0.2's rules miss
+    their degree by 1e-4 to 7e-3.
+    """
+    if dim == 3 and degree > 4:
+        raise ValueError(f"no exact tetrahedron rule of degree {degree}")
     points, weights = get_quadrature((RefLine, RefTri, RefTet)[dim - 1], max(degree, 1))
     return points.T.copy(), weights.copy()
 

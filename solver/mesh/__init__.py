@@ -17,9 +17,11 @@ from meshio._mesh import topological_dimension
 
 from solver.errors import InputError
 from solver.files import replacing
+from solver.mesh.catalogue import BY_NAME
 
-# meshio counts the nodes of this type, but its table of dimensions has no line for it.
-topological_dimension.setdefault("pyramid13", 3)
+# meshio knows the nodes of PENTA15 and PYRA13, but its table of dimensions has no line for them.
+for _kind in BY_NAME.values():
+    topological_dimension.setdefault(_kind.meshio, _kind.dim)
 
 __all__ = ["generate", "read_mesh", "transform", "write_mesh"]
 
