@@ -24,13 +24,19 @@ class Block:
     """Cells of one type with their material.
 
     `cells` (n, n_nodes) node numbers; `lame` and `shear` (n,) Lamé's λ and μ, in units of stress
-    (plane strain in 2D).
+    (plane strain in 2D); `straight`: all their edges are.
     """
 
     type: CellType
     cells: np.ndarray
     lame: np.ndarray
     shear: np.ndarray
+    straight: bool = True
+
+    @property
+    def rule(self) -> tuple[np.ndarray, np.ndarray]:
+        """The quadrature points (q, dim) and weights (q,) of the block."""
+        return volume_rule(self.type.name, self.straight)
 
 
 def lame_parameters(young: np.ndarray, poisson: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -58,7 +64,7 @@ def physical_gradients(
 
 
 def _chunks(block: Block, dim: int) -> Iterator[slice]:
-    points, _ = volume_rule(block.type.name)
+    points, _ = block.rule
     size = len(points) * block.type.n_nodes * dim * 8
     step = max(1, _CHUNK_BYTES // size)
     for start in range(0, len(block.cells), step):
@@ -69,7 +75,7 @@ def element_matrices(points: np.ndarray, block: Block) -> np.ndarray:
     """Stiffness matrices (n, dim · n_nodes, dim · n_nodes) of a block's cells."""
     dim = points.shape[1]
     nodes = block.type.n_nodes
-    reference, weights = volume_rule(block.type.name)
+    reference, weights = block.rule
     matrices = np.empty((len(block.cells), nodes, dim, nodes, dim))
     for part in _chunks(block, dim):
         gradient, determinant = physical_gradients(
@@ -118,7 +124,7 @@ def internal_force(points: np.ndarray, blocks: list[Block], displacement: np.nda
     n, dim = points.shape
     force = np.zeros(n * dim)
     for block in blocks:
-        reference, weights = volume_rule(block.type.name)
+        reference, weights = block.rule
         for part in _chunks(block, dim):
             cells = block.cells[part]
             gradient, determinant = physical_gradients(points, cells, block.type, reference)
@@ -155,7 +161,7 @@ def nodal_stress(
     n = len(points)
     total, count = np.zeros((n, 6)), np.zeros(n)
     for block in blocks:
-        reference, _ = volume_rule(block.type.name)
+        reference, _ = block.rule
         fit = _extrapolation(block.type, reference)
         for part in _chunks(block, points.shape[1]):
             cells = block.cells[part]

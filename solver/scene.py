@@ -9,6 +9,7 @@ from solver.bodies import body_numbers
 from solver.case import Case, Load, Scalar, Support, Zone
 from solver.clock import Clock
 from solver.elasticity import Block, lame_parameters
+from solver.elements import has_straight_edges
 from solver.errors import InputError
 from solver.expressions import evaluate
 from solver.faces import FaceBlock, boundary_faces, nodal_normals, volume_cells
@@ -304,7 +305,12 @@ class _Groups:
                 young[name][mask] = materials[group].young
                 poisson[name][mask] = materials[group].poisson
         return [
-            Block(BY_NAME[name], cells, *lame_parameters(young[name], poisson[name]))
+            Block(
+                BY_NAME[name],
+                cells,
+                *lame_parameters(young[name], poisson[name]),
+                bool(has_straight_edges(BY_NAME[name], self.points[cells]).all()),
+            )
             for name, cells in self.cut.cells.items()
         ]
 

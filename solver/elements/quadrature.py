@@ -33,9 +33,15 @@ _MORTAR_DEGREES = {"SEG2": 1, "SEG3": 2, "TRIA3": 1, "TRIA6": 2, "QUAD4": 2, "QU
 
 
 @cache
-def volume_rule(name: str) -> Rule:
-    """Points (n, dim) and weights (n,) for the stiffness of the cell type `name`."""
+def volume_rule(name: str, straight: bool = True) -> Rule:
+    """Points (n, dim) and weights (n,) for the stiffness of the cell type `name`.
+
+    Cells whose edges are not `straight` need more points where the type is TETRA10; the rules of
+    the others suffice for bent cells as well.
+    """
     shape = name.rstrip("0123456789")
+    if name == "TETRA10" and not straight:
+        return simplex_rule(3, 4)
     degrees = _DEGREES[shape][BY_NAME[name].order - 1]
     if shape in ("TRIA", "TETRA"):
         return simplex_rule(BY_NAME[name].dim, degrees[0])

@@ -4,7 +4,10 @@ from functools import cache
 
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME
+from solver.mesh.catalogue import BY_NAME, CellType
+
+# Mid-edge nodes off the middle by less than this share of the edge make no bent edge.
+_STRAIGHT = 1e-9
 
 
 class ShapeFunctions:
@@ -54,6 +57,20 @@ class ShapeFunctions:
 def shape_functions(name: str) -> ShapeFunctions:
     """The shape functions of the cell type `name` (the field's name: `HEXA20`)."""
     return ShapeFunctions(name)
+
+
+def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
+    """Which cells or faces (c,), of node coordinates (c, n_nodes, dim), have straight edges.
+
+    That is, mid-edge nodes in the middle, to 1e-9 of the edge: all cells of linear types.
+    """
+    if kind.order == 1:
+        return np.ones(len(corner), dtype=bool)
+    ends = corner[:, np.array(kind.edges)]
+    n = kind.n_vertices
+    offset = corner[:, n : n + len(kind.edges)] - ends.mean(axis=2)
+    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    return (np.linalg.norm(offset, axis=2) <= _STRAIGHT * length).all(axis=1)
 
 
 def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]

@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from solver.elements import shape_functions
+from solver.elements import has_straight_edges, shape_functions
 from solver.faces import FaceBlock
 from solver.mesh.catalogue import BY_NAME, CellType, cell_type
 
@@ -123,9 +123,8 @@ class _Pieces:
 
     def add(self, template: "_Template", name: str, owner: np.ndarray, macro: np.ndarray) -> None:
         parents = self.cells[name][owner]
-        values = shape_functions(name).values(template.new_nodes)
-        new = np.einsum("ka,cad->ckd", values, self.points[0][parents])
-        count = len(template.new_nodes)
+        new = template.places(self.points[0][parents], BY_NAME[name])
+        count = new.shape[1]
         numbers = self.n_points + np.arange(len(owner) * count).reshape(len(owner), count)
         self.points.append(new.reshape(-1, new.shape[2]))
         self.n_points += numbers.size
@@ -173,12 +172,29 @@ class _Template:
     """How one cell type is cut for one pattern of slave faces.
 
     Local node numbers: the parent's nodes, then the new ones, which lie at `new_nodes` (k, dim) of
-    the parent's reference cell. `sub_faces` by slave face.
+    the parent's reference cell; the last of them are the middles of the edges `new_edges` (e, 2),
+    given by local numbers. `sub_faces` by slave face.
     """
 
     new_nodes: np.ndarray
+    new_edges: np.ndarray
     pieces: list[tuple[str, list[int]]]
     sub_faces: list[list[tuple[str, list[int]]]]
+
+    def places(self, corner: np.ndarray, kind: CellType) -> np.ndarray:
+        """New nodes (c, k, dim) of parents with node coordinates (c, n_nodes, dim).
+
+        They follow the parent's own map, so that the pieces keep a bent shape; but a parent with
+        straight edges gets pieces with straight edges, whose faces are affine triangles. Its own
+        map would bend the diagonals of a face that is no parallelogram.
+        """
+        new = np.einsum("ka,cad->ckd", shape_functions(kind.name).values(self.new_nodes), corner)
+        if len(self.new_edges):
+            ends = np.concatenate([corner, new], axis=1)[:, self.new_edges]
+            straight = has_straight_edges(kind, corner)
+            first = new.shape[1] - len(self.new_edges)
+            new[straight, first:] = ends[straight].mean(axis=2)
+        return new
 
 
 Cell = tuple[str, tuple[int, ...]]
@@ -290,6 +306,7 @@ def _promote(
     """Number the nodes as parent's nodes then new ones; give quadratic pieces their mid-nodes."""
     n = kind.n_vertices
     new_nodes = [np.array(p) for p in places[n:]]
+    new_edges: list[tuple[int, int]] = []
     number = {i: i if i < n else kind.n_nodes + i - n for i in range(len(places))}
     middle = {frozenset(edge): n + k for k, edge in enumerate(kind.edges)}
 
@@ -303,6 +320,7 @@ def _promote(
             if edge not in middle:
                 middle[edge] = kind.n_nodes + len(new_nodes)
                 new_nodes.append((np.array(places[vertices[i]]) + places[vertices[j]]) / 2)
+                new_edges.append((number[vertices[i]], number[vertices[j]]))
             nodes.append(middle[edge])
         return _QUADRATIC[skeleton], nodes
 
@@ -310,6 +328,7 @@ def _promote(
         pieces=[full(p) for p in pieces],
         sub_faces=[[full(f) for f in group] for group in sub_faces],
         new_nodes=np.array(new_nodes).reshape(-1, kind.dim),
+        new_edges=np.array(new_edges, dtype=int).reshape(-1, 2),
     )
 
 

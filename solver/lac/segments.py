@@ -23,6 +23,8 @@ _FACING = 0.2
 # Extra degrees where a face is not the affine image of its reference face: its functions are then
 # no polynomials in the plane.
 _BENT_DEGREES = 4
+# Around a bent face, this share of its size is looked at beyond its own extent.
+_MARGIN = 0.05
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,8 @@ def _in_plane(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray, reach
     outline = _outline(master.type, bent=not master.straight[j].all())
     subject = _plane(shift(master, j, slave.centre[i])[:, outline[::-1]], tangents)
     degree = _degree(slave, master, i, j)
-    pair, places, weight = _cut_pieces(window, subject, degree)
+    count = np.full(len(i), subject.shape[1])
+    pair, places, weight = _cut_pieces(window, subject, count, degree)
     i, j = i[pair], j[pair]
     points = np.einsum("sqt,std->sqd", places, slave.tangents[i])
     normal = np.broadcast_to(slave.normal[i][:, None], points.shape)
@@ -81,12 +84,18 @@ def _in_reference(
     kind = slave.type
     corner = shift(slave, i, slave.centre[i])
     outline = _outline(master.type, bent=True)
-    rim = shift(master, j, slave.centre[i])[:, outline[::-1]]
+    rim = _plane(shift(master, j, slave.centre[i])[:, outline[::-1]], slave.tangents[i])
+    rim, count = _near(_plane(corner, slave.tangents[i]), rim)
+    used = np.arange(rim.shape[1]) < count[:, None]
+    rim = np.where(used[..., None], rim, rim[:, :1])
+    some = count > 0
+    i, j, corner, rim, count = i[some], j[some], corner[some], rim[some], count[some]
+    rim = np.einsum("sat,std->sad", rim, slave.tangents[i])
     direction = np.broadcast_to(slave.normal[i][:, None], rim.shape)
     subject, _ = locate(kind, corner, rim, direction)
     window = kind.nodes[_outline(kind, bent=False)]
     window = np.broadcast_to(window, (len(i), *window.shape))
-    pair, place, weight = _cut_pieces(window, subject, _degree(slave, master, i, j))
+    pair, place, weight = _cut_pieces(window, subject, count, _degree(slave, master, i, j))
     i, j = i[pair], j[pair]
     values, slopes = shape_functions(kind.name).both(place)
     corner = shift(slave, i, slave.centre[i])
@@ -152,12 +161,27 @@ def _degree(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> int:
     return degree if affine else degree + _BENT_DEGREES
 
 
+def _near(face: np.ndarray, rim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The part of each rim (n, v, d) around its face (n, a, d), both seen in a plane, and counts.
+
+    Far from a bent face, points have no place in its reference face, or a wrong one.
+    """
+    low, high = face.min(axis=1), face.max(axis=1)
+    margin = _MARGIN * (high - low).max(axis=1, keepdims=True)
+    low, high = low - margin, high + margin
+    if face.shape[2] == 1:
+        ends, length = overlap(np.concatenate([low, high], axis=1), np.sort(rim[..., 0], axis=1))
+        return ends[..., None], np.where(length > 0, 2, 0)
+    box = np.stack([low, [1, 0] * high + [0, 1] * low, high, [1, 0] * low + [0, 1] * high], axis=1)
+    return clip(rim, np.full(len(rim), rim.shape[1]), box)
+
+
 def _cut_pieces(
-    window: np.ndarray, subject: np.ndarray, degree: int
+    window: np.ndarray, subject: np.ndarray, count: np.ndarray, degree: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pieces of the subjects within the windows: pair (s,), points (s, q, d), weights (s, q).
 
-    Polygons (n, v, 2) in 3D; intervals (n, 2, 1) in 2D.
+    Polygons (n, v, 2) of `count` (n,) vertices in 3D; intervals (n, 2, 1) in 2D.
     """
     dim = window.shape[2]
     reference, weights = simplex_rule(dim, degree)
@@ -166,7 +190,6 @@ def _cut_pieces(
         pair = np.flatnonzero(length > 0)
         points = ends[pair, :1] + length[pair, None] * reference[:, 0]
         return pair, points[..., None], length[pair, None] * weights
-    count = np.full(len(subject), subject.shape[1])
     pair, corner, area = triangles(*clip(subject, count, window))
     barycentric = np.column_stack([1 - reference.sum(axis=1), reference])
     points = np.einsum("qk,skt->sqt", barycentric, corner)
