@@ -283,9 +283,11 @@ def _expressions(case: Case) -> Iterable[Expression]:
     values: list[Any] = [support.fix for support in case.supports]
     values += [load.value for load in case.loads]
     values += case.reference.values()
-    for value in values:
-        if isinstance(value, dict):
-            value = tuple(value.values())
-        for scalar in value if isinstance(value, tuple) else (value,):
-            if isinstance(scalar, Expression):
-                yield scalar
+    while values:
+        value = values.pop()
+        if isinstance(value, Expression):
+            yield value
+        elif isinstance(value, dict):
+            values += value.values()
+        elif isinstance(value, tuple):
+            values += value

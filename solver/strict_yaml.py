@@ -28,7 +28,7 @@ _WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
 def read_text(path: Path) -> str:
     """The text of a file; `InputError` where it cannot be read, is not UTF-8 or exceeds 1 MB."""
     try:
-        with open(path, "rb") as stream:
+        with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -1,0 +1,221 @@
+"""The command line: `python -m solver COMMAND …`.
+
+Exit status: 0 all checks hold; 1 a check fails or the result is unreliable; 2 the input is refused;
+3 the solve failed; 70 an error of the program itself; 130 interrupted. What a command needs is
+imported when it runs, so that help comes at once.
+"""
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from solver.errors import InputError, SolveError
+
+if TYPE_CHECKING:
+    from solver.run import Job
+
+Command = Callable[[argparse.Namespace], int]
+
+PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the exit status."""
+    options = _parser().parse_args(arguments)
+    if options.threads:
+        for variable in THREADS:  # read by the libraries when they are loaded
+            os.environ.setdefault(variable, str(options.threads))
+    try:
+        return options.run(options)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return REFUSED
+    except SolveError as error:
+        print(error, file=sys.stderr)
+        return NO_RESULT
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return PASSED
+    except Exception:  # noqa: BLE001 -- status 1, Python's own, means that a check fails
+        traceback.print_exc()
+        return BUG
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="solver", description="Verified contact solves.")
+    parser.set_defaults(threads=None)
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    command = _add(commands, "mesh", _mesh, "write the mesh of a case, its transform applied")
+    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="MESH")
+
+    command = _add(commands, "solve", _solve, "solve a case, check it and write the result")
+    _add_job(command)
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="RESULT.vtkhdf")
+    command.add_argument("--verdict", type=Path, metavar="VERDICT.json", help="written in any case")
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
+
+    command = _add(commands, "crashed", _crashed, "write the verdict of a solve that died")
+    _add_job(command)
+    command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
+    command.add_argument("--log", type=Path, help="its last line is the reason")
+
+    command = _add(commands, "check", _check, "run the checks of stored results again")
+    command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+    command.add_argument("--json", action="store_true", help="print a list of verdicts")
+
+    command = _add(commands, "report", _report, "write the report of many verdicts")
+    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
+
+    command = _add(commands, "validate", _validate, "say whether case files are valid")
+    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
+    command.add_argument("--mesh", action="store_true", help="mesh them too and check the groups")
+
+    command = _add(commands, "new", _new, "write a commented case file to start from")
+    command.add_argument("name", metavar="NAME")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: NAME.yaml")
+
+    command = _add(commands, "accept", _accept, "take results as the accepted values")
+    command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+    return parser
+
+
+def _add(commands: Any, name: str, run: Command, purpose: str) -> argparse.ArgumentParser:
+    text = f"{purpose[0].upper()}{purpose[1:]}."
+    command = commands.add_parser(name, help=purpose, description=text)
+    command.set_defaults(run=run)
+    return command
+
+
+def _add_job(command: argparse.ArgumentParser) -> None:
+    """What singles out one solve: case, mesh, direction, variant."""
+    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, taken as it is")
+    command.add_argument("--swap", action="store_true", help="exchange slave and master")
+    command.add_argument("--hexahedra", choices=("pyramids", "hexahedra"), help="how they are cut")
+
+
+def _mesh(options: argparse.Namespace) -> int:
+    from solver.case import load_case
+    from solver.mesh import write_mesh
+    from solver.run import mesh_of
+
+    write_mesh(mesh_of(load_case(options.case)), options.output)
+    return PASSED
+
+
+def _job(options: argparse.Namespace) -> "Job":
+    from solver.run import Job
+
+    return Job(options.case, options.mesh, options.swap, options.hexahedra)
+
+
+def _solve(options: argparse.Namespace) -> int:
+    from solver.run import solve
+
+    log = _silent if options.quiet else partial(print, flush=True)
+    verdict = solve(_job(options), options.output, options.verdict, log)
+    return PASSED if verdict["passed"] else FAILED
+
+
+def _silent(line: str) -> None:
+    """Print nothing."""
+
+
+def _crashed(options: argparse.Namespace) -> int:
+    from solver.run import record_crash
+
+    record_crash(_job(options), options.verdict, options.log)
+    return PASSED
+
+
+def _check(options: argparse.Namespace) -> int:
+    from solver.run import check, summary
+    from solver.verdict import to_json
+
+    verdicts = [check(result) for result in options.results]
+    if options.json:
+        print(to_json(verdicts))
+    else:
+        for verdict in verdicts:
+            print(summary(verdict))
+            for row in verdict["checks"]:
+                print("  " + _row(row))
+    return PASSED if all(verdict["passed"] for verdict in verdicts) else FAILED
+
+
+def _row(check: dict[str, Any]) -> str:
+    name = f"{check['name']} {check['zone'] or ''}"
+    extremes = f"{check['minimum']:.10g} … {check['maximum']:.10g}"
+    error = f"error {check['error']:.1e} (allowed {check['tolerance']:.0e})"
+    return f"{'ok' if check['passed'] else 'FAILED':<7}{name:<40}{extremes:<36}{error}"
+
+
+def _report(options: argparse.Namespace) -> int:
+    from solver.report import write_report
+
+    return write_report(options.verdicts, options.output)
+
+
+def _validate(options: argparse.Namespace) -> int:
+    status = PASSED
+    for path in options.cases:
+        try:
+            _validate_one(path, options.mesh)
+        except InputError as error:
+            print(error, file=sys.stderr)
+            status = REFUSED
+        else:
+            print(f"{path}: valid")
+    return status
+
+
+def _validate_one(path: Path, with_mesh: bool) -> None:
+    from solver.case import load_case
+
+    case = load_case(path)
+    file = case.mesh.get("path")
+    if file and not file.is_file():
+        raise InputError(path, "mesh.file", str(file), "no such file")
+    if with_mesh:
+        from solver.groups import check_groups
+        from solver.run import mesh_of
+
+        check_groups(case, mesh_of(case))
+
+
+def _new(options: argparse.Namespace) -> int:
+    from solver.template import write_template
+
+    path = options.output or Path(f"{options.name}.yaml")
+    write_template(options.name, path)
+    print(f"{path}: written; next: python -m solver solve {path} -o {options.name}.vtkhdf")
+    return PASSED
+
+
+def _accept(options: argparse.Namespace) -> int:
+    from solver.checks import run_checks
+    from solver.regression import accept, accepted_values
+    from solver.results import read_result
+
+    for path in options.results:
+        solution = read_result(path).solution
+        checks = run_checks(solution, accepted_values(solution))
+        changes = accept(solution, checks)
+        print(f"{solution.job}: {len(changes)} values accepted anew of {len(checks)}")
+        for line in changes:
+            print(f"  {line}")
+    return PASSED

@@ -1,0 +1,131 @@
+"""One job from case file to verdict: mesh, solve, checks, result file, verdict."""
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import meshio
+
+from solver.case import Case, load_case
+from solver.checks import run_checks
+from solver.clock import Clock
+from solver.errors import InputError, SolveError
+from solver.mesh import generate, read_mesh, transform
+from solver.provenance import gather
+from solver.regression import accepted_values
+from solver.results import read_result, write_result
+from solver.simulation import simulate
+from solver.verdict import CRASHED, FAILED, REFUSED, of_solution, without_result, write_verdict
+
+Log = Callable[[str], Any]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One solve of a case: which mesh, which direction, which way to cut hexahedra.
+
+    `mesh` is a mesh file taken as it is; None means the case's own, its transform applied.
+    """
+
+    case: Path
+    mesh: Path | None = None
+    swapped: bool = False
+    hexahedra: str | None = None
+
+
+def mesh_of(case: Case) -> meshio.Mesh:
+    """The case's mesh, read or generated, its transform applied."""
+    if "path" in case.mesh:
+        mesh = read_mesh(case.mesh["path"])
+    else:
+        mesh = generate(case.mesh, str(case.path))
+    return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
+
+
+def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> dict[str, Any]:
+    """Solve, check, write the result; the verdict, also written to `verdict_file` if given.
+
+    Where there is no result, the verdict that says why is written all the same, and the exception
+    goes on: InputError, SolveError, or whatever shows an error of the program.
+    """
+    case: Case | None = None
+    try:
+        case = load_case(job.case)
+        verdict = _solve(job, case, output, verdict_file or output, log)
+    except Exception as error:
+        if verdict_file:
+            word, reason = _ending(error)
+            subject = case or job.case
+            write_verdict(
+                verdict_file, without_result(word, reason, subject, job.swapped, job.hexahedra)
+            )
+        raise
+    if verdict_file:
+        write_verdict(verdict_file, verdict)
+    log(summary(verdict))
+    return verdict
+
+
+def check(result_file: Path) -> dict[str, Any]:
+    """The verdict of a stored result, its checks run again on the stored fields."""
+    result = read_result(result_file)
+    checks = run_checks(result.solution, accepted_values(result.solution))
+    return of_solution(result.solution, checks, result_file.name, result.provenance)
+
+
+def record_crash(job: Job, verdict_file: Path, log_file: Path | None) -> None:
+    """Write the verdict of a solve whose process died; the log's last line is the reason."""
+    try:
+        case: Case | Path = load_case(job.case)
+    except InputError:
+        case = job.case
+    reason = (_last_line(log_file) if log_file else "") or "the process died without a word"
+    write_verdict(verdict_file, without_result(CRASHED, reason, case, job.swapped, job.hexahedra))
+
+
+def summary(verdict: dict[str, Any]) -> str:
+    """The verdict in one line: job, word, reason or worst error, time."""
+    line = f"{verdict['job']}: {verdict['verdict']}"
+    if verdict["reason"]:
+        return f"{line}: {verdict['reason']}"
+    worst = verdict["worst"]
+    error = f", worst error {worst['error']:.1e} ({worst['name']})" if worst else ""
+    return f"{line}{error}, {verdict['seconds']['total']:.2f} s"
+
+
+def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[str, Any]:
+    """The verdict of a solve that comes to its end; `beside` lies where the verdict will."""
+    started, clock = time.process_time(), Clock()
+    with clock.stage("mesh"):
+        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
+    solution = simulate(case, mesh, job.swapped, job.hexahedra, log)
+    solution.seconds = {**clock.seconds, **solution.seconds}
+    with clock.stage("checks"):
+        checks = run_checks(solution, accepted_values(solution))
+    solution.seconds["checks"] = clock.seconds["checks"]
+    solution.cpu_seconds = time.process_time() - started
+    provenance = gather(job.case, job.mesh or case.mesh.get("path"))
+    with clock.stage("write"):
+        write_result(output, solution, checks, provenance)
+    solution.seconds["write"] = clock.seconds["write"]
+    return of_solution(solution, checks, os.path.relpath(output, beside.parent), provenance)
+
+
+def _ending(error: Exception) -> tuple[str, str]:
+    """The verdict's word and reason for a solve that an exception ended."""
+    if isinstance(error, InputError):
+        return REFUSED, str(error)
+    if isinstance(error, SolveError):
+        return FAILED, str(error)
+    return CRASHED, f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _last_line(path: Path) -> str:
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError:
+        return ""
+    return next((line.strip() for line in reversed(lines) if line.strip()), "")

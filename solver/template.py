@@ -1,0 +1,76 @@
+"""The case file that `new` writes: one that runs as it is, with a comment on every key."""
+
+from pathlib import Path
+
+from solver.case import parse_case
+from solver.errors import InputError
+from solver.files import replacing
+
+TEMPLATE = """\
+# A case file: change it to your problem, then
+#   python -m solver validate --mesh FILE                    says whether it is valid
+#   python -m solver solve FILE -o {name}.vtkhdf     solves and checks it
+# Paths are relative to this file. Units are yours: lengths, forces, stresses that fit together.
+
+name: {name}
+title: Two blocks pressed together
+
+# A mesh made by recipe ...
+mesh:
+  recipe: blocks
+  size: 50.0
+  bottom: {{cells: HEXA8, divisions: 3}}
+  top: {{cells: HEXA8, divisions: 2}}
+# ... or your own (.med .msh .inp .vtu), whose groups are then known by their names there:
+# mesh: {{file: my-mesh.med}}
+
+# plane: strain                          # for plane meshes, and only there
+
+# By group of volume cells, or `all`.
+materials:
+  all: {{young: 2000.0, poisson: 0.3}}
+
+# Directions x, y, z, or `normal` (a plane of symmetry that lies any way); with a colon, a value.
+supports:
+  - {{group: symx, fix: [x]}}
+  - {{group: symy, fix: [normal]}}
+  - {{group: base, fix: {{z: 0.0}}}}
+
+# pressure (positive inwards) or traction: [x, y, z] on faces; body_force: [x, y, z] on cells.
+# A value may be an expression in x, y, z, r, pi, sqrt, sin, cos, such as "25 * (1 - x / 50)".
+loads:
+  - {{group: press, pressure: 25.0}}
+
+# Contact zones. The finer surface, or that of the softer body, is the better slave.
+contact:
+  - name: interface
+    slave: bottom_contact
+    master: top_contact
+    hexahedra: pyramids                  # how slave hexahedra are cut: pyramids or hexahedra
+    interference: 0.0                    # overlap at the start, of bodies modelled apart
+
+directions: first                        # or both: solved again with slave and master exchanged
+steps: [0.5, 1.0]                        # load factors
+observe:                                 # the contact element nearest to a point, at every step
+  - {{zone: interface, nearest: [25.0, 25.0, 0.0]}}
+
+# What the results are checked against; leave out what you do not know.
+reference:
+  kind: analytical                       # analytical, manufactured, refined or other_code
+  contact_pressure: 25.0                 # >= 0 in compression
+  normal_stress: -25.0                   # > 0 in tension
+  gap: 0.0                               # >= 0 open
+  displacement: [0.00375 * x, 0.00375 * y, -0.0125 * (z + 50)]
+
+tolerance: 1.0e-3                        # or by check: {{multiplier: 1.0e-6, element_gap: 1.0e-8}}
+"""
+
+
+def write_template(name: str, path: Path) -> None:
+    """Write a commented case of that name; InputError for a bad name or a file already there."""
+    text = TEMPLATE.format(name=name)
+    parse_case(text, path)
+    if path.exists():
+        raise InputError(path, "file", None, "is there already; choose another with -o")
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
