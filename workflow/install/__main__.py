@@ -8,7 +8,7 @@ old one is told what is missing.
 import sys
 
 if sys.version_info < (3, 11):
-    version = "{}.{}".format(*sys.version_info[:2])  # noqa: UP032
+    version = "{}.{}".format(*sys.version_info[:2])
     sys.exit(
         "Python 3.11 or newer is needed, this is %s (%s): name a newer one, for example "
         "make PYTHON=python3.12" % (version, sys.executable)
@@ -36,8 +36,10 @@ def main() -> None:
         groups = environment.wanted(arguments.groups, arguments.mkl)
         if not environment.current(groups):
             environment.install(groups)
-            libraries.provide(environment.VENV)
             environment.stamp(groups)
+        if not environment.complete():
+            libraries.provide(environment.VENV)
+            environment.stamp(groups, complete=True)
     except InstallError as error:
         sys.exit(f"installation: {error}")
 

