@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.case import Scalar
 from solver.expressions import evaluate
 from solver.solution import STRESS_COMPONENTS, Solution, ZoneResult
 
@@ -91,12 +92,11 @@ class CheckResult:
 
 @dataclass(frozen=True)
 class _Sample:
-    """Values (n,) and their reference (n,), with the places they were taken at."""
+    """Values (n,) and their reference (n,); `place` says in words where the i-th was taken."""
 
     values: np.ndarray
     reference: np.ndarray
-    kind: str
-    places: Sequence[Any] | np.ndarray
+    place: Callable[[int], str]
 
 
 Reference = Any  # a scalar; for vectors and tensors a sequence or a mapping of scalars
@@ -152,8 +152,14 @@ def _unit(_: Solution) -> float:
 
 
 def _at_macro_elements(zone: ZoneResult, values: np.ndarray, reference: Reference) -> _Sample:
-    numbers = range(len(zone.centre))
-    return _Sample(np.asarray(values), evaluate(reference, zone.centre), "macro-element", numbers)
+    return _Sample(values, evaluate(reference, zone.centre), "macro-element {}".format)
+
+
+def _at_nodes(
+    solution: Solution, nodes: np.ndarray, values: np.ndarray, reference: Reference
+) -> _Sample:
+    expected = evaluate(reference, solution.mesh.points[nodes])
+    return _Sample(values, expected, lambda i: f"node {nodes[i]}")
 
 
 def _pressure(_: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
@@ -179,44 +185,45 @@ def _covered_pressure(_: Solution, zone: ZoneResult, reference: Reference) -> _S
     return _at_macro_elements(zone, zone.coverage * zone.multiplier, reference)
 
 
-def _surface_stress(side: str) -> _Sampler:
-    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
-        nodes = getattr(zone, f"{side}_nodes")
-        values = np.asarray(getattr(zone, f"stress_{side}"), dtype=float)
-        return _Sample(values, evaluate(reference, solution.mesh.points[nodes]), "node", nodes)
+def _slave_stress(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
+    return _at_nodes(solution, zone.slave_nodes, zone.stress_slave, reference)
 
-    return sample
+
+def _master_stress(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
+    return _at_nodes(solution, zone.master_nodes, zone.stress_master, reference)
 
 
 def _nodal_stress(solution: Solution, _: None, reference: Reference) -> _Sample:
     nodes = np.flatnonzero(solution.body >= 0)
-    values = solution.nodal_normal_stress[nodes]
-    return _Sample(values, evaluate(reference, solution.mesh.points[nodes]), "node", nodes)
+    return _at_nodes(solution, nodes, solution.nodal_normal_stress[nodes], reference)
 
 
-def _by_component(array: str, names: Sequence[str]) -> _Sampler:
-    """Sample the referenced components of a nodal field, all on the scale of the largest."""
+def _displacement(solution: Solution, _: None, reference: Reference) -> _Sample:
+    by_axis = dict(zip("xyz", reference, strict=False))
+    return _by_component(solution, solution.displacement, "xyz", by_axis)
 
-    def sample(solution: Solution, _: None, reference: Reference) -> _Sample:
-        given = (
-            reference
-            if isinstance(reference, Mapping)
-            else dict(zip(names, reference, strict=False))
-        )
-        nodes = np.flatnonzero(solution.body >= 0)
-        points = solution.mesh.points[nodes]
-        field_ = getattr(solution, array)
-        values = [field_[nodes, names.index(name)] for name in given]
-        expected = [evaluate(scalar, points) for scalar in given.values()]
-        places = [f"{node} ({name})" for name in given for node in nodes]
-        return _Sample(np.concatenate(values), np.concatenate(expected), "node", places)
 
-    return sample
+def _stress_components(solution: Solution, _: None, reference: Reference) -> _Sample:
+    return _by_component(solution, solution.stress, STRESS_COMPONENTS, reference)
+
+
+def _by_component(
+    solution: Solution, values: np.ndarray, names: Sequence[str], given: Mapping[str, Scalar]
+) -> _Sample:
+    """The given components of a nodal field one after the other: all on one scale."""
+    nodes = np.flatnonzero(solution.body >= 0)
+    points, listed = solution.mesh.points[nodes], list(given)
+    return _Sample(
+        np.concatenate([values[nodes, names.index(name)] for name in listed]),
+        np.concatenate([evaluate(given[name], points) for name in listed]),
+        lambda i: f"node {nodes[i % len(nodes)]} ({listed[i // len(nodes)]})",
+    )
 
 
 def _balance(solution: Solution, _: None, __: Reference) -> _Sample:
+    names = list(solution.balance)
     values = np.array(list(solution.balance.values()), dtype=float)
-    return _Sample(values, np.zeros(len(values)), "the balance of", list(solution.balance))
+    return _Sample(values, np.zeros(len(values)), lambda i: f"the balance of {names[i]}")
 
 
 def _observed(quantity: str) -> _Sampler:
@@ -235,8 +242,9 @@ def _observed(quantity: str) -> _Sampler:
         expected = evaluate(reference, zone.centre[elements])
         if quantity == "pressure":
             expected = expected * factors
-        places = [f"{e}, load factor {f:g}" for f, e in zip(factors, elements, strict=True)]
-        return _Sample(values, expected, "macro-element", places)
+        return _Sample(
+            values, expected, lambda i: f"macro-element {elements[i]}, load factor {factors[i]:g}"
+        )
 
     return sample
 
@@ -245,8 +253,8 @@ _PRESSURE, _STRESS = "contact_pressure", "normal_stress"
 CHECKS: tuple[Check, ...] = (
     Check("multiplier", "LAGS_C", _PRESSURE, _pressure, _load),
     Check("nodal_stress", "SIEF_NOEU", _STRESS, _nodal_stress, _load, by_zone=False),
-    Check("surface_stress_slave", None, _STRESS, _surface_stress("slave"), _load),
-    Check("surface_stress_master", None, _STRESS, _surface_stress("master"), _load),
+    Check("surface_stress_slave", None, _STRESS, _slave_stress, _load),
+    Check("surface_stress_master", None, _STRESS, _master_stress, _load),
     Check("element_pressure", "CONT_ELEM/PRES", _PRESSURE, _pressure, _load),
     Check("element_gap", "CONT_ELEM/JEU", "gap", _gap, block_size, GAP, fixed=True),
     Check("element_status", "CONT_ELEM/CONT", _PRESSURE, _status, _unit, 0.0, fixed=True),
@@ -259,22 +267,8 @@ CHECKS: tuple[Check, ...] = (
         _load,
         accepted=1e-6,
     ),
-    Check(
-        "displacement",
-        "DEPL",
-        "displacement",
-        _by_component("displacement", "xyz"),
-        _elongation,
-        by_zone=False,
-    ),
-    Check(
-        "stress_components",
-        None,
-        "stress",
-        _by_component("stress", STRESS_COMPONENTS),
-        _load,
-        by_zone=False,
-    ),
+    Check("displacement", "DEPL", "displacement", _displacement, _elongation, by_zone=False),
+    Check("stress_components", None, "stress", _stress_components, _load, by_zone=False),
     Check("balance", None, None, _balance, _unit, 1e-10, fixed=True, by_zone=False),
     Check("observation", "OBSERVATION/PRES", _PRESSURE, _observed("pressure"), _load),
     Check(
@@ -320,7 +314,7 @@ def _judge(
         error = _over(deviation[worst], scale)
         extremes = float(sample.values.min()), float(sample.values.max())
         value, reference = float(sample.values[worst]), float(sample.reference[worst])
-        where = f"{sample.kind} {sample.places[worst]}"
+        where = sample.place(worst)
     else:
         error = value = reference = float("nan")
         extremes, where = (value, value), "no place at all"

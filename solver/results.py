@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -139,35 +140,48 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
     """The volume cells, then the sub-faces of all zones, one block for each cell type."""
     mesh, dim = solution.mesh, solution.mesh.points.shape[1]
     volumes = [i for i, block in enumerate(mesh.cells) if block.dim == dim]
+    faces, cell_data = _face_blocks(solution)
     cells = [(mesh.cells[i].type, mesh.cells[i].data) for i in volumes]
     n_volumes = sum(len(data) for _, data in cells)
-    data = {name: [np.full(n_volumes, np.nan)] for name in _ON_FACES}
-    data |= {name: [np.full(n_volumes, -1)] for name in ("macro_element", "zone")}
-    parts = [
-        (name, number, zone, connectivity, owner)
-        for number, zone in enumerate(solution.zones)
-        for name, connectivity, owner in zone.faces
-    ]
-    parts.sort(key=lambda part: part[0])  # stable: one block a type, its zones in their order
-    for name, group_ in groupby(parts, key=lambda part: part[0]):
-        same = list(group_)
-        cells.append((cell_type(name).meshio, np.concatenate([part[3] for part in same])))
-        for _, number, zone, _, owner in same:
-            data["macro_element"].append(owner)
-            data["zone"].append(np.full(len(owner), number))
-            for key, attribute in _ON_FACES.items():
-                data[key].append(getattr(zone, attribute)[owner].astype(float))
-    nothing = [np.empty(0, dtype=int)] * (len(cells) - len(volumes))
-    sets = {name: [of[i] for i in volumes] + nothing for name, of in mesh.cell_sets.items()}
-    padding = np.zeros((len(mesh.points), 3 - dim))
+    for name, values in cell_data.items():
+        nothing = np.nan if values.dtype.kind == "f" else -1
+        cell_data[name] = np.concatenate([np.full(n_volumes, nothing), values])
+    none = [np.empty(0, dtype=int)] * len(faces)
+    sets = {name: [of[i] for i in volumes] + none for name, of in mesh.cell_sets.items()}
     point_data = {
-        "displacement": np.hstack([solution.displacement, padding]),
+        "displacement": np.pad(solution.displacement, ((0, 0), (0, 3 - dim))),
         "stress": solution.stress,
         "normal_stress": solution.nodal_normal_stress,
         "body": solution.body,
     }
-    cell_data = {name: np.concatenate(arrays) for name, arrays in data.items()}
-    write_grid(group, meshio.Mesh(mesh.points, cells, cell_sets=sets), point_data, cell_data)
+    write_grid(
+        group, meshio.Mesh(mesh.points, cells + faces, cell_sets=sets), point_data, cell_data
+    )
+
+
+def _face_blocks(
+    solution: Solution,
+) -> tuple[list[tuple[str, np.ndarray]], dict[str, np.ndarray]]:
+    """The sub-faces of all zones, a block for each cell type, and the data of these cells."""
+    parts = [
+        (kind, connectivity, owner, number)
+        for number, zone in enumerate(solution.zones)
+        for kind, connectivity, owner in zone.faces
+    ]
+    parts.sort(key=itemgetter(0))  # stable: the zones of a block stay in their order
+    blocks = [
+        (cell_type(kind).meshio, np.concatenate([part[1] for part in same]))
+        for kind, same in groupby(parts, key=itemgetter(0))
+    ]
+    none = np.empty(0, dtype=int)
+    data = {
+        "macro_element": np.concatenate([none, *(owner for _, _, owner, _ in parts)]),
+        "zone": np.concatenate([none, *(np.full(len(o), number) for _, _, o, number in parts)]),
+    }
+    for name, attribute in _ON_FACES.items():
+        values = [getattr(solution.zones[n], attribute)[owner] for _, _, owner, n in parts]
+        data[name] = np.concatenate([np.empty(0), *values]).astype(float)
+    return blocks, data
 
 
 def _sub_faces(

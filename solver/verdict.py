@@ -16,7 +16,7 @@ from solver.checks import CheckResult
 from solver.files import replacing
 from solver.solution import Solution, job_name
 
-PASSED, FAILED, UNRELIABLE = "passed", "failed", "unreliable"
+PASSED, FAILED = "passed", "failed"
 REFUSED, CRASHED = "refused", "crashed"
 # What a solve tells and a solve without an end cannot.
 _UNKNOWN: dict[str, Any] = {

@@ -1,5 +1,7 @@
 """Every check holds on the exact state and fails when its own quantity is wrong."""
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -199,8 +201,6 @@ def test_the_block_size_is_that_of_a_block_and_not_of_the_stack(solution):
 
 
 def test_checks_run_zone_by_zone(solution):
-    from copy import deepcopy
-
     second = deepcopy(solution.zones[0])
     second.name, second.gap[0] = "other", 1.0
     solution.zones.append(second)

@@ -1,5 +1,6 @@
 """The result file: whole, readable by others, and enough to make every check again."""
 
+from copy import deepcopy
 from dataclasses import asdict, fields
 
 import h5py
@@ -53,6 +54,31 @@ def test_everything_comes_back(solution, written):
     solution.case = again.case  # compared by the next test
     assert again.job == solution.job
     assert same(in_order(solution), in_order(again))
+
+
+def test_zones_that_share_a_cell_type_come_back_apart(tmp_path):
+    solution = solid(tmp_path)
+    second = deepcopy(solution.zones[0])
+    second.name, second.faces = "a second", [("TRIA3", np.array([[8, 9, 10]]), np.array([1]))]
+    solution.zones.append(second)
+    path = tmp_path / "result.vtkhdf"
+    write_result(path, solution, [], {})
+    again = read_result(path).solution
+    assert [zone.name for zone in again.zones] == ["interface", "a second"]
+    assert same(in_order(solution).zones, in_order(again).zones)
+
+
+def test_a_solve_without_contact_comes_back(tmp_path):
+    solution = plane(tmp_path)
+    solution.zones = []
+    for step in solution.steps:
+        step.observations = []
+    path = tmp_path / "result.vtkhdf"
+    write_result(path, solution, [], {})
+    again = read_result(path).solution
+    assert again.zones == []
+    assert same(again.steps, solution.steps)
+    assert same(again.mesh, solution.mesh)
 
 
 def test_the_case_comes_back_from_its_source(solution, written):
