@@ -1,0 +1,98 @@
+"""The README's commands, run from top to bottom as a newcomer would.
+
+They run as they stand, in a copy of the project where long ones are short: `cases/` holds only the
+case that the README names, and `tests/` a single test. The installation is left out:
+the copy borrows this environment.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCKS = FENCE.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+LEFT_OUT = {".git", ".venv", ".snakemake", "cases", "results", "tests"}
+
+
+def write_part(case: dict, path: Path) -> None:
+    """Two unit cubes on each other as a MED file, with the groups that a case names."""
+    import gmsh
+
+    gmsh.initialize()
+    try:
+        gmsh.option.set_number("General.Terminal", 0)
+        z = {}
+        for name, bottom in zip(case["materials"], (0, 1), strict=True):
+            box = gmsh.model.occ.add_box(0, 0, bottom, 1, 1, 1)
+            gmsh.model.occ.synchronize()
+            gmsh.model.set_physical_name(3, gmsh.model.add_physical_group(3, [box]), name)
+            for _, face in gmsh.model.get_boundary([(3, box)], oriented=False):
+                z[name, round(gmsh.model.occ.get_center_of_mass(2, face)[2], 6)] = face
+        (lower, upper), [zone] = case["materials"], case["contact"]
+        faces = {
+            case["supports"][0]["group"]: z[lower, 0.0],
+            zone["slave"]: z[lower, 1.0],
+            zone["master"]: z[upper, 1.0],
+            case["loads"][0]["group"]: z[upper, 2.0],
+        }
+        for name, face in faces.items():
+            gmsh.model.set_physical_name(2, gmsh.model.add_physical_group(2, [face]), name)
+        gmsh.option.set_number("Mesh.MeshSizeMax", 0.5)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """The copy with little to do."""
+    for path in ROOT.iterdir():
+        if path.name not in LEFT_OUT and not path.name.startswith("."):
+            copy = shutil.copytree if path.is_dir() else shutil.copy
+            copy(path, tmp_path / path.name)
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    (tmp_path / "cases" / "ssnp170").mkdir(parents=True)
+    for name in ("e.yaml", "family.yaml"):
+        shutil.copy(ROOT / "cases" / "ssnp170" / name, tmp_path / "cases" / "ssnp170")
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "test_start.py").write_text("def test_start():\n    import solver.cli\n")
+    (tmp_path / "my-cases").mkdir()
+    [text] = [text for language, text in BLOCKS if language == "yaml"]
+    (tmp_path / "my-cases" / "part.yaml").write_text(text)
+    case = yaml.safe_load(text)
+    write_part(case, tmp_path / "my-cases" / case["mesh"]["file"])
+    return tmp_path
+
+
+def test_every_command_works_in_its_order(project: Path):
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST")}
+    environment["MAKEFLAGS"] = "INSTALL=:"
+    for language, text in BLOCKS:
+        if language == "yaml":
+            continue
+        command = ["bash", "-ec"] if language == "sh" else [sys.executable, "-c"]
+        run = subprocess.run(
+            [*command, text],
+            cwd=project,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        assert run.returncode == 0, f"{text}\n{run.stdout}"
+    assert (project / "results" / "report" / "workflow.html").is_file()
+    assert "my-block" in (project / "results" / "report" / "summary.md").read_text()
+
+
+def test_links_lead_to_files():
+    for target in re.findall(r"\]\(([^)#]+)\)", (ROOT / "README.md").read_text(encoding="utf-8")):
+        assert (ROOT / target).exists(), target
