@@ -36,7 +36,8 @@ def key_path(keys: Iterable[str | int]) -> str:
     """`contact[0].slave` for the keys `("contact", 0, "slave")`."""
     path = ""
     for key in keys:
-        step = f"[{key}]" if isinstance(key, int) else str(key)
+        name = str(key) if str(key).isprintable() else repr(key)
+        step = f"[{key}]" if isinstance(key, int) else name
         path += step if isinstance(key, int) or not path else f".{step}"
     return path
 
