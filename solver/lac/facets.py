@@ -22,8 +22,9 @@ class Facets:
 
     `nodes` (n, n_nodes); `number` (n,) the caller's number; `corner` (n, n_nodes, dim) coordinates;
     `centre` (n, dim); `radius` (n,); `normal` (n, dim) outward at the centre; `tangents`
-    (n, dim − 1, dim) completing it to a right-handed frame; `straight` (n,): planar with straight
-    edges; `affine` (n,): straight, and the image of the reference face under an affine map.
+    (n, dim − 1, dim) completing it to a right-handed frame; `flat` (n,): planar; `straight` (n,):
+    planar with straight edges; `affine` (n,): straight, and the image of the reference face under
+    an affine map.
     """
 
     type: CellType
@@ -34,6 +35,7 @@ class Facets:
     radius: np.ndarray
     normal: np.ndarray
     tangents: np.ndarray
+    flat: np.ndarray
     straight: np.ndarray
     affine: np.ndarray
 
@@ -47,7 +49,7 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
     slope = shape_functions(kind.name).gradients(middle[None])
     normal = area_vectors(points, nodes, slope)[:, 0]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    straight, affine = _shape(kind, corner - centre[:, None], radius, normal)
+    shape = _shape(kind, corner - centre[:, None], radius, normal)
     return Facets(
         kind,
         nodes,
@@ -57,8 +59,7 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
         radius,
         normal,
         _tangents(normal),
-        straight,
-        affine,
+        *shape,
     )
 
 
@@ -74,9 +75,10 @@ def _tangents(normal: np.ndarray) -> np.ndarray:
 
 def _shape(
     kind: CellType, corner: np.ndarray, radius: np.ndarray, normal: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Which faces are straight (planar, straight-edged) and which are affine images."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which faces are flat, which straight-edged as well, and which affine images."""
     bend = np.abs(np.einsum("fad,fd->fa", corner, normal)).max(axis=1)
+    flat = bend <= _FLAT * radius
     n, edges = kind.n_vertices, np.array(kind.edges)
     if kind.order == 2 and kind.dim == 2:
         ends = corner[:, edges]
@@ -89,7 +91,8 @@ def _shape(
     sides = corner[:, [1, n - 1]] - first if kind.dim == 2 else corner[:, [1]] - first
     image = first + np.einsum("ar,frd->fad", kind.nodes - kind.nodes[0], sides)
     skew = np.linalg.norm(image - corner, axis=2).max(axis=1)
-    return bend <= _FLAT * radius, (bend <= _FLAT * radius) & (skew <= _AFFINE * radius)
+    straight = bend <= _FLAT * radius
+    return flat, straight, straight & (skew <= _AFFINE * radius)
 
 
 def shift(face: Facets, chosen: np.ndarray, origin: np.ndarray) -> np.ndarray:

@@ -1,9 +1,7 @@
 """The gap operator of a zone: average gap of each macro-element as a linear map of displacement.
 
 With ḡ = (initial + matrix · u) / covered area, the contact forces of pressures p are matrixᵀ · p.
-Source: Abbas, Drouet, Hild, CMAME 339 (2018) 488–513, §2–4. Exactness of the integrals: sums over
-segments miss ∫ N_a dS of a face that is no parallelogram, since the place of a point on it is no
-polynomial of its coordinates; the closure here returns the defect to the segments.
+Source: Abbas, Drouet, Hild, CMAME 339 (2018) 488–513, §2–4.
 """
 
 from dataclasses import dataclass
@@ -12,15 +10,9 @@ import numpy as np
 from scipy import sparse
 
 from solver.elements import face_rule, shape_functions
-from solver.faces import area_vectors
+from solver.lac.closure import Integrals, close_faces, close_plane, surface_vectors
 from solver.lac.facets import Facets
 from solver.lac.segments import Segments, intersect
-
-# A face counts as fully covered when the segments miss less than this share of its area.
-_FULL = 1e-11
-# Slave normals over one master face that differ by less are one normal.
-_ONE_NORMAL = 1e-9
-
 
 @dataclass(frozen=True)
 class GapOperator:
@@ -56,7 +48,7 @@ def gap_operator(
     """
     found = _search(slaves, masters, search)
     parts = [_integrals(slaves[a], masters[b], s) for a, b, s in found]
-    closed = _close(slaves, masters, found, parts) if closure else 0
+    closed = close_faces(slaves, masters, found, parts) if closure else 0
     dim = slaves[0].centre.shape[1]
     rows, columns, values = [], [], []
     initial, covered = np.zeros(n_macro), np.zeros(n_macro)
@@ -75,8 +67,34 @@ def gap_operator(
     entries = (_joined(values), (_joined(rows).astype(int), _joined(columns).astype(int)))
     matrix = sparse.coo_matrix(entries, shape=(n_macro, dim * n_nodes)).tocsr()
     area, centre, normal = _macro_geometry(slaves, n_macro)
+    if closure and found:
+        plane = _plane_closure(slaves, masters, found, parts, (n_macro, n_nodes))
+        if plane is not None:
+            matrix = sparse.kron(plane, slaves[0].normal[:1]).tocsr()
+            initial, covered = initial * (area / covered), area
+            closed = sum(len(block.number) for block in [*slaves, *masters])
     count = sum(len(s.slave) for _, _, s in found)
     return GapOperator(matrix, initial, area, covered, centre, normal, count, closed)
+
+
+def _plane_closure(
+    slaves: list[Facets],
+    masters: list[Facets],
+    found: list[tuple[int, int, Segments]],
+    parts: list[Integrals],
+    shape: tuple[int, int],
+) -> sparse.csr_matrix | None:
+    """∫ (N_b − N_a) dS (m, n_nodes), closed over whole plane surfaces, where that is needed."""
+    rows, columns, values = [], [], []
+    for (a, b, segments), part in zip(found, parts, strict=True):
+        nodes = masters[b].nodes[segments.master]
+        rows.append(np.broadcast_to(slaves[a].number[segments.slave][:, None], nodes.shape).ravel())
+        columns.append(nodes.ravel())
+        values.append(np.einsum("sad,sd->sa", part.master, part.normal).ravel())
+    entries = (_joined(values), (_joined(rows), _joined(columns)))
+    covering = sparse.coo_matrix(entries, shape=shape).tocsr()
+    closed = close_plane(slaves, masters, covering, shape[1])
+    return None if closed is None else closed[1] - closed[0]
 
 
 def _joined(parts: list[np.ndarray]) -> np.ndarray:
@@ -132,20 +150,9 @@ def _renumbered(segments: Segments, slaves: np.ndarray) -> Segments:
     return Segments(**{**vars(segments), "slave": slaves[segments.slave]})
 
 
-@dataclass
-class _Integrals:
-    """Per segment: ∫ N n dS of both sides (s, n_nodes, dim), ∫ gap dS (s,), area (s,)."""
-
-    slave: np.ndarray
-    master: np.ndarray
-    gap: np.ndarray
-    area: np.ndarray
-    normal: np.ndarray
-
-
-def _integrals(slave: Facets, master: Facets, segments: Segments) -> _Integrals:
+def _integrals(slave: Facets, master: Facets, segments: Segments) -> Integrals:
     measure = segments.weight[..., None] * segments.normal
-    return _Integrals(
+    return Integrals(
         np.einsum("sqa,sqd->sad", segments.slave_values, measure),
         np.einsum("sqa,sqd->sad", segments.master_values, measure),
         (segments.weight * segments.gap).sum(axis=1),
@@ -154,85 +161,10 @@ def _integrals(slave: Facets, master: Facets, segments: Segments) -> _Integrals:
     )
 
 
-def _close(
-    slaves: list[Facets],
-    masters: list[Facets],
-    found: list[tuple[int, int, Segments]],
-    parts: list[_Integrals],
-) -> int:
-    """Return the defect of ∫ N_a dS on fully covered straight faces to their segments.
-
-    In proportion to area. The defect sums to zero, and so does its first moment since both
-    integrals are exact for linear functions: gaps of linear fields stay exact.
-    """
-    count = 0
-    for blocks, index, side in ((slaves, 0, "slave"), (masters, 1, "master")):
-        for number, block in enumerate(blocks):
-            mine = [
-                (getattr(f[2], side), p, getattr(p, side))
-                for f, p in zip(found, parts, strict=True)
-                if f[index] == number
-            ]
-            if mine and not _all_affine(slaves, masters, found, number, index):
-                count += _close_block(block, mine)
-    return count
-
-
-def _all_affine(
-    slaves: list[Facets],
-    masters: list[Facets],
-    found: list[tuple[int, int, Segments]],
-    number: int,
-    index: int,
-) -> bool:
-    return all(
-        slaves[f[0]].affine[f[2].slave].all() and masters[f[1]].affine[f[2].master].all()
-        for f in found
-        if f[index] == number
-    )
-
-
-def _close_block(
-    block: Facets, mine: list[tuple[np.ndarray, _Integrals, np.ndarray]]
-) -> int:
-    n = len(block.number)
-    cosine = [np.abs(np.einsum("sd,sd->s", p.normal, block.normal[face])) for face, p, _ in mine]
-    area, lowest, highest = np.zeros(n), np.ones(n), np.zeros(n)
-    summed = np.zeros((n, block.type.n_nodes))
-    for (face, part, vectors), c in zip(mine, cosine, strict=True):
-        area += np.bincount(face, part.area, minlength=n)
-        np.minimum.at(lowest, face, c)
-        np.maximum.at(highest, face, c)
-        np.add.at(summed, face, np.einsum("sad,sd->sa", vectors, part.normal))
-    exact = _shape_integrals(block) * highest[:, None]
-    whole = exact.sum(axis=1)
-    full = np.abs(area - whole) <= _FULL * whole
-    full &= block.straight & (highest - lowest <= _ONE_NORMAL)
-    defect = np.where(full[:, None], exact - summed, 0.0)
-    for face, part, vectors in mine:
-        share = defect[face] * (part.area / area[face])[:, None]
-        vectors += share[..., None] * part.normal[:, None]
-    return int(full.sum())
-
-
-def _shape_integrals(block: Facets) -> np.ndarray:
-    """∫ N_a dS (n, n_nodes) of straight faces, exact."""
-    reference, weights = face_rule(block.type.name)
-    values, slopes = shape_functions(block.type.name).both(reference)
-    vectors = _vectors(block, slopes)
-    return np.einsum("q,qa,fqd,fd->fa", weights, values, vectors, block.normal, optimize=True)
-
-
 def _areas(block: Facets) -> np.ndarray:
     reference, weights = face_rule(block.type.name)
-    vectors = _vectors(block, shape_functions(block.type.name).gradients(reference))
+    vectors = surface_vectors(block, shape_functions(block.type.name).gradients(reference))
     return np.linalg.norm(vectors, axis=2) @ weights
-
-
-def _vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
-    n, n_nodes, dim = block.corner.shape
-    nodes = np.arange(n * n_nodes).reshape(n, n_nodes)
-    return area_vectors(block.corner.reshape(-1, dim), nodes, slopes)
 
 
 def _macro_geometry(
@@ -244,7 +176,7 @@ def _macro_geometry(
     for block in slaves:
         reference, weights = face_rule(block.type.name)
         values, slopes = shape_functions(block.type.name).both(reference)
-        vectors = _vectors(block, slopes) * weights[:, None]
+        vectors = surface_vectors(block, slopes) * weights[:, None]
         measure = np.linalg.norm(vectors, axis=2)
         area += np.bincount(block.number, measure.sum(axis=1), minlength=n_macro)
         place = np.einsum("fq,qa,fad->fd", measure, values, block.corner, optimize=True)

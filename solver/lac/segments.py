@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.batch import invert
 from solver.elements import mortar_degree, shape_functions, simplex_rule
 from solver.faces import area_vectors
 from solver.lac.clipping import clip, overlap, triangles
@@ -22,8 +23,9 @@ from solver.mesh.catalogue import CellType
 _FACING = 0.2
 # Extra degrees where a face is not the affine image of its reference face: its functions are then
 # no polynomials in the plane.
-_BENT_DEGREES = 4
-# Around a bent face, this share of its size is looked at beyond its own extent.
+_BENT_DEGREES = 6
+# The straight edges around a bent face are moved outward by twice what its mid-nodes ask for, since
+# an edge may reach beyond its mid-node, and by this share of their distance from the centre.
 _MARGIN = 0.05
 
 
@@ -85,7 +87,7 @@ def _in_reference(
     corner = shift(slave, i, slave.centre[i])
     outline = _outline(master.type, bent=True)
     rim = _plane(shift(master, j, slave.centre[i])[:, outline[::-1]], slave.tangents[i])
-    rim, count = _near(_plane(corner, slave.tangents[i]), rim)
+    rim, count = _near(_plane(corner, slave.tangents[i]), kind.n_vertices, rim)
     used = np.arange(rim.shape[1]) < count[:, None]
     rim = np.where(used[..., None], rim, rim[:, :1])
     some = count > 0
@@ -161,19 +163,30 @@ def _degree(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> int:
     return degree if affine else degree + _BENT_DEGREES
 
 
-def _near(face: np.ndarray, rim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _near(
+    face: np.ndarray, n_vertices: int, rim: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The part of each rim (n, v, d) around its face (n, a, d), both seen in a plane, and counts.
 
     Far from a bent face, points have no place in its reference face, or a wrong one.
     """
-    low, high = face.min(axis=1), face.max(axis=1)
-    margin = _MARGIN * (high - low).max(axis=1, keepdims=True)
-    low, high = low - margin, high + margin
     if face.shape[2] == 1:
-        ends, length = overlap(np.concatenate([low, high], axis=1), np.sort(rim[..., 0], axis=1))
+        low, high = face.min(axis=1), face.max(axis=1)
+        margin = _MARGIN * (high - low)
+        ends, length = overlap(np.hstack([low - margin, high + margin]), np.sort(rim[..., 0], 1))
         return ends[..., None], np.where(length > 0, 2, 0)
-    box = np.stack([low, [1, 0] * high + [0, 1] * low, high, [1, 0] * low + [0, 1] * high], axis=1)
-    return clip(rim, np.full(len(rim), rim.shape[1]), box)
+    vertices = face[:, :n_vertices]
+    centre = vertices.mean(axis=1, keepdims=True)
+    side = np.roll(vertices, -1, axis=1) - vertices
+    outward = np.stack([side[..., 1], -side[..., 0]], axis=-1)
+    inner = np.einsum("fed,fed->fe", outward, vertices - centre)
+    reach = np.einsum("fed,fad->fea", outward, face - centre).max(axis=2)
+    offset = (1 + _MARGIN) * inner + 2 * (reach - inner)
+    # A corner of the window is where two neighbouring edges, moved outward, meet.
+    lines = np.stack([np.roll(outward, 1, axis=1), outward], axis=2)
+    values = np.stack([np.roll(offset, 1, axis=1), offset], axis=2)
+    window = centre + np.einsum("feij,fej->fei", invert(lines)[1], values)
+    return clip(rim, np.full(len(rim), rim.shape[1]), window)
 
 
 def _cut_pieces(
