@@ -24,7 +24,9 @@ import numpy as np
 
 from solver.mesh.catalogue import BY_NAME, CellType
 from solver.mesh.gmsh_session import current_model, session
+from solver.mesh.hybrid import cube
 from solver.mesh.recipes import Keys
+from solver.mesh.sides import side_name
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
 _ALGORITHMS = {"meshadapt": 1, "delaunay": 5, "frontal": 6, "bamg": 7, "packing": 9}
@@ -39,22 +41,26 @@ def blocks(keys: Keys) -> meshio.Mesh:
     if types["top"].dim != dim:
         raise keys.refuse("top.cells", types["top"].name, f"must be of dimension {dim} as bottom")
     size = keys.numbers("size", dim)
-    meshes = [_Block(name, types[name], size, sections[name]).mesh() for name in sections]
     keys.finish()
-    return _joined(meshes)
+    return _joined([_block(n, types[n], np.array(size), sections[n]) for n in sections])
+
+
+def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys) -> meshio.Mesh:
+    origin = np.zeros(cell.dim)
+    if name == "bottom":
+        origin[-1] = -size[-1]
+    if cell.name.startswith(("PENTA", "PYRA")):
+        return cube(name, cell, origin, size, keys)
+    return _Block(name, cell, origin, size, keys).mesh()
 
 
 class _Block:
     """One block: a rectangle or a box, its corners and sides those of QUAD4 or HEXA8."""
 
-    def __init__(self, name: str, cell: CellType, size: list[float], keys: Keys):
-        self.name, self.cell, self.keys = name, cell, keys
+    def __init__(self, name: str, cell: CellType, origin: np.ndarray, size: np.ndarray, keys: Keys):
+        self.name, self.cell, self.origin, self.size = name, cell, origin, size
         self.solid = BY_NAME["QUAD4" if cell.dim == 2 else "HEXA8"]
         self.regular = cell.name.startswith(("QUAD", "HEXA"))
-        self.size = np.array(size)
-        self.origin = np.zeros(cell.dim)
-        if name == "bottom":
-            self.origin[-1] = -size[-1]
         self.divisions = keys.integers("divisions", cell.dim)
         self.far = self.divisions[:-1]
         options = {}
@@ -146,19 +152,6 @@ class _Block:
     def _divisions_at(self, share: np.ndarray) -> np.ndarray:
         far = abs(share[-1] - (0 if self.name == "bottom" else 1)) < 1e-9
         return np.array([*(self.far if far else self.divisions[:-1]), self.divisions[-1]])
-
-
-def side_name(block: str, corners: np.ndarray) -> str:
-    """The group of a side of the unit square or cube, from its corners (n, dim); "" if none."""
-    for axis in range(corners.shape[1]):
-        if np.ptp(corners[:, axis]) == 0:
-            break
-    lower = corners[0, axis] == 0
-    if axis < corners.shape[1] - 1:
-        return f"sym{'xyz'[axis]}" if lower else ""
-    if lower == (block == "top"):
-        return f"{block}_contact"
-    return "base" if block == "bottom" else "press"
 
 
 def _joined(meshes: list[meshio.Mesh]) -> meshio.Mesh:
