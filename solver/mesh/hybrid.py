@@ -8,7 +8,7 @@
 `contact` is the type of the faces on the interface: TRIA6 and QUAD8 for PENTA15 and PYRA13.
 """
 
-from collections.abc import Iterator
+from collections import defaultdict
 
 import gmsh
 import meshio
@@ -39,9 +39,9 @@ def cube(
         volume = gmsh.model.addDiscreteEntity(3)
         numbers = np.arange(1, len(nodes) + 1)
         gmsh.model.mesh.addNodes(3, volume, numbers, (origin + nodes * size).ravel())
-        _add_cells(linear, pieces, volume, name)
-        for group, kind, face in _sides(name, linear, nodes, pieces):
-            _add_cells(kind, face, gmsh.model.addDiscreteEntity(2), group)
+        _fill(volume, 3, name, [(linear.name, pieces)])
+        for group, faces in _sides(name, linear, nodes, pieces).items():
+            _fill(gmsh.model.addDiscreteEntity(2), 2, group, faces)
         gmsh.model.mesh.setOrder(cell.order)
         return current_model(unnamed=False)
 
@@ -57,17 +57,21 @@ def _pyramids(apex_height: float) -> tuple[np.ndarray, np.ndarray]:
     return np.vstack([_CUBE.nodes, apex]), np.array([(*base, 8) for base in bases])
 
 
-def _sides(
-    name: str, cell: CellType, nodes: np.ndarray, pieces: np.ndarray
-) -> Iterator[tuple[str, CellType, np.ndarray]]:
-    """The faces that lie on a side with a group: group, type and nodes of each."""
+_Cells = list[tuple[str, np.ndarray]]
+
+
+def _sides(name: str, cell: CellType, nodes: np.ndarray, pieces: np.ndarray) -> dict[str, _Cells]:
+    """The faces that lie on a side with a group: by group, the type and the nodes of each."""
+    sides: dict[str, _Cells] = defaultdict(list)
     for face in cell.faces:
         for corners in pieces[:, face.nodes]:
             group = side_name(name, nodes[corners])
             if group:
-                yield group, BY_NAME[face.type], corners
+                sides[group].append((face.type, corners))
+    return sides
 
 
-def _add_cells(cell: CellType, cells: np.ndarray, entity: int, group: str) -> None:
-    gmsh.model.mesh.addElementsByType(entity, number_of(cell.name), [], cells.ravel() + 1)
-    gmsh.model.addPhysicalGroup(cell.dim, [entity], name=group)
+def _fill(entity: int, dim: int, group: str, cells: _Cells) -> None:
+    for kind, nodes in cells:
+        gmsh.model.mesh.addElementsByType(entity, number_of(kind), [], nodes.ravel() + 1)
+    gmsh.model.addPhysicalGroup(dim, [entity], name=group)
