@@ -117,7 +117,7 @@ def close_plane(
     """
     blocks = [*slaves, *masters]
     normal, tangents = slaves[0].normal[0], slaves[0].tangents[0]
-    tilt = max(float(np.linalg.norm(np.cross(b.normal, normal), axis=-1).max()) for b in blocks)
+    tilt = max(float(np.abs(b.normal @ tangents.T).max()) for b in blocks)
     flat = all(b.flat.all() for b in blocks) and tilt <= _ONE_NORMAL
     if not flat or all(b.straight.all() for b in blocks):
         return None

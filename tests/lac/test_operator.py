@@ -1,0 +1,160 @@
+"""Gap operators of small patches, derived by hand, and what every gap operator must keep."""
+
+import numpy as np
+import pytest
+
+from solver.elements import shape_functions
+from solver.lac.closure import shape_integrals
+from solver.lac.facets import facets
+from solver.lac.operator import gap_operator
+from solver.lac.pairing import candidate_pairs
+from solver.mesh.catalogue import BY_NAME
+
+
+def segment_pair(slave_x, master_x, height=0.0):
+    """Slave edges on y = 0 facing up over master edges on y = `height` facing down."""
+    slave = np.array([[x, 0.0] for x in slave_x])
+    master = np.array([[x, height] for x in master_x])
+    points = np.vstack([slave, master])
+    # Outward normals: up for edges walked to the left, down for edges walked to the right.
+    down = len(slave) + np.array([[i, i + 1] for i in range(len(master) - 1)])
+    up = np.array([[i + 1, i] for i in range(len(slave) - 1)])
+    kind = BY_NAME["SEG2"]
+    return (
+        points,
+        facets(points, kind, up, np.arange(len(up))),
+        facets(points, kind, down, np.arange(len(down))),
+    )
+
+
+def vertical(operator, n_points):
+    return operator.matrix.toarray().reshape(-1, n_points, 2)[..., 1]
+
+
+def test_one_slave_edge_over_two_master_edges_by_hand():
+    """Slave [0, 3] over master [0, 1], [1, 3]: ∫ N of hats with feet at the master nodes."""
+    points, slave, master = segment_pair([0.0, 3.0], [0.0, 1.0, 3.0])
+    operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    assert vertical(operator, 5)[0] == pytest.approx([-1.5, -1.5, 0.5, 1.5, 1.0], rel=1e-15)
+    assert np.abs(operator.matrix.toarray().reshape(5, 2)[:, 0]).max() < 1e-15
+    assert operator.area == pytest.approx([3.0]) and operator.covered == pytest.approx([3.0])
+    assert operator.normal[0] == pytest.approx([0.0, 1.0])
+
+
+def test_overlapping_edges_by_hand():
+    """Slave [0, 1], [1, 2] over one master edge [0.5, 2]: partly covered, hats integrated by hand.
+
+    On [0.5, 1] the slave hats 1 − x and x give 1/8 and 3/8; the master hats (2 − x)/1.5 and
+    (x − 0.5)/1.5 give 5/12 and 1/12. On [1, 2] the slave's give 1/2 each, the master's 1/3, 2/3.
+    """
+    points, slave, master = segment_pair([0.0, 1.0, 2.0], [0.5, 2.0])
+    operator = gap_operator([slave], [master], 2, len(points), 1.0)
+    assert vertical(operator, 5) == pytest.approx(
+        np.array([[-1 / 8, -3 / 8, 0, 5 / 12, 1 / 12], [0, -1 / 2, -1 / 2, 1 / 3, 2 / 3]]), abs=1e-15
+    )
+    assert operator.covered == pytest.approx([0.5, 1.0])
+
+
+def test_gap_is_positive_when_open_and_negative_when_overlapping():
+    for height in (0.25, -0.25):
+        points, slave, master = segment_pair([0.0, 2.0], [0.0, 1.0, 2.0], height)
+        operator = gap_operator([slave], [master], 1, len(points), 1.0)
+        assert operator.initial == pytest.approx([2.0 * height], rel=1e-15)
+
+
+def test_surfaces_beyond_the_search_distance_do_not_meet():
+    points, slave, master = segment_pair([0.0, 2.0], [0.0, 1.0, 2.0], 0.5)
+    assert gap_operator([slave], [master], 1, len(points), 0.4).segments == 0
+    assert gap_operator([slave], [master], 1, len(points), 0.6).segments == 2
+
+
+def test_faces_that_look_the_same_way_do_not_meet():
+    points, slave, master = segment_pair([0.0, 2.0], [0.0, 2.0])
+    turned = facets(points, master.type, master.nodes[:, ::-1], master.number)
+    assert gap_operator([slave], [turned], 1, len(points), 1.0).segments == 0
+
+
+def square_pair(slave_type, master_type, seed=0):
+    """One slave face over four master faces of the unit square, distorted inside the plane."""
+    rng = np.random.default_rng(seed)
+    low, high = BY_NAME[slave_type], BY_NAME[master_type]
+    slave = np.column_stack([low.nodes, np.zeros(low.n_nodes)])
+    corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]])
+    middle = np.array([0.5, 0.5]) + rng.uniform(0.1, 0.2, 2) * rng.choice([-1, 1], 2)
+    corner = np.vstack([corner, middle])
+    quads = [(0, 7, 8, 4), (4, 8, 5, 1), (8, 6, 2, 5), (7, 3, 6, 8)]  # facing down
+    points, faces = [], []
+    for quad in quads:
+        values = shape_functions("QUAD4").values(high.nodes)
+        faces.append(np.arange(high.n_nodes) + sum(map(len, points)))
+        points.append(values @ corner[list(quad)])
+    master = np.column_stack([np.vstack(points), np.zeros(4 * high.n_nodes)])
+    all_points = np.vstack([slave, master])
+    up = np.arange(low.n_nodes)[None]
+    down = np.array(faces) + len(slave)
+    return (
+        all_points,
+        facets(all_points, low, up, np.array([0])),
+        facets(all_points, high, down, np.arange(4)),
+    )
+
+
+@pytest.mark.parametrize("slave_type", ["QUAD4", "QUAD8", "QUAD9"])
+@pytest.mark.parametrize("master_type", ["QUAD4", "QUAD8", "QUAD9"])
+def test_skew_master_faces_get_their_exact_integrals(slave_type, master_type):
+    points, slave, master = square_pair(slave_type, master_type)
+    assert not master.affine.any()
+    operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    entries = operator.matrix.toarray().reshape(-1, 3)[:, 2]
+    exact = shape_integrals(master)
+    assert entries[master.nodes] == pytest.approx(exact, abs=1e-15)
+    assert -entries[slave.nodes] == pytest.approx(shape_integrals(slave), abs=1e-15)
+    # and without the closure they are missed by far more than round-off
+    rough = gap_operator([slave], [master], 1, len(points), 1.0, closure=False)
+    missed = rough.matrix.toarray().reshape(-1, 3)[:, 2][master.nodes] - exact
+    assert np.abs(missed).max() > 1e-12
+
+
+@pytest.mark.parametrize("types", [("QUAD4", "QUAD8"), ("QUAD9", "QUAD4")])
+def test_linear_displacements_of_both_sides_open_no_gap(types):
+    points, slave, master = square_pair(*types)
+    operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        field = points @ rng.normal(size=(3, 3)) + rng.normal(size=3)
+        assert operator.matrix @ field.ravel() == pytest.approx([0.0], abs=1e-14)
+
+
+def test_contact_forces_balance_in_force_and_moment_across_a_tilted_gap():
+    points, slave, master = square_pair("QUAD4", "QUAD8")
+    tilted = points.copy()
+    tilted[4:, 2] = 0.05 + 0.1 * points[4:, 0]
+    lower = facets(tilted, slave.type, slave.nodes, slave.number)
+    upper = facets(tilted, master.type, master.nodes, master.number)
+    operator = gap_operator([lower], [upper], 1, len(points), 1.0)
+    force = operator.matrix.toarray().reshape(-1, 3)
+    assert np.abs(force.sum(axis=0)).max() < 1e-14
+    assert np.abs(np.cross(tilted, force).sum(axis=0)).max() < 1e-14
+    assert operator.initial == pytest.approx([0.05 + 0.05], rel=1e-13)
+
+
+def test_pairs_are_all_that_come_near_whatever_their_sizes():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        a, b = rng.uniform(0, 10, (40, 3)), rng.uniform(0, 10, (70, 3))
+        r, s = 10 ** rng.uniform(-2, 0.5, 40), 10 ** rng.uniform(-2, 0.5, 70)
+        distance = np.linalg.norm(a[:, None] - b[None], axis=2)
+        wanted = np.argwhere(distance <= r[:, None] + s[None] + 0.1)
+        found = np.column_stack(candidate_pairs(a, r, b, s, 0.1))
+        assert found.tolist() == wanted.tolist()
+
+
+def test_pairs_grow_with_the_faces_alone():
+    """One coarse face over n fine ones, and a matching pair of surfaces: pairs ∝ n."""
+    counts = []
+    for n in (10, 20, 40):
+        x = (np.arange(n) + 0.5) / n
+        centre = np.array([[a, b, 0.0] for a in x for b in x])
+        radius = np.full(n * n, 0.75 / n)
+        counts.append(len(candidate_pairs(centre, radius, centre, radius, 0.0)[0]) / n**2)
+    assert counts[2] < 1.2 * counts[1] < 1.44 * counts[0] * 1.2
