@@ -1,0 +1,1 @@
+"""Linear systems: condensation of the constraints, direct solvers, multigrid."""
