@@ -89,7 +89,7 @@ def test_refused_input_is_2_with_one_line(small, capsys, old, new, message):
     assert message in printed
     assert printed == verdict["reason"] + "\n"
     assert printed.startswith(f"{small / 'c.yaml'}: ")
-    assert os.listdir(small / "out") == ["v.json"]
+    assert [file.name for file in (small / "out").iterdir()] == ["v.json"]
 
 
 def _raising(error):
@@ -104,7 +104,7 @@ def test_a_solve_that_fails_is_3_with_one_line(small, capsys, monkeypatch):
     status, verdict = solve(small)
     assert (status, verdict["verdict"], verdict["reason"]) == (3, "failed", "no convergence")
     assert capsys.readouterr().err == "no convergence\n"
-    assert os.listdir(small / "out") == ["v.json"]
+    assert [file.name for file in (small / "out").iterdir()] == ["v.json"]
 
 
 def test_a_bug_is_70_with_a_traceback(small, capsys, monkeypatch):

@@ -47,7 +47,7 @@ def two_squares():
         "both": [[0, 1], []],
     }
     return meshio.Mesh(
-        np.concatenate([square, square + (0, 1)]),
+        np.concatenate([square, square + np.array([0.0, 1.0])]),
         [
             ("quad", np.array([(0, 1, 2, 3), (4, 5, 6, 7)])),
             ("line", np.array([(0, 1), (2, 3), (4, 5), (6, 7), (3, 2)])),
@@ -86,7 +86,11 @@ MISFITS = [
     ("{lower: {cells", "{lover: {cells", "counts.lover = 'lover': no such group in the mesh; did"),
     # materials
     ("  upper:", "  both:", "materials = ['lower', 'both']: 1 cells have more than one material"),
-    ("  upper: {young: 2.0, poisson: 0.3}\n", "", "materials = ['lower']: 1 of 2 volume cells have"),
+    (
+        "  upper: {young: 2.0, poisson: 0.3}\n",
+        "",
+        "materials = ['lower']: 1 of 2 volume cells have",
+    ),
     # contact surfaces
     ("slave: bottom_contact", "slave: empty", "contact[0].slave = 'empty': is empty; a group of "),
     ("slave: bottom_contact", "slave: lower", "contact[0].slave = 'lower': holds 1 QUAD4 but no f"),
@@ -142,9 +146,7 @@ def tetrahedron():
 )
 def test_a_solid_is_not_plane(line, message):
     check_groups(parse_case(SOLID, PATH), tetrahedron())
-    if "plane" in line:  # a plane case cannot speak of z to begin with
-        text = SOLID.replace("[z]", "[y]") + line
-    else:
-        text = SOLID + line
+    # A plane case cannot speak of z to begin with.
+    text = (SOLID.replace("[z]", "[y]") if "plane" in line else SOLID) + line
     with pytest.raises(InputError, match=re.escape(message)):
         check_groups(parse_case(text, PATH), tetrahedron())
