@@ -1,5 +1,6 @@
 # Everything is run from here: `make help` lists the targets.
-# Settings: CORES=4 (all), MKL=no (without Intel MKL), PYTHON=python3.12, ARGS='-n' (for Snakemake).
+# Settings: CORES=4 (all), CASES=folder (case files of yours join the batch), MKL=no (without Intel
+# MKL), PYTHON=python3.12; for Snakemake: CONFIG='variants=true', ARGS='--dry-run'.
 
 PYTHON ?= python3
 CORES ?= all
@@ -10,7 +11,10 @@ ARGS ?=
 MAKEFLAGS += --no-print-directory
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
-SNAKEMAKE := .venv/bin/python -m snakemake --cores $(CORES) $(ARGS)
+CONFIG ?=
+CASES ?=
+SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
+SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
 .PHONY: help all-cases family case report test accept format lint lock clean clean-all
 .PHONY: environment test-environment lint-environment
@@ -21,13 +25,16 @@ help: ## list the targets
 all-cases: environment ## mesh, solve and check what is not up to date, then report
 	@$(SNAKEMAKE) all_cases
 
+family: CONFIG += family=$(FAMILY)
 family: environment ## the same for one family: make family FAMILY=ssnp170
 	@test -n "$(FAMILY)" || { echo "make family: name a folder of cases/, FAMILY=…"; exit 2; }
-	@$(SNAKEMAKE) all_cases --config family=$(FAMILY)
+	@$(SNAKEMAKE) all_cases
 
+case: CONFIG += case=$(CASE)
+case: ARGS += --forcerun solve
 case: environment ## solve one case again, then report: make case CASE=ssnp170-e-swapped
 	@test -n "$(CASE)" || { echo "make case: name a case as the report does, CASE=…"; exit 2; }
-	@$(SNAKEMAKE) all_cases --forcerun solve --config case=$(CASE)
+	@$(SNAKEMAKE) all_cases
 
 report: environment ## write the report again from the results there are
 	@$(SNAKEMAKE) report
