@@ -45,9 +45,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PASSED
-    except Exception:  # noqa: BLE001 -- status 1, Python's own, means that a check fails
-        traceback.print_exc()
-        return BUG
+    except Exception as error:  # noqa: BLE001 -- status 1, Python's own, means a failed check
+        return _unexpected(error)
+
+
+def _unexpected(error: Exception) -> int:
+    """One line for a file that cannot be read or written, a traceback for a bug."""
+    if isinstance(error, OSError) and error.filename:
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+        return REFUSED
+    traceback.print_exception(error)
+    return BUG
 
 
 def _parser() -> argparse.ArgumentParser:

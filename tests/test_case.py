@@ -329,6 +329,14 @@ def test_every_value_of_the_schema_says_what_is_allowed():
     assert all("description" in inner for inner in schema["$defs"].values())
 
 
+def test_snakemake_validates_by_the_same_schema():
+    validate = pytest.importorskip("snakemake.utils").validate
+    workflow_error = pytest.importorskip("snakemake.exceptions").WorkflowError
+    validate(dict(BASE), str(CASE_SCHEMA))
+    with pytest.raises(workflow_error, match="'stress' is not one of"):
+        validate({**BASE, "plane": "stress"}, str(CASE_SCHEMA))
+
+
 def _keys(schema):
     for name, inner in schema.get("properties", {}).items():
         yield name

@@ -99,6 +99,14 @@ def _raising(error):
     return simulate
 
 
+def test_a_file_that_cannot_be_written_is_2_with_one_line(small, capsys, monkeypatch):
+    monkeypatch.setattr(solver.run, "simulate", _raising(AssertionError("solved for nothing")))
+    for command in ("mesh", "solve"):
+        output = small / "c.yaml" / "r.vtkhdf"
+        assert main([command, str(small / "c.yaml"), "-o", str(output)]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+
+
 def test_a_solve_that_fails_is_3_with_one_line(small, capsys, monkeypatch):
     monkeypatch.setattr(solver.run, "simulate", _raising(SolveError("no convergence")))
     status, verdict = solve(small)
