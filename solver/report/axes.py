@@ -1,0 +1,66 @@
+"""A plot's frame: scales, ticks, labels, linear or logarithmic."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.report.svg import INK, MUTED, RULE, Drawing
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Maps values from [low, high] to pixels [start, end], linearly or by decades."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+    log: bool = False
+
+    def __call__(self, values: object) -> np.ndarray:
+        """Pixels of values of any shape."""
+        low, high, values = self._flat(self.low), self._flat(self.high), self._flat(values)
+        return self.start + (values - low) / (high - low) * (self.end - self.start)
+
+    def _flat(self, values: object) -> np.ndarray:
+        array = np.asarray(values, dtype=float)
+        return np.log10(array) if self.log else array
+
+    def ticks(self) -> list[float]:
+        """Round values in range: decades, or steps of 1, 2 or 5."""
+        if self.log:
+            first, last = np.ceil(np.log10(self.low)), np.floor(np.log10(self.high))
+            step = max(1, round((last - first) / 8))
+            return [10.0**k for k in np.arange(first, last + 1, step)]
+        rough = (self.high - self.low) / 5
+        decade = 10.0 ** np.floor(np.log10(rough))
+        step = decade * next(m for m in (1, 2, 5, 10) if m * decade >= rough * 0.999)
+        first = np.ceil(self.low / step - 1e-9)
+        last = np.floor(self.high / step + 1e-9)
+        return [float(k * step) + 0.0 for k in np.arange(first, last + 1)]  # + 0.0: no -0
+
+    def label(self, value: float) -> str:
+        """A tick's text."""
+        if not self.log:
+            return f"{value:.6g}"
+        power = round(np.log10(value))
+        return f"{value:g}" if -2 <= power <= 3 else "10" + f"{power}".translate(_SUPERSCRIPT)
+
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def draw_axes(drawing: Drawing, x: Scale, y: Scale, x_label: str, y_label: str) -> None:
+    """Grid lines, ticks and labels of a plot."""
+    left, right, bottom, top = x.start, x.end, y.start, y.end
+    for value in y.ticks():
+        at = float(y(value))
+        drawing.line(left, at, right, at, stroke=RULE, stroke_width=0.6)
+        drawing.text(left - 6, at + 4, y.label(value), "end", color=MUTED)
+    for value in x.ticks():
+        at = float(x(value))
+        drawing.line(at, bottom, at, bottom + 4, stroke=MUTED, stroke_width=0.8)
+        drawing.text(at, bottom + 16, x.label(value), "middle", color=MUTED)
+    drawing.line(left, bottom, right, bottom, stroke=MUTED, stroke_width=0.8)
+    drawing.text((left + right) / 2, bottom + 33, x_label, "middle", color=INK)
+    drawing.text(left, top - 10, y_label, color=INK)

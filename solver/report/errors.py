@@ -1,0 +1,105 @@
+"""Error against run time of all solves of a family, log–log, with what to compare them with."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from markupsafe import Markup
+
+from solver.report import formats
+from solver.report.axes import Scale, draw_axes
+from solver.report.rows import Row
+from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
+
+WIDTH, HEIGHT = 940, 470
+TOLERANCE = 1e-3
+EPSILON = float(np.finfo(float).eps)
+# One mark for each kind of reference: they are not compared with one another.
+KINDS = ("analytical", "manufactured", "refined", "other_code")
+_COLORS = {"analytical": BLUE, "manufactured": GREEN, "refined": PURPLE, "other_code": ORANGE}
+
+
+def drawn(rows: Sequence[Row]) -> list[Row]:
+    """The rows that have both an error and a time."""
+    return [row for row in rows if row.accuracy is not None and row.total]
+
+
+def floor(rows: Sequence[Row]) -> tuple[float, float]:
+    """The round-off floor: the unit round-off ε, and ε√N for the largest N unknowns."""
+    return EPSILON, EPSILON * max((row.dofs or 1 for row in rows), default=1) ** 0.5
+
+
+def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]) -> Markup:
+    """Points of all solves with lines for the tolerance, the reference code and round-off."""
+    shown = drawn(rows)
+    drawing = Drawing(WIDTH, HEIGHT, "Worst error against run time of every solve")
+    times = np.array([row.total for row in shown])
+    errors = np.array([max(row.accuracy[0], EPSILON / 4) for row in shown])  # type: ignore[index]
+    x = Scale(*_around(times, 1.25), 62, WIDTH - 190, log=True)
+    y = Scale(EPSILON / 8, max(1e-2, 3 * errors.max(initial=0)), HEIGHT - 52, 34, log=True)
+    _floor(drawing, x, y, shown)
+    draw_axes(drawing, x, y, "wall time of the solve, s", "worst relative error")
+    _level(drawing, x, y, TOLERANCE, "tolerance 0.1 %", RED, ())
+    for entry in reference_code:
+        label = f"{entry.get('name', 'reference code')} {entry.get('version', '')}"
+        _level(drawing, x, y, float(entry["error"]), label, MUTED, (6, 4))
+    at = np.column_stack([x(times), y(errors)])
+    for row, point in zip(shown, at, strict=True):
+        _mark(drawing, row, point)
+    _labels(drawing, shown, at)
+    return drawing.svg()
+
+
+def _around(values: np.ndarray, factor: float) -> tuple[float, float]:
+    """A range of at least a decade about the values."""
+    low, high = values.min() / factor, values.max() * factor
+    widen = max(1.0, (10 / (high / low)) ** 0.5)
+    return float(low / widen), float(high * widen)
+
+
+def _floor(drawing: Drawing, x: Scale, y: Scale, rows: Sequence[Row]) -> None:
+    low, high = floor(rows)
+    top, bottom = float(y(high)), float(y(low))
+    drawing.rectangle(x.start, top, x.end - x.start, bottom - top, fill="#eef1f4")
+    drawing.text(x.end + 8, bottom + 4, f"ε = {low:.1e}", color=MUTED)
+    drawing.text(x.end + 8, min(top, bottom - 12) + 4, f"ε√N = {high:.1e}", color=MUTED)
+
+
+def _level(
+    drawing: Drawing, x: Scale, y: Scale, value: float, label: str, color: str, dashes: tuple
+) -> None:
+    at = float(y(value))
+    dashed = {"stroke_dasharray": dashes} if dashes else {}
+    drawing.line(x.start, at, x.end, at, stroke=color, stroke_width=1.2, **dashed)
+    drawing.text(x.end + 8, at + 4, label, color=color)
+
+
+def _mark(drawing: Drawing, row: Row, point: np.ndarray) -> None:
+    error, check = row.accuracy  # type: ignore[misc]
+    tip = f"{row.name}: {formats.error(error)} ({check}), {formats.seconds(row.total)}, {row.word}"
+    color = _COLORS.get(row.reference_kind, INK)
+    drawing.open_link(f"#{quote(row.name)}", tip)
+    if row.word == "passed":
+        drawing.circles(point[None], 4, fill=color, fill_opacity=0.55, stroke=color)
+    else:
+        drawing.crosses(point[None], 5, stroke=RED, stroke_width=2.2)
+    drawing.close_link()
+
+
+def _labels(drawing: Drawing, rows: Sequence[Row], at: np.ndarray) -> None:
+    """Names beside the points, failures first, where they cover neither points nor names."""
+    boxes = [(x - 4, y - 4, x + 4, y + 4) for x, y in at]
+    for row, (x, y) in zip(rows, at, strict=True):
+        name = row.name.removeprefix(f"{row.group}-").replace("-swapped", "′")
+        width = 5.6 * len(name)
+        for left, base in ((x + 6, y + 4), (x - 6 - width, y + 4), (x - width / 2, y - 7)):
+            box = (left, base - 8, left + width, base)
+            if not any(_overlap(box, other) for other in boxes):
+                drawing.text(left, base, name, size=10, color=RED if row.why else INK)
+                boxes.append(box)
+                break
+
+
+def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

@@ -1,0 +1,53 @@
+"""What the pictures share: colours of the two sides, bodies drawn apart, coordinates to pixels."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from solver.report.svg import BLUE, MUTED, ORANGE, PAPER, mixed
+from solver.solution import BodyInfo, Solution
+
+Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
+
+
+def edge_color(body: BodyInfo) -> str:
+    """Blue for the slave, orange for the master."""
+    return {"slave": BLUE, "master": ORANGE}.get(body.role, MUTED)
+
+
+def tint(body: BodyInfo) -> str:
+    """The light colour a body is filled with."""
+    return mixed(edge_color(body), PAPER, 0.8)
+
+
+def mean_normal(solution: Solution) -> np.ndarray:
+    """The mean outward normal of the first zone's slave, (dim,); upward where there is none."""
+    dim = solution.mesh.points.shape[1]
+    upward = np.eye(dim)[-1]
+    if not solution.zones or not len(solution.zones[0].normal):
+        return upward
+    mean = solution.zones[0].normal.mean(axis=0)
+    length = float(np.linalg.norm(mean))
+    return mean / length if length > 1e-6 else upward
+
+
+def apart(solution: Solution, share: float) -> np.ndarray:
+    """Points with slave and master moved apart by `share` of the mesh's size, (n, dim)."""
+    side = {"slave": -0.5, "master": 0.5}
+    shift = np.array([side.get(body.role, 0.0) for body in solution.bodies] or [0.0])
+    away = share * solution.length * mean_normal(solution)
+    return solution.mesh.points + shift[solution.body][:, None] * away
+
+
+def fit(points: np.ndarray, frame: Frame) -> Callable[[np.ndarray], np.ndarray]:
+    """A map of (…, 2) coordinates into the frame, y upward, shape kept, in its middle."""
+    x, y, width, height = frame
+    low, extent = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-300)
+    scale = min(width / extent[0], height / extent[1])
+    left, bottom = x + (width - scale * extent[0]) / 2, y + (height + scale * extent[1]) / 2
+
+    def place(values: np.ndarray) -> np.ndarray:
+        moved = (values - low) * scale
+        return np.stack([left + moved[..., 0], bottom - moved[..., 1]], axis=-1)
+
+    return place

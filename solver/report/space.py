@@ -1,0 +1,172 @@
+"""The picture of a 3D case: the blocks seen from the slave's side, and the interface in plan."""
+
+import numpy as np
+from markupsafe import Markup
+
+from solver.mesh.catalogue import cell_type
+from solver.report.geometry import boundary_faces, macro_edges, normals, outlines
+from solver.report.layout import Frame, apart, edge_color, fit, mean_normal, tint
+from solver.report.svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
+from solver.solution import Solution, ZoneResult
+
+WIDTH, HEIGHT = 760, 400
+AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
+# From no pressure to the largest, light to dark: told apart by lightness alone.
+PRESSURE = ("#f3f6fa", "#cfe1ee", "#9cc3dc", "#5f9dc6", "#2f75a8", "#174f7c")
+LEVELS = 32
+MASTER = "#ffa45c"  # readable on every pressure
+
+
+def draw_space(solution: Solution, title: str) -> Markup:
+    """Axonometric view on the left, plan of the first zone on the right."""
+    drawing = Drawing(WIDTH, HEIGHT, title)
+    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24))
+    if solution.zones:
+        _plan(drawing, solution.zones[0], solution.mesh.points, (420, 40, 240, HEIGHT - 110))
+    return drawing.svg()
+
+
+def _camera(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Screen axes (right, up) (2, 3) and the direction towards the eye (3,).
+
+    The eye is above a slave that looks up and below one that looks down, so that the slave's
+    surface, where cells are cut, is seen.
+    """
+    tilt = ELEVATION if mean_normal(solution)[2] >= 0 else -ELEVATION
+    flat = np.array([np.cos(AZIMUTH), np.sin(AZIMUTH), 0.0])
+    eye = np.cos(tilt) * flat + np.sin(tilt) * np.array([0.0, 0.0, 1.0])
+    right = np.array([-flat[1], flat[0], 0.0])
+    return np.stack([right, np.cross(eye, right)]), eye
+
+
+def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
+    """The faces turned to the eye, from far to near, the bodies drawn apart."""
+    points = apart(solution, 0.3)
+    screen, eye = _camera(solution)
+    place = fit(points @ screen.T, frame)
+    numbers = range(len(solution.bodies))
+    distance = {k: float((points[solution.body == k] @ eye).mean()) for k in numbers}
+    faces = [
+        (outlines(points, kind, nodes), solution.body[nodes[:, 0]])
+        for kind, nodes in boundary_faces(solution.mesh)
+    ]
+    for number in sorted(numbers, key=distance.__getitem__):
+        body = solution.bodies[number]
+        for polygons in _far_to_near([p[owner == number] for p, owner in faces], eye):
+            light = float(normals(polygons[:1])[0] @ np.array([0.25, -0.45, 0.85]))
+            drawing.polygons(
+                place(polygons @ screen.T),
+                fill=mixed(tint(body), INK, 0.16 * (1 - max(light, 0.0))),
+                stroke=mixed(edge_color(body), PAPER, 0.15),
+                stroke_width=0.5,
+            )
+        if body.role != "master":
+            _macro_outlines(drawing, solution, points, lambda x: place(x @ screen.T))
+        own = place(points[solution.body == number] @ screen.T)
+        at, middle = float(own[:, 0].max()) + 10, float(own[:, 1].mean())
+        drawing.text(at, middle - 8, body.name, weight="600")
+        drawing.text(at, middle + 6, ", ".join(body.cells), color=MUTED)
+        drawing.text(at, middle + 20, body.role, color=edge_color(body))
+
+
+def _far_to_near(groups: list[np.ndarray], eye: np.ndarray):
+    """Faces (n, corners, 3) turned to the eye, in runs of one shape and direction, far first."""
+    runs = []
+    for polygons in groups:
+        seen = polygons[normals(polygons) @ eye > 1e-6] if len(polygons) else polygons
+        directions = np.round(normals(seen), 1) if len(seen) else np.empty((0, 3))
+        for direction in np.unique(directions, axis=0):
+            run = seen[(directions == direction).all(axis=1)]
+            runs.append((float((run.mean(axis=1) @ eye).mean()), run))
+    return [run for _, run in sorted(runs, key=lambda entry: entry[0])]
+
+
+def _macro_outlines(drawing: Drawing, solution: Solution, points: np.ndarray, place) -> None:
+    for zone in solution.zones:
+        edges = macro_edges(zone.faces)
+        drawing.polygons(place(points[edges]), closed=False, stroke=BLUE, stroke_width=1.3)
+
+
+def _plan(drawing: Drawing, zone: ZoneResult, points: np.ndarray, frame: Frame) -> None:
+    """Slave sub-faces coloured by pressure, macro-elements and master faces in outline."""
+    axes, names = _plan_axes(zone)
+    flat = points @ axes.T
+    used = np.concatenate([nodes.ravel() for _, nodes, _ in zone.faces])
+    place = fit(flat[used], frame)
+    largest = max(float(zone.multiplier.max()), 1e-300)
+    share = np.clip(zone.multiplier / largest, 0.0, 1.0)
+    level = np.rint(share * LEVELS).astype(int)
+    for kind, nodes, owner in zone.faces:
+        polygons = place(outlines(flat, kind, nodes))
+        for value in np.unique(level[owner]):
+            fill = pressure_color(value / LEVELS)
+            drawing.polygons(
+                polygons[level[owner] == value], fill=fill, stroke=PAPER, stroke_width=0.5
+            )
+    edges = place(flat[macro_edges(zone.faces)])
+    drawing.polygons(edges, closed=False, stroke=PAPER, stroke_width=1.8)
+    for kind, nodes in zone.master_faces:
+        drawing.polygons(
+            place(outlines(flat, kind, nodes)), stroke=MASTER, stroke_width=1
+        )
+    low, high = place(flat[used]).min(axis=0), place(flat[used]).max(axis=0)
+    drawing.text(low[0], low[1] - 10, f"{zone.name} in plan: pressure on the slave")
+    _ends(drawing, low, high, flat[used], names)
+    _color_bar(drawing, zone, largest, (high[0] + 16, low[1], 12, high[1] - low[1]))
+    _legend(drawing, zone, (low[0], high[1] + 38))
+
+
+def _ends(
+    drawing: Drawing, low: np.ndarray, high: np.ndarray, flat: np.ndarray, names: tuple[str, str]
+) -> None:
+    """What the plan's sides are: the two directions, with the coordinates at their ends."""
+    first, last = flat.min(axis=0) + 0.0, flat.max(axis=0) + 0.0
+    drawing.text(low[0], high[1] + 15, f"{first[0]:.4g}", color=MUTED)
+    drawing.text((low[0] + high[0]) / 2, high[1] + 15, names[0], "middle", color=MUTED)
+    drawing.text(high[0], high[1] + 15, f"{last[0]:.4g}", "end", color=MUTED)
+    drawing.text(low[0] - 7, high[1], f"{first[1]:.4g}", "end", color=MUTED)
+    drawing.text(low[0] - 7, (low[1] + high[1]) / 2, names[1], "end", color=MUTED)
+    drawing.text(low[0] - 7, low[1] + 9, f"{last[1]:.4g}", "end", color=MUTED)
+
+
+def _plan_axes(zone: ZoneResult) -> tuple[np.ndarray, tuple[str, str]]:
+    """Two unit vectors (2, 3) in the mean plane, along coordinate axes if it can be; names."""
+    normal = zone.normal.mean(axis=0)
+    drop = int(np.argmax(np.abs(normal))) if np.abs(normal).max() > 1e-6 else 2
+    first, second = (i for i in range(3) if i != drop)
+    normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
+    u = np.eye(3)[first] - normal[first] * normal
+    u /= np.linalg.norm(u)
+    v = np.eye(3)[second] - normal[second] * normal
+    v -= (v @ u) * u
+    return np.stack([u, v / np.linalg.norm(v)]), ("xyz"[first], "xyz"[second])
+
+
+def pressure_color(share: float) -> str:
+    """The colour of a pressure, `share` of the largest one."""
+    position = share * (len(PRESSURE) - 1)
+    k = min(int(position), len(PRESSURE) - 2)
+    return mixed(PRESSURE[k], PRESSURE[k + 1], position - k)
+
+
+def _color_bar(drawing: Drawing, zone: ZoneResult, largest: float, frame: Frame) -> None:
+    x, y, width, height = frame
+    step = height / LEVELS
+    for k in range(LEVELS):
+        fill = pressure_color((LEVELS - k - 0.5) / LEVELS)
+        drawing.rectangle(x, y + k * step, width, step + 0.3, fill=fill)
+    drawing.rectangle(x, y, width, height, stroke=MUTED, stroke_width=0.6)
+    drawing.text(x + width + 5, y + 9, f"{largest:.4g}")
+    drawing.text(x + width + 5, y + height, "0")
+
+
+def _legend(drawing: Drawing, zone: ZoneResult, corner: tuple[float, float]) -> None:
+    x, y = corner
+    sub_faces = sum(len(nodes) for _, nodes, _ in zone.faces)
+    master = sum(len(nodes) for _, nodes in zone.master_faces)
+    kinds = ", ".join(sorted({cell_type(kind).name for kind, _, _ in zone.faces}))
+    drawing.rectangle(x, y - 8, 14, 9, fill=PRESSURE[4], stroke=PAPER, stroke_width=1.8)
+    slave = f"{len(zone.centre)} macro-elements in {sub_faces} sub-faces ({kinds})"
+    drawing.text(x + 20, y, slave)
+    drawing.rectangle(x, y + 7, 14, 9, stroke=MASTER, stroke_width=1)
+    drawing.text(x + 20, y + 16, f"{master} master faces")

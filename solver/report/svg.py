@@ -1,0 +1,112 @@
+"""Drawings as SVG text: integer tenths of a pixel, many polygons in one path, all text escaped.
+
+Written directly rather than through a plotting library: a picture of a thousand faces costs some
+milliseconds and kilobytes, and needs no library where there is nothing to draw.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from markupsafe import Markup, escape
+
+INK, MUTED, RULE, PAPER = "#1f2933", "#66727f", "#cfd6dd", "#ffffff"
+# Colours that the colour-blind tell apart (Okabe and Ito).
+BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "#aa5588"
+
+
+class Drawing:
+    """An SVG under construction. Lengths and positions are pixels, y downward."""
+
+    def __init__(self, width: float, height: float, title: str):
+        self.width, self.height, self.title = width, height, title
+        self._parts: list[str] = []
+
+    def polygons(self, points: np.ndarray, closed: bool = True, **style: object) -> None:
+        """Add polygons or lines of equally many points, (n, points, 2), as one path."""
+        if not len(points):
+            return
+        pattern = "M" + " ".join(["%d %d"] * points.shape[1]) + ("Z" if closed else "")
+        whole = np.rint(points * 10).astype(int).ravel().tolist()
+        self.path(pattern * len(points) % tuple(whole), **style)
+
+    def path(self, data: str, **style: object) -> None:
+        """Add a path whose data are in tenths of a pixel."""
+        self._parts.append(f'<path d="{data}"{_attributes(style)}/>')
+
+    def line(self, x1: float, y1: float, x2: float, y2: float, **style: object) -> None:
+        """Add one straight line."""
+        self.polygons(np.array([[[x1, y1], [x2, y2]]]), closed=False, **style)
+
+    def rectangle(self, x: float, y: float, width: float, height: float, **style: object) -> None:
+        """Add an upright rectangle, (x, y) its upper left corner."""
+        corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
+        self.polygons(np.array([corners]), **style)
+
+    def circles(self, centres: np.ndarray, radius: float, **style: object) -> None:
+        """Add circles at (n, 2)."""
+        r = round(radius * 10)
+        arcs = f"m-{r} 0a{r} {r} 0 1 0 {2 * r} 0a{r} {r} 0 1 0-{2 * r} 0"
+        self.path("".join(f"M{x} {y}{arcs}" for x, y in _tenths(centres)), **style)
+
+    def crosses(self, centres: np.ndarray, radius: float, **style: object) -> None:
+        """Add diagonal crosses at (n, 2)."""
+        r = round(radius * 10)
+        strokes = f"m-{r}-{r}l{2 * r} {2 * r}m0-{2 * r}l-{2 * r} {2 * r}"
+        self.path("".join(f"M{x} {y}{strokes}" for x, y in _tenths(centres)), **style)
+
+    def text(
+        self,
+        x: float,
+        y: float,
+        content: object,
+        anchor: str = "start",
+        size: float = 11,
+        color: str = INK,
+        turn: float = 0,
+        weight: str = "",
+    ) -> None:
+        """Add one line of text with its baseline at y; `anchor` start, middle or end."""
+        turned = f' transform="rotate({turn:g} {x * 10:.0f} {y * 10:.0f})"' if turn else ""
+        bold = f' font-weight="{weight}"' if weight else ""
+        self._parts.append(
+            f'<text x="{x * 10:.0f}" y="{y * 10:.0f}" font-size="{size * 10:g}" fill="{color}"'
+            f' text-anchor="{anchor}"{turned}{bold}>{escape(content)}</text>'
+        )
+
+    def open_link(self, target: str, tip: str) -> None:
+        """What follows, until `close_link`, links to `target` and says `tip` under the pointer."""
+        self._parts.append(f'<a href="{escape(target)}"><title>{escape(tip)}</title>')
+
+    def close_link(self) -> None:
+        """End the link."""
+        self._parts.append("</a>")
+
+    def svg(self) -> Markup:
+        """The drawing as one SVG element that stands alone and fits into a page."""
+        w, h = self.width, self.height
+        head = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {w * 10:g} {h * 10:g}" '
+            f'width="{w:g}" height="{h:g}" role="img" font-family="system-ui, sans-serif" '
+            f'stroke-linejoin="round"><title>{escape(self.title)}</title>'
+        )
+        return Markup(head + "".join(self._parts) + "</svg>")
+
+
+def _attributes(style: dict[str, object]) -> str:
+    """Attributes from keyword arguments; strokes in pixels, no fill unless asked for."""
+    style = {"fill": "none"} | style
+    for key in ("stroke_width", "stroke_dasharray"):
+        if key in style:
+            lengths = style[key] if isinstance(style[key], Iterable) else [style[key]]
+            style[key] = " ".join(f"{10 * float(v):g}" for v in lengths)  # type: ignore[union-attr]
+    return "".join(f' {key.replace("_", "-")}="{escape(value)}"' for key, value in style.items())
+
+
+def _tenths(points: np.ndarray) -> list[list[int]]:
+    return np.rint(np.asarray(points, dtype=float).reshape(-1, 2) * 10).astype(int).tolist()
+
+
+def mixed(color: str, other: str, share: float) -> str:
+    """The colour between two, `share` of the way to the other."""
+    a, b = (np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) for c in (color, other))
+    return "#" + "".join(f"{round(v):02x}" for v in (1 - share) * a + share * b)

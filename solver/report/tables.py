@@ -1,0 +1,195 @@
+"""The report for machines and terminals: JSON, CSV, Markdown, JUnit XML, the list of failures."""
+
+import csv
+import io
+import json
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from typing import Any
+
+from solver.report import formats
+from solver.report.rows import Row, counted, families
+
+_HEAD = (
+    "case",
+    "verdict",
+    "reference",
+    "cell types",
+    "slave",
+    "cells / reference",
+    "faces / reference",
+    "unknowns",
+    "macro-elements",
+    "pressure",
+    "normal stress",
+    "gap",
+    "contact",
+    "coverage",
+    "worst error",
+    "time",
+    "reason",
+)
+
+
+def to_json(rows: Sequence[Row]) -> str:
+    """The verdicts as they are."""
+    return json.dumps([row.verdict for row in rows], indent=1, ensure_ascii=False) + "\n"
+
+
+def to_csv(rows: Sequence[Row]) -> str:
+    """One line a solve, every digit kept; times by stage and errors by check in columns."""
+    stages = list(dict.fromkeys(stage for row in rows for stage in row.stages))
+    checks = list(dict.fromkeys(check["name"] for row in rows for check in row.checks or ()))
+    records = [_record(row, stages, checks) for row in rows]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=list(records[0]) if records else ["case"])
+    writer.writeheader()
+    writer.writerows(records)
+    return text.getvalue()
+
+
+def _record(row: Row, stages: Sequence[str], checks: Sequence[str]) -> dict[str, Any]:
+    record = {
+        "family": row.group,
+        "job": row.name,
+        "case": row.case,
+        "direction": row.direction,
+        "variant": row.variant,
+        "verdict": row.word,
+        "reason": row.why,
+        "reference_kind": row.reference_kind,
+        "slave": row.slave,
+    }
+    for key in ("cells", "reference_cells", "faces", "reference_faces"):
+        for role in ("slave", "master"):
+            bodies = [body for body in row.sides if body["role"] == role]
+            record[f"{role}_{key}"] = "; ".join(_plain(body.get(key)) for body in bodies)
+    record |= {"dofs": row.dofs, "macro_elements": row.macro_elements}
+    for key in ("pressure", "stress", "gap", "status", "coverage"):
+        pair = row.verdict.get(key) or (None, None)
+        record |= {f"{key}_minimum": pair[0], f"{key}_maximum": pair[1]}
+    worst = row.accuracy or (None, None)
+    record |= {"worst_error": worst[0], "worst_check": worst[1]}
+    for check in checks:
+        record[f"error_{check}"] = next((e for e, _ in row.errors([check])), None)
+    for stage in stages:
+        record[f"seconds_{stage}"] = row.stages.get(stage)
+    record |= {"seconds_total": row.total, "cpu_seconds": row.cpu_seconds}
+    return record | {"peak_memory_mb": row.peak_memory_mb, "linear_solver": row.linear_solver}
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{kind} {count}" for kind, count in value.items())
+    return "" if value is None else str(value)
+
+
+def to_markdown(rows: Sequence[Row]) -> str:
+    """The outcome, the failures with their reasons, and a table for each family."""
+    parts = [f"# Verification of contact solves\n\n{outcome(rows)}\n"]
+    bad = [row for row in rows if row.word != "passed"]
+    if bad:
+        parts.append("\n## Not passed\n")
+        parts += [f"- **{_md(row.name)}** {row.word}: {_md(row.why)}" for row in bad]
+    for family, members in families(rows).items():
+        parts.append(f"\n## {_md(family)}\n\n{outcome(members)}\n")
+        parts.append("| " + " | ".join(_HEAD) + " |")
+        parts.append("|" + " --- |" * len(_HEAD))
+        parts += ["| " + " | ".join(map(_md, _cells(row))) + " |" for row in members]
+    return "\n".join(parts) + "\n"
+
+
+def _cells(row: Row) -> list[str]:
+    sides = row.sides
+    worst = row.accuracy
+    return [
+        row.name,
+        row.word,
+        row.reference_kind or formats.NOTHING,
+        " on ".join(formats.cells(body) for body in sides) or formats.NOTHING,
+        row.slave or formats.NOTHING,
+        ", ".join(
+            formats.against(sum(body["cells"].values()), body.get("reference_cells"))
+            for body in sides
+        ),
+        ", ".join(formats.against(body["faces"], body.get("reference_faces")) for body in sides),
+        str(row.dofs or formats.NOTHING),
+        str(row.macro_elements or formats.NOTHING),
+        formats.extremes(row.pressure),
+        formats.extremes(row.stress),
+        formats.extremes(row.gap, row.length),
+        formats.extremes(row.status),
+        formats.extremes(row.coverage),
+        f"{formats.error(worst[0])} ({worst[1]})" if worst else formats.NOTHING,
+        formats.seconds(row.total),
+        row.why,
+    ]
+
+
+def _md(text: str) -> str:
+    """Text that Markdown, and the HTML made of it, shows as it is."""
+    text = " ".join(str(text).split()).replace("&", "&amp;").replace("<", "&lt;")
+    return re.sub(r"([\\|`*_\[\]])", r"\\\1", text.replace(">", "&gt;"))
+
+
+def to_junit(rows: Sequence[Row]) -> str:
+    """JUnit XML: a suite for each family; a failed or unreliable solve is a failure, one that was
+    refused or crashed is an error."""
+    suites = ET.Element("testsuites", _junit_counts(rows))
+    for family, members in families(rows).items():
+        suite = ET.SubElement(suites, "testsuite", {"name": _xml(family)} | _junit_counts(members))
+        for row in members:
+            case = ET.SubElement(
+                suite,
+                "testcase",
+                {"classname": _xml(family), "name": _xml(row.name), "time": f"{row.total or 0:.3f}"},
+            )
+            if row.word != "passed":
+                tag = "failure" if row.word in ("failed", "unreliable") else "error"
+                ending = ET.SubElement(case, tag, {"type": row.word, "message": _xml(row.why)})
+                ending.text = _xml(_failed_checks(row))
+    ET.indent(suites)
+    return ET.tostring(suites, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _junit_counts(rows: Sequence[Row]) -> dict[str, str]:
+    words = [row.word for row in rows]
+    return {
+        "tests": str(len(words)),
+        "failures": str(sum(word in ("failed", "unreliable") for word in words)),
+        "errors": str(sum(word in ("refused", "crashed") for word in words)),
+        "time": f"{sum(row.total or 0 for row in rows):.3f}",
+    }
+
+
+def _failed_checks(row: Row) -> str:
+    failed = [check for check in row.checks or () if not check["passed"]]
+    return "\n".join(
+        f"{check['name']}{' ' + check['zone'] if check['zone'] else ''}: error "
+        f"{formats.error(check['error'])}, tolerance {formats.error(check['tolerance'])}"
+        for check in failed
+    )
+
+
+def _xml(text: str) -> str:
+    """Text without the characters that XML does not allow at all."""
+    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "�", text)
+
+
+def to_failures(rows: Sequence[Row]) -> str:
+    """One line for each solve that did not pass: name, verdict, reason; empty if all did."""
+    return "".join(
+        f"{row.name}: {row.word}: {' '.join(row.why.split())}\n"
+        for row in rows
+        if row.word != "passed"
+    )
+
+
+def outcome(rows: Sequence[Row]) -> str:
+    """The batch in one line."""
+    counts = counted(rows)
+    if set(counts) == {"passed"}:
+        return f"All {len(rows)} solves passed."
+    words = ", ".join(f"{n} {word}" for word, n in counts.items())
+    return f"{len(rows)} solves: {words or 'none at all'}."
