@@ -113,6 +113,13 @@ def parse_case(text: str, path: Path) -> Case:
     return case
 
 
+def check_mesh_file(case: Case) -> None:
+    """Raise `InputError` where the case names a mesh file that is not there."""
+    path = case.mesh.get("path")
+    if path and not path.is_file():
+        raise InputError(case.path, "mesh.file", str(path), "no such file")
+
+
 class _Reader:
     """Turns a mapping that the schema has passed into typed objects."""
 

@@ -192,12 +192,10 @@ def _validate(options: argparse.Namespace) -> int:
 
 
 def _validate_one(path: Path, with_mesh: bool) -> None:
-    from solver.case import load_case
+    from solver.case import check_mesh_file, load_case
 
     case = load_case(path)
-    file = case.mesh.get("path")
-    if file and not file.is_file():
-        raise InputError(path, "mesh.file", str(file), "no such file")
+    check_mesh_file(case)
     if with_mesh:
         from solver.groups import check_groups
         from solver.run import mesh_of

@@ -9,7 +9,7 @@ from typing import Any
 
 import meshio
 
-from solver.case import Case, load_case
+from solver.case import Case, check_mesh_file, load_case
 from solver.checks import run_checks
 from solver.clock import Clock
 from solver.errors import InputError, SolveError
@@ -39,6 +39,7 @@ class Job:
 def mesh_of(case: Case) -> meshio.Mesh:
     """The case's mesh, read or generated, its transform applied."""
     if "path" in case.mesh:
+        check_mesh_file(case)
         mesh = read_mesh(case.mesh["path"])
     else:
         mesh = generate(case.mesh, str(case.path))

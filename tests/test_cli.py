@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -78,6 +79,7 @@ def test_a_failed_check_is_1_and_leaves_its_result(small):
     [
         ("young: 2000.0", "young: -1.0", "materials.all.young = -1.0: must be a positive number"),
         ("master: top_contact", "master: top_contakt", "did you mean top_contact?"),
+        ("recipe: blocks", "file: no.msh", "mesh = {"),
         ("cells: QUAD4, divisions: 3", "cells: QUAD5, divisions: 3", "mesh.bottom.cells = 'QUAD5'"),
     ],
 )
@@ -201,11 +203,12 @@ def test_new_writes_a_case_that_is_valid_and_passes(tmp_path, monkeypatch, capsy
 
 def test_validate_goes_through_all_files(small, capsys):
     (small / "bad.yaml").write_text(PLANE.replace("small", "a/b"))
-    (small / "lost.yaml").write_text(PLANE.replace("recipe: blocks", "file: lost.msh"))
+    (small / "lost.yaml").write_text(re.sub("mesh:\n(  .*\n)+", "mesh: {file: lost.msh}\n", PLANE))
     paths = [str(small / name) for name in ("bad.yaml", "c.yaml", "lost.yaml", "none.yaml")]
     assert main(["validate", *paths]) == 2
     printed = capsys.readouterr()
     assert printed.out == f"{paths[1]}: valid\n"
+    assert "lost.yaml: mesh.file = " in printed.err
     assert len(printed.err.splitlines()) == 3
 
 
