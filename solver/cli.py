@@ -175,7 +175,12 @@ def _row(check: dict[str, Any]) -> str:
 def _report(options: argparse.Namespace) -> int:
     from solver.report import write_report
 
-    return write_report(options.verdicts, options.output)
+    verdicts = list(options.verdicts)
+    if options.results:
+        verdicts += sorted(options.results.glob("**/verdict.json"))
+    if not verdicts:
+        raise InputError(options.results or "report", "VERDICT.json", None, "there is none")
+    return write_report(verdicts, options.output)
 
 
 def _validate(options: argparse.Namespace) -> int:

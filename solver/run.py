@@ -101,7 +101,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[s
     """The verdict of a solve that comes to its end; `beside` lies where the verdict will."""
     started, clock = time.process_time(), Clock()
     output.parent.mkdir(parents=True, exist_ok=True)  # better refused now than after the solve
-    with clock.stage("mesh"):
+    with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
     solution = simulate(case, mesh, job.swapped, job.hexahedra, log)
     solution.seconds = {**clock.seconds, **solution.seconds}

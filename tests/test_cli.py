@@ -152,6 +152,7 @@ def test_mesh_is_written_once_for_both_directions(small):
         status, verdict = solve(small, "--mesh", str(mesh), *options)
         assert (status, verdict["macro_elements"]) == (0, slaves)
     assert verdict["swapped"]
+    assert "read" in verdict["seconds"]
     mesh.write_text("c.yaml: mesh.bottom: no such thing\n")
     status, verdict = solve(small, "--mesh", str(mesh))
     assert (status, verdict["verdict"]) == (2, "refused")
@@ -185,6 +186,19 @@ def test_accept_shows_the_difference_and_check_holds_it(small, capsys):
     status, verdict = solve(small)
     assert status == 1
     assert "accepted 25 … 25" in verdict["reason"]
+
+
+def test_report_takes_verdicts_by_name_or_by_folder(small, capsys):
+    solve(small)
+    assert main(["report", str(small / "out/v.json"), "-o", str(small / "one")]) == 0
+    (small / "out/v.json").rename(small / "out/verdict.json")
+    assert main(["report", "--results", str(small), "-o", str(small / "two")]) == 0
+    for folder in ("one", "two"):
+        (told,) = json.loads((small / folder / "summary.json").read_text())
+        assert (told["case"], told["passed"]) == ("small", True)
+    capsys.readouterr()
+    assert main(["report", "-o", str(small / "three")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 def test_new_writes_a_case_that_is_valid_and_passes(tmp_path, monkeypatch, capsys):
