@@ -13,6 +13,8 @@ from solver.mesh.catalogue import CellType
 # Below these shares of a face's size, its bending and the skew of its map are round-off.
 _FLAT = 1e-9
 _AFFINE = 1e-12
+# Newton's method stops at steps below the first, in parts of a face, and is content below the second.
+_CONVERGED, _ACCEPTED = 1e-13, 1e-8
 _NEWTON_STEPS = 30
 
 
@@ -101,38 +103,63 @@ def shift(face: Facets, chosen: np.ndarray, origin: np.ndarray) -> np.ndarray:
 
 
 def locate(
-    kind: CellType, corner: np.ndarray, target: np.ndarray, direction: np.ndarray
+    kind: CellType,
+    corner: np.ndarray,
+    target: np.ndarray,
+    direction: np.ndarray,
+    outline: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where lines through points meet faces: reference points (f, q, dim − 1), distances (f, q).
 
     One face `corner` (f, n_nodes, dim) for each row of `target` (f, q, dim) and unit `direction`
     (f, q, dim); the meeting point is target + distance · direction. Newton from the affine face
     through the vertices, which is exact at once for affine faces. Raises SolveError where it does
-    not converge.
+    not converge; points of an `outline` around the face then keep their place on the affine face
+    (they lie outside the face, and all that matters is that neighbours agree on them).
     """
-    shape, n = shape_functions(kind.name), kind.n_vertices
+    start, distance = _on_affine_face(kind, corner, target, direction)
+    place = start
+    for _ in range(_NEWTON_STEPS):
+        step = _newton_step(kind, corner, target, direction, place, distance)
+        place, distance = place - step[..., :-1], distance - step[..., -1]
+        size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+        if not (size > _CONVERGED).any():
+            break
+    lost = ~(size <= _ACCEPTED)
+    if outline:
+        return np.where(lost[..., None], start, place), distance
+    if lost.any():
+        raise SolveError(f"{int(lost.sum())} points could not be projected onto {kind.name} faces")
+    return place, distance
+
+
+def _on_affine_face(
+    kind: CellType, corner: np.ndarray, target: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for the affine faces through the first vertices."""
+    n = kind.n_vertices
     sides = corner[:, [1, n - 1]] if kind.dim == 2 else corner[:, [1]]
     sides = np.swapaxes(sides - corner[:, :1], 1, 2)[:, None]
     sides = np.broadcast_to(sides, (*target.shape[:2], *sides.shape[2:]))
     _, inverse = invert(np.concatenate([sides, -direction[..., None]], axis=-1))
-    step = np.einsum("fqij,fqj->fqi", inverse, target - corner[:, :1])
-    place, distance = step[..., :-1], step[..., -1]
-    for _ in range(_NEWTON_STEPS):
-        values, slopes = shape.both(place)
-        reached = np.einsum("fqa,fad->fqd", values, corner)
-        error = reached - target - distance[..., None] * direction
-        tangent = np.einsum("fad,fqat->fqdt", corner, slopes, optimize=True)
-        _, inverse = invert(np.concatenate([tangent, -direction[..., None]], axis=-1))
-        step = np.einsum("fqij,fqj->fqi", inverse, error)
-        # Far outside a bent face the full step may overshoot; one face length at a time is safe.
-        length = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
-        step /= np.maximum(length, 1.0)[..., None]
-        place, distance = place - step[..., :-1], distance - step[..., -1]
-        if not np.abs(step[..., :-1]).max(initial=0.0) > 1e-13:
-            break
-    else:
-        if np.abs(step[..., :-1]).max() > 1e-8:
-            raise SolveError(f"a point could not be projected onto a {kind.name} contact face")
-    if not np.isfinite(place).all():
-        raise SolveError(f"a {kind.name} contact face is degenerate: no projection onto it exists")
-    return place, distance
+    found = np.einsum("fqij,fqj->fqi", inverse, target - corner[:, :1])
+    return found[..., :-1], found[..., -1]
+
+
+def _newton_step(
+    kind: CellType,
+    corner: np.ndarray,
+    target: np.ndarray,
+    direction: np.ndarray,
+    place: np.ndarray,
+    distance: np.ndarray,
+) -> np.ndarray:
+    """Step (f, q, dim) of place and distance, at most one face length at a time."""
+    values, slopes = shape_functions(kind.name).both(place)
+    error = np.einsum("fqa,fad->fqd", values, corner) - target - distance[..., None] * direction
+    tangent = np.einsum("fad,fqat->fqdt", corner, slopes, optimize=True)
+    _, inverse = invert(np.concatenate([tangent, -direction[..., None]], axis=-1))
+    step = np.einsum("fqij,fqj->fqi", inverse, error)
+    # Far outside a bent face the full step may overshoot.
+    length = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+    return step / np.maximum(length, 1.0)[..., None]

@@ -94,7 +94,7 @@ def _in_reference(
     i, j, corner, rim, count = i[some], j[some], corner[some], rim[some], count[some]
     rim = np.einsum("sat,std->sad", rim, slave.tangents[i])
     direction = np.broadcast_to(slave.normal[i][:, None], rim.shape)
-    subject, _ = locate(kind, corner, rim, direction)
+    subject, _ = locate(kind, corner, rim, direction, outline=True)
     window = kind.nodes[_outline(kind, bent=False)]
     window = np.broadcast_to(window, (len(i), *window.shape))
     pair, place, weight = _cut_pieces(window, subject, count, _degree(slave, master, i, j))
