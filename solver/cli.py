@@ -59,7 +59,9 @@ def _unexpected(error: Exception) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="solver", description="Verified contact solves.")
+    parser = argparse.ArgumentParser(
+        prog="python -m solver", description="Verified contact solves."
+    )
     parser.set_defaults(threads=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
@@ -93,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--mesh", action="store_true", help="mesh them too and check the groups")
 
     command = _add(commands, "new", _new, "write a commented case file to start from")
-    command.add_argument("name", metavar="NAME")
+    command.add_argument("name", nargs="?", metavar="NAME", help="default: as FILE")
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: NAME.yaml")
 
     command = _add(commands, "accept", _accept, "take results as the accepted values")
@@ -211,9 +213,10 @@ def _validate_one(path: Path, with_mesh: bool) -> None:
 def _new(options: argparse.Namespace) -> int:
     from solver.template import write_template
 
-    path = options.output or Path(f"{options.name}.yaml")
-    write_template(options.name, path)
-    print(f"{path}: written; next: python -m solver solve {path} -o {options.name}.vtkhdf")
+    name = options.name or (options.output.stem if options.output else "new-case")
+    path = options.output or Path(f"{name}.yaml")
+    write_template(name, path)
+    print(f"{path}: written; next: python -m solver solve {path} -o {name}.vtkhdf")
     return PASSED
 
 

@@ -22,6 +22,7 @@ Keys = tuple[str | int, ...]
 
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 _WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
 
 
@@ -114,6 +115,8 @@ class _Builder:
 
     def scalar(self, event: yaml.ScalarEvent, keys: Keys) -> object:
         text = event.value
+        if _CONTROL.search(text):
+            raise self.error(keys, event, "control characters are not allowed")
         if not event.implicit[0]:  # quoted
             return text
         if text.lower() in _WORDS:

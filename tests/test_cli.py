@@ -211,6 +211,11 @@ def test_new_writes_a_case_that_is_valid_and_passes(tmp_path, monkeypatch, capsy
     assert (status, verdict["reason"]) == (0, "")
     assert main(["new", "mine"]) == 2
     assert capsys.readouterr().err == "mine.yaml: file: is there already; choose another with -o\n"
+    assert main(["new"]) == main(["new", "-o", "yours.yaml"]) == 0
+    assert [load_case(f"{name}.yaml").name for name in ("new-case", "yours")] == [
+        "new-case",
+        "yours",
+    ]
     assert main(["new", "../mine", "-o", "x.yaml"]) == 2
     assert not Path("x.yaml").exists()
 

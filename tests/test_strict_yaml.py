@@ -55,6 +55,7 @@ def test_values(text, value):
         ("a: !!binary aGk=", r"^c.yaml: a: the tag .* is not allowed"),
         ("1: a", r"^c.yaml: line 1: the key 1 is not text: put it in quotes"),
         ("a: {[1]: b}", r"^c.yaml: a: the key \[1\] is not text"),
+        ('a: "x\\0"', r"^c.yaml: a: control characters are not allowed"),
         ("a: 1e999", r"^c.yaml: a: 1e999 is too large a number"),
         ("a: [1, 2", r"^c.yaml: line \d: must be YAML \("),
         ("a: b: c", r"^c.yaml: line 1: must be YAML \("),
