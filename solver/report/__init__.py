@@ -7,9 +7,7 @@ from typing import Any
 PAGE = "summary.html"
 
 
-def write_report(
-    verdicts: Sequence[Path], folder: Path, log: Callable[[str], Any] = print
-) -> int:
+def write_report(verdicts: Sequence[Path], folder: Path, log: Callable[[str], Any] = print) -> int:
     """Write the report of the verdict files into `folder`; the exit status, always 0.
 
     Every verdict stands in every file: summary.html, .json, .csv, .md, junit.xml, and failures.txt

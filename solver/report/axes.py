@@ -29,15 +29,20 @@ class Scale:
     def ticks(self) -> list[float]:
         """Round values in range: decades, or steps of 1, 2 or 5."""
         if self.log:
-            first, last = np.ceil(np.log10(self.low)), np.floor(np.log10(self.high))
-            step = max(1, round((last - first) / 8))
-            return [10.0**k for k in np.arange(first, last + 1, step)]
+            return self._decades()
         rough = (self.high - self.low) / 5
         decade = 10.0 ** np.floor(np.log10(rough))
         step = decade * next(m for m in (1, 2, 5, 10) if m * decade >= rough * 0.999)
         first = np.ceil(self.low / step - 1e-9)
         last = np.floor(self.high / step + 1e-9)
         return [float(k * step) + 0.0 for k in np.arange(first, last + 1)]  # + 0.0: no -0
+
+    def _decades(self) -> list[float]:
+        first, last = np.floor(np.log10(self.low)), np.floor(np.log10(self.high))
+        step = max(1, round((last - first) / 8))
+        between = (1, 2, 5) if last - first <= 3 else (1,)
+        ticks = [m * 10.0**k for k in np.arange(first, last + 1, step) for m in between]
+        return [tick for tick in ticks if self.low <= tick <= self.high]
 
     def label(self, value: float) -> str:
         """A tick's text."""

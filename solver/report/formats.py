@@ -18,10 +18,14 @@ def error(value: float | None) -> str:
 
 def extremes(pair: Sequence[float] | None, scale: float | None = None) -> str:
     """Minimum … maximum; one number where both show alike; round-off of `scale` shown as such."""
+    return " … ".join(both(pair, scale))
+
+
+def both(pair: Sequence[float] | None, scale: float | None = None) -> list[str]:
+    """Minimum and maximum, or the one number where both show alike."""
     if not pair:
-        return NOTHING
-    low, high = (_near_zero(value, scale) for value in pair)
-    return low if low == high else f"{low} … {high}"
+        return [NOTHING]
+    return list(dict.fromkeys(_near_zero(value, scale) for value in pair))
 
 
 def _near_zero(value: float, scale: float | None) -> str:
@@ -29,13 +33,13 @@ def _near_zero(value: float, scale: float | None) -> str:
 
 
 def seconds(value: float | None) -> str:
-    """Three digits at most."""
-    return NOTHING if value is None else f"{value:.3g} s" if value >= 0.1 else f"{value:.2f} s"
+    """Hundredths; more than a hundred seconds are whole."""
+    return NOTHING if value is None else f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
 
 
-def cells(body: Mapping[str, Any]) -> str:
-    """Cells of a body by type."""
-    return ", ".join(f"{kind}" for kind in body["cells"])
+def types(body: Mapping[str, Any]) -> str:
+    """The cell types of a body."""
+    return ", ".join(body["cells"])
 
 
 def against(count: int, reference: int | None) -> str:

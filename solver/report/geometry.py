@@ -19,9 +19,7 @@ def outlines(points: np.ndarray, kind: str, connectivity: np.ndarray) -> np.ndar
     return ring if np.abs(bend).max(initial=0.0) > 1e-6 * np.ptp(points) else corners
 
 
-def plane_cells(
-    points: np.ndarray, mesh: meshio.Mesh
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def plane_cells(points: np.ndarray, mesh: meshio.Mesh) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Per cell type of a 2D mesh drawn at `points`: outlines (n, corners, 2), a node of each."""
     for block in mesh.cells:
         if block.dim == 2 and len(block.data):

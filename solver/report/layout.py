@@ -8,6 +8,7 @@ from solver.report.svg import BLUE, MUTED, ORANGE, PAPER, mixed
 from solver.solution import BodyInfo, Solution
 
 Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
+Placement = Callable[[np.ndarray], np.ndarray]  # coordinates (…, dim) to pixels (…, 2)
 
 
 def edge_color(body: BodyInfo) -> str:
@@ -39,7 +40,7 @@ def apart(solution: Solution, share: float) -> np.ndarray:
     return solution.mesh.points + shift[solution.body][:, None] * away
 
 
-def fit(points: np.ndarray, frame: Frame) -> Callable[[np.ndarray], np.ndarray]:
+def fit(points: np.ndarray, frame: Frame) -> Placement:
     """A map of (…, 2) coordinates into the frame, y upward, shape kept, in its middle."""
     x, y, width, height = frame
     low, extent = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-300)

@@ -109,10 +109,11 @@ def _facts(rows: Sequence[Row]) -> list[tuple[str, str]]:
     def all_of(key: str) -> str:
         return ", ".join(sorted({str(o[key]) for o in origins if o.get(key)}))
 
-    days = sorted(str(o["time_utc"]) for o in origins if o.get("time_utc"))
+    times = sorted(str(o["time_utc"])[:16] for o in origins if o.get("time_utc"))
+    span = " … ".join(dict.fromkeys(times[:1] + times[-1:])).replace("T", " ")
     packages = ("python", "numpy", "scipy", "scikit-fem", "gmsh")
     facts = {
-        "Solved": f"{days[0]} … {days[-1]}" if days else "",
+        "Solved": f"{span} UTC" if span else "",
         "Revision": all_of("revision"),
         "Machine": f"{all_of('cpu')}, {all_of('cores')} cores" if all_of("cpu") else "",
         "Versions": ", ".join(f"{p} {all_of(p)}" for p in packages if all_of(p)),

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from solver.errors import InputError
 from solver.files import replacing
 from solver.report.rows import Row
 
@@ -18,7 +19,7 @@ def picture(row: Row, folder: Path) -> Markup:
     if not _is_current(kept, row.result_file):
         try:
             drawing = _draw(row)
-        except Exception as error:  # whatever is wrong with one result, the report is written
+        except (InputError, OSError, LookupError, ValueError, ArithmeticError) as error:
             reason = f"{type(error).__name__}: {error}"
             return Markup("<p class=none>No picture: {}</p>").format(reason)
         with replacing(kept) as temporary:

@@ -45,9 +45,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
         drawing.text(right, middle + 24, body.role, color=edge_color(body))
 
 
-def _interface(
-    drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Frame
-) -> None:
+def _interface(drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Frame) -> None:
     """Pressure by macro-element and surface stresses along the interface; both meshes below."""
     left, top, width, height = frame
     points = solution.mesh.points
@@ -100,7 +98,7 @@ def _reference(
     drawing: Drawing, solution: Solution, zone: ZoneResult, x: Scale, y: Scale, along: np.ndarray
 ) -> None:
     scalar = solution.case.reference.get("contact_pressure")
-    if scalar is None:
+    if scalar is None or isinstance(scalar, tuple | dict):
         return
     position = zone.centre @ along
     order = np.argsort(position)
@@ -109,9 +107,7 @@ def _reference(
     if np.ptp(values) == 0:  # a constant reference is drawn over the whole width
         position, values = np.array([x.low, x.high]), values[[0, -1]]
     line = np.column_stack([x(position), y(values)])
-    drawing.polygons(
-        line[None], closed=False, stroke=INK, stroke_width=1, stroke_dasharray=(5, 4)
-    )
+    drawing.polygons(line[None], closed=False, stroke=INK, stroke_width=1, stroke_dasharray=(5, 4))
 
 
 def _nodes_of_both(
@@ -144,6 +140,8 @@ def _legend(drawing: Drawing, x: float, y: float) -> None:
     drawing.text(x + 100, y, "−σₙ slave")
     drawing.crosses(np.array([[x + 168, y - 4]]), 2.6, stroke=ORANGE, stroke_width=1.1)
     drawing.text(x + 176, y, "−σₙ master")
-    drawing.line(x + 250, y - 4, x + 268, y - 4, stroke=INK, stroke_width=1, stroke_dasharray=(5, 4))
+    drawing.line(
+        x + 250, y - 4, x + 268, y - 4, stroke=INK, stroke_width=1, stroke_dasharray=(5, 4)
+    )
     drawing.text(x + 273, y, "reference")
     drawing.text(x + 335, y, "| nodes", color=MUTED)

@@ -5,8 +5,8 @@ from markupsafe import Markup
 
 from solver.mesh.catalogue import cell_type
 from solver.report.geometry import boundary_faces, macro_edges, normals, outlines
-from solver.report.layout import Frame, apart, edge_color, fit, mean_normal, tint
-from solver.report.svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
+from solver.report.layout import Frame, Placement, apart, edge_color, fit, mean_normal, tint
+from solver.report.svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
 from solver.solution import Solution, ZoneResult
 
 WIDTH, HEIGHT = 760, 400
@@ -69,7 +69,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
         drawing.text(at, middle + 20, body.role, color=edge_color(body))
 
 
-def _far_to_near(groups: list[np.ndarray], eye: np.ndarray):
+def _far_to_near(groups: list[np.ndarray], eye: np.ndarray) -> list[np.ndarray]:
     """Faces (n, corners, 3) turned to the eye, in runs of one shape and direction, far first."""
     runs = []
     for polygons in groups:
@@ -81,7 +81,9 @@ def _far_to_near(groups: list[np.ndarray], eye: np.ndarray):
     return [run for _, run in sorted(runs, key=lambda entry: entry[0])]
 
 
-def _macro_outlines(drawing: Drawing, solution: Solution, points: np.ndarray, place) -> None:
+def _macro_outlines(
+    drawing: Drawing, solution: Solution, points: np.ndarray, place: Placement
+) -> None:
     for zone in solution.zones:
         edges = macro_edges(zone.faces)
         drawing.polygons(place(points[edges]), closed=False, stroke=BLUE, stroke_width=1.3)
@@ -106,13 +108,11 @@ def _plan(drawing: Drawing, zone: ZoneResult, points: np.ndarray, frame: Frame) 
     edges = place(flat[macro_edges(zone.faces)])
     drawing.polygons(edges, closed=False, stroke=PAPER, stroke_width=1.8)
     for kind, nodes in zone.master_faces:
-        drawing.polygons(
-            place(outlines(flat, kind, nodes)), stroke=MASTER, stroke_width=1
-        )
+        drawing.polygons(place(outlines(flat, kind, nodes)), stroke=MASTER, stroke_width=1)
     low, high = place(flat[used]).min(axis=0), place(flat[used]).max(axis=0)
     drawing.text(low[0], low[1] - 10, f"{zone.name} in plan: pressure on the slave")
     _ends(drawing, low, high, flat[used], names)
-    _color_bar(drawing, zone, largest, (high[0] + 16, low[1], 12, high[1] - low[1]))
+    _color_bar(drawing, largest, (high[0] + 16, low[1], 12, high[1] - low[1]))
     _legend(drawing, zone, (low[0], high[1] + 38))
 
 
@@ -149,7 +149,7 @@ def pressure_color(share: float) -> str:
     return mixed(PRESSURE[k], PRESSURE[k + 1], position - k)
 
 
-def _color_bar(drawing: Drawing, zone: ZoneResult, largest: float, frame: Frame) -> None:
+def _color_bar(drawing: Drawing, largest: float, frame: Frame) -> None:
     x, y, width, height = frame
     step = height / LEVELS
     for k in range(LEVELS):

@@ -4,14 +4,14 @@ Written directly rather than through a plotting library: a picture of a thousand
 milliseconds and kilobytes, and needs no library where there is nothing to draw.
 """
 
-from collections.abc import Iterable
-
 import numpy as np
 from markupsafe import Markup, escape
 
 INK, MUTED, RULE, PAPER = "#1f2933", "#66727f", "#cfd6dd", "#ffffff"
 # Colours that the colour-blind tell apart (Okabe and Ito).
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "#aa5588"
+
+Style = str | float | tuple[float, ...]
 
 
 class Drawing:
@@ -21,34 +21,37 @@ class Drawing:
         self.width, self.height, self.title = width, height, title
         self._parts: list[str] = []
 
-    def polygons(self, points: np.ndarray, closed: bool = True, **style: object) -> None:
+    def polygons(self, points: np.ndarray, closed: bool = True, **style: Style) -> None:
         """Add polygons or lines of equally many points, (n, points, 2), as one path."""
-        if not len(points):
-            return
+        if len(points):
+            self.path(self._data(points, closed), **style)
+
+    @staticmethod
+    def _data(points: np.ndarray, closed: bool = True) -> str:
         pattern = "M" + " ".join(["%d %d"] * points.shape[1]) + ("Z" if closed else "")
         whole = np.rint(points * 10).astype(int).ravel().tolist()
-        self.path(pattern * len(points) % tuple(whole), **style)
+        return pattern * len(points) % tuple(whole)
 
-    def path(self, data: str, **style: object) -> None:
+    def path(self, data: str, **style: Style) -> None:
         """Add a path whose data are in tenths of a pixel."""
         self._parts.append(f'<path d="{data}"{_attributes(style)}/>')
 
-    def line(self, x1: float, y1: float, x2: float, y2: float, **style: object) -> None:
+    def line(self, x1: float, y1: float, x2: float, y2: float, **style: Style) -> None:
         """Add one straight line."""
-        self.polygons(np.array([[[x1, y1], [x2, y2]]]), closed=False, **style)
+        self.path(self._data(np.array([[[x1, y1], [x2, y2]]]), closed=False), **style)
 
-    def rectangle(self, x: float, y: float, width: float, height: float, **style: object) -> None:
+    def rectangle(self, x: float, y: float, width: float, height: float, **style: Style) -> None:
         """Add an upright rectangle, (x, y) its upper left corner."""
         corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
-        self.polygons(np.array([corners]), **style)
+        self.path(self._data(np.array([corners])), **style)
 
-    def circles(self, centres: np.ndarray, radius: float, **style: object) -> None:
+    def circles(self, centres: np.ndarray, radius: float, **style: Style) -> None:
         """Add circles at (n, 2)."""
         r = round(radius * 10)
         arcs = f"m-{r} 0a{r} {r} 0 1 0 {2 * r} 0a{r} {r} 0 1 0-{2 * r} 0"
         self.path("".join(f"M{x} {y}{arcs}" for x, y in _tenths(centres)), **style)
 
-    def crosses(self, centres: np.ndarray, radius: float, **style: object) -> None:
+    def crosses(self, centres: np.ndarray, radius: float, **style: Style) -> None:
         """Add diagonal crosses at (n, 2)."""
         r = round(radius * 10)
         strokes = f"m-{r}-{r}l{2 * r} {2 * r}m0-{2 * r}l-{2 * r} {2 * r}"
@@ -92,13 +95,12 @@ class Drawing:
         return Markup(head + "".join(self._parts) + "</svg>")
 
 
-def _attributes(style: dict[str, object]) -> str:
+def _attributes(style: dict[str, Style]) -> str:
     """Attributes from keyword arguments; strokes in pixels, no fill unless asked for."""
     style = {"fill": "none"} | style
     for key in ("stroke_width", "stroke_dasharray"):
         if key in style:
-            lengths = style[key] if isinstance(style[key], Iterable) else [style[key]]
-            style[key] = " ".join(f"{10 * float(v):g}" for v in lengths)  # type: ignore[union-attr]
+            style[key] = " ".join(f"{10 * length:g}" for length in np.atleast_1d(style[key]))
     return "".join(f' {key.replace("_", "-")}="{escape(value)}"' for key, value in style.items())
 
 

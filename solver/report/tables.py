@@ -107,7 +107,7 @@ def _cells(row: Row) -> list[str]:
         row.name,
         row.word,
         row.reference_kind or formats.NOTHING,
-        " on ".join(formats.cells(body) for body in sides) or formats.NOTHING,
+        " on ".join(formats.types(body) for body in sides) or formats.NOTHING,
         row.slave or formats.NOTHING,
         ", ".join(
             formats.against(sum(body["cells"].values()), body.get("reference_cells"))
@@ -134,8 +134,7 @@ def _md(text: str) -> str:
 
 
 def to_junit(rows: Sequence[Row]) -> str:
-    """JUnit XML: a suite for each family; a failed or unreliable solve is a failure, one that was
-    refused or crashed is an error."""
+    """JUnit XML: a suite for each family; refused and crashed solves are errors, not failures."""
     suites = ET.Element("testsuites", _junit_counts(rows))
     for family, members in families(rows).items():
         suite = ET.SubElement(suites, "testsuite", {"name": _xml(family)} | _junit_counts(members))
@@ -143,7 +142,11 @@ def to_junit(rows: Sequence[Row]) -> str:
             case = ET.SubElement(
                 suite,
                 "testcase",
-                {"classname": _xml(family), "name": _xml(row.name), "time": f"{row.total or 0:.3f}"},
+                {
+                    "classname": _xml(family),
+                    "name": _xml(row.name),
+                    "time": f"{row.total or 0:.3f}",
+                },
             )
             if row.word != "passed":
                 tag = "failure" if row.word in ("failed", "unreliable") else "error"

@@ -13,7 +13,9 @@ from snakemake.utils import validate
 validate(config, "../schemas/config.schema.yaml")
 
 # One line a job is printed when it ends; two more for each that is chosen and started are too many.
-logger.addFilter(lambda record: not record.getMessage().startswith(("Select jobs", "Execute ")))
+logger.addFilter(
+    lambda record: not record.getMessage().startswith(("Select jobs", "Execute "))
+)
 
 PYTHON = shlex.quote(sys.executable)
 
@@ -24,11 +26,21 @@ Job = namedtuple("Job", "family case name file mesh swap hexahedra")
 
 def sources(*patterns):
     """Source files of the solver, as inputs: whoever depends on them runs again on a change."""
-    return sorted(str(f) for p in patterns for f in Path("solver").glob(p) if f.is_file())
+    return sorted(
+        str(f) for p in patterns for f in Path("solver").glob(p) if f.is_file()
+    )
 
 
-REPORT_SOURCES = sources("report/**/*.py", "report/**/*.jinja")
-MESH_SOURCES = sources("errors.py", "case.py", "expressions.py", "schemas/*", "mesh/*.py")
+REPORT_SOURCES = sources("report/**/*.py", "report/templates/*")
+READING = (
+    "case.py",
+    "errors.py",
+    "expressions.py",
+    "files.py",
+    "strict_yaml.py",
+    "schemas/*",
+)
+MESH_SOURCES = sources(*READING, "mesh/*.py")
 SOLVER_SOURCES = sorted({*sources("**/*.py", "schemas/*")} - {*REPORT_SOURCES})
 
 
@@ -43,7 +55,9 @@ def case_files():
     for folder in listed(config["cases"]):
         found = sorted(Path(folder).expanduser().glob("*.yaml"))
         if not found:
-            raise WorkflowError(f"cases = {folder}: no case file (*.yaml) in this folder")
+            raise WorkflowError(
+                f"cases = {folder}: no case file (*.yaml) in this folder"
+            )
         files += found
     return [f for f in files if f.name != "family.yaml"]
 
@@ -51,7 +65,9 @@ def case_files():
 def peek(file):
     """The few keys needed here; a broken file still becomes one job, which the solver refuses."""
     try:
-        content = yaml.load(file.read_text(), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        content = yaml.load(
+            file.read_text(), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+        )
     except (yaml.YAMLError, UnicodeDecodeError):
         content = None
     return content if isinstance(content, dict) else {}
@@ -63,14 +79,18 @@ def jobs_of(file):
     family = file.resolve().parent.name
     name = str(content.get("name"))
     if "name" not in content or not re.fullmatch(r"[A-Za-z0-9][\w.+-]*", name):
-        name = re.sub(r"[^\w.+-]", "_", f"{family}-{file.stem}")
+        name = re.sub(r"[^\w.+-]", "_", file.stem)
     mesh = content.get("mesh")
     mesh_file = (
-        file.parent / str(mesh["file"]) if isinstance(mesh, dict) and "file" in mesh else None
+        file.parent / str(mesh["file"])
+        if isinstance(mesh, dict) and "file" in mesh
+        else None
     )
     cuts = [None]
     if config["variants"] and (mesh_file or "HEXA" in str(mesh)):
-        own = re.search(r"\bhexahedra: *(\w+)", str(content.get("contact")).replace("'", ""))
+        own = re.search(
+            r"\bhexahedra: *(\w+)", str(content.get("contact")).replace("'", "")
+        )
         cuts.append("pyramids" if own and own[1] == "hexahedra" else "hexahedra")
     for cut in cuts:
         for swap in [False, True] if content.get("directions") == "both" else [False]:
@@ -104,7 +124,9 @@ def verdict_of(job):
 BATCH = find_jobs()
 RUN = {k: j for k, j in BATCH.items() if config["case"] in ("", j.name)}
 if not RUN:
-    raise WorkflowError(f"case = {config['case']}: unknown; a case is named as in its file")
+    raise WorkflowError(
+        f"case = {config['case']}: unknown; a case is named as in its file"
+    )
 
 
 wildcard_constraints:

@@ -5,6 +5,7 @@ SHOWN = [verdict_of(job) for key, job in BATCH.items() if key not in RUN]
 rule report:
     input:
         verdicts=[verdict_of(job) for job in RUN.values()],
+        families=sorted(map(str, Path("cases").glob("*/family.yaml"))),
         sources=REPORT_SOURCES,
     output:
         report(

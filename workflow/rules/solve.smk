@@ -5,11 +5,19 @@ def mesh_of(job):
     return [str(job.mesh)] if job.mesh.is_file() else []
 
 
+def accepted_of(job):
+    """The accepted values that the solve's checks are held against, if there are any."""
+    file = Path(job.file).parent / "regression" / f"{job.name}.json"
+    return [str(file)] if file.is_file() else []
+
+
 def options_of(job):
     """How the command line is told which job of a case this is."""
     options = "--mesh " + shlex.quote(mesh_of(job)[0]) if job.mesh is None else ""
     return (
-        options + " --swap" * job.swap + (f" --hexahedra {job.hexahedra}" if job.hexahedra else "")
+        options
+        + " --swap" * job.swap
+        + (f" --hexahedra {job.hexahedra}" if job.hexahedra else "")
     )
 
 
@@ -18,6 +26,7 @@ rule solve:
     input:
         case=lambda w: BATCH[w.family, w.job].file,
         mesh=lambda w: mesh_of(BATCH[w.family, w.job]),
+        accepted=lambda w: accepted_of(BATCH[w.family, w.job]),
         sources=SOLVER_SOURCES,
     output:
         verdict="results/{family}/{job}/verdict.json",
