@@ -3,12 +3,13 @@
     recipe: blocks
     size: [50, 50]         # of each block along x, y (and z in 3D); one number for a cube
     bottom: {cells: QUAD4, divisions: [12, 12]}
-    top: {cells: TRIA3, divisions: [10, 8], far: 6, algorithm: frontal, seed: 3}
+    top: {cells: TRIA3, divisions: [10, 8], far: 6, inner: 1.2, algorithm: frontal}
 
 `cells` is the cell type, in both blocks of the same dimension. `divisions` says how many pieces
 the edges have along each axis; blocks of QUAD and HEXA cells are regular grids. Blocks of TRIA and
-TETRA cells are unstructured inside; there `far` (the lateral edges on the side away from the
-interface, by default as the others), `algorithm` and `seed` (any whole number) shape the mesh.
+TETRA cells are unstructured inside; there `far` (divisions of the lateral edges on the side away
+from the interface, by default as on it), `inner` (size of the inner cells, as a share of what the
+edges suggest) and `algorithm` (for the surfaces) shape the mesh.
 Blocks of PENTA and PYRA cells are a single cube cut in pieces (see `hybrid`).
 
 The interface lies in y = 0 (2D) or z = 0 (3D), the corner of both blocks at x = 0 (and y = 0).
@@ -69,7 +70,9 @@ class _Block:
             options["Mesh__Algorithm"] = _ALGORITHMS[
                 keys.choice("algorithm", _ALGORITHMS, "frontal")
             ]
-            options["Mesh__RandomSeed"] = keys.integers("seed", 1, [1])[0]
+            if keys.given("inner"):
+                options["Mesh__MeshSizeExtendFromBoundary"] = 0
+                options["Mesh__MeshSizeMax"] = keys.numbers("inner", 1)[0]
         self.options = options
         keys.finish()
 
