@@ -1,0 +1,1 @@
+"""Verification of mortar contact: meshes, solves, checks and reports cases."""

@@ -21,7 +21,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         by_zone[zone.zone.name] = forces
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2) or 1.0
-    result = {}
+    result: dict[str, float] = {}
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length)
     internal = internal_force(points, scene.blocks, state.displacement)

@@ -1,6 +1,7 @@
 """From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import meshio
 import numpy as np
@@ -121,9 +122,7 @@ def build_scene(
 
 def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
     """The same cells and groups on other points."""
-    return meshio.Mesh(
-        points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets
-    )
+    return meshio.Mesh(points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets)
 
 
 def _as_solved(zone: Zone, swapped: bool, hexahedra: str | None) -> Zone:
@@ -172,7 +171,7 @@ def _cut(
         first.append(first[-1] + sum(len(block.nodes) for block in slave))
     cut_mesh = cut(mesh.points, volume_cells(mesh), faces, macro, into_hexahedra)
     sub_faces = []
-    for low, high in zip(first[:-1], first[1:], strict=True):
+    for low, high in pairwise(first):
         mine = [(f, (f.macro >= low) & (f.macro < high)) for f in cut_mesh.sub_faces]
         sub_faces.append(
             [SubFaces(f.type, f.nodes[m], f.macro[m] - low) for f, m in mine if m.any()]
@@ -194,9 +193,7 @@ def _operator(
     search = float(np.linalg.norm(np.ptp(corners, axis=0)))
     search += max(f.radius.max() for f in [*slaves, *masters])
     operator = gap_operator(slaves, masters, count, len(points), search)
-    initial = np.where(
-        np.abs(operator.initial) <= noise * operator.covered, 0.0, operator.initial
-    )
+    initial = np.where(np.abs(operator.initial) <= noise * operator.covered, 0.0, operator.initial)
     return replace(operator, initial=initial - zone.interference * operator.covered)
 
 
@@ -239,7 +236,7 @@ class _Groups:
 
     def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
         """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
-        found = []
+        found: list[tuple[str, np.ndarray]] = []
         for block in boundary_faces(self.mesh, group, self.case.path, key):
             plain = np.ones(len(block.nodes), dtype=bool)
             for zone in self.zones:
@@ -260,8 +257,9 @@ class _Groups:
                 mine, theirs = (10 * b.owner + b.local for b in (block, slave))
                 hit |= np.isin(mine, theirs)
                 macro = slave.number[np.isin(theirs, mine)]
-                for sub in zone.sub_faces:
-                    found.append((sub.type.name, sub.nodes[np.isin(sub.macro, macro)]))
+                found += [
+                    (sub.type.name, sub.nodes[np.isin(sub.macro, macro)]) for sub in zone.sub_faces
+                ]
         return hit
 
     def nodes(self, group: str, key: str) -> np.ndarray:

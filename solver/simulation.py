@@ -28,7 +28,7 @@ def simulate(
     mesh: meshio.Mesh,
     swapped: bool = False,
     hexahedra: str | None = None,
-    log: Log = lambda line: None,
+    log: Log = lambda _: None,
 ) -> Solution:
     """Solve a case on its mesh.
 
@@ -135,7 +135,9 @@ def _zone_result(
     scene: Scene, problem: ContactProblem, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
 ) -> ZoneResult:
     operator, part = zone.operator, zone.numbers
-    slave_nodes, slave_normal = _nodal_normals(scene, [(f.type.name, f.nodes) for f in zone.sub_faces])
+    slave_nodes, slave_normal = _nodal_normals(
+        scene, [(f.type.name, f.nodes) for f in zone.sub_faces]
+    )
     master = [(b.type.name, b.nodes) for b in zone.master_faces]
     master_nodes, master_normal = _nodal_normals(scene, master)
     return ZoneResult(
@@ -187,9 +189,7 @@ def _step_results(
                 }
             )
         changes = sum(state.status.changes)
-        results.append(
-            StepResult(factor, state.status.iterations, changes, state.residual, seen)
-        )
+        results.append(StepResult(factor, state.status.iterations, changes, state.residual, seen))
     return results
 
 

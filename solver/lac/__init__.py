@@ -1,0 +1,1 @@
+"""The LAC mortar method: cut, pairing, segments, gap operator, contact status."""

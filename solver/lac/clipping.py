@@ -10,7 +10,7 @@ import numpy as np
 def clip(
     subject: np.ndarray, count: np.ndarray, window: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Intersect each subject polygon (n, v, 2), of `count` (n,) vertices, with its window (n, w, 2).
+    """Intersect subject polygons (n, v, 2), of `count` (n,) vertices, with windows (n, w, 2).
 
     Windows are convex with all w vertices in use. Source: Sutherland, Hodgman, Reentrant polygon
     clipping, CACM 17 (1974) 32–42.

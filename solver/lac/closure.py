@@ -99,7 +99,7 @@ def _close_block(
     defect = np.where(full[:, None], exact - summed, 0.0)
     for face, part, vectors in mine:
         share = defect[face] * (part.area / area[face])[:, None]
-        vectors += share[..., None] * part.normal[:, None]
+        np.add(vectors, share[..., None] * part.normal[:, None], out=vectors)
     return int(full.sum())
 
 
@@ -116,7 +116,7 @@ def close_plane(
     edges only (`close_faces` serves there).
     """
     blocks = [*slaves, *masters]
-    normal, tangents = slaves[0].normal[0], slaves[0].tangents[0]
+    tangents = slaves[0].tangents[0]
     tilt = max(float(np.abs(b.normal @ tangents.T).max()) for b in blocks)
     flat = all(b.flat.all() for b in blocks) and tilt <= _ONE_NORMAL
     if not flat or all(b.straight.all() for b in blocks):

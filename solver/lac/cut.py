@@ -150,9 +150,7 @@ class _Pieces:
             joined = np.concatenate(data)
             if len(joined):
                 cells[name], origin[name] = joined, parents
-        return CutMesh(
-            np.concatenate(self.points), cells, origin, _joined(whole + self.sub_faces)
-        )
+        return CutMesh(np.concatenate(self.points), cells, origin, _joined(whole + self.sub_faces))
 
 
 def _joined(parts: list[SubFaces]) -> list[SubFaces]:
@@ -230,7 +228,7 @@ def _faces(cell: Cell) -> list[tuple[int, ...]]:
 
 
 def _mean(places: list[tuple[float, ...]], weights: dict[int, float]) -> tuple[float, ...]:
-    return tuple(sum(w * np.array(places[i]) for i, w in weights.items()))
+    return tuple(np.sum([w * np.array(places[i]) for i, w in weights.items()], axis=0))
 
 
 def _add(places: list[tuple[float, ...]], place: tuple[float, ...]) -> int:
@@ -278,7 +276,9 @@ def _cut_into_hexahedra(
     cell: Cell, corners: tuple[int, ...], places: list[tuple[float, ...]]
 ) -> tuple[list[Cell], list[Cell]]:
     edges = [{cell[1][i], cell[1][j]} for i, j in BY_NAME["HEXA8"].edges]
-    far = [next((e - {a}).pop() for e in edges if a in e and not e <= set(corners)) for a in corners]
+    far = [
+        next((e - {a}).pop() for e in edges if a in e and not e <= set(corners)) for a in corners
+    ]
     inner, deep = [], []
     for i in range(4):
         near = {corners[j]: 1 / 4 * 2 / 3 + (1 / 3 if j == i else 0) for j in range(4)}

@@ -13,7 +13,7 @@ from solver.mesh.catalogue import CellType
 # Below these shares of a face's size, its bending and the skew of its map are round-off.
 _FLAT = 1e-9
 _AFFINE = 1e-12
-# Newton's method stops at steps below the first, in parts of a face, and is content below the second.
+# Newton's method stops at steps below the first (in parts of a face) and accepts the second.
 _CONVERGED, _ACCEPTED = 1e-13, 1e-8
 _NEWTON_STEPS = 30
 

@@ -14,6 +14,7 @@ from solver.lac.closure import Integrals, close_faces, close_plane, surface_vect
 from solver.lac.facets import Facets
 from solver.lac.segments import Segments, intersect
 
+
 @dataclass(frozen=True)
 class GapOperator:
     """Gap integrals of m macro-elements.
@@ -47,7 +48,7 @@ def gap_operator(
     looked for nearby, and farther away only for sub-faces that found no partner there.
     """
     found = _search(slaves, masters, search)
-    parts = [_integrals(slaves[a], masters[b], s) for a, b, s in found]
+    parts = [_integrals(s) for _, _, s in found]
     closed = close_faces(slaves, masters, found, parts) if closure else 0
     dim = slaves[0].centre.shape[1]
     rows, columns, values = [], [], []
@@ -112,7 +113,7 @@ def _search(
         return found
     for a, block in enumerate(slaves):
         covered = np.zeros(len(block.number))
-        for b, _, segments in [f for f in found if f[0] == a]:
+        for segments in [f[2] for f in found if f[0] == a]:
             covered += np.bincount(
                 segments.slave, segments.weight.sum(axis=1), minlength=len(covered)
             )
@@ -150,7 +151,7 @@ def _renumbered(segments: Segments, slaves: np.ndarray) -> Segments:
     return Segments(**{**vars(segments), "slave": slaves[segments.slave]})
 
 
-def _integrals(slave: Facets, master: Facets, segments: Segments) -> Integrals:
+def _integrals(segments: Segments) -> Integrals:
     measure = segments.weight[..., None] * segments.normal
     return Integrals(
         np.einsum("sqa,sqd->sad", segments.slave_values, measure),

@@ -13,7 +13,6 @@ import numpy as np
 
 from solver.batch import invert
 from solver.elements import mortar_degree, shape_functions, simplex_rule
-from solver.faces import area_vectors
 from solver.lac.clipping import clip, overlap, triangles
 from solver.lac.facets import Facets, locate, shift
 from solver.lac.pairing import candidate_pairs
@@ -61,7 +60,9 @@ def intersect(slave: Facets, master: Facets, reach: float) -> list[Segments]:
     return [part for part in parts if len(part.slave)]
 
 
-def _in_plane(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray, reach: float) -> Segments:
+def _in_plane(
+    slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray, reach: float
+) -> Segments:
     """Segments of straight slave faces, cut in the plane of the slave face."""
     tangents = slave.tangents[i]
     outline = _outline(slave.type, bent=False)
@@ -163,9 +164,7 @@ def _degree(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> int:
     return degree if affine else degree + _BENT_DEGREES
 
 
-def _near(
-    face: np.ndarray, n_vertices: int, rim: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _near(face: np.ndarray, n_vertices: int, rim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The part of each rim (n, v, d) around its face (n, a, d), both seen in a plane, and counts.
 
     Far from a bent face, points have no place in its reference face, or a wrong one.

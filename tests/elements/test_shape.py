@@ -31,8 +31,9 @@ def test_gradients_are_those_of_the_values(name):
     points, _ = volume_rule(name)
     shape, step = shape_functions(name), 1e-6
     for axis, direction in enumerate(np.eye(BY_NAME[name].dim)):
-        ahead, behind = shape.values(points + step * direction), shape.values(
-            points - step * direction
+        ahead, behind = (
+            shape.values(points + step * direction),
+            shape.values(points - step * direction),
         )
         slope = (ahead - behind) / (2 * step)
         assert np.allclose(shape.gradients(points)[..., axis], slope, atol=1e-7)
@@ -55,7 +56,7 @@ def test_polynomials_up_to_the_order_are_reproduced(name):
 
 @pytest.mark.parametrize("name", TYPES)
 def test_weights_sum_to_the_volume_of_the_reference_cell(name):
-    points, weights = volume_rule(name)
+    _, weights = volume_rule(name)
     assert weights.sum() == pytest.approx(VOLUME[shape_name(name)], rel=1e-14)
     assert (weights > 0).all()
 

@@ -29,7 +29,7 @@ def cut_in_pieces(polygon):
 
 
 def test_overlapping_squares():
-    area, moment = area_and_moment(SQUARE + [0.5, 0.25], SQUARE)
+    area, moment = area_and_moment(SQUARE + np.array([0.5, 0.25]), SQUARE)
     assert area == pytest.approx(0.375, rel=1e-15)
     assert moment == pytest.approx(0.375 * np.array([0.75, 0.625]), rel=1e-15)
 
@@ -42,14 +42,14 @@ def test_triangle_in_a_square_and_around_it():
 
 
 def test_polygons_apart_or_touching_have_no_common_area():
-    assert area_and_moment(SQUARE + [2.0, 0.0], SQUARE)[0] == 0
-    assert area_and_moment(SQUARE + [1.0, 0.0], SQUARE)[0] == 0
+    assert area_and_moment(SQUARE + np.array([2.0, 0.0]), SQUARE)[0] == 0
+    assert area_and_moment(SQUARE + np.array([1.0, 0.0]), SQUARE)[0] == 0
 
 
 @pytest.mark.parametrize("shift", [1e-15, 1e-12, 1e-9, 1e-3])
 def test_slivers_are_kept(shift):
-    left = area_and_moment(SQUARE + [shift, 0.0], SQUARE)[0]
-    right = area_and_moment(SQUARE + [shift - 1.0, 0.0], SQUARE)[0]
+    left = area_and_moment(SQUARE + np.array([shift, 0.0]), SQUARE)[0]
+    right = area_and_moment(SQUARE + np.array([shift - 1.0, 0.0]), SQUARE)[0]
     assert left + right == pytest.approx(1.0, abs=1e-15)
     assert right == pytest.approx(shift, abs=2e-16)
     assert right > 0
@@ -89,7 +89,7 @@ def test_rotation_changes_nothing(a, b, offset, angle):
 
 
 def test_many_at_once_equal_one_by_one():
-    polygons = np.array([SQUARE + [0.1 * k, 0.05 * k] for k in range(25)])
+    polygons = np.array([SQUARE + np.array([0.1 * k, 0.05 * k]) for k in range(25)])
     windows = np.array([SQUARE] * 25)
     clipped, count = clip(polygons, np.full(25, 4), windows)
     which, _, area = triangles(clipped, count)

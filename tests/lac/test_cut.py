@@ -117,12 +117,13 @@ def test_every_choice_of_up_to_three_slave_faces_is_cut_conformingly(name, hexah
         for f in range(len(kind.faces)):
             cut_away = f in faces and needs_cut(kind.faces[f].type)
             assert (corners[f] in outer) != cut_away
-        slaves = [frozenset(map(int, row[: s.type.n_vertices])) for s in result.sub_faces
-                  for row in s.nodes]
+        slaves = [
+            frozenset(map(int, row[: s.type.n_vertices]))
+            for s in result.sub_faces
+            for row in s.nodes
+        ]
         assert set(slaves) <= outer
-        assert len(outer) == len(set(slaves)) + sum(
-            not (f in faces) for f in range(len(kind.faces))
-        )
+        assert len(outer) == len(set(slaves)) + sum(f not in faces for f in range(len(kind.faces)))
 
 
 @pytest.mark.parametrize("name", VOLUMES)
@@ -142,9 +143,7 @@ def test_each_macro_element_owns_a_node_strictly_inside(name, hexahedra):
         for block in result.sub_faces:
             for row in block.nodes:
                 nodes |= set(map(int, row))
-                ends = [row] if block.type.dim == 1 else [
-                    row[list(e)] for e in block.type.edges
-                ]
+                ends = [row] if block.type.dim == 1 else [row[list(e)] for e in block.type.edges]
                 for k, end in enumerate(ends):
                     if block.type.dim == 1:
                         rim.update(map(int, end[:2]))

@@ -37,7 +37,8 @@ def test_one_slave_edge_over_two_master_edges_by_hand():
     operator = gap_operator([slave], [master], 1, len(points), 1.0)
     assert vertical(operator, 5)[0] == pytest.approx([-1.5, -1.5, 0.5, 1.5, 1.0], rel=1e-15)
     assert np.abs(operator.matrix.toarray().reshape(5, 2)[:, 0]).max() < 1e-15
-    assert operator.area == pytest.approx([3.0]) and operator.covered == pytest.approx([3.0])
+    assert operator.area == pytest.approx([3.0])
+    assert operator.covered == pytest.approx([3.0])
     assert operator.normal[0] == pytest.approx([0.0, 1.0])
 
 
@@ -50,7 +51,8 @@ def test_overlapping_edges_by_hand():
     points, slave, master = segment_pair([0.0, 1.0, 2.0], [0.5, 2.0])
     operator = gap_operator([slave], [master], 2, len(points), 1.0)
     assert vertical(operator, 5) == pytest.approx(
-        np.array([[-1 / 8, -3 / 8, 0, 5 / 12, 1 / 12], [0, -1 / 2, -1 / 2, 1 / 3, 2 / 3]]), abs=1e-15
+        np.array([[-1 / 8, -3 / 8, 0, 5 / 12, 1 / 12], [0, -1 / 2, -1 / 2, 1 / 3, 2 / 3]]),
+        abs=1e-15,
     )
     assert operator.covered == pytest.approx([0.5, 1.0])
 

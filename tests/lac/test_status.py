@@ -28,7 +28,8 @@ def test_each_start_ends_where_pressure_and_gap_are_complementary(start):
 
 def test_a_right_start_takes_one_solve():
     result = find_status(springs([1.0, 2.0]), np.full(2, True), np.full(2, True), 1.0, 1.0)
-    assert result.iterations == 1 and result.changes == []
+    assert result.iterations == 1
+    assert result.changes == []
 
 
 def test_what_may_not_close_stays_open():
