@@ -79,7 +79,7 @@ def _mark(drawing: Drawing, row: Row, point: np.ndarray) -> None:
     error, check = row.accuracy  # type: ignore[misc]
     tip = f"{row.name}: {formats.error(error)} ({check}), {formats.seconds(row.total)}, {row.word}"
     color = _COLORS.get(row.reference_kind, INK)
-    drawing.open_link(f"#{quote(row.name)}", tip)
+    drawing.open_link(f"#{quote(row.anchor)}", tip)
     if row.word == "passed":
         drawing.circles(point[None], 4, fill=color, fill_opacity=0.55, stroke=color)
     else:

@@ -43,6 +43,11 @@ class Row:
         return str(self.verdict.get("family") or self.folder.parent.name)
 
     @cached_property
+    def anchor(self) -> str:
+        """Where the solve stands on the page: its own, also where families share names."""
+        return f"{self.group}/{self.name}"
+
+    @cached_property
     def word(self) -> str:
         """The verdict in one word; what is none of ours counts as crashed."""
         word = self.verdict.get("verdict")

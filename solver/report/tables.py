@@ -193,6 +193,6 @@ def outcome(rows: Sequence[Row]) -> str:
     """The batch in one line."""
     counts = counted(rows)
     if set(counts) == {"passed"}:
-        return f"All {len(rows)} solves passed."
+        return f"All {len(rows)} solves passed." if len(rows) > 1 else "The one solve passed."
     words = ", ".join(f"{n} {word}" for word, n in counts.items())
     return f"{len(rows)} solves: {words or 'none at all'}."

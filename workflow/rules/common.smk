@@ -17,6 +17,7 @@ logger.addFilter(
     lambda record: not record.getMessage().startswith(("Select jobs", "Execute "))
 )
 
+VARIANTS = config["variants"] in (True, "true")
 PYTHON = shlex.quote(sys.executable)
 
 # One solve. `mesh`: the user's mesh file, or None where a recipe generates it; `hexahedra`: how
@@ -87,7 +88,7 @@ def jobs_of(file):
         else None
     )
     cuts = [None]
-    if config["variants"] and (mesh_file or "HEXA" in str(mesh)):
+    if VARIANTS and (mesh_file or "HEXA" in str(mesh)):
         own = re.search(
             r"\bhexahedra: *(\w+)", str(content.get("contact")).replace("'", "")
         )

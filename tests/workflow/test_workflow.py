@@ -1,0 +1,218 @@
+"""The workflow as a user meets it: real Snakemake on a copy of the project with tiny cases."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CASE = """\
+name: {name}
+mesh: {{recipe: blocks, size: 10, bottom: {{cells: QUAD4, divisions: [2, 2]}},
+       top: {{cells: QUAD4, divisions: [3, 2]}}}}
+plane: strain
+materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
+supports: [{{group: symx, fix: [x]}}, {{group: base, fix: [y]}}]
+loads: [{{group: press, pressure: 25.0}}]
+contact: [{{name: interface, slave: bottom_contact, master: top_contact}}]
+directions: {directions}
+reference: {{kind: analytical, contact_pressure: {pressure}, gap: 0.0}}
+"""
+
+
+def write_case(folder, name, directions="first", pressure=25.0):
+    folder.mkdir(parents=True, exist_ok=True)
+    text = CASE.format(name=name, directions=directions, pressure=pressure)
+    (folder / f"{name}.yaml").write_text(text)
+
+
+def snakemake(project, *arguments):
+    """The finished process of a run, its output and errors as one text."""
+    return subprocess.run(
+        [sys.executable, "-m", "snakemake", *map(str, arguments)],
+        cwd=project,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=300,
+    )
+
+
+def jobs(project, *arguments):
+    """What a run would do, by the jobs' messages."""
+    planned = snakemake(project, "--dry-run", *arguments)
+    assert planned.returncode == 0, planned.stdout
+    return set(re.findall(r"^Job \d+: (.*)$", planned.stdout, re.MULTILINE))
+
+
+def new_project(folder):
+    for name in ("workflow", "solver"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    write_case(folder / "cases" / "tiny", "tiny-a", "both")
+    write_case(folder / "cases" / "tiny", "tiny-b")
+    (folder / "cases" / "tiny" / "family.yaml").write_text("title: Tiny cases\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """A project whose batch has run."""
+    project = new_project(tmp_path_factory.mktemp("solved"))
+    done = snakemake(project)
+    assert done.returncode == 0, done.stdout
+    assert "All 3 solves passed. Report: results/report/summary.html" in done.stdout
+    return project
+
+
+@pytest.fixture
+def project(solved, tmp_path):
+    """A copy of the solved project, to be changed."""
+    return shutil.copytree(solved, tmp_path / "project")
+
+
+def append(file, text):
+    file.write_text(file.read_text() + text)
+
+
+def summary(project):
+    content = json.loads((project / "results" / "report" / "summary.json").read_text())
+    return {verdict["job"]: verdict for verdict in content}
+
+
+def test_results_lie_where_they_should(solved):
+    for job in ("tiny-a", "tiny-a-swapped", "tiny-b"):
+        folder = solved / "results" / "tiny" / job
+        assert json.loads((folder / "verdict.json").read_text())["job"] == job
+        for name in ("result.vtkhdf", "log", "benchmark"):
+            assert (folder / name).stat().st_size > 0
+    assert (solved / "results" / "tiny" / "tiny-a" / "mesh.vtkhdf").is_file()
+    assert not (solved / "results" / "tiny" / "tiny-a-swapped" / "mesh.vtkhdf").exists()
+    assert summary(solved).keys() == {"tiny-a", "tiny-a-swapped", "tiny-b"}
+    assert "Tiny cases" in (solved / "results" / "report" / "summary.html").read_text()
+
+
+def test_nothing_to_do_is_said(solved):
+    again = snakemake(solved)
+    assert again.returncode == 0
+    assert "Nothing to be done" in again.stdout
+
+
+REPORT = {"report of all cases", "all cases passed?"}
+
+
+def test_a_changed_case_runs_alone(project):
+    append(project / "cases" / "tiny" / "tiny-a.yaml", "# changed\n")
+    expected = {"mesh tiny-a", "solve tiny-a", "solve tiny-a-swapped"} | REPORT
+    assert jobs(project) == expected
+
+
+def test_changed_accepted_values_check_their_solve_again(project):
+    accepted = project / "cases" / "tiny" / "regression" / "tiny-a-swapped.json"
+    accepted.parent.mkdir()
+    accepted.write_text("{}")
+    assert jobs(project) == {"solve tiny-a-swapped"} | REPORT
+
+
+def test_a_changed_solver_runs_all_and_a_changed_report_only_itself(project):
+    append(project / "solver" / "report" / "page.py", "# changed\n")
+    assert jobs(project) == REPORT
+    append(project / "solver" / "lac" / "__init__.py", "# changed\n")
+    solves = {"solve tiny-a", "solve tiny-a-swapped", "solve tiny-b"}
+    assert jobs(project) == solves | REPORT
+
+
+def test_one_case_again_is_one_case(project):
+    verdict = "results/tiny/tiny-a-swapped/verdict.json"
+    assert jobs(project, "--forcerun", verdict) == {"solve tiny-a-swapped"} | REPORT
+    assert jobs(project, verdict, "--forcerun", verdict) == {"solve tiny-a-swapped"}
+    forced = ("--config", "case=tiny-b", "--forcerun", "solve")
+    assert jobs(project, *forced) == {"solve tiny-b"} | REPORT
+
+
+def test_both_cuts_of_hexahedra(project):
+    case = (project / "cases" / "tiny" / "tiny-b.yaml").read_text().replace("QUAD4", "HEXA8")
+    (project / "cases" / "tiny" / "tiny-b.yaml").write_text(case)
+    planned = jobs(project, "--config", "variants=true")
+    assert {"solve tiny-b", "solve tiny-b-hexahedra"} <= planned
+    assert not any("solve tiny-a" in job for job in planned)
+
+
+def test_a_batch_with_every_kind_of_ending(project, tmp_path):
+    mine = tmp_path / "my cases"
+    write_case(mine, "good")
+    write_case(mine, "wrong", pressure=26.0)
+    write_case(mine, "doomed")
+    (mine / "broken.yaml").write_text("name: [broken\n")
+    write_case(mine, "meshless")
+    text = (mine / "meshless.yaml").read_text().replace("recipe: blocks", "recipe: nothing")
+    (mine / "meshless.yaml").write_text(text)
+    main = project / "solver" / "__main__.py"
+    dies = "if 'solve' in sys.argv and 'doomed' in str(sys.argv): os.kill(os.getpid(), 9)\n"
+    main.write_text(f"import os, sys\n{dies}{main.read_text()}")
+
+    run = snakemake(project, "--config", f"cases={mine}", "family=my cases")
+
+    assert run.returncode != 0
+    verdicts = {name: v["verdict"] for name, v in summary(project).items()}
+    assert verdicts == {
+        "good": "passed",
+        "wrong": "failed",
+        "doomed": "crashed",
+        "broken": "refused",
+        "meshless": "refused",
+    }
+    reasons = {name: v["reason"] for name, v in summary(project).items()}
+    assert "multiplier" in reasons["wrong"]
+    assert "137" in reasons["doomed"]
+    assert "nothing" in reasons["meshless"]
+    for name in verdicts.keys() - {"good"}:
+        assert re.search(rf"^{name}: {verdicts[name]}: \S", run.stdout, re.MULTILINE), name
+    page = (project / "results" / "report" / "summary.html").read_text()
+    assert all(name in page for name in verdicts)
+    assert not (project / "results" / "report" / "passed").exists()
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("family=tinny", "family = tinny: unknown; there are tiny"),
+        ("famly=tiny", "'famly' was unexpected"),
+        ("case=tiny-c", "case = tiny-c: unknown"),
+        ("cases=/nowhere", "cases = /nowhere: no case file"),
+    ],
+)
+def test_a_wrong_setting_is_refused(solved, setting, message):
+    refused = snakemake(solved, "--dry-run", "--config", setting)
+    assert refused.returncode != 0
+    assert message in refused.stdout
+
+
+def test_two_cases_of_one_name_are_refused(project):
+    shutil.copy(project / "cases/tiny/tiny-b.yaml", project / "cases/tiny/other.yaml")
+    refused = snakemake(project, "--dry-run")
+    assert refused.returncode != 0
+    assert "name = tiny-b: already taken by cases/tiny/other.yaml" in refused.stdout
+
+
+def test_after_a_killed_run_the_next_one_works(tmp_path):
+    project = new_project(tmp_path / "killed")
+    command = [sys.executable, "-m", "snakemake"]
+    with (tmp_path / "output").open("w") as output:
+        run = subprocess.Popen(
+            command, cwd=project, stdout=output, stderr=output, start_new_session=True
+        )
+        while not list(project.glob("results/tiny/*/log")):
+            assert run.poll() is None
+            time.sleep(0.02)
+        os.killpg(run.pid, signal.SIGKILL)
+        run.wait()
+    done = snakemake(project)
+    assert done.returncode == 0, done.stdout
+    assert "All 3 solves passed." in done.stdout
