@@ -1,18 +1,48 @@
-"""Mesh files by extension."""
+"""Mesh files, by their extension.
 
+| extension | read by | groups |
+|---|---|---|
+| .med | `med` | of cells and of nodes |
+| .msh, versions 2 and 4 | gmsh | physical groups; those of points become groups of nodes |
+| .inp | `abaqus` | *ELSET, *SURFACE, *NSET |
+| .vtu | meshio | each integer array of 0 and 1 on cells or points is a group of its name |
+| .vtkhdf | `vtkhdf` | as this program writes them |
+"""
+
+from importlib import import_module
 from pathlib import Path
 
 import meshio
 
 from solver.errors import InputError
+from solver.mesh.tidy import tidy
+
+# Modules with a function `read(path)` that gives the mesh as it stands in the file.
+_READERS = {
+    ".med": "solver.mesh.med",
+    ".msh": "solver.mesh.msh",
+    ".inp": "solver.mesh.abaqus",
+    ".vtu": "solver.mesh.vtu",
+    ".vtkhdf": "solver.mesh.vtkhdf",
+}
 
 
 def read(path: Path) -> meshio.Mesh:
-    """The mesh of a file."""
+    """The mesh of a file, tidied. Raises InputError for whatever keeps it from being read."""
+    if path.suffix not in _READERS:
+        raise InputError(path, "extension", path.suffix, f"allowed: {', '.join(_READERS)}")
     if not path.is_file():
         raise InputError(path, "mesh", None, "no such file")
-    if path.suffix == ".vtkhdf":
-        from solver.mesh import vtkhdf
-
-        return vtkhdf.read(path)
-    raise InputError(path, "extension", path.suffix, "allowed: .vtkhdf")
+    reader = import_module(_READERS[path.suffix])
+    try:
+        raw = reader.read(path)
+    except InputError:
+        raise
+    except Exception as error:
+        # Whatever the reader trips over lies in the file.
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(path, "mesh", None, f"cannot be read: {reason}") from error
+    mesh = tidy(raw, path)
+    if not mesh.cell_sets:
+        raise InputError(path, "groups", None, "the mesh must have named groups of cells or faces")
+    return mesh

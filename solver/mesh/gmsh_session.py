@@ -76,15 +76,19 @@ def current_model(unnamed: bool = True) -> meshio.Mesh:
     """
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags)
-    rank = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
-    rank[tags[order]] = np.arange(len(tags))
+    sorted_tags = tags[order]
     cells, numbers, members = [], [], []
     for dim, entity in gmsh.model.getEntities():
         names = _groups_of(dim, entity)
         if not (names or unnamed):
             continue
         for number, ids, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
-            cells.append((_meshio_type(number), _in_our_order(number, rank[nodes], len(ids))))
+            cells.append(
+                (
+                    _meshio_type(number),
+                    _in_our_order(number, np.searchsorted(sorted_tags, nodes), len(ids)),
+                )
+            )
             numbers.append(ids.astype(np.int64))
             members.append(names)
     every = sorted({name for names in members for name in names})

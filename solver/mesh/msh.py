@@ -1,0 +1,20 @@
+"""Mesh files of gmsh, versions 2 and 4, read by gmsh."""
+
+from pathlib import Path
+
+import gmsh
+import meshio
+
+from solver.errors import InputError
+from solver.mesh.gmsh_session import current_model, session
+
+
+def read(path: Path) -> meshio.Mesh:
+    """The mesh of a .msh file; physical groups are its groups."""
+    # Handed anything else, gmsh runs it as a script.
+    with path.open("rb") as file:
+        if not file.read(4096).lstrip().startswith(b"$"):
+            raise InputError(path, "mesh", None, "no gmsh mesh: it must start with $MeshFormat")
+    with session():
+        gmsh.merge(str(path))
+        return current_model()
