@@ -78,9 +78,7 @@ def element_matrices(points: np.ndarray, block: Block) -> np.ndarray:
     reference, weights = block.rule
     matrices = np.empty((len(block.cells), nodes, dim, nodes, dim))
     for part in _chunks(block, dim):
-        gradient, determinant = physical_gradients(
-            points, block.cells[part], block.type, reference
-        )
+        gradient, determinant = physical_gradients(points, block.cells[part], block.type, reference)
         flat = gradient.reshape(*gradient.shape[:2], nodes * dim)
         weighted = flat * (weights * determinant)[:, :, None]
         products = np.matmul(np.swapaxes(weighted, 1, 2), flat)
@@ -149,9 +147,7 @@ def _stress(
     return stress
 
 
-def nodal_stress(
-    points: np.ndarray, blocks: list[Block], displacement: np.ndarray
-) -> np.ndarray:
+def nodal_stress(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> np.ndarray:
     """Stress (n_nodes, 6) as xx, yy, zz, xy, yz, xz, the mean over the cells around each node.
 
     In each cell the stress at the points of a low-order rule is fitted by the linear shape
