@@ -26,7 +26,7 @@ import numpy as np
 from solver.mesh.catalogue import BY_NAME, CellType
 from solver.mesh.gmsh_session import current_model, session
 from solver.mesh.hybrid import cube
-from solver.mesh.recipes import Keys
+from solver.mesh.keys import Keys
 from solver.mesh.sides import side_name
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
@@ -64,7 +64,7 @@ class _Block:
         self.regular = cell.name.startswith(("QUAD", "HEXA"))
         self.divisions = keys.integers("divisions", cell.dim)
         self.far = self.divisions[:-1]
-        options = {}
+        options: dict[str, float] = {}
         if not self.regular:
             self.far = keys.integers("far", cell.dim - 1, self.far)
             options["Mesh__Algorithm"] = _ALGORITHMS[

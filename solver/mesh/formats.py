@@ -40,8 +40,8 @@ def read(path: Path) -> meshio.Mesh:
         raise
     except Exception as error:
         # Whatever the reader trips over lies in the file.
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(path, "mesh", None, f"cannot be read: {reason}") from error
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(path, "mesh", None, f"cannot be read ({reason})") from error
     mesh = tidy(raw, path)
     if not mesh.cell_sets:
         raise InputError(path, "groups", None, "the mesh must have named groups of cells or faces")

@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.mesh.catalogue import BY_NAME, CellType
 from solver.mesh.gmsh_session import current_model, number_of, session
-from solver.mesh.recipes import Keys
+from solver.mesh.keys import Keys
 from solver.mesh.sides import side_name
 
 _CUBE = BY_NAME["HEXA8"]
