@@ -50,12 +50,12 @@ accept: environment ## take results as the accepted values, showing the differen
 format: lint-environment ## format the sources
 	@.venv/bin/python -m ruff check --quiet --fix-only .
 	@.venv/bin/python -m ruff format .
-	@.venv/bin/snakefmt workflow
+	@.venv/bin/snakefmt Snakefile workflow
 
 lint: lint-environment ## check format, style and types of the sources
 	.venv/bin/python -m ruff format --check .
 	.venv/bin/python -m ruff check .
-	.venv/bin/snakefmt --check workflow
+	.venv/bin/snakefmt --check Snakefile workflow
 	.venv/bin/python -m mypy
 
 environment:

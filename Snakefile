@@ -5,7 +5,7 @@ from snakemake.utils import min_version
 min_version("9.0")
 
 
-include: "rules/common.smk"
+include: "workflow/rules/common.smk"
 
 
 rule all_cases:
@@ -13,6 +13,6 @@ rule all_cases:
         "results/report/passed",
 
 
-include: "rules/mesh.smk"
-include: "rules/solve.smk"
-include: "rules/report.smk"
+include: "workflow/rules/mesh.smk"
+include: "workflow/rules/solve.smk"
+include: "workflow/rules/report.smk"
