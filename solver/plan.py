@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from solver.contact import Equilibrium
+from solver.contact import MIN_COVERAGE, Equilibrium
 from solver.lac.cut import needs_cut
 from solver.scene import Scene
 
@@ -21,6 +21,10 @@ def made_plan(scene: Scene, states: Sequence[Equilibrium]) -> list[tuple[str, st
             plan.append((f"{name}: closure of {zone.operator.closed_faces} face integrals", why))
         else:
             plan.append((f"{name}: plain Gauss rules", "every face is an affine image"))
+        bare = int((zone.operator.covered <= MIN_COVERAGE * zone.operator.area).sum())
+        if bare:
+            why = f"less than {MIN_COVERAGE:.0%} of their area lies under the master surface"
+            plan.append((f"{name}: {bare} macro-elements out of contact", why))
     if all(state.status.iterations == 1 for state in states):
         why = "the first status already fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0"
         plan.append(("no second active-set solve", why))

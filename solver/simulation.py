@@ -74,6 +74,7 @@ def _recover(
 ) -> Solution:
     last = states[-1]
     stress = nodal_stress(scene.points, scene.blocks, last.displacement)
+    scale = _stress_scale(scene, stress)
     zones = [_zone_result(scene, problem, zone, last, stress) for zone in scene.zones]
     return Solution(
         case=scene.case,
@@ -87,9 +88,9 @@ def _recover(
         zones=zones,
         nodal_normal_stress=_along(stress, _contact_direction(scene)),
         balance=imbalances(scene, last),
-        steps=_step_results(scene, problem, states),
+        steps=_step_results(scene, problem, states, scale),
         length=scene.length,
-        load_scale=_load_scale(scene),
+        load_scale=scale,
         dofs=scene.n_dofs,
         macro_elements=sum(zone.count for zone in scene.zones),
         iterations=sum(state.status.iterations for state in states),
@@ -168,7 +169,7 @@ def _nodal_normals(
 
 
 def _step_results(
-    scene: Scene, problem: ContactProblem, states: list[Equilibrium]
+    scene: Scene, problem: ContactProblem, states: list[Equilibrium], scale: float
 ) -> list[StepResult]:
     results = []
     for factor, state in zip(scene.case.steps, states, strict=True):
@@ -188,16 +189,25 @@ def _step_results(
                     "coverage": float(problem.coverage[number]),
                 }
             )
-        changes = sum(state.status.changes)
-        results.append(StepResult(factor, state.status.iterations, changes, state.residual, seen))
+        product = float(np.abs(state.pressure * state.gap).max(initial=0.0))
+        results.append(
+            StepResult(
+                factor=factor,
+                iterations=state.status.iterations,
+                status_changes=sum(state.status.changes),
+                residual=state.residual,
+                complementarity=product / (scale * scene.length),
+                observations=seen,
+            )
+        )
     return results
 
 
-def _load_scale(scene: Scene) -> float:
-    """The largest pressure of the loads, else the largest nodal force."""
+def _stress_scale(scene: Scene, stress: np.ndarray) -> float:
+    """The largest pressure among the loads (as a number), else the largest stress, else 1."""
     values = [
         abs(load.value)
         for load in scene.case.loads
         if load.kind == "pressure" and isinstance(load.value, float)
     ]
-    return max(values, default=float(np.abs(scene.force).max()))
+    return max(values, default=0.0) or float(np.abs(stress).max(initial=0.0)) or 1.0

@@ -70,6 +70,9 @@ class ZoneResult:
 class StepResult:
     """One load step: load factor, cost of the status iteration, and what was observed.
 
+    `residual` is relative to the forces; `complementarity` is the largest |p ḡ| of a macro-element,
+    relative to the scale of stress times the model's length.
+
     `observations` holds one mapping per observed macro-element, in the order of the case file:
     zone, macro_element (number), pressure, gap, status (0 or 1), coverage.
     """
@@ -78,6 +81,7 @@ class StepResult:
     iterations: int
     status_changes: int
     residual: float
+    complementarity: float
     observations: list[dict[str, Any]]
 
 
@@ -89,8 +93,8 @@ class Solution:
     (n, dim), `stress` (n, 6) in the order of STRESS_COMPONENTS and averaged per body, `body` (n,).
     `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone. `balance`
     names relative imbalances (of forces and moments, relative to the load). `length` is the largest
-    extent of the mesh, `load_scale` the largest pressure of the load. `seconds` is wall time by
-    stage, `peak_memory_mb` the process's largest resident size.
+    extent of the mesh, `load_scale` the largest pressure of the load or else the largest stress.
+    `seconds` is wall time by stage, `peak_memory_mb` the process's largest resident size.
     """
 
     case: Case
