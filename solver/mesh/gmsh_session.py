@@ -68,6 +68,13 @@ def node_order(cell_type: str) -> tuple[int, ...]:
     return tuple(int(i) for i in distance.argmin(axis=1))
 
 
+def foreign_types() -> list[str]:
+    """Gmsh's names of the cell types in the current model that are not in the catalogue."""
+    numbers = gmsh.model.mesh.getElementTypes()
+    foreign = [n for n in numbers if n != _POINT and n not in _NAMES]
+    return [gmsh.model.mesh.getElementProperties(number)[0] for number in foreign]
+
+
 def current_model(unnamed: bool = True) -> meshio.Mesh:
     """The mesh of gmsh's current model: one block per entity and type, groups by name.
 
@@ -83,12 +90,7 @@ def current_model(unnamed: bool = True) -> meshio.Mesh:
         if not (names or unnamed):
             continue
         for number, ids, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
-            cells.append(
-                (
-                    _meshio_type(number),
-                    _in_our_order(number, np.searchsorted(sorted_tags, nodes), len(ids)),
-                )
-            )
+            cells.append(_block(number, np.searchsorted(sorted_tags, nodes), len(ids)))
             numbers.append(ids.astype(np.int64))
             members.append(names)
     every = sorted({name for names in members for name in names})
@@ -105,14 +107,9 @@ def _groups_of(dim: int, entity: int) -> list[str]:
     return [gmsh.model.getPhysicalName(dim, g).strip() or str(g) for g in groups]
 
 
-def _meshio_type(number: int) -> str:
-    if number == _POINT:
-        return "vertex"
-    if number in _NAMES:
-        return BY_NAME[_NAMES[number]].meshio
-    return str(gmsh.model.mesh.getElementProperties(number)[0])
-
-
-def _in_our_order(number: int, nodes: np.ndarray, n_cells: int) -> np.ndarray:
+def _block(number: int, nodes: np.ndarray, n_cells: int) -> tuple[str, np.ndarray]:
     table = nodes.reshape(n_cells, -1)
-    return table[:, node_order(_NAMES[number])] if number in _NAMES else table
+    if number == _POINT:
+        return "vertex", table
+    name = _NAMES[number]
+    return BY_NAME[name].meshio, table[:, node_order(name)]

@@ -6,7 +6,8 @@ import gmsh
 import meshio
 
 from solver.errors import InputError
-from solver.mesh.gmsh_session import current_model, session
+from solver.mesh.catalogue import BY_NAME
+from solver.mesh.gmsh_session import current_model, foreign_types, session
 
 
 def read(path: Path) -> meshio.Mesh:
@@ -17,4 +18,7 @@ def read(path: Path) -> meshio.Mesh:
             raise InputError(path, "mesh", None, "no gmsh mesh: it must start with $MeshFormat")
     with session():
         gmsh.merge(str(path))
+        if foreign := foreign_types():
+            allowed = f"allowed: {', '.join(BY_NAME)}"
+            raise InputError(path, "cell type", ", ".join(foreign), allowed)
         return current_model()

@@ -13,11 +13,9 @@ import meshio
 import numpy as np
 
 from solver.errors import InputError
-from solver.mesh.catalogue import BY_NAME, CellType, cell_type
+from solver.mesh.catalogue import BY_NAME, cell_type
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
-# VTK's linear wedge has its triangles turned the other way; its quadratic one has not.
-_VTK_ORDER = {"PENTA6": [0, 2, 1, 3, 5, 4]}
 _GROUPS = "mesh_groups"
 
 
@@ -39,7 +37,7 @@ def write_grid(
     group.attrs["Dimension"] = dim
     cells = [(cell_type(block.type), block.data) for block in mesh.cells]
     sizes = np.repeat([cell.n_nodes for cell, _ in cells], [len(nodes) for _, nodes in cells])
-    flat = [_in_vtk_order(cell, nodes).ravel() for cell, nodes in cells]
+    flat = [nodes.ravel() for _, nodes in cells]
     points = np.zeros((len(mesh.points), 3))
     points[:, :dim] = mesh.points
     arrays = {
@@ -71,7 +69,7 @@ def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
     for start, stop in bounds:
         cell = _BY_VTK[int(types[start])]
         nodes = connectivity[offsets[start] : offsets[stop]].reshape(-1, cell.n_nodes)
-        cells.append((cell.meshio, _in_vtk_order(cell, nodes)))
+        cells.append((cell.meshio, nodes))
     cell_sets, point_sets = {}, {}
     groups = group.parent[_GROUPS]
     for name, numbers in groups["cells"].items():
@@ -104,11 +102,6 @@ def read(path: Path) -> meshio.Mesh:
         if "VTKHDF" not in file or _GROUPS not in file:
             raise InputError(path, "mesh", None, "no mesh that this program wrote")
         return read_grid(file["VTKHDF"])[0]
-
-
-def _in_vtk_order(cell: CellType, nodes: np.ndarray) -> np.ndarray:
-    """Connectivity (n_cells, n_nodes) into VTK's node order, or back: the way is its own return."""
-    return nodes[:, _VTK_ORDER[cell.name]] if cell.name in _VTK_ORDER else nodes
 
 
 def _write_groups(folder: h5py.Group, mesh: meshio.Mesh) -> None:

@@ -1,0 +1,273 @@
+"""Reading mesh files: node orders, groups, refusals."""
+
+from pathlib import Path
+
+import gmsh
+import h5py
+import meshio
+import numpy as np
+import pytest
+import vtk
+from vtk.util.numpy_support import vtk_to_numpy
+
+from solver.errors import InputError
+from solver.mesh import read_mesh, write_mesh
+from solver.mesh.catalogue import BY_NAME
+from solver.mesh.gmsh_session import session
+from solver.mesh.orient import vertex_jacobians
+from tests.mesh.one_cell import KINDS, distorted, middles, write_by_gmsh
+
+ABAQUS_KINDS = [name for name in KINDS if name not in ("HEXA27", "PYRA13")]
+
+
+def assert_well_read(mesh: meshio.Mesh, name: str) -> None:
+    """One cell, all its vertices there, right side out, every mid-node between its vertices."""
+    cell = BY_NAME[name]
+    (block,) = (b for b in mesh.cells if b.type == cell.meshio)
+    points = mesh.points[block.data[0]]
+    assert points.shape == (cell.n_nodes, cell.dim)
+    expected = distorted(cell)[:, : cell.dim]
+    assert sorted(map(tuple, points[: cell.n_vertices].round(9))) == sorted(
+        map(tuple, expected.round(9))
+    )
+    assert (vertex_jacobians(mesh.points, block.data, cell) > 0).all()
+    mids = points[cell.n_vertices :]
+    np.testing.assert_allclose(mids, middles(cell, points[: cell.n_vertices]), atol=1e-8)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_med(name, tmp_path):
+    write_by_gmsh(name, tmp_path / "cell.med")
+    mesh = read_mesh(tmp_path / "cell.med")
+    assert_well_read(mesh, name)
+    assert [len(ids) for ids in mesh.cell_sets["body"]] == [1]
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("name", KINDS)
+def test_msh(name, version, binary, tmp_path):
+    options = {"Mesh__MshFileVersion": version, "Mesh__Binary": binary}
+    write_by_gmsh(name, tmp_path / "cell.msh", **options)
+    mesh = read_mesh(tmp_path / "cell.msh")
+    assert_well_read(mesh, name)
+    assert [len(ids) for ids in mesh.cell_sets["body"]] == [1]
+
+
+@pytest.mark.parametrize("name", ABAQUS_KINDS)
+def test_inp(name, tmp_path):
+    write_by_gmsh(name, tmp_path / "cell.inp", Mesh__SaveGroupsOfElements=1)
+    mesh = read_mesh(tmp_path / "cell.inp")
+    assert_well_read(mesh, name)
+    assert [len(ids) for ids in mesh.cell_sets["body"]] == [1]
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_vtu(name, tmp_path):
+    write_by_vtk(name, tmp_path / "cell.vtu")
+    mesh = read_mesh(tmp_path / "cell.vtu")
+    assert_well_read(mesh, name)
+    assert [len(ids) for ids in mesh.cell_sets["body"]] == [1]
+    assert "material" not in mesh.cell_sets
+    assert len(mesh.point_sets["pinned"]) == 1
+
+
+def write_by_vtk(name: str, path: Path) -> None:
+    """The cell with its nodes where VTK's own cell of that type has them."""
+    cell = BY_NAME[name]
+    theirs = vtk.vtkGenericCell()
+    theirs.SetCellType(cell.vtk)
+    flat = theirs.GetParametricCoords()
+    parametric = np.array([flat[i] for i in range(3 * cell.n_nodes)]).reshape(-1, 3)
+    vertices = distorted(cell)
+    grid, points = vtk.vtkUnstructuredGrid(), vtk.vtkPoints()
+    points.SetDataTypeToDouble()
+    for place in _interpolated(cell, vertices, parametric[:, : cell.dim]):
+        points.InsertNextPoint(*place)
+    grid.SetPoints(points)
+    grid.InsertNextCell(cell.vtk, cell.n_nodes, list(range(cell.n_nodes)))
+    for target, values, label in (
+        (grid.GetCellData(), [1], "body"),
+        (grid.GetCellData(), [7], "material"),
+        (grid.GetPointData(), [1] + [0] * (cell.n_nodes - 1), "pinned"),
+    ):
+        array = vtk.vtkIntArray()
+        array.SetName(label)
+        for value in values:
+            array.InsertNextValue(value)
+        target.AddArray(array)
+    writer = vtk.vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(grid)
+    writer.Write()
+
+
+def _interpolated(cell, vertices: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Images of VTK's parametric places (n, dim) under the map of the linear cell."""
+    corners = cell.nodes[: cell.n_vertices]
+    if cell.name.startswith("PYRA"):
+        # VTK stands its pyramid on [0, 1]².
+        base = at[:, :2] * 2 - 1
+        at = np.column_stack([base * (1 - at[:, 2:]), at[:, 2]])
+    weights = np.array([_weights(cell.name, place, corners) for place in at])
+    return weights @ vertices
+
+
+def _weights(name: str, place: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Linear shape functions, derived here by hand, at a place of the reference cell."""
+    if name.startswith(("TRIA", "TETRA")):
+        return np.array([1 - place.sum(), *place])
+    if name.startswith("PENTA"):
+        flat = np.array([1 - place[:2].sum(), *place[:2]])
+        return np.concatenate([flat * (1 - place[2]), flat * place[2]])
+    if name.startswith("PYRA"):
+        if place[2] == 1:
+            return np.eye(5)[4]
+        height = 1 - place[2]
+        base = np.prod(height + corners[:4, :2] * place[:2], axis=1) / (4 * height)
+        return np.array([*base, place[2]])
+    return np.prod(np.where(corners == 1, place, 1 - place), axis=1)
+
+
+def write_square(path: Path, version: float = 4.1) -> None:
+    """A unit square of triangles: overlapping groups of edges, a point, one group without name."""
+    with session(Mesh__MshFileVersion=version):
+        geo = gmsh.model.geo
+        corners = [geo.addPoint(x, y, 0, 0.5) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        edges = [geo.addLine(corners[i - 1], corners[i]) for i in range(4)]
+        geo.addPlaneSurface([geo.addCurveLoop(edges)])
+        geo.synchronize()
+        gmsh.model.addPhysicalGroup(0, corners[:1], name="origin")
+        gmsh.model.addPhysicalGroup(1, edges[:2], name="left and bottom")
+        gmsh.model.addPhysicalGroup(1, edges[1:3], name="bottom and right")
+        gmsh.model.addPhysicalGroup(1, edges[3:], tag=77)
+        gmsh.model.addPhysicalGroup(2, [1], name="square")
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(path))
+
+
+@pytest.mark.parametrize("name", ["v2.msh", "v4.msh", "square.med"])
+def test_groups_of_every_dimension(name, tmp_path):
+    write_square(tmp_path / name, version=2.2 if name == "v2.msh" else 4.1)
+    mesh = read_mesh(tmp_path / name)
+    assert mesh.points.shape[1] == 2
+    lines = mesh.get_cells_type("line")
+    assert len(lines) == 8, "an edge in two groups is one edge"
+    place = mesh.cells.index(next(b for b in mesh.cells if b.type == "line"))
+    for group, axis_values in (
+        ("left and bottom", {(0, 0.0), (1, 0.0)}),
+        ("bottom and right", {(1, 0.0), (0, 1.0)}),
+    ):
+        ids = mesh.cell_sets[group][place]
+        assert len(ids) == 4
+        for ends in mesh.points[lines[ids]]:
+            assert any((ends[:, axis] == value).all() for axis, value in axis_values)
+    assert len(mesh.cell_sets["square"][0]) == len(mesh.cells[0].data)
+    assert mesh.points[mesh.point_sets["origin"]].tolist() == [[0, 0]]
+    if name.endswith("msh"):
+        assert len(mesh.cell_sets["77"][place]) == 2
+
+
+def test_groups_of_nodes_in_med(tmp_path):
+    write_by_gmsh("TETRA4", tmp_path / "cell.med")
+    with h5py.File(tmp_path / "cell.med", "a") as file:
+        (name,) = file["ENS_MAA"]
+        (step,) = file["ENS_MAA"][name].values()
+        if "FAM" in step["NOE"]:
+            del step["NOE/FAM"]
+        step["NOE"].create_dataset("FAM", data=np.array([0, 5, 0, 5], dtype=np.int32))
+        family = file.create_group(f"FAS/{name}/NOEUD/FAM_5")
+        family.attrs["NUM"] = 5
+        names = b"".join(label.encode().ljust(80, b"\0") for label in ("pins", "Stütze"))
+        family["GRO/NOM"] = np.frombuffer(names, dtype=np.int8).reshape(2, 80)
+    mesh = read_mesh(tmp_path / "cell.med")
+    expected = distorted(BY_NAME["TETRA4"])[[1, 3]]
+    for label in ("pins", "Stütze"):
+        np.testing.assert_array_equal(mesh.points[mesh.point_sets[label]], expected)
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        read_mesh(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert "\n" not in message
+    return message.removeprefix(f"{path}: ")
+
+
+def test_no_such_file(tmp_path):
+    assert refusal(tmp_path / "none.med") == "mesh: no such file"
+
+
+def test_unknown_extension(tmp_path):
+    message = refusal(tmp_path / "mesh.stl")
+    assert message == "extension = '.stl': allowed: .med, .msh, .inp, .vtu, .vtkhdf"
+
+
+@pytest.mark.parametrize("suffix", ["med", "msh", "inp", "vtu", "vtkhdf"])
+@pytest.mark.parametrize("content", [b"", b"no mesh\n", bytes(range(256)) * 8])
+def test_rubbish(suffix, content, tmp_path, capfd):
+    path = tmp_path / f"mesh.{suffix}"
+    path.write_bytes(content)
+    refusal(path)
+    assert capfd.readouterr().out == ""
+
+
+def test_a_script_is_no_gmsh_mesh(tmp_path):
+    path = tmp_path / "mesh.msh"
+    path.write_text(f'SystemCall "touch {tmp_path}/executed";')
+    assert refusal(path) == "mesh: no gmsh mesh: it must start with $MeshFormat"
+    assert not (tmp_path / "executed").exists()
+
+
+def test_truncated_msh(tmp_path):
+    path = tmp_path / "square.msh"
+    write_square(path)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    refusal(path)
+
+
+def test_no_groups(tmp_path):
+    path = tmp_path / "mesh.vtu"
+    meshio.write(path, meshio.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [("triangle", [[0, 1, 2]])]))
+    assert refusal(path) == "groups: the mesh must have named groups of cells or faces"
+
+
+def test_a_type_that_is_not_there(tmp_path):
+    path = tmp_path / "mesh.msh"
+    with session(Mesh__ElementOrder=3):
+        gmsh.model.geo.addPoint(0, 0, 0)
+        gmsh.model.geo.extrude([(0, 1)], 1, 0, 0, [1])
+        gmsh.model.geo.extrude([(1, 1)], 0, 1, 0, [1])
+        gmsh.model.geo.synchronize()
+        gmsh.model.addPhysicalGroup(2, [5], name="square")
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(path))
+    assert refusal(path).startswith("cell type = 'Triangle 10': allowed: SEG2, SEG3,")
+
+
+def test_several_meshes_in_one_med_file(tmp_path):
+    path = tmp_path / "two.med"
+    write_by_gmsh("TRIA3", path)
+    with h5py.File(path, "a") as file:
+        (name,) = file["ENS_MAA"]
+        file.copy(f"ENS_MAA/{name}", "ENS_MAA/again")
+    assert refusal(path).startswith("meshes = 2: the file must hold one mesh: again, ")
+
+
+def test_vtk_sees_the_volume_of_every_type(tmp_path):
+    """Written as VTKHDF and read by VTK, each type is what it was and right side out."""
+    for name in KINDS:
+        write_by_gmsh(name, tmp_path / "cell.msh")
+        mesh = read_mesh(tmp_path / "cell.msh")
+        write_mesh(mesh, tmp_path / "cell.vtkhdf")
+        reader = vtk.vtkHDFReader()
+        reader.SetFileName(str(tmp_path / "cell.vtkhdf"))
+        sizes = vtk.vtkCellSizeFilter()
+        sizes.SetInputConnection(reader.GetOutputPort())
+        sizes.Update()
+        grid = sizes.GetOutput()
+        data = grid.GetCellData()
+        label = "Volume" if BY_NAME[name].dim == 3 else "Area"
+        assert vtk_to_numpy(data.GetArray(label))[0] > 0.1, name
+        assert grid.GetCell(0).GetCellType() == BY_NAME[name].vtk
