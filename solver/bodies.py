@@ -40,6 +40,20 @@ def rigid_motions(points: np.ndarray, body: np.ndarray) -> sparse.csc_matrix:
     return sparse.csc_matrix((values, (rows, columns)), shape=(n * dim, len(count) * per_body))
 
 
+def unsupported(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> sparse.csr_matrix:
+    """The rigid motions (n_dofs, k) of each body that the supports leave free.
+
+    `basis` (n_dofs, n_free) spans the displacements that the supports leave free.
+    """
+    held = motions - basis @ (basis.T @ motions)
+    resistance = (held.T @ held).toarray()
+    values, vectors = np.linalg.eigh(resistance)
+    free = values <= _FREE * max(float(values[-1]), np.finfo(float).tiny)
+    # Round-off entries would mix the bodies and fill the motions up.
+    chosen = np.where(np.abs(vectors[:, free]) > _FREE, vectors[:, free], 0.0)
+    return (motions @ sparse.csr_matrix(chosen)).tocsr()
+
+
 def unheld_motion(
     motions: sparse.csc_matrix,
     basis: sparse.csr_matrix,

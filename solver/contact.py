@@ -1,11 +1,11 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
-from solver.bodies import rigid_motions, unheld_motion
+from solver.bodies import rigid_motions, unheld_motion, unsupported
 from solver.elasticity import internal_force, stiffness
 from solver.errors import InputError, SolveError
 from solver.lac.status import StatusResult, find_status
@@ -21,14 +21,83 @@ _TWICE = 1e-6
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A solved load factor: displacement (n, dim), pressure and gap (m,), status, residual."""
+    """A solved load factor: displacement (n, dim), pressure and gap (m,), status, residual.
+
+    `straining` (n, dim) is the displacement less a rigid motion of each body: strains are taken
+    from it.
+    """
 
     displacement: np.ndarray
+    straining: np.ndarray
     pressure: np.ndarray
     gap: np.ndarray
     status: StatusResult
     residual: float
     force: np.ndarray
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """A displacement as free rigid motions of the bodies plus a remainder, the part that strains.
+
+    A stiff body on a soft one moves far and strains little. Were its displacement stored as one
+    number a node, its strain would be lost in the rounding of the motion; the remainder keeps it.
+    The rigid motion is that of the contact surface, so that the remainder is smallest where the
+    other body feels it. `motions` (n_dofs, k) are the rigid motions that supports leave free, `fit`
+    (k, n_dofs) finds how much of each a displacement holds, `amount` (k,) is how far each goes,
+    `straining` (n_dofs,) the remainder.
+    """
+
+    motions: sparse.csr_matrix
+    fit: sparse.csr_matrix
+    amount: np.ndarray
+    straining: np.ndarray
+
+    @classmethod
+    def zero(cls, motions: sparse.csr_matrix, surface: np.ndarray) -> "Displacement":
+        """No displacement; `surface` (n_dofs,) marks the unknowns of the contact surfaces."""
+        seen = sparse.diags(surface.astype(float)) @ motions
+        fit = sparse.csr_matrix(np.linalg.pinv((seen.T @ seen).toarray())) @ seen.T
+        return cls(motions, fit.tocsr(), np.zeros(motions.shape[1]), np.zeros(len(surface)))
+
+    @property
+    def total(self) -> np.ndarray:
+        """The displacement (n_dofs,) itself."""
+        return self.motions @ self.amount + self.straining
+
+    def moved(self, change: np.ndarray) -> "Displacement":
+        """This displacement with `change` (n_dofs,) added."""
+        more = self.fit @ change
+        straining = self.straining + (change - self.motions @ more)
+        return Displacement(self.motions, self.fit, self.amount + more, straining)
+
+    def opening(self, gaps: sparse.csr_matrix) -> np.ndarray:
+        """∫ gap (m,) that it opens, by the gap operator `gaps` (m, n_dofs)."""
+        return (gaps @ self.motions) @ self.amount + gaps @ self.straining
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    """The contact problem's unknowns as the condensed solve sees them."""
+
+    problem: "ContactProblem"
+    closed: np.ndarray
+    force: np.ndarray
+    displacement: Displacement
+
+    def residual(self) -> np.ndarray:
+        scene = self.problem.scene
+        straining = self.displacement.straining.reshape(scene.points.shape)
+        internal = internal_force(scene.points, scene.blocks, straining)
+        return scene.free.basis.T @ (self.force - internal).ravel()
+
+    def violation(self) -> np.ndarray:
+        gaps, initial = self.problem.gaps[self.closed], self.problem.initial[self.closed]
+        return -(initial + self.displacement.opening(gaps))
+
+    def advanced(self, change: np.ndarray) -> "_Iterate":
+        moved = self.displacement.moved(self.problem.scene.free.basis @ change)
+        return replace(self, displacement=moved)
 
 
 class ContactProblem:
@@ -54,6 +123,8 @@ class ContactProblem:
             for faces in zone.sub_faces:
                 self.own[(dim * faces.nodes[..., None] + np.arange(dim)).ravel()] = True
         self.motions = rigid_motions(scene.points, scene.body)
+        free = unsupported(self.motions, scene.free.basis)
+        self.at_rest = Displacement.zero(free, np.diff(self.gaps.tocsc().indptr) > 0)
         self._refuse_unheld()
         self._refuse_lost_nodes()
         self.matrix = scene.free.reduced(stiffness(scene.points, scene.blocks))
@@ -69,50 +140,44 @@ class ContactProblem:
         scene = self.scene
         start = self.eligible if start is None else start
         force = factor * scene.force
-        scale = float(np.abs(force).sum()) or 1.0
-        latest: list[tuple[np.ndarray, np.ndarray, float]] = []
+        latest: list[tuple[Displacement, np.ndarray, float]] = []
 
         def attempt(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            displacement, pressure, residual = self._solve_closed(closed, force, factor)
-            gap = self._average_gap(displacement)
-            latest[:] = [(displacement, pressure, residual)]
-            return pressure, gap
+            found, pressure, residual = self._solve_closed(closed, force, factor)
+            latest[:] = [(found, pressure, residual)]
+            return pressure, self._average_gap(found)
 
-        pressure_scale = scale / max(float(self.area.sum()), np.finfo(float).tiny)
+        load = float(np.abs(force).sum()) or 1.0
+        pressure_scale = load / max(float(self.area.sum()), np.finfo(float).tiny)
         status = find_status(attempt, start, self.eligible, pressure_scale, scene.length)
-        displacement, pressure, residual = latest[0]
-        gap = self._average_gap(displacement)
-        return Equilibrium(displacement, pressure, gap, status, residual, force)
+        found, pressure, residual = latest[0]
+        shape = scene.points.shape
+        return Equilibrium(
+            found.total.reshape(shape),
+            found.straining.reshape(shape),
+            pressure,
+            self._average_gap(found),
+            status,
+            residual,
+            force,
+        )
 
-    def _average_gap(self, displacement: np.ndarray) -> np.ndarray:
-        opening = self.initial + self.gaps @ displacement.ravel()
+    def _average_gap(self, displacement: "Displacement") -> np.ndarray:
+        opening = self.initial + displacement.opening(self.gaps)
         return opening / np.where(self.eligible, self.covered, np.inf)
 
     def _solve_closed(
         self, closed: np.ndarray, force: np.ndarray, factor: float
-    ) -> tuple[np.ndarray, np.ndarray, float]:
+    ) -> tuple["Displacement", np.ndarray, float]:
         """Displacement and pressures with the given macro-elements closed, relative residual."""
-        scene, free = self.scene, self.scene.free
         condensed = self._condense(closed)
-        gaps, initial = self.gaps[closed], self.initial[closed]
-        offset = factor * free.offset
-
-        def displacement(x: np.ndarray) -> np.ndarray:
-            return (offset + free.basis @ x).reshape(scene.points.shape)
-
-        def residual(x: np.ndarray) -> np.ndarray:
-            internal = internal_force(scene.points, scene.blocks, displacement(x))
-            return free.basis.T @ (force - internal).ravel()
-
-        def violation(x: np.ndarray) -> np.ndarray:
-            return -(initial + gaps @ displacement(x).ravel())
-
-        x = np.zeros(free.basis.shape[1])
-        scale = self._force_scale(force, displacement(x))
-        x, multiplier, size = solve(condensed, x, residual, violation, scale)
+        offset = factor * self.scene.free.offset
+        scale = self._force_scale(force, offset.reshape(self.scene.points.shape))
+        iterate = _Iterate(self, closed, force, self.at_rest.moved(offset))
+        iterate, multiplier, size = solve(condensed, iterate, scale)
         pressure = np.zeros(len(closed))
         pressure[closed] = multiplier
-        return displacement(x), pressure, size
+        return iterate.displacement, pressure, size
 
     def _force_scale(self, force: np.ndarray, imposed: np.ndarray) -> float:
         """The size of the forces at work: the loads, or those that imposed values bring up."""

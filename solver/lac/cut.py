@@ -20,6 +20,8 @@ from solver.mesh.catalogue import BY_NAME, CellType, cell_type
 
 # Faces without a node strictly inside, and TRIA6 and QUAD8, whose inner nodes are on the rim.
 CUT_FACES = ("SEG2", "TRIA3", "TRIA6", "QUAD4", "QUAD8")
+# Shape functions below this at a new node are zero there but for round-off.
+_NO_SHARE = 1e-14
 
 
 @dataclass(frozen=True)
@@ -186,7 +188,11 @@ class _Template:
         straight edges gets pieces with straight edges, whose faces are affine triangles. Its own
         map would bend the diagonals of a face that is no parallelogram.
         """
-        new = np.einsum("ka,cad->ckd", shape_functions(kind.name).values(self.new_nodes), corner)
+        values = shape_functions(kind.name).values(self.new_nodes)
+        values[np.abs(values) < _NO_SHARE] = 0.0
+        # Counted from the nearest node, so that the middle of a plane face lies in it to the bit.
+        base = corner[:, np.abs(values).argmax(axis=1)]
+        new = base + np.einsum("ka,ckad->ckd", values, corner[:, None] - base[:, :, None])
         if len(self.new_edges):
             ends = np.concatenate([corner, new], axis=1)[:, self.new_edges]
             straight = has_straight_edges(kind, corner)

@@ -5,8 +5,8 @@ the others through the constraint, x = Z v + c, and the multiplier follows from 
 that degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -21,6 +21,9 @@ _MAX_REFINEMENTS = 6
 _ROUND_OFF = 8 * np.finfo(float).eps
 # A macro-element's own coefficient must not be smaller than this share of its row's largest.
 _SMALLEST_PIVOT = 1e-6
+
+
+AnyIterate = TypeVar("AnyIterate", bound="Iterate")
 
 
 @dataclass(frozen=True)
@@ -110,37 +113,43 @@ def _expansion(
     return (identity + place @ follow).tocsr()
 
 
-def solve(
-    condensed: Condensed,
-    start: np.ndarray,
-    residual: Callable[[np.ndarray], np.ndarray],
-    violation: Callable[[np.ndarray], np.ndarray],
-    scale: float,
-    refine: bool = True,
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Solve from `start` (n,); return x (n,), multipliers (m,) and the relative residual.
+class Iterate(Protocol):
+    """An approximate solution x of K x = f + Gᵀ p, G x = b, kept as exactly as its owner can."""
 
-    `residual(x)` (n,) is f − K x summed as exactly as the caller can; `violation(x)` (m,) is
-    b − G x; `scale` is the size of the forces. Newton's method with a fixed factor: one step
-    solves, further ones refine until the residual no longer falls (Higham, Accuracy and Stability
-    of Numerical Algorithms, §12).
+    def residual(self) -> np.ndarray:
+        """The forces f − K x (n,)."""
+
+    def violation(self) -> np.ndarray:
+        """The gaps b − G x (m,)."""
+
+    def advanced(self, change: np.ndarray) -> Self:
+        """The iterate at x + change (n,)."""
+
+
+def solve(
+    condensed: Condensed, iterate: AnyIterate, scale: float, refine: bool = True
+) -> tuple[AnyIterate, np.ndarray, float]:
+    """Solve from an iterate; return the last one, multipliers (m,) and the relative residual.
+
+    `scale` is the size of the forces. Newton's method with a fixed factor: one step solves, further
+    ones refine until the residual no longer falls (Higham, Accuracy and Stability of Numerical
+    Algorithms, §12). Raises SolveError where the solution is not finite.
     """
-    x, expansion = start.copy(), condensed.expansion
-    force = residual(x)
-    best, last = None, np.inf
+    expansion = condensed.expansion
+    force, last = iterate.residual(), np.inf
     for _ in range(_MAX_REFINEMENTS if refine else 1):
-        change = condensed.particular(violation(x))
+        change = condensed.particular(iterate.violation())
         moved = force - condensed.matrix @ change if change.any() else force
-        x = x + change + expansion @ condensed.factor.solve(expansion.T @ moved)
-        force = residual(x)
-        size = float(np.abs(expansion.T @ force).max(initial=0.0)) / scale
+        change += expansion @ condensed.factor.solve(expansion.T @ moved)
+        following = iterate.advanced(change)
+        following_force = following.residual()
+        size = float(np.abs(expansion.T @ following_force).max(initial=0.0)) / scale
+        if not np.isfinite(size):
+            raise SolveError("the solution is not finite")
         if size < last:
-            best = (x, force)
-        if size <= _ROUND_OFF or size > _MIN_GAIN * last:
-            last = min(size, last)
+            iterate, force = following, following_force
+        enough = size <= _ROUND_OFF or size > _MIN_GAIN * last
+        last = min(size, last)
+        if enough:
             break
-        last = size
-    if best is None or not np.isfinite(best[0]).all():
-        raise SolveError("the solution is not finite")
-    x, force = best
-    return x, -force[condensed.pivot] / condensed.coefficient, last
+    return iterate, -force[condensed.pivot] / condensed.coefficient, last
