@@ -42,7 +42,8 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]
     draw_axes(drawing, x, y, "wall time of the solve, s", "worst relative error")
     _level(drawing, x, y, TOLERANCE, "tolerance 0.1 %", RED, ())
     for entry in reference_code:
-        label = f"{entry.get('name', 'reference code')} {entry.get('version', '')}"
+        name = f"{entry.get('name', 'reference code')} {entry.get('version', '')}"
+        label = f"{name.strip()}: {formats.error(float(entry['error']))}"
         _level(drawing, x, y, float(entry["error"]), label, MUTED, (6, 4))
     at = np.column_stack([x(times), y(errors)])
     for row, point in zip(shown, at, strict=True):

@@ -120,7 +120,8 @@ def _ends(
     drawing: Drawing, low: np.ndarray, high: np.ndarray, flat: np.ndarray, names: tuple[str, str]
 ) -> None:
     """What the plan's sides are: the two directions, with the coordinates at their ends."""
-    first, last = flat.min(axis=0) + 0.0, flat.max(axis=0) + 0.0
+    first, last = flat.min(axis=0), flat.max(axis=0)
+    first = np.where(np.abs(first) < 1e-9 * (last - first), 0.0, first)
     drawing.text(low[0], high[1] + 15, f"{first[0]:.4g}", color=MUTED)
     drawing.text((low[0] + high[0]) / 2, high[1] + 15, names[0], "middle", color=MUTED)
     drawing.text(high[0], high[1] + 15, f"{last[0]:.4g}", "end", color=MUTED)

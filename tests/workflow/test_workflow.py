@@ -53,7 +53,9 @@ def jobs(project, *arguments):
 
 
 def new_project(folder):
-    for name in ("workflow", "solver"):
+    folder.mkdir(exist_ok=True)
+    shutil.copy(ROOT / "Snakefile", folder)
+    for name in ("workflow", "profiles", "solver"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     write_case(folder / "cases" / "tiny", "tiny-a", "both")
     write_case(folder / "cases" / "tiny", "tiny-b")
