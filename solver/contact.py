@@ -23,8 +23,8 @@ _TWICE = 1e-6
 class Equilibrium:
     """A solved load factor: displacement (n, dim), pressure and gap (m,), status, residual.
 
-    `straining` (n, dim) is the displacement less a rigid motion of each body: strains are taken
-    from it.
+    `straining` (2, n, dim): the two parts of the displacement less a rigid motion of each body, from
+    which strains are taken (see `Displacement`).
     """
 
     displacement: np.ndarray
@@ -44,8 +44,9 @@ class Displacement:
     number a node, its strain would be lost in the rounding of the motion; the remainder keeps it.
     The rigid motion is that of the contact surface, so that the remainder is smallest where the
     other body feels it. `motions` (n_dofs, k) are the rigid motions that supports leave free, `fit`
-    (k, n_dofs) finds how much of each a displacement holds, `amount` (k,) is how far each goes,
-    `straining` (n_dofs,) the remainder.
+    (k, n_dofs) finds how much of each a displacement holds, `amount` (k,) is how far each goes. The
+    remainder is the sum, never evaluated, of two parts `straining` (2, n_dofs): what the first
+    loses to rounding is in the second, so that each refinement gains its digits in full.
     """
 
     motions: sparse.csr_matrix
@@ -58,22 +59,28 @@ class Displacement:
         """No displacement; `surface` (n_dofs,) marks the unknowns of the contact surfaces."""
         seen = sparse.diags(surface.astype(float)) @ motions
         fit = sparse.csr_matrix(np.linalg.pinv((seen.T @ seen).toarray())) @ seen.T
-        return cls(motions, fit.tocsr(), np.zeros(motions.shape[1]), np.zeros(len(surface)))
+        return cls(motions, fit.tocsr(), np.zeros(motions.shape[1]), np.zeros((2, len(surface))))
 
     @property
     def total(self) -> np.ndarray:
         """The displacement (n_dofs,) itself."""
-        return self.motions @ self.amount + self.straining
+        return self.motions @ self.amount + self.straining.sum(axis=0)
 
     def moved(self, change: np.ndarray) -> "Displacement":
         """This displacement with `change` (n_dofs,) added."""
         more = self.fit @ change
-        straining = self.straining + (change - self.motions @ more)
+        first, second = self.straining
+        added = change - self.motions @ more
+        total = first + added
+        # What the sum lost (Knuth, The Art of Computer Programming, vol. 2, §4.2.2).
+        back = total - first
+        lost = (first - (total - back)) + (added - back)
+        straining = np.stack([total, second + lost])
         return Displacement(self.motions, self.fit, self.amount + more, straining)
 
     def opening(self, gaps: sparse.csr_matrix) -> np.ndarray:
         """∫ gap (m,) that it opens, by the gap operator `gaps` (m, n_dofs)."""
-        return (gaps @ self.motions) @ self.amount + gaps @ self.straining
+        return (gaps @ self.motions) @ self.amount + (gaps @ self.straining.T).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -87,8 +94,7 @@ class _Iterate:
 
     def residual(self) -> np.ndarray:
         scene = self.problem.scene
-        straining = self.displacement.straining.reshape(scene.points.shape)
-        internal = internal_force(scene.points, scene.blocks, straining)
+        internal = straining_force(scene, self.displacement.straining.reshape(2, *self.force.shape))
         return scene.free.basis.T @ (self.force - internal).ravel()
 
     def violation(self) -> np.ndarray:
@@ -98,6 +104,14 @@ class _Iterate:
     def advanced(self, change: np.ndarray) -> "_Iterate":
         moved = self.displacement.moved(self.problem.scene.free.basis @ change)
         return replace(self, displacement=moved)
+
+
+def straining_force(scene: Scene, straining: np.ndarray) -> np.ndarray:
+    """Internal forces (n, dim) of a displacement in two parts (2, n, dim)."""
+    force = internal_force(scene.points, scene.blocks, straining[0])
+    if straining[1].any():
+        force += internal_force(scene.points, scene.blocks, straining[1])
+    return force
 
 
 class ContactProblem:
@@ -154,7 +168,7 @@ class ContactProblem:
         shape = scene.points.shape
         return Equilibrium(
             found.total.reshape(shape),
-            found.straining.reshape(shape),
+            found.straining.reshape(2, *shape),
             pressure,
             self._average_gap(found),
             status,

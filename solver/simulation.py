@@ -73,7 +73,7 @@ def _recover(
     hexahedra: str | None,
 ) -> Solution:
     last = states[-1]
-    stress = nodal_stress(scene.points, scene.blocks, last.straining)
+    stress = sum(nodal_stress(scene.points, scene.blocks, part) for part in last.straining)
     scale = _stress_scale(scene, stress)
     zones = [_zone_result(scene, problem, zone, last, stress) for zone in scene.zones]
     return Solution(

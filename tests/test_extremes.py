@@ -56,7 +56,7 @@ def test_stiffness_ratio(dim, ratio, swapped):
     ("poisson", "floor"), [(-0.9, 1e-13), (0.49, 1e-12), (0.4999, 1e-10), (0.499999, 2e-9)]
 )
 def test_nearly_incompressible(dim, poisson, floor):
-    """Twenty times the error that rounding the exact displacement causes by itself: ε / (1 − 2ν)."""
+    """Within twenty times ε / (1 − 2ν), what rounding the exact displacement causes by itself."""
     assert max(patch_errors(dim, poisson=poisson)) < max(floor, 20 * 2.2e-16 / (1 - 2 * poisson))
 
 
