@@ -73,7 +73,9 @@ def _recover(
     hexahedra: str | None,
 ) -> Solution:
     last = states[-1]
-    stress = sum(nodal_stress(scene.points, scene.blocks, part) for part in last.straining)
+    first, second = last.straining
+    stress = nodal_stress(scene.points, scene.blocks, first)
+    stress += nodal_stress(scene.points, scene.blocks, second)
     scale = _stress_scale(scene, stress)
     zones = [_zone_result(scene, problem, zone, last, stress) for zone in scene.zones]
     return Solution(
