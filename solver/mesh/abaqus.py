@@ -51,6 +51,8 @@ def read(path: Path) -> meshio.Mesh:
 
 _Options = dict[str, str]
 _Lines = list[list[str]]
+# A cell or face: its number (0 for a face of a surface), its nodes, the names of its groups.
+_Row = tuple[int, list[int], set[str]]
 
 
 def _keywords(path: Path) -> Iterator[tuple[str, _Options, _Lines]]:
@@ -90,14 +92,16 @@ class _Deck:
         self.spelling: dict[str, str] = {}
         self.seen: set[str] = set()
 
+    def _refuse(self, key: str, value: object, allowed: str) -> InputError:
+        return InputError(self.path, key, value, allowed)
+
     def take(self, keyword: str, options: _Options, lines: _Lines) -> None:
         if keyword in _REFUSED:
-            raise InputError(self.path, f"*{keyword}", None, "not followed: write out the mesh")
+            raise self._refuse(f"*{keyword}", None, "not followed: write out the mesh")
         if keyword in ("PART", "INSTANCE"):
             if keyword in self.seen or lines:
-                raise InputError(
-                    self.path, f"*{keyword}", None, "allowed: one part and one instance, not moved"
-                )
+                allowed = "allowed: one part and one instance, not moved"
+                raise self._refuse(f"*{keyword}", None, allowed)
             self.seen.add(keyword)
         elif keyword == "NODE":
             self._take_nodes(options, lines)
@@ -120,10 +124,16 @@ class _Deck:
             self.node_sets[self._key(options["NSET"])] += [int(line[0]) for line in lines]
 
     def _take_cells(self, options: _Options, lines: _Lines) -> None:
-        cell = self._cell_type(options.get("TYPE", "").upper())
+        kind = options.get("TYPE", "")
+        cell = self._cell_type(kind.upper())
         flat = [int(field) for line in lines for field in line if field]
+        if len(flat) % (cell.n_nodes + 1):
+            raise self._refuse("*ELEMENT", None, f"each {kind} must have {cell.n_nodes} nodes")
         table = np.array(flat).reshape(-1, cell.n_nodes + 1).tolist()
         for number, *nodes in table:
+            missing = next((n for n in nodes if n not in self.nodes), None)
+            if missing is not None:
+                raise self._refuse("node", missing, f"cell {number} has it, *NODE has not")
             self.cells[number] = (cell, nodes)
         if "ELSET" in options:
             self.cell_sets[self._key(options["ELSET"])] += [row[0] for row in table]
@@ -137,7 +147,7 @@ class _Deck:
             found = _SURFACES.get(int(plane[1]))
         if found is None:
             allowed = "C3D4, C3D5, C3D6, C3D8, C3D10, C3D15, C3D20, CPE3, CPE4, CPE6, CPE8 and kin"
-            raise InputError(self.path, "*ELEMENT, TYPE", name, f"allowed: {allowed}")
+            raise self._refuse("*ELEMENT, TYPE", name, f"allowed: {allowed}")
         return BY_NAME[found]
 
     def _take_set(
@@ -152,55 +162,58 @@ class _Deck:
                 continue
             for field in fields:
                 if not field.isdigit() and field.upper() not in sets:
-                    raise InputError(self.path, f"set {name}", field, "no such set above it")
+                    raise self._refuse(f"set {name}", field, "no such set above it")
                 members += [int(field)] if field.isdigit() else sets[field.upper()]
 
     def mesh(self) -> meshio.Mesh:
-        faces = {name: self._faces(lines) for name, lines in self.surfaces.items()}
-        rank = {number: i for i, number in enumerate(self.nodes)}
-        rows: dict[CellType, list[tuple[int, list[int], set[str]]]] = defaultdict(list)
-        groups: dict[int, set[str]] = defaultdict(set)
+        """All that was taken: cells of a type in one block, the faces of surfaces after them."""
+        names: dict[int, set[str]] = defaultdict(set)
         for name, members in self.cell_sets.items():
             for number in members:
-                groups[number].add(name)
+                names[number].add(name)
+        rows: dict[CellType, list[_Row]] = defaultdict(list)
         for number, (cell, nodes) in self.cells.items():
-            rows[cell].append((number, nodes, groups[number]))
-        for name, found in faces.items():
-            for cell, nodes in found:
+            rows[cell].append((number, nodes, names[number]))
+        for name, lines in self.surfaces.items():
+            for cell, nodes in self._faces(name, lines):
                 rows[cell].append((0, nodes, {name}))
-        cells = [
-            (cell.meshio, np.array([[rank[n] for n in nodes] for _, nodes, _ in row]))
-            for cell, row in rows.items()
-        ]
-        sets = {
-            self.spelling[name]: [
-                np.array([i for i, (_, _, of) in enumerate(row) if name in of], dtype=np.int64)
-                for row in rows.values()
-            ]
-            for name in {**self.cell_sets, **faces}
-        }
+        rank = {number: i for i, number in enumerate(self.nodes)}
         return meshio.Mesh(
             np.array(list(self.nodes.values())).reshape(-1, 3),
-            cells,
+            [
+                (cell.meshio, np.array([[rank[n] for n in nodes] for _, nodes, _ in row]))
+                for cell, row in rows.items()
+            ],
             cell_data={"number": [np.array([n for n, _, _ in row]) for row in rows.values()]},
-            cell_sets=sets,
+            cell_sets={
+                self.spelling[name]: [
+                    np.flatnonzero([name in of for _, _, of in row]) for row in rows.values()
+                ]
+                for name in {**self.cell_sets, **self.surfaces}
+            },
             point_sets={
-                self.spelling[name]: np.array([rank[n] for n in members], dtype=np.int64)
+                self.spelling[name]: np.array([rank[n] for n in members if n in rank], np.int64)
                 for name, members in self.node_sets.items()
             },
         )
 
-    def _faces(self, lines: _Lines) -> Iterator[tuple[CellType, list[int]]]:
+    def _faces(self, name: str, lines: _Lines) -> Iterator[tuple[CellType, list[int]]]:
         """The faces of a surface, whose lines hold a cell, or a set of them, and a face."""
         for owner, *label in lines:
+            if not owner.isdigit() and owner.upper() not in self.cell_sets:
+                raise self._refuse(f"surface {self.spelling[name]}", owner, "no such set of cells")
             numbers = [int(owner)] if owner.isdigit() else self.cell_sets[owner.upper()]
             for number in numbers:
-                cell, nodes = self.cells[number]
-                if not label or not re.fullmatch(r"S\d", label[0].upper()):
-                    # The sides SPOS and SNEG of a shell: the shell cell is the face.
-                    yield cell, nodes
-                    continue
-                corners = _FACES[cell.name.rstrip("0123456789")][int(label[0][1]) - 1]
-                wanted = {int(c) - 1 for c in corners}
-                face = next(f for f in cell.faces if wanted <= set(f.nodes))
-                yield BY_NAME[face.type], [nodes[i] for i in face.nodes]
+                if number not in self.cells:
+                    raise self._refuse(f"surface {self.spelling[name]}", number, "no such cell")
+                yield self._face(*self.cells[number], label[0].upper() if label else "")
+
+    def _face(self, cell: CellType, nodes: list[int], label: str) -> tuple[CellType, list[int]]:
+        corners = _FACES[cell.name.rstrip("0123456789")]
+        number = int(label[1:]) if re.fullmatch(r"S\d", label) else 0
+        if not 0 < number <= len(corners):
+            # Without a number, or as SPOS and SNEG: the shell itself is the face.
+            return cell, nodes
+        wanted = {int(c) - 1 for c in corners[number - 1]}
+        face = next(f for f in cell.faces if wanted <= set(f.nodes))
+        return BY_NAME[face.type], [nodes[i] for i in face.nodes]

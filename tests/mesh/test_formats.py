@@ -8,10 +8,9 @@ import meshio
 import numpy as np
 import pytest
 import vtk
-from vtk.util.numpy_support import vtk_to_numpy
 
 from solver.errors import InputError
-from solver.mesh import read_mesh, write_mesh
+from solver.mesh import read_mesh
 from solver.mesh.catalogue import BY_NAME
 from solver.mesh.gmsh_session import session
 from solver.mesh.orient import vertex_jacobians
@@ -253,21 +252,3 @@ def test_several_meshes_in_one_med_file(tmp_path):
         (name,) = file["ENS_MAA"]
         file.copy(f"ENS_MAA/{name}", "ENS_MAA/again")
     assert refusal(path).startswith("meshes = 2: the file must hold one mesh: again, ")
-
-
-def test_vtk_sees_the_volume_of_every_type(tmp_path):
-    """Written as VTKHDF and read by VTK, each type is what it was and right side out."""
-    for name in KINDS:
-        write_by_gmsh(name, tmp_path / "cell.msh")
-        mesh = read_mesh(tmp_path / "cell.msh")
-        write_mesh(mesh, tmp_path / "cell.vtkhdf")
-        reader = vtk.vtkHDFReader()
-        reader.SetFileName(str(tmp_path / "cell.vtkhdf"))
-        sizes = vtk.vtkCellSizeFilter()
-        sizes.SetInputConnection(reader.GetOutputPort())
-        sizes.Update()
-        grid = sizes.GetOutput()
-        data = grid.GetCellData()
-        label = "Volume" if BY_NAME[name].dim == 3 else "Area"
-        assert vtk_to_numpy(data.GetArray(label))[0] > 0.1, name
-        assert grid.GetCell(0).GetCellType() == BY_NAME[name].vtk

@@ -1,0 +1,183 @@
+"""What `transform:` promises: exact moves, plane sides, the same mesh in another order."""
+
+import meshio
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from solver.errors import InputError
+from solver.mesh import generate, transform
+from solver.mesh.catalogue import cell_type
+from solver.mesh.orient import vertex_jacobians
+
+PLANE = {"bottom": {"cells": "QUAD8", "divisions": 4}, "top": {"cells": "TRIA6", "divisions": 3}}
+SOLIDS = {
+    "bottom": {"cells": "HEXA27", "divisions": 3}, "top": {"cells": "TETRA10", "divisions": 3},
+}  # fmt: skip
+MIXED = {
+    "bottom": {"cells": "HEXA20", "divisions": 3}, "top": {"cells": "PYRA13", "contact": "TRIA6"},
+}  # fmt: skip
+MESHES = {
+    name: generate({"recipe": "blocks", "size": 2.0} | spec, "case.yaml")
+    for name, spec in (("plane", PLANE), ("solids", SOLIDS), ("mixed", MIXED))
+}
+
+
+def assert_right_side_out(mesh: meshio.Mesh) -> None:
+    for block in mesh.cells:
+        cell = cell_type(block.type)
+        if cell.dim == mesh.points.shape[1]:
+            assert (vertex_jacobians(mesh.points, block.data, cell) > 0).all()
+
+
+def test_scale_stretch_translate_are_exact():
+    mesh = MESHES["plane"]
+    spec = {"scale": 0.5, "stretch": [1, 4], "translate": [3, -1]}
+    moved = transform(mesh, spec, "case.yaml")
+    np.testing.assert_array_equal(moved.points, mesh.points * 0.5 * [1, 4] + [3, -1])
+    assert moved.cells is mesh.cells or moved.cells == mesh.cells
+    assert moved.cell_sets == mesh.cell_sets
+
+
+def test_steps_are_taken_in_the_order_in_which_they_stand():
+    mesh = MESHES["plane"]
+    first = transform(mesh, {"translate": [1, 0], "scale": 2}, "case.yaml")
+    np.testing.assert_array_equal(first.points, (mesh.points + np.array([1, 0])) * 2)
+
+
+def test_quarter_turns_are_exact():
+    plane = transform(MESHES["plane"], {"rotate": 90}, "case.yaml")
+    x, y = MESHES["plane"].points.T
+    np.testing.assert_array_equal(plane.points, np.column_stack([-y, x]))
+    solid = transform(MESHES["solids"], {"rotate": {"axis": [0, 0, 2], "angle": -90}}, "case.yaml")
+    x, y, z = MESHES["solids"].points.T
+    np.testing.assert_array_equal(solid.points, np.column_stack([y, -x, z]))
+
+
+@given(angle=st.floats(-1000, 1000), axis=st.tuples(*[st.integers(-3, 3)] * 3))
+def test_rotations_keep_lengths_and_their_axis(angle, axis):
+    mesh = MESHES["solids"]
+    if axis == (0, 0, 0):
+        return
+    turned = transform(mesh, {"rotate": {"axis": list(axis), "angle": angle}}, "case.yaml").points
+    np.testing.assert_allclose(
+        np.linalg.norm(turned, axis=1), np.linalg.norm(mesh.points, axis=1), rtol=1e-14, atol=1e-14
+    )
+    np.testing.assert_allclose(turned @ axis, mesh.points @ axis, atol=1e-13)
+
+
+def test_a_turn_about_the_diagonal_permutes_the_axes():
+    """A third of a turn about (1, 1, 1) takes x to y, y to z and z to x."""
+    spec = {"rotate": {"axis": [1, 1, 1], "angle": 120}}
+    turned = transform(MESHES["solids"], spec, "case.yaml").points
+    np.testing.assert_allclose(turned, np.roll(MESHES["solids"].points, 1, axis=1), atol=1e-14)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_perturb_keeps_plane_sides_and_the_shape_of_edges(name):
+    mesh = MESHES[name]
+    spec = {"perturb": {"amplitude": 0.2, "seed": 4}}
+    moved = transform(mesh, spec, "case.yaml")
+    step = moved.points - mesh.points
+    for axis in range(mesh.points.shape[1]):
+        heights = (0.0, 2.0) if axis < mesh.points.shape[1] - 1 else (-2.0, 0.0, 2.0)
+        for height in heights:
+            on_side = mesh.points[:, axis] == height
+            assert on_side.any()
+            assert (moved.points[on_side, axis] == height).all()
+        assert (np.abs(step[:, axis]) > 0).any()
+    assert_right_side_out(moved)
+    for block in mesh.cells:
+        cell = cell_type(block.type)
+        for i, edge in enumerate(cell.edges):
+            middle = step[block.data[:, list(edge)]].mean(axis=1)
+            np.testing.assert_allclose(step[block.data[:, cell.n_vertices + i]], middle, atol=1e-15)
+
+
+def test_perturb_moves_the_nodes_of_the_interface():
+    """Else the faces there would stay the parallelograms that hide an inexact quadrature."""
+    moved = transform(MESHES["mixed"], {"perturb": 0.2}, "case.yaml")
+    ids = MESHES["mixed"].cell_sets["bottom_contact"]
+    (nodes,) = (b.data[i] for b, i in zip(moved.cells, ids, strict=True) if len(i))
+    corners = moved.points[nodes[:, :4]]
+    skew = corners[:, 0] - corners[:, 1] + corners[:, 2] - corners[:, 3]
+    assert (np.linalg.norm(skew, axis=1) > 0.01).all()
+
+
+def test_perturb_on_a_turned_mesh_stays_in_the_turned_planes():
+    spec = {"rotate": {"axis": [1, 2, 3], "angle": 33}, "perturb": 0.2}
+    moved = transform(MESHES["mixed"], spec, "case.yaml")
+    back = transform(moved, {"rotate": {"axis": [1, 2, 3], "angle": -33}}, "case.yaml").points
+    straight = MESHES["mixed"].points
+    on_interface = straight[:, 2] == 0
+    np.testing.assert_allclose(back[on_interface, 2], 0, atol=1e-15)
+    assert np.abs(back - straight).max() > 0.01
+
+
+def test_perturb_is_the_same_for_a_seed_and_another_for_another():
+    mesh = MESHES["plane"]
+    moved = [
+        transform(mesh, {"perturb": {"amplitude": 0.1, "seed": seed}}, "case.yaml").points
+        for seed in (1, 1, 2)
+    ]
+    np.testing.assert_array_equal(moved[0], moved[1])
+    assert (moved[0] != moved[2]).any()
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_renumber_is_the_same_mesh_in_another_order(name):
+    mesh = MESHES[name]
+    mesh = meshio.Mesh(
+        mesh.points, mesh.cells, cell_sets=mesh.cell_sets, point_sets={"few": np.array([0, 5, 7])}
+    )
+    other = transform(mesh, {"renumber": 3}, "case.yaml")
+    assert (other.points != mesh.points).any()
+    assert_right_side_out(other)
+
+    def places(of: meshio.Mesh, group: str) -> set[tuple]:
+        return {
+            tuple(map(tuple, of.points[row]))
+            for block, ids in zip(of.cells, of.cell_sets[group], strict=True)
+            for row in block.data[ids]
+        }
+
+    for group in mesh.cell_sets:
+        assert places(other, group) == places(mesh, group)
+    few = {tuple(p) for p in mesh.points[mesh.point_sets["few"]]}
+    assert {tuple(p) for p in other.points[other.point_sets["few"]]} == few
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ({"mirror": 1}, "transform.mirror: unknown key; allowed: "),
+        ({"skale": 1}, "transform.skale: unknown key (did you mean scale?); allowed: "),
+        ({"scale": 0}, "transform.scale = 0: must be a positive number"),
+        ({"stretch": [1, -1]}, "transform.stretch = [1, -1]: must be a positive number, or a list"),
+        ({"translate": 3}, "transform.translate = 3: must be a list of 2 numbers"),
+        ({"translate": [1, 2, 3]}, "transform.translate = [1, 2, 3]: must be a list of 2 numbers"),
+        ({"rotate": "x"}, "transform.rotate = 'x': must be a number"),
+        ({"renumber": -1}, "transform.renumber.seed = -1: must be a whole number from 0 on"),
+        ({"perturb": {"seed": 1}}, "transform.perturb.amplitude: must be a positive number"),
+        ({"perturb": 5.0}, "transform.perturb.amplitude = 5.0: folds cells over: must be smaller"),
+    ],
+)
+def test_refusals(spec, message):
+    with pytest.raises(InputError) as caught:
+        transform(MESHES["plane"], spec, "case.yaml")
+    assert str(caught.value).startswith(f"case.yaml: {message}")
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (30, "transform.rotate = 30: must be {axis: [x, y, z], angle: degrees}"),
+        ({"axis": [0, 0, 0], "angle": 3}, "transform.rotate.axis = [0.0, 0.0, 0.0]: must not be"),
+        ({"axis": [0, 0, 1]}, "transform.rotate.angle: must be a number"),
+    ],
+)
+def test_refused_rotations_in_3d(value, message):
+    with pytest.raises(InputError) as caught:
+        transform(MESHES["solids"], {"rotate": value}, "case.yaml")
+    assert str(caught.value).startswith(f"case.yaml: {message}")
