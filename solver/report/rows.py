@@ -55,8 +55,11 @@ class Row:
 
     @cached_property
     def why(self) -> str:
-        """The reason where it did not pass."""
-        return "" if self.word == "passed" else str(self.verdict.get("reason") or "no reason given")
+        """The reason where it did not pass, in one line that is safe to print."""
+        if self.word == "passed":
+            return ""
+        reason = " ".join(str(self.verdict.get("reason") or "no reason given").split())
+        return "".join(c if c.isprintable() else "�" for c in reason)
 
     @cached_property
     def result_file(self) -> Path | None:

@@ -182,11 +182,7 @@ def _xml(text: str) -> str:
 
 def to_failures(rows: Sequence[Row]) -> str:
     """One line for each solve that did not pass: name, verdict, reason; empty if all did."""
-    return "".join(
-        f"{row.name}: {row.word}: {' '.join(row.why.split())}\n"
-        for row in rows
-        if row.word != "passed"
-    )
+    return "".join(f"{row.name}: {row.word}: {row.why}\n" for row in rows if row.word != "passed")
 
 
 def outcome(rows: Sequence[Row]) -> str:
