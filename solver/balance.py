@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from solver.contact import Equilibrium, straining_force
+from solver.contact import Equilibrium
+from solver.elasticity import internal_force
 from solver.scene import Scene
 
 
@@ -23,7 +24,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     result: dict[str, float] = {}
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length)
-    internal = straining_force(scene, state.straining)
+    internal = internal_force(points, scene.blocks, state.straining)
     unbalanced = (internal - state.force - contact).ravel()
     basis = scene.free.basis
     # What is left on held unknowns are the reactions; on free ones nothing may be left.

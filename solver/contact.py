@@ -94,7 +94,8 @@ class _Iterate:
 
     def residual(self) -> np.ndarray:
         scene = self.problem.scene
-        internal = straining_force(scene, self.displacement.straining.reshape(2, *self.force.shape))
+        straining = self.displacement.straining.reshape(2, *self.force.shape)
+        internal = internal_force(scene.points, scene.blocks, straining)
         return scene.free.basis.T @ (self.force - internal).ravel()
 
     def violation(self) -> np.ndarray:
@@ -104,14 +105,6 @@ class _Iterate:
     def advanced(self, change: np.ndarray) -> "_Iterate":
         moved = self.displacement.moved(self.problem.scene.free.basis @ change)
         return replace(self, displacement=moved)
-
-
-def straining_force(scene: Scene, straining: np.ndarray) -> np.ndarray:
-    """Internal forces (n, dim) of a displacement in two parts (2, n, dim)."""
-    force = internal_force(scene.points, scene.blocks, straining[0])
-    if straining[1].any():
-        force += internal_force(scene.points, scene.blocks, straining[1])
-    return force
 
 
 class ContactProblem:

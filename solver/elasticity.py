@@ -117,7 +117,8 @@ def internal_force(points: np.ndarray, blocks: list[Block], displacement: np.nda
 
     Strains are taken from differences of displacement within the cell: the large common part of a
     displacement, which carries no strain, then costs no digits, as it would in the assembled
-    product K·u.
+    product K·u. A displacement may come in several parts (parts, n_nodes, dim), of which it is the
+    sum to more digits than one number holds: their differences are summed, not they themselves.
     """
     n, dim = points.shape
     force = np.zeros(n * dim)
@@ -126,7 +127,7 @@ def internal_force(points: np.ndarray, blocks: list[Block], displacement: np.nda
         for part in _chunks(block, dim):
             cells = block.cells[part]
             gradient, determinant = physical_gradients(points, cells, block.type, reference)
-            stress = _stress(gradient, displacement[cells], block.lame[part], block.shear[part])
+            stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
             stress *= (weights * determinant)[:, :, None, None]
             nodal = np.einsum("cqaj,cqij->cai", gradient, stress, optimize=True)
             dofs = degrees_of_freedom(cells, dim)
@@ -135,10 +136,15 @@ def internal_force(points: np.ndarray, blocks: list[Block], displacement: np.nda
 
 
 def _stress(
-    gradient: np.ndarray, nodal: np.ndarray, lame: np.ndarray, shear: np.ndarray
+    gradient: np.ndarray,
+    displacement: np.ndarray,
+    cells: np.ndarray,
+    lame: np.ndarray,
+    shear: np.ndarray,
 ) -> np.ndarray:
-    """In-plane or 3D stress tensors (n, q, dim, dim) from nodal displacements (n, n_nodes, dim)."""
-    difference = nodal - nodal[:, :1]
+    """In-plane or 3D stress tensors (n, q, dim, dim) in cells (n, n_nodes)."""
+    nodal = displacement.reshape(-1, *displacement.shape[-2:])[:, cells]
+    difference = (nodal - nodal[:, :, :1]).sum(axis=0)
     slope = np.einsum("cai,cqaj->cqij", difference, gradient, optimize=True)
     stress = shear[:, None, None, None] * (slope + np.swapaxes(slope, 2, 3))
     pressure = lame[:, None] * np.einsum("cqii->cq", slope)
@@ -162,7 +168,7 @@ def nodal_stress(points: np.ndarray, blocks: list[Block], displacement: np.ndarr
         for part in _chunks(block, points.shape[1]):
             cells = block.cells[part]
             gradient, _ = physical_gradients(points, cells, block.type, reference)
-            stress = _stress(gradient, displacement[cells], block.lame[part], block.shear[part])
+            stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
             full = _voigt(stress, block.lame[part], block.shear[part])
             nodal = np.einsum("aq,cqs->cas", fit, full, optimize=True)
             for s in range(6):

@@ -73,9 +73,7 @@ def _recover(
     hexahedra: str | None,
 ) -> Solution:
     last = states[-1]
-    first, second = last.straining
-    stress = nodal_stress(scene.points, scene.blocks, first)
-    stress += nodal_stress(scene.points, scene.blocks, second)
+    stress = nodal_stress(scene.points, scene.blocks, last.straining)
     scale = _stress_scale(scene, stress)
     zones = [_zone_result(scene, problem, zone, last, stress) for zone in scene.zones]
     return Solution(
