@@ -17,7 +17,7 @@ Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (th
 bottom block), `press` (the upper side of the top block), `symx` (x = 0) and `symy` (y = 0, 3D).
 """
 
-from itertools import chain, pairwise
+from itertools import pairwise
 
 import gmsh
 import meshio
@@ -83,9 +83,15 @@ class _Block:
             edges = self._edges(self._corners())
             self._volume(self._surfaces(edges))
             gmsh.model.mesh.generate(self.cell.dim)
-            self._straighten()
+            # Gmsh measures curves numerically, which leaves their nodes 1e-12 of the size away.
+            if not self.regular:
+                self._divide_edges_evenly()
             gmsh.model.mesh.setOrder(self.cell.order)
-            return current_model(unnamed=False)
+            mesh = current_model(unnamed=False)
+        if self.regular:
+            steps = np.array(self.divisions) * self.cell.order
+            mesh.points[:, : self.cell.dim] = self._snapped(mesh.points, steps)
+        return mesh
 
     def _corners(self) -> list[int]:
         places = np.zeros((self.solid.n_nodes, 3))
@@ -137,24 +143,21 @@ class _Block:
             if name:
                 gmsh.model.addPhysicalGroup(dim - 1, [abs(side)], name=name)
 
-    def _straighten(self) -> None:
-        """Put the nodes of edges, and of regular grids, exactly where the divisions say.
-
-        gmsh measures curves numerically, which leaves the nodes 1e-12 of the size away.
-        """
-        for dim, entity in chain.from_iterable(map(gmsh.model.getEntities, range(1, 4))):
-            if dim > 1 and not self.regular:
-                continue
-            tags, flat, _ = gmsh.model.mesh.getNodes(dim, entity)
+    def _divide_edges_evenly(self) -> None:
+        far_end = 0 if self.name == "bottom" else 1
+        for dim, edge in gmsh.model.getEntities(1):
+            tags, flat, _ = gmsh.model.mesh.getNodes(dim, edge)
             for tag, place in zip(tags, flat.reshape(-1, 3), strict=True):
-                share = (place[: self.cell.dim] - self.origin) / self.size
-                n = self._divisions_at(share)
-                place[: self.cell.dim] = self.origin + np.round(share * n) * self.size / n
+                height = (place[self.cell.dim - 1] - self.origin[-1]) / self.size[-1]
+                lateral = self.far if abs(height - far_end) < 1e-9 else self.divisions[:-1]
+                steps = np.array([*lateral, self.divisions[-1]])
+                place[: self.cell.dim] = self._snapped(place, steps)
                 gmsh.model.mesh.setNode(tag, place, [])
 
-    def _divisions_at(self, share: np.ndarray) -> np.ndarray:
-        far = abs(share[-1] - (0 if self.name == "bottom" else 1)) < 1e-9
-        return np.array([*(self.far if far else self.divisions[:-1]), self.divisions[-1]])
+    def _snapped(self, places: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Places (…, dim) moved to the nearest node of a lattice of so many steps each way."""
+        share = (places[..., : self.cell.dim] - self.origin) / self.size
+        return self.origin + np.round(share * steps) * self.size / steps
 
 
 def _joined(meshes: list[meshio.Mesh]) -> meshio.Mesh:

@@ -2,7 +2,7 @@
 
 | extension | read by | groups |
 |---|---|---|
-| .med | `med` | of cells and of nodes |
+| .med, .mmed | `med` | of cells and of nodes |
 | .msh, versions 2 and 4 | gmsh | physical groups; those of points become groups of nodes |
 | .inp | `abaqus` | *ELSET, *SURFACE, *NSET |
 | .vtu | meshio | each integer array of 0 and 1 on cells or points is a group of its name |
@@ -20,6 +20,7 @@ from solver.mesh.tidy import tidy
 # Modules with a function `read(path)` that gives the mesh as it stands in the file.
 _READERS = {
     ".med": "solver.mesh.med",
+    ".mmed": "solver.mesh.med",
     ".msh": "solver.mesh.msh",
     ".inp": "solver.mesh.abaqus",
     ".vtu": "solver.mesh.vtu",
@@ -29,11 +30,12 @@ _READERS = {
 
 def read(path: Path) -> meshio.Mesh:
     """The mesh of a file, tidied. Raises InputError for whatever keeps it from being read."""
-    if path.suffix not in _READERS:
+    suffix = path.suffix.lower()
+    if suffix not in _READERS:
         raise InputError(path, "extension", path.suffix, f"allowed: {', '.join(_READERS)}")
     if not path.is_file():
         raise InputError(path, "mesh", None, "no such file")
-    reader = import_module(_READERS[path.suffix])
+    reader = import_module(_READERS[suffix])
     try:
         raw = reader.read(path)
     except InputError:

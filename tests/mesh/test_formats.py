@@ -200,7 +200,7 @@ def test_no_such_file(tmp_path):
 
 def test_unknown_extension(tmp_path):
     message = refusal(tmp_path / "mesh.stl")
-    assert message == "extension = '.stl': allowed: .med, .msh, .inp, .vtu, .vtkhdf"
+    assert message == "extension = '.stl': allowed: .med, .mmed, .msh, .inp, .vtu, .vtkhdf"
 
 
 @pytest.mark.parametrize("suffix", ["med", "msh", "inp", "vtu", "vtkhdf"])
