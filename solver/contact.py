@@ -9,7 +9,13 @@ from solver.bodies import rigid_motions, unheld_motion, unsupported
 from solver.elasticity import internal_force, stiffness
 from solver.errors import InputError, SolveError
 from solver.lac.status import StatusResult, find_status
-from solver.linear.condensation import Condensed, choose_pivots, condense, solve
+from solver.linear.condensation import (
+    Constrained,
+    choose_pivots,
+    condense,
+    saddle_point,
+    solve,
+)
 from solver.naming import body_names
 from solver.scene import Scene
 
@@ -23,7 +29,7 @@ _TWICE = 1e-6
 class Equilibrium:
     """A solved load factor: displacement (n, dim), pressure and gap (m,), status, residual.
 
-    `straining` (2, n, dim): the two parts of the displacement less a rigid motion of each body, from
+    `straining` (2, n, dim): both parts of the displacement less a rigid motion of each body, from
     which strains are taken (see `Displacement`).
     """
 
@@ -133,14 +139,16 @@ class ContactProblem:
         free = unsupported(self.motions, scene.free.basis)
         self.at_rest = Displacement.zero(free, np.diff(self.gaps.tocsc().indptr) > 0)
         self._refuse_unheld()
-        self._refuse_lost_nodes()
+        self.has_own_unknowns = all(z.zone.treatment != "uncut" for z in scene.zones)
+        if self.has_own_unknowns:
+            self._refuse_lost_nodes()
         self.matrix = scene.free.reduced(stiffness(scene.points, scene.blocks))
-        self._condensed: tuple[bytes, Condensed] | None = None
+        self._system: tuple[bytes, Constrained] | None = None
 
     @property
     def linear_solver(self) -> str:
         """The name of what solved the last system."""
-        return self._condensed[1].factor.name if self._condensed else "none"
+        return self._system[1].factor.name if self._system else "none"
 
     def solve(self, factor: float, start: np.ndarray | None = None) -> Equilibrium:
         """Equilibrium at a load factor, the status search starting from `start` (all closed)."""
@@ -177,11 +185,11 @@ class ContactProblem:
         self, closed: np.ndarray, force: np.ndarray, factor: float
     ) -> tuple["Displacement", np.ndarray, float]:
         """Displacement and pressures with the given macro-elements closed, relative residual."""
-        condensed = self._condense(closed)
+        system = self._constrained(closed)
         offset = factor * self.scene.free.offset
         scale = self._force_scale(force, offset.reshape(self.scene.points.shape))
         iterate = _Iterate(self, closed, force, self.at_rest.moved(offset))
-        iterate, multiplier, size = solve(condensed, iterate, scale)
+        iterate, multiplier, size = solve(system, iterate, scale)
         pressure = np.zeros(len(closed))
         pressure[closed] = multiplier
         return iterate.displacement, pressure, size
@@ -191,16 +199,19 @@ class ContactProblem:
         internal = internal_force(self.scene.points, self.scene.blocks, imposed)
         return float(max(np.abs(force).max(), np.abs(internal).max())) or 1.0
 
-    def _condense(self, closed: np.ndarray) -> Condensed:
+    def _constrained(self, closed: np.ndarray) -> Constrained:
         key = closed.tobytes()
-        if self._condensed is None or self._condensed[0] != key:
+        if self._system is None or self._system[0] != key:
             held = self._unheld(closed)
             if held:
                 raise SolveError(f"{held} once {int((~closed).sum())} macro-elements are open")
             constraints = (self.gaps[closed] @ self.scene.free.basis).tocsr()
-            own = self._own_unknowns()
-            self._condensed = key, condense(self.matrix, constraints, own)
-        return self._condensed[1]
+            if self.has_own_unknowns:
+                system = condense(self.matrix, constraints, self._own_unknowns())
+            else:
+                system = saddle_point(self.matrix, constraints)
+            self._system = key, system
+        return self._system[1]
 
     def _own_unknowns(self) -> np.ndarray:
         """Free unknowns (n_free,) that belong to slave nodes."""

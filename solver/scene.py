@@ -162,14 +162,15 @@ def _cut(
     surfaces: list[tuple[list[FaceBlock], list[FaceBlock]]],
 ) -> tuple[CutMesh, list[list[SubFaces]]]:
     """The cut mesh, and each zone's sub-faces with macro-elements counted within the zone."""
-    faces, macro, into_hexahedra, first = [], [], [], [0]
+    faces, macro, into_hexahedra, uncut, first = [], [], [], [], [0]
     for zone, (slave, _) in zip(zones, surfaces, strict=True):
         for block in slave:
             faces.append(block)
             macro.append(first[-1] + block.number)
             into_hexahedra.append(zone.hexahedra == "hexahedra")
+            uncut.append(zone.treatment == "uncut")
         first.append(first[-1] + sum(len(block.nodes) for block in slave))
-    cut_mesh = cut(mesh.points, volume_cells(mesh), faces, macro, into_hexahedra)
+    cut_mesh = cut(mesh.points, volume_cells(mesh), faces, macro, into_hexahedra, uncut)
     sub_faces = []
     for low, high in pairwise(first):
         mine = [(f, (f.macro >= low) & (f.macro < high)) for f in cut_mesh.sub_faces]

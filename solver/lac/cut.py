@@ -11,6 +11,7 @@ method, CMAME 339 (2018) 488–513, §3; which cells need the cut: code_aster R5
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import compress
 
 import numpy as np
 
@@ -62,17 +63,24 @@ def cut(
     faces: list[FaceBlock],
     macro: list[np.ndarray],
     into_hexahedra: list[bool],
+    uncut: list[bool] | None = None,
 ) -> CutMesh:
     """Cut the cells behind slave faces.
 
     `faces` are the slave faces of all zones, `macro` their macro-element numbers, `into_hexahedra`
-    the choice for hexahedra, all by block.
+    the choice for hexahedra, all by block; blocks marked `uncut` are left as they are.
     """
-    slaves = _slave_faces_by_cell(faces, macro, into_hexahedra)
+    left = uncut or [False] * len(faces)
+    chosen = [
+        needs_cut(block.type.name) and not leave for block, leave in zip(faces, left, strict=True)
+    ]
+    slaves = _slave_faces_by_cell(
+        *(list(compress(a, chosen)) for a in (faces, macro, into_hexahedra))
+    )
     whole = [
         SubFaces(block.type, block.nodes, number)
-        for block, number in zip(faces, macro, strict=True)
-        if not needs_cut(block.type.name)
+        for block, number, pick in zip(faces, macro, chosen, strict=True)
+        if not pick
     ]
     pieces = _Pieces(points, cells)
     for (name, pattern), (owner, numbers) in slaves.items():
@@ -93,10 +101,9 @@ def _slave_faces_by_cell(
     groups: dict[tuple[str, Pattern], tuple[np.ndarray, np.ndarray]] = {}
     by_type: dict[str, list[np.ndarray]] = {}
     for block, number, whole in zip(faces, macro, into_hexahedra, strict=True):
-        if needs_cut(block.type.name):
-            flag = np.full(len(number), whole)
-            rows = np.stack([block.owner, block.local, flag, number], axis=1)
-            by_type.setdefault(block.owner_type.name, []).append(rows)
+        flag = np.full(len(number), whole)
+        rows = np.stack([block.owner, block.local, flag, number], axis=1)
+        by_type.setdefault(block.owner_type.name, []).append(rows)
     for name, parts in by_type.items():
         rows = np.concatenate(parts)
         rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.errors import SolveError
-from solver.linear.direct import Factor, factorise
+from solver.linear.direct import Factor, factorise, factorise_indefinite
 
 # Each refinement must at least halve the residual, or it has reached round-off.
 _MIN_GAIN = 0.5
@@ -24,6 +24,21 @@ _SMALLEST_PIVOT = 1e-6
 
 
 AnyIterate = TypeVar("AnyIterate", bound="Iterate")
+
+
+class Constrained(Protocol):
+    """A factored system K x = f + Gᵀ p under constraints G x = b."""
+
+    factor: Factor
+
+    def correction(self, force: np.ndarray, violation: np.ndarray) -> np.ndarray:
+        """The change of x (n,) that removes f − K x = `force` and b − G x = `violation`."""
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """The multipliers p (m,) that balance f − K x = `force`."""
+
+    def imbalance(self, force: np.ndarray) -> float:
+        """The largest force that no multiplier can balance."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +55,48 @@ class Condensed:
     factor: Factor
     matrix: sparse.csr_matrix
 
-    def particular(self, right: np.ndarray) -> np.ndarray:
-        """An x (n,) with G x = `right` (m,): the pivots alone move."""
-        x = np.zeros(self.expansion.shape[0])
-        x[self.pivot] = right / self.coefficient
-        return x
+    def correction(self, force: np.ndarray, violation: np.ndarray) -> np.ndarray:
+        """The pivots alone meet the constraints; the others then restore equilibrium."""
+        change = np.zeros(self.expansion.shape[0])
+        change[self.pivot] = violation / self.coefficient
+        moved = force - self.matrix @ change if change.any() else force
+        return change + self.expansion @ self.factor.solve(self.expansion.T @ moved)
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """From the equilibrium of the pivots, which one multiplier each acts on."""
+        return -force[self.pivot] / self.coefficient
+
+    def imbalance(self, force: np.ndarray) -> float:
+        """The largest force left on the unknowns v."""
+        return float(np.abs(self.expansion.T @ force).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class Saddle:
+    """The system with the multipliers as unknowns, for constraints without a pivot of their own."""
+
+    constraints: sparse.csr_matrix
+    factor: Factor
+
+    def correction(self, force: np.ndarray, violation: np.ndarray) -> np.ndarray:
+        """Solved for x and p together."""
+        return self.factor.solve(np.concatenate([force, -violation]))[: len(force)]
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """The multipliers of the same system with nothing violated."""
+        right = np.concatenate([force, np.zeros(self.constraints.shape[0])])
+        return self.factor.solve(right)[len(force) :]
+
+    def imbalance(self, force: np.ndarray) -> float:
+        """The largest force left with the multipliers acting."""
+        left = force + self.constraints.T @ self.multiplier(force)
+        return float(np.abs(left).max(initial=0.0))
+
+
+def saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> Saddle:
+    """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular."""
+    rows = [[matrix, -constraints.T], [-constraints, None]]
+    return Saddle(constraints, factorise_indefinite(sparse.bmat(rows, format="csr")))
 
 
 def choose_pivots(
@@ -127,7 +179,7 @@ class Iterate(Protocol):
 
 
 def solve(
-    condensed: Condensed, iterate: AnyIterate, scale: float, refine: bool = True
+    system: Constrained, iterate: AnyIterate, scale: float, refine: bool = True
 ) -> tuple[AnyIterate, np.ndarray, float]:
     """Solve from an iterate; return the last one, multipliers (m,) and the relative residual.
 
@@ -135,15 +187,11 @@ def solve(
     ones refine until the residual no longer falls (Higham, Accuracy and Stability of Numerical
     Algorithms, §12). Raises SolveError where the solution is not finite.
     """
-    expansion = condensed.expansion
     force, last = iterate.residual(), np.inf
     for _ in range(_MAX_REFINEMENTS if refine else 1):
-        change = condensed.particular(iterate.violation())
-        moved = force - condensed.matrix @ change if change.any() else force
-        change += expansion @ condensed.factor.solve(expansion.T @ moved)
-        following = iterate.advanced(change)
+        following = iterate.advanced(system.correction(force, iterate.violation()))
         following_force = following.residual()
-        size = float(np.abs(expansion.T @ following_force).max(initial=0.0)) / scale
+        size = system.imbalance(following_force) / scale
         if not np.isfinite(size):
             raise SolveError("the solution is not finite")
         if size < last:
@@ -152,4 +200,4 @@ def solve(
         last = min(size, last)
         if enough:
             break
-    return iterate, -force[condensed.pivot] / condensed.coefficient, last
+    return iterate, system.multiplier(force), last
