@@ -14,7 +14,8 @@ Blocks of PENTA and PYRA cells are a single cube cut in pieces (see `hybrid`).
 
 The interface lies in y = 0 (2D) or z = 0 (3D), the corner of both blocks at x = 0 (and y = 0).
 Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (the lower side of the
-bottom block), `press` (the upper side of the top block), `symx` (x = 0) and `symy` (y = 0, 3D).
+bottom block), `press` (the upper side of the top block), `symx` (x = 0) and `symy` (y = 0, 3D) of
+both blocks, `farx` and `fary` opposite to them. `refine` multiplies all divisions (1).
 """
 
 from itertools import pairwise
@@ -30,49 +31,65 @@ from solver.mesh.keys import Keys
 from solver.mesh.sides import side_name
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
-_ALGORITHMS = {"meshadapt": 1, "delaunay": 5, "frontal": 6, "bamg": 7, "packing": 9}
+_ALGORITHMS = {"frontal": 6, "delaunay": 5, "meshadapt": 1}
 _CELLS = [name for name, cell in BY_NAME.items() if cell.dim > 1]
 
 
 def blocks(keys: Keys) -> meshio.Mesh:
     """Both blocks, which share no nodes."""
+    mesh = stacked(keys, None)
+    keys.finish()
+    return mesh
+
+
+def stacked(keys: Keys, size: float | None) -> meshio.Mesh:
+    """Both blocks, each of edge `size`, or of the key `size`; the caller finishes the keys."""
     sections = {name: keys.section(name) for name in ("bottom", "top")}
     types = {name: BY_NAME[section.choice("cells", _CELLS)] for name, section in sections.items()}
     dim = types["bottom"].dim
     if types["top"].dim != dim:
         raise keys.refuse("top.cells", types["top"].name, f"must be of dimension {dim} as bottom")
-    size = keys.numbers("size", dim)
-    keys.finish()
-    return _joined([_block(n, types[n], np.array(size), sections[n]) for n in sections])
+    edges = np.array(keys.numbers("size", dim) if size is None else [size] * dim)
+    refine = keys.integers("refine", 1, [1])[0]
+    return _joined([_block(n, types[n], edges, sections[n], refine) for n in sections])
 
 
-def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys) -> meshio.Mesh:
+def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys, refine: int) -> meshio.Mesh:
     origin = np.zeros(cell.dim)
     if name == "bottom":
         origin[-1] = -size[-1]
     if cell.name.startswith(("PENTA", "PYRA")):
         return cube(name, cell, origin, size, keys)
-    return _Block(name, cell, origin, size, keys).mesh()
+    return _Block(name, cell, origin, size, keys, refine).mesh()
 
 
 class _Block:
     """One block: a rectangle or a box, its corners and sides those of QUAD4 or HEXA8."""
 
-    def __init__(self, name: str, cell: CellType, origin: np.ndarray, size: np.ndarray, keys: Keys):
+    def __init__(
+        self,
+        name: str,
+        cell: CellType,
+        origin: np.ndarray,
+        size: np.ndarray,
+        keys: Keys,
+        refine: int,
+    ):
         self.name, self.cell, self.origin, self.size = name, cell, origin, size
         self.solid = BY_NAME["QUAD4" if cell.dim == 2 else "HEXA8"]
         self.regular = cell.name.startswith(("QUAD", "HEXA"))
-        self.divisions = keys.integers("divisions", cell.dim)
+        self.divisions = [refine * n for n in keys.integers("divisions", cell.dim)]
         self.far = self.divisions[:-1]
         options: dict[str, float] = {}
         if not self.regular:
-            self.far = keys.integers("far", cell.dim - 1, self.far)
+            if keys.given("far"):
+                self.far = [refine * n for n in keys.integers("far", cell.dim - 1)]
             options["Mesh__Algorithm"] = _ALGORITHMS[
                 keys.choice("algorithm", _ALGORITHMS, "frontal")
             ]
             if keys.given("inner"):
                 options["Mesh__MeshSizeExtendFromBoundary"] = 0
-                options["Mesh__MeshSizeMax"] = keys.numbers("inner", 1)[0]
+                options["Mesh__MeshSizeMax"] = keys.numbers("inner", 1)[0] / refine
         self.options = options
         keys.finish()
 

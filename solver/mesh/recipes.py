@@ -9,10 +9,18 @@ from typing import Any
 
 import meshio
 
+from solver.errors import InputError
 from solver.mesh.keys import Keys
 from solver.mesh.tidy import tidy
 
-_RECIPES = {"blocks": "solver.mesh.blocks:blocks"}
+_RECIPES = {
+    "blocks": "solver.mesh.blocks:blocks",
+    "rings": "solver.mesh.mapped:rings",
+    "shells": "solver.mesh.mapped:shells",
+    "wavy": "solver.mesh.mapped:wavy",
+    "parabola": "solver.mesh.mapped:parabola",
+    "hertz": "solver.mesh.mapped:hertz",
+}
 
 
 def generate(recipe: Mapping[str, Any], where: str) -> meshio.Mesh:
@@ -23,4 +31,12 @@ def generate(recipe: Mapping[str, Any], where: str) -> meshio.Mesh:
     """
     keys = Keys(recipe, where, "mesh")
     module, function = _RECIPES[keys.choice("recipe", _RECIPES)].split(":")
-    return tidy(getattr(import_module(module), function)(keys), where)
+    make = getattr(import_module(module), function)
+    try:
+        raw = make(keys)
+    except Exception as error:
+        # What gmsh raises has no class of its own.
+        if type(error) is not Exception:
+            raise
+        raise InputError(where, "mesh", None, f"gmsh cannot make it: {error}") from error
+    return tidy(raw, where)

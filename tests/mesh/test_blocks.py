@@ -233,6 +233,17 @@ def test_refusals(spec, message):
     assert "\n" not in str(caught.value)
 
 
+def test_what_gmsh_cannot_do_is_told_in_one_line(monkeypatch):
+    def fail(dim: int) -> None:
+        raise Exception("PLC Error: two facets intersect")  # gmsh's own way
+
+    monkeypatch.setattr("gmsh.model.mesh.generate", fail)
+    with pytest.raises(InputError) as caught:
+        generate(recipe(GOOD, GOOD), "case.yaml")
+    told = "case.yaml: mesh: gmsh cannot make it: PLC Error: two facets intersect"
+    assert str(caught.value) == told
+
+
 def test_nothing_on_standard_output(capfd):
     generate(recipe(block("TETRA10"), block("HEXA20")), "case.yaml")
     assert capfd.readouterr().out == ""
