@@ -6,18 +6,41 @@ What can only be known with the mesh at hand is checked in `solver.groups`.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from solver.errors import InputError
 from solver.expressions import Expression
 from solver.schemas import CASE_SCHEMA, hint, key_path, validate
 from solver.strict_yaml import parse_mapping, read_text
 
+if TYPE_CHECKING:
+    from solver.solutions import ExactSolution
+
+
+class Exact(Enum):
+    """`solution` in place of a value: what the case's exact solution has there."""
+
+    VALUE = "solution"
+
+
+EXACT = Exact.VALUE
 Scalar = float | Expression
 Vector = tuple[Scalar, ...]
 LOAD_KINDS = ("pressure", "traction", "body_force")
 SWAPPED = "-swapped"
+# What an exact solution must have to stand in for the value under a key, displacement for supports.
+_QUANTITY = {
+    "contact_pressure": "contact_pressure",
+    "normal_stress": "stress",
+    "gap": "gap",
+    "displacement": "displacement",
+    "stress": "stress",
+    "pressure": "stress",
+    "traction": "stress",
+    "body_force": "body_force",
+}
 
 
 @dataclass(frozen=True)
@@ -33,7 +56,7 @@ class Support:
     """Imposed displacements of a group: direction (x, y, z, normal) to value."""
 
     group: str
-    fix: dict[str, Scalar]
+    fix: dict[str, Scalar | Exact]
 
 
 @dataclass(frozen=True)
@@ -42,7 +65,7 @@ class Load:
 
     group: str
     kind: str
-    value: Scalar | Vector
+    value: Scalar | Vector | Exact
 
 
 @dataclass(frozen=True)
@@ -91,9 +114,9 @@ class Case:
     directions: str = "first"
     steps: tuple[float, ...] = (1.0,)
     observe: tuple[Observation, ...] = ()
-    reference: dict[str, Scalar | Vector | dict[str, Scalar]] = field(default_factory=dict)
+    reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
     reference_kind: str | None = None
-    solution: str | None = None
+    solution: "ExactSolution | None" = None
     tolerance: dict[str, float] = field(default_factory=dict)
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
 
@@ -126,10 +149,16 @@ class _Reader:
     def __init__(self, path: Path, content: dict[str, Any]):
         self.path = path
         self.content = content
+        self.materials = {
+            group: Material(float(m["young"]), float(m["poisson"]))
+            for group, m in content["materials"].items()
+        }
+        self.zones = tuple(map(self.zone, content.get("contact", [])))
+        self.solution = self.exact_solution()
 
     def case(self, source: str) -> Case:
         content = self.content
-        reference = dict(content.get("reference", {}))
+        reference = content.get("reference", {})
         # Left out where the file does not give them, for the defaults of `Case` to hold.
         given: dict[str, Any] = {
             key: content[key]
@@ -145,13 +174,10 @@ class _Reader:
             title=content.get("title", ""),
             source=source,
             mesh=self.mesh(),
-            materials={
-                group: Material(float(m["young"]), float(m["poisson"]))
-                for group, m in content["materials"].items()
-            },
+            materials=self.materials,
             supports=tuple(map(self.support, range(len(content["supports"])))),
             loads=tuple(map(self.load, range(len(content.get("loads", []))))),
-            zones=tuple(map(self.zone, content.get("contact", []))),
+            zones=self.zones,
             rigid=frozenset(
                 group for group, body in content.get("bodies", {}).items() if body.get("rigid")
             ),
@@ -159,9 +185,11 @@ class _Reader:
                 Observation(item["zone"], tuple(map(float, item["nearest"])))
                 for item in content.get("observe", [])
             ),
-            reference_kind=reference.pop("kind", None),
-            solution=reference.pop("solution", None),
-            reference={key: self.value("reference", key) for key in reference},
+            reference_kind=reference.get("kind"),
+            solution=self.solution,
+            reference={
+                key: self.value_or_exact("reference", key) for key in reference if key in _QUANTITY
+            },
             tolerance=self.tolerance(),
             **given,
         )
@@ -177,7 +205,8 @@ class _Reader:
         if isinstance(item["fix"], list):
             return Support(item["group"], dict.fromkeys(item["fix"], 0.0))
         keys = ("supports", index, "fix")
-        return Support(item["group"], {axis: self.value(*keys, axis) for axis in item["fix"]})
+        fix = {axis: self.value_or_exact(*keys, axis) for axis in item["fix"]}
+        return Support(item["group"], fix)
 
     def zone(self, item: dict[str, Any]) -> Zone:
         if "interference" in item:
@@ -187,18 +216,50 @@ class _Reader:
     def load(self, index: int) -> Load:
         item = self.content["loads"][index]
         kind = next(kind for kind in LOAD_KINDS if kind in item)
-        return Load(item["group"], kind, self.value("loads", index, kind))
+        return Load(item["group"], kind, self.value_or_exact("loads", index, kind))
 
     def tolerance(self) -> dict[str, float]:
         given = self.content.get("tolerance", {})
         given = given if isinstance(given, dict) else {"all": given}
         return {check: float(value) for check, value in given.items()}
 
-    def value(self, *keys: str | int) -> Any:
-        """The number, expression, tuple or mapping of them that stands under the keys."""
+    def exact_solution(self) -> "ExactSolution | None":
+        """The solution that the reference names, told what the case says already."""
+        given = self.content.get("reference", {}).get("solution")
+        if given is None:
+            return None
+        from solver.solutions import Known, build
+
+        known = Known(
+            where=self.path,
+            materials=self.materials,
+            dimension=2 if "plane" in self.content else 3,
+            pressure=_only(load.get("pressure") for load in self.content.get("loads", [])),
+            interference=_only(zone.interference for zone in self.zones),
+        )
+        return build(given, known)
+
+    def value_or_exact(self, *keys: str | int) -> Any:
+        """EXACT where `solution` stands under the keys; refused where that does not tell it."""
+        if self.given(*keys) != EXACT.value:
+            return self.value(*keys)
+        quantity = _QUANTITY.get(str(keys[-1]), "displacement")
+        if self.solution is not None and quantity in self.solution.quantities:
+            return EXACT
+        name = self.solution.name if self.solution else None
+        allowed = f"{name} has no {quantity}" if name else "reference.solution names none"
+        raise InputError(self.path, key_path(keys), EXACT.value, allowed)
+
+    def given(self, *keys: str | int) -> Any:
+        """What stands under the keys in the file."""
         value: Any = self.content
         for key in keys:
             value = value[key]
+        return value
+
+    def value(self, *keys: str | int) -> Any:
+        """The number, expression, tuple or mapping of them that stands under the keys."""
+        value = self.given(*keys)
         if isinstance(value, list):
             return tuple(self.value(*keys, i) for i in range(len(value)))
         if isinstance(value, dict):
@@ -206,6 +267,13 @@ class _Reader:
         if isinstance(value, str):
             return Expression(value, where=str(self.path), key=key_path(keys))
         return float(value)
+
+
+def _only(values: Iterable[Any]) -> float | None:
+    """The one number among the values; None where there is none, or another value beside it."""
+    different = {value for value in values if value is not None}
+    value = different.pop() if len(different) == 1 else None
+    return float(value) if isinstance(value, int | float) else None
 
 
 def _check(case: Case) -> None:

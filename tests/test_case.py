@@ -13,6 +13,7 @@ from solver.checks import CHECKS
 from solver.errors import InputError
 from solver.expressions import Expression
 from solver.schemas import CASE_SCHEMA
+from solver.solutions.uniform import Hydrostatic
 
 PATH = Path("family/c.yaml")
 FULL = """\
@@ -48,7 +49,7 @@ steps: [0.5, 1]
 observe: [{zone: interface, nearest: [25, 0]}]
 reference:
   kind: analytical
-  solution: block
+  solution: {name: hydrostatic, pressure: 25, material: lower}
   contact_pressure: 25
   gap: x*0
   displacement: [0.0, -0.1*y]
@@ -102,7 +103,7 @@ def test_every_key_arrives():
             "stress": {"yy": -25.0, "zz": Expression("-7.5*x/x")},
         },
         reference_kind="analytical",
-        solution="block",
+        solution=Hydrostatic(pressure=25.0, material=Material(2000.0, 0.3), dim=2),
         tolerance={"multiplier": 1e-6},
         counts={"lower": {"cells": 144, "faces": 12}},
     )
@@ -149,6 +150,18 @@ REFUSED = [
     ("suports: []", "suports = []: unknown key; did you mean supports?"),
     ("plane: stress", "plane = 'stress': must be strain"),
     ("transform: {rotation: 1}", "transform.rotation = 1: unknown key; did you mean rotate?"),
+    ("transform: {scale: 0}", "transform.scale = 0: must be a positive number"),
+    ("transform: {stretch: [1, 0]}", "transform.stretch[1] = 0: must be a positive number"),
+    ("transform: {rotate: left}", "transform.rotate = 'left': must be an angle in degrees"),
+    ("transform: {rotate: {angle: 3}}", "transform.rotate.axis: this key is needed"),
+    (
+        "transform: {rotate: {axis: [0, 0, 1], angel: 3, angle: 3}}",
+        "transform.rotate.angel = 3: unknown key; did you mean angle?",
+    ),
+    ("transform: {perturb: -0.1}", "transform.perturb = -0.1: must be a positive share"),
+    ("transform: {perturb: {seed: 1}}", "transform.perturb.amplitude: this key is needed"),
+    ("transform: {renumber: 1.5}", "transform.renumber = 1.5: must be a seed"),
+    ("transform: {renumber: {seed: -1}}", "transform.renumber.seed = -1: must be a whole number"),
     (
         "contact: [{name: a, slave: S, master: M, normals: element}]",
         "contact[0].normals = 'element': unknown key; did you mean normal?",
