@@ -105,10 +105,11 @@ def test_sides_and_volumes(name, contact):
         up = cell.dim - 1
         planes = {
             "bottom_contact": (up, 0.0), "top_contact": (up, 0.0), "symx": (0, 0.0),
+            "farx": (0, size[0]),
             "base": (up, -size[-1]), "press": (up, size[-1]),
         }  # fmt: skip
         if cell.dim == 3:
-            planes["symy"] = (1, 0.0)
+            planes |= {"symy": (1, 0.0), "fary": (1, size[1])}
         assert set(mesh.cell_sets) == {"bottom", "top", *planes}
         for group, (axis, value) in planes.items():
             for nodes in members(mesh, group):

@@ -1,0 +1,165 @@
+"""Recipes whose bodies are the two blocks of the recipe `blocks`, of edge 1, bent into shape.
+
+Every node is mapped, mid-edge nodes too, so that quadratic cells have their nodes on the true
+curve. `bottom` and `top` are sections as in `blocks`; `refine` multiplies all divisions. The
+interface is the image of height 0, and all groups are those of `blocks`.
+
+    recipe: rings       # 2D, a quarter of two tubes: bottom inside, top outside
+    radii: [20, 30, 40] # base is the bore, press the rim, symx lies on x = 0, farx on y = 0
+
+    recipe: shells      # 3D, a sector of two spheres; symx, symy on x = 0, y = 0,
+    radii: [20, 30, 40] # farx, fary on the planes x = z and y = z through the centre
+
+    recipe: wavy        # both blocks of edge 1 with an interface that is no plane
+    shape: wave         # tilt, kink, arc, wave; 3D also twist (a warped, ruled surface)
+    height: 0.1
+
+    recipe: parabola    # 2D and 3D: the top block of edge 1 stands above a parabolic die (bottom):
+    height: 0.05        # interface of the die at −height · ((x − ½)² + (y − ½)²), of the block at 0
+
+    recipe: hertz       # 2D and 3D: a parabolic body (top, of radius R) on a flat one, symmetric
+    radius: 50          # about x = 0 (and y = 0), each of edge `size`; cells shrink towards the
+    size: 50            # contact by `grading` (0: even; 4: e⁴ between the largest and the smallest)
+    grading: 4
+"""
+
+from collections.abc import Callable
+
+import meshio
+import numpy as np
+
+from solver.mesh.blocks import stacked
+from solver.mesh.keys import Keys
+
+_SHAPES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "tilt": lambda x, y: x + y / 2,
+    "kink": lambda x, _: np.abs(x - 0.5),
+    "arc": lambda x, y: 4 * x * (1 - x) + y * (1 - y),
+    "wave": lambda x, y: np.sin(2 * x + 0.3) * np.cos(1.5 * y),
+    "twist": lambda x, y: 4 * (x - 0.5) * (y - 0.5),
+}
+
+
+def rings(keys: Keys) -> meshio.Mesh:
+    """A quarter of two nested tubes, plane."""
+    radii = _radii(keys)
+    mesh = _flat(keys)
+
+    def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
+        angle = np.pi / 2 * x[:, 0]
+        direction = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        # the straight sides stay on the axes to the bit
+        direction[x[:, 0] == 1, 1] = 0.0
+        return _radius(height, radii)[:, None] * direction
+
+    return _bent(mesh, bend)
+
+
+def shells(keys: Keys) -> meshio.Mesh:
+    """A sector of two nested spheres, between four planes through the centre."""
+    radii = _radii(keys)
+    mesh = _flat(keys, 3)
+
+    def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
+        direction = np.column_stack([x[:, :2], np.ones(len(x))])
+        direction /= np.linalg.norm(direction, axis=1)[:, None]
+        return _radius(height, radii)[:, None] * direction
+
+    return _bent(mesh, bend)
+
+
+def wavy(keys: Keys) -> meshio.Mesh:
+    """Two blocks whose interface is tilted, kinked, curved or warped; all other sides are plane."""
+    shape = _SHAPES[keys.choice("shape", _SHAPES)]
+    rise = keys.number("height")
+    if not abs(rise) < 0.5:
+        raise keys.refuse("height", rise, "must lie between −0.5 and 0.5 (blocks of edge 1)")
+    mesh = _flat(keys)
+
+    def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
+        lift = rise * shape(x[:, 0], _y(x)) * (1 - np.abs(height))
+        return np.column_stack([x[:, :-1], height + lift])
+
+    return _bent(mesh, bend)
+
+
+def parabola(keys: Keys) -> meshio.Mesh:
+    """A block above a parabolic die; their distance is the initial gap."""
+    depth = keys.number("height")
+    mesh = _flat(keys)
+
+    def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
+        sag = (x[:, 0] - 0.5) ** 2 + (0 if x.shape[1] == 2 else (_y(x) - 0.5) ** 2)
+        return np.column_stack([x[:, :-1], height - depth * sag * (1 + height)])
+
+    top = _nodes(mesh, "top")
+    return _bent(mesh, bend, ~top)
+
+
+def hertz(keys: Keys) -> meshio.Mesh:
+    """A parabolic body on a flat one, their cells shrinking towards the point of contact."""
+    radius, size = keys.numbers("radius", 1)[0], keys.numbers("size", 1)[0]
+    grading = keys.number("grading")
+    if not 0 <= grading <= 12:
+        raise keys.refuse("grading", grading, "must lie between 0 and 12")
+    mesh = _flat(keys)
+
+    def graded(x: np.ndarray) -> np.ndarray:
+        return size * (np.sinh(grading * x) / np.sinh(grading) if grading else x)
+
+    def flat(x: np.ndarray, height: np.ndarray) -> np.ndarray:
+        return np.column_stack([graded(x[:, :-1]), graded(height)])
+
+    def curved(x: np.ndarray, height: np.ndarray) -> np.ndarray:
+        place = flat(x, height)
+        rise = (place[:, :-1] ** 2).sum(axis=1) / (2 * radius)
+        place[:, -1] += rise * (1 - place[:, -1] / size)
+        return place
+
+    top = _nodes(mesh, "top")
+    return _bent(_bent(mesh, flat, ~top), curved, top)
+
+
+Bend = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def _flat(keys: Keys, dim: int | None = None) -> meshio.Mesh:
+    mesh = stacked(keys, 1.0)
+    keys.finish()
+    mesh.points = mesh.points[:, : 3 if "symy" in mesh.cell_sets else 2]
+    if dim and mesh.points.shape[1] != dim:
+        raise keys.refuse("bottom.cells", None, f"must be a cell type of {dim}D")
+    return mesh
+
+
+def _bent(mesh: meshio.Mesh, bend: Bend, chosen: np.ndarray | None = None) -> meshio.Mesh:
+    """The mesh with the chosen nodes (n,), or all, mapped from (points, height)."""
+    points = mesh.points.copy()
+    chosen = np.ones(len(points), dtype=bool) if chosen is None else chosen
+    points[chosen] = bend(points[chosen], points[chosen, -1])
+    return meshio.Mesh(points, mesh.cells, cell_sets=mesh.cell_sets)
+
+
+def _nodes(mesh: meshio.Mesh, group: str) -> np.ndarray:
+    """Which nodes (n,) belong to the cells of a group."""
+    mask = np.zeros(len(mesh.points), dtype=bool)
+    for block, members in zip(mesh.cells, mesh.cell_sets[group], strict=True):
+        mask[block.data[np.asarray(members, dtype=int)].ravel()] = True
+    return mask
+
+
+def _y(x: np.ndarray) -> np.ndarray:
+    return x[:, 1] if x.shape[1] == 3 else np.zeros(len(x))
+
+
+def _radii(keys: Keys) -> list[float]:
+    radii = keys.numbers("radii", 3)
+    if not radii[0] < radii[1] < radii[2]:
+        raise keys.refuse("radii", radii, "must increase: bore, interface, rim")
+    return radii
+
+
+def _radius(height: np.ndarray, radii: list[float]) -> np.ndarray:
+    bore, interface, rim = radii
+    inner, outer = interface - bore, rim - interface
+    return interface + height * np.where(height < 0, inner, outer)
