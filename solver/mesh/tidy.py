@@ -9,6 +9,9 @@ from solver.mesh.orient import right_side_out
 
 _RANK = {cell.name: i for i, cell in enumerate(BY_NAME.values())}
 _SHOWN = 5
+# A mesh no thicker than this share of its extent is plane; leaving its round-off in z away changes
+# no length by more than the square of it.
+_PLANE = 1e-9
 
 
 def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
@@ -50,12 +53,10 @@ class _Block:
     def turn(self, points: np.ndarray, where: object) -> None:
         self.nodes, bad = right_side_out(points, self.nodes, self.cell)
         if bad.any():
-            numbers = ", ".join(str(n) for n in self.number[bad][:_SHOWN])
-            more = f" and {bad.sum() - _SHOWN} more" if bad.sum() > _SHOWN else ""
             centre = points[self.nodes[bad][0]].mean(axis=0)
             raise InputError(
                 where,
-                f"{self.cell.name} {numbers}{more}",
+                _numbered(self.cell, self.number[bad]),
                 None,
                 "flat or folded: the Jacobian must not vanish or change its sign at the cell's "
                 f"vertices (the first lies around {', '.join(f'{x:.6g}' for x in centre)})",
@@ -81,7 +82,16 @@ class _Table:
             nodes = np.asarray(block.data, dtype=np.int64)
             number = np.arange(1, len(nodes) + 1) if numbers is None else numbers[i]
             masks = {name: np.isin(np.arange(len(nodes)), ids) for name, ids in groups.items()}
-            self.blocks.append(_Block(BY_MESHIO[block.type], nodes, number, masks))
+            cell = BY_MESHIO[block.type]
+            loose = ((nodes < 0) | (nodes >= len(raw.points))).any(axis=1)
+            if loose.any():
+                raise InputError(
+                    where,
+                    _numbered(cell, number[loose]),
+                    None,
+                    "made of nodes that the file does not hold",
+                )
+            self.blocks.append(_Block(cell, nodes, number, masks))
         self.cells = {block.cell for block in self.blocks if len(block.nodes)}
 
     def merged(self, cell: CellType) -> _Block:
@@ -100,6 +110,13 @@ class _Table:
         return _Block(cell, nodes[first], number[first], groups)
 
 
+def _numbered(cell: CellType, numbers: np.ndarray) -> str:
+    """Type and numbers of cells to be complained of."""
+    shown = ", ".join(str(n) for n in numbers[:_SHOWN])
+    more = f" and {len(numbers) - _SHOWN} more" if len(numbers) > _SHOWN else ""
+    return f"{cell.name} {shown}{more}"
+
+
 def _len(ids: object) -> int:
     return 0 if ids is None else len(ids)  # type: ignore[arg-type]
 
@@ -113,7 +130,7 @@ def _flattened(points: np.ndarray, dim: int, where: object) -> np.ndarray:
     if not np.isfinite(points).all():
         raise InputError(where, "node coordinates", None, "must be finite numbers")
     if dim == 2 and points.shape[1] == 3:
-        if np.ptp(points[:, 2]) > 0:
+        if np.ptp(points[:, 2]) > _PLANE * np.ptp(points, axis=0).max():
             raise InputError(where, "node coordinates", None, "a mesh of 2D cells must have z = 0")
         points = points[:, :2]
     return np.ascontiguousarray(points)

@@ -77,12 +77,17 @@ def test_lower_cells_stay_when_they_are_faces_or_named():
 def test_a_plane_mesh_has_two_columns():
     flat = [[*place, 0.0] for place in SQUARE[:3]]
     assert tidy(meshio.Mesh(flat, [("triangle", [[0, 1, 2]])]), "mesh").points.shape == (3, 2)
+    flat[1][2] = 1e-15
+    assert tidy(meshio.Mesh(flat, [("triangle", [[0, 1, 2]])]), "mesh").points.shape == (3, 2)
 
 
 @pytest.mark.parametrize(
     ("points", "cells", "sets", "message"),
     [
         ([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [("triangle", [[0, 1, 2]])], {}, "must have z = 0"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 1e-6]], [("triangle", [[0, 1, 2]])], {}, "must have z = 0"),
+        (SQUARE, [("triangle", [[0, 1, 4]])], {}, "TRIA3 1: made of nodes that the file does not"),
+        (SQUARE, [("triangle", [[0, 1, 2], [0, 2, -1]])], {}, "TRIA3 2: made of nodes"),
         ([[0, 0], [1, np.nan], [0, 1]], [("triangle", [[0, 1, 2]])], {}, "finite numbers"),
         ([[0, 0], [1, 0]], [("line", [[0, 1]])], {}, "no cells of dimension 2 or 3"),
         (

@@ -1,15 +1,21 @@
 """What `transform:` promises: exact moves, plane sides, the same mesh in another order."""
 
+import re
+from pathlib import Path
+
 import meshio
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from solver.case import parse_case
 from solver.errors import InputError
 from solver.mesh import generate, transform
 from solver.mesh.catalogue import cell_type
 from solver.mesh.orient import vertex_jacobians
+from solver.simulation import simulate
+from tests.scenes import POISSON, PRESSURE, YOUNG, block_case
 
 PLANE = {"bottom": {"cells": "QUAD8", "divisions": 4}, "top": {"cells": "TRIA6", "divisions": 3}}
 SOLIDS = {
@@ -181,3 +187,68 @@ def test_refused_rotations_in_3d(value, message):
     with pytest.raises(InputError) as caught:
         transform(MESHES["solids"], {"rotate": value}, "case.yaml")
     assert str(caught.value).startswith(f"case.yaml: {message}")
+
+
+EVERYWHERE = {
+    "scaled": {"scale": 1e-3},
+    "perturbed": {"perturb": {"amplitude": 0.3, "seed": 2}},
+    "renumbered": {"renumber": 5},
+}
+IN_PLANE = {
+    "stretched": {"stretch": [3, 2]},
+    "rotated": {"rotate": 23},
+    "translated": {"translate": [-3, 5]},
+    "all": {
+        "perturb": 0.2, "scale": 2, "stretch": [1, 3], "rotate": 77, "translate": [3, 1],
+        "renumber": 2,
+    },
+}  # fmt: skip
+IN_SPACE = {
+    "stretched": {"stretch": [3, 1, 2]},
+    "rotated": {"rotate": {"axis": [1, -2, 3], "angle": 57}},
+    "translated": {"translate": [-3, 5, 2]},
+    "all": {
+        "perturb": 0.2, "scale": 2, "stretch": [1, 2, 3],
+        "rotate": {"axis": [0, 1, 1], "angle": 200}, "translate": [3, 1, 1], "renumber": 2,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "spec"),
+    [("plane", spec) for spec in (EVERYWHERE | IN_PLANE).values()]
+    + [(name, s) for name in ("solids", "mixed") for s in (EVERYWHERE | IN_SPACE).values()],
+    ids=[f"plane-{key}" for key in EVERYWHERE | IN_PLANE]
+    + [f"{name}-{key}" for name in ("solids", "mixed") for key in EVERYWHERE | IN_SPACE],
+)
+def test_the_patch_test_holds_after_it(name, spec):
+    """Uniaxial pressure along the turned axis, symmetry planes lying any way."""
+    mesh = MESHES[name]
+    dim = mesh.points.shape[1]
+    text = re.sub(r"fix: \[.\]", "fix: [normal]", block_case(dim).source)
+    moved = transform(mesh, spec, "case.yaml")
+    solution = simulate(parse_case(text, Path("patch.yaml")), moved)
+
+    turn = np.eye(dim)
+    if "rotate" in spec:
+        axes = meshio.Mesh(np.eye(dim), [("vertex", [[0]])])
+        turn = transform(axes, {"rotate": spec["rotate"]}, "case.yaml").points.T
+    up = turn[:, -1]
+    stress = np.zeros((3, 3))
+    stress[:dim, :dim] = -PRESSURE * np.outer(up, up)
+    if dim == 2:
+        stress[2, 2] = -POISSON * PRESSURE
+    strain = ((1 + POISSON) * stress - POISSON * np.trace(stress) * np.eye(3)) / YOUNG
+    # The corner in which base and symmetry planes meet does not move.
+    corner = np.argmin(np.linalg.norm(mesh.points - [*[0] * (dim - 1), -2], axis=1))
+    moves = {key: value for key, value in spec.items() if key != "renumber"}
+    fixed = transform(mesh, moves, "case.yaml").points[corner]
+    x = solution.mesh.points
+    exact = (x - fixed) @ strain[:dim, :dim]
+
+    components = stress[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    assert np.abs(solution.zones[0].multiplier / PRESSURE - 1).max() < 1e-12
+    assert np.abs(solution.stress - components).max() < 1e-12 * PRESSURE
+    assert np.abs(solution.displacement - exact).max() < 1e-12 * np.abs(exact).max()
+    assert np.abs(solution.zones[0].coverage - 1).max() < 1e-12
+    assert np.abs(solution.zones[0].gap).max() < 1e-14 * np.ptp(x, axis=0).max()
