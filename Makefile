@@ -5,14 +5,14 @@
 PYTHON ?= python3
 CORES ?= all
 MKL ?=
-ARGS ?=
+ARGS =
+CONFIG =
+CASES =
 
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-print-directory
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
-CONFIG ?=
-CASES ?=
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
@@ -25,13 +25,13 @@ help: ## list the targets
 all-cases: environment ## mesh, solve and check what is not up to date, then report
 	@$(SNAKEMAKE) all_cases
 
-family: CONFIG += family=$(FAMILY)
+family: override CONFIG += family=$(FAMILY)
 family: environment ## the same for one family: make family FAMILY=ssnp170
 	@test -n "$(FAMILY)" || { echo "make family: name a folder of cases/, FAMILY=…"; exit 2; }
 	@$(SNAKEMAKE) all_cases
 
-case: CONFIG += case=$(CASE)
-case: ARGS += --forcerun solve
+case: override CONFIG += case=$(CASE)
+case: override ARGS += --forcerun solve
 case: environment ## solve one case again, then report: make case CASE=ssnp170-e-swapped
 	@test -n "$(CASE)" || { echo "make case: name a case as the report does, CASE=…"; exit 2; }
 	@$(SNAKEMAKE) all_cases
@@ -73,7 +73,7 @@ LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
-	@for group in build mkl test lint lock; do \
+	@for group in build mkl slurm test lint lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 
