@@ -287,6 +287,7 @@ def _check(case: Case) -> None:
             allowed = "load factors must increase"
             raise InputError(case.path, "steps", list(case.steps), allowed)
     _check_listed_twice(case)
+    _check_errors(case)
     if case.plane:
         check_dimension(case, 2)
 
@@ -305,6 +306,22 @@ def _check_names(case: Case) -> None:
         if item.zone not in names:
             allowed = f"no such zone; {hint(item.zone, names)}"
             raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
+
+
+def _check_errors(case: Case) -> None:
+    """An error against an exact solution can have a tolerance only where there is such a one."""
+    if not case.tolerance:
+        return
+    from solver.solutions import ERRORS
+
+    for error in case.tolerance.keys() & ERRORS.keys():
+        if case.solution is None:
+            allowed = "needs an exact solution: reference.solution names none"
+        elif ERRORS[error] not in case.solution.quantities:
+            allowed = f"{case.solution.name} has no {ERRORS[error]}"
+        else:
+            continue
+        raise InputError(case.path, f"tolerance.{error}", case.tolerance[error], allowed)
 
 
 def _check_listed_twice(case: Case) -> None:

@@ -9,15 +9,16 @@ size, status, coverage and balance against one. A value that is not a number fai
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from solver.case import Scalar
-from solver.expressions import evaluate
-from solver.solution import STRESS_COMPONENTS, Solution, ZoneResult
+from solver import samples
+from solver.case import Exact
+from solver.exact import ExactValues
+from solver.solution import Solution, ZoneResult
+from solver.solutions import ERRORS
 
 RELATIVE = 1e-3
 GAP = 2e-5
@@ -91,20 +92,6 @@ class CheckResult:
 
 
 @dataclass(frozen=True)
-class _Sample:
-    """Values (n,) and their reference (n,); `place` says in words where the i-th was taken."""
-
-    values: np.ndarray
-    reference: np.ndarray
-    place: Callable[[int], str]
-
-
-Reference = Any  # a scalar; for vectors and tensors a sequence or a mapping of scalars
-# Called with the solution, the zone (None for checks of the whole solve) and the reference.
-_Sampler = Callable[[Solution, Any, Reference], _Sample | None]
-
-
-@dataclass(frozen=True)
 class Check:
     """One row of the table.
 
@@ -117,7 +104,7 @@ class Check:
     name: str
     alias: str | None
     key: str | None
-    sample: _Sampler
+    sample: samples.Sampler
     scale: Callable[[Solution], float]
     tolerance: float | None = None
     fixed: bool = False
@@ -151,128 +138,40 @@ def _unit(_: Solution) -> float:
     return 1.0
 
 
-def _at_macro_elements(zone: ZoneResult, values: np.ndarray, reference: Reference) -> _Sample:
-    return _Sample(values, evaluate(reference, zone.centre), "macro-element {}".format)
-
-
-def _at_nodes(
-    solution: Solution, nodes: np.ndarray, values: np.ndarray, reference: Reference
-) -> _Sample:
-    expected = evaluate(reference, solution.mesh.points[nodes])
-    return _Sample(values, expected, lambda i: f"node {nodes[i]}")
-
-
-def _pressure(_: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
-    return _at_macro_elements(zone, zone.multiplier, reference)
-
-
-def _gap(_: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
-    return _at_macro_elements(zone, zone.gap, reference)
-
-
-def _status(_: Solution, zone: ZoneResult, pressure: Reference) -> _Sample:
-    """In contact wherever the reference presses."""
-    sample = _at_macro_elements(zone, zone.closed.astype(float), pressure)
-    return replace(sample, reference=(sample.reference > 0).astype(float))
-
-
-def _coverage(_: Solution, zone: ZoneResult, __: Reference) -> _Sample:
-    """Covered in full wherever there is a pressure to compare."""
-    return _at_macro_elements(zone, zone.coverage, 1.0)
-
-
-def _covered_pressure(_: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
-    return _at_macro_elements(zone, zone.coverage * zone.multiplier, reference)
-
-
-def _slave_stress(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
-    return _at_nodes(solution, zone.slave_nodes, zone.stress_slave, reference)
-
-
-def _master_stress(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample:
-    return _at_nodes(solution, zone.master_nodes, zone.stress_master, reference)
-
-
-def _nodal_stress(solution: Solution, _: None, reference: Reference) -> _Sample:
-    nodes = np.flatnonzero(solution.body >= 0)
-    return _at_nodes(solution, nodes, solution.nodal_normal_stress[nodes], reference)
-
-
-def _displacement(solution: Solution, _: None, reference: Reference) -> _Sample:
-    by_axis = dict(zip("xyz", reference, strict=False))
-    return _by_component(solution, solution.displacement, "xyz", by_axis)
-
-
-def _stress_components(solution: Solution, _: None, reference: Reference) -> _Sample:
-    return _by_component(solution, solution.stress, STRESS_COMPONENTS, reference)
-
-
-def _by_component(
-    solution: Solution, values: np.ndarray, names: Sequence[str], given: Mapping[str, Scalar]
-) -> _Sample:
-    """The given components of a nodal field one after the other: all on one scale."""
-    nodes = np.flatnonzero(solution.body >= 0)
-    points, listed = solution.mesh.points[nodes], list(given)
-    return _Sample(
-        np.concatenate([values[nodes, names.index(name)] for name in listed]),
-        np.concatenate([evaluate(given[name], points) for name in listed]),
-        lambda i: f"node {nodes[i % len(nodes)]} ({listed[i // len(nodes)]})",
-    )
-
-
-def _balance(solution: Solution, _: None, __: Reference) -> _Sample:
-    names = list(solution.balance)
-    values = np.array(list(solution.balance.values()), dtype=float)
-    return _Sample(values, np.zeros(len(values)), lambda i: f"the balance of {names[i]}")
-
-
-def _observed(quantity: str) -> _Sampler:
-    """Sample what was observed in a zone at every step; pressure grows with the load factor."""
-
-    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> _Sample | None:
-        rows = [
-            (step.factor, o["macro_element"], float(o[quantity]))
-            for step in solution.steps
-            for o in step.observations
-            if o["zone"] == zone.name
-        ]
-        if not rows:
-            return None
-        factors, elements, values = (np.array(column) for column in zip(*rows, strict=True))
-        expected = evaluate(reference, zone.centre[elements])
-        if quantity == "pressure":
-            expected = expected * factors
-        return _Sample(
-            values, expected, lambda i: f"macro-element {elements[i]}, load factor {factors[i]:g}"
-        )
-
-    return sample
-
-
 _PRESSURE, _STRESS = "contact_pressure", "normal_stress"
 CHECKS: tuple[Check, ...] = (
-    Check("multiplier", "LAGS_C", _PRESSURE, _pressure, _load),
-    Check("nodal_stress", "SIEF_NOEU", _STRESS, _nodal_stress, _load, by_zone=False),
-    Check("surface_stress_slave", None, _STRESS, _slave_stress, _load),
-    Check("surface_stress_master", None, _STRESS, _master_stress, _load),
-    Check("element_pressure", "CONT_ELEM/PRES", _PRESSURE, _pressure, _load),
-    Check("element_gap", "CONT_ELEM/JEU", "gap", _gap, block_size, GAP, fixed=True),
-    Check("element_status", "CONT_ELEM/CONT", _PRESSURE, _status, _unit, 0.0, fixed=True),
-    Check("coverage", "CONT_ELEM/COEFSURF", _PRESSURE, _coverage, _unit, 1e-6, fixed=True),
+    Check("multiplier", "LAGS_C", _PRESSURE, samples.pressure, _load),
+    Check("nodal_stress", "SIEF_NOEU", _STRESS, samples.nodal_stress, _load, by_zone=False),
+    Check("surface_stress_slave", None, _STRESS, samples.surface_stress("slave"), _load),
+    Check("surface_stress_master", None, _STRESS, samples.surface_stress("master"), _load),
+    Check("element_pressure", "CONT_ELEM/PRES", _PRESSURE, samples.pressure, _load),
+    Check("element_gap", "CONT_ELEM/JEU", "gap", samples.gap, block_size, GAP, fixed=True),
+    Check("element_status", "CONT_ELEM/CONT", _PRESSURE, samples.status, _unit, 0.0, fixed=True),
+    Check("coverage", "CONT_ELEM/COEFSURF", _PRESSURE, samples.coverage, _unit, 1e-6, fixed=True),
     Check(
         "covered_pressure",
         "CONT_ELEM/PRESCOOR",
         _PRESSURE,
-        _covered_pressure,
+        samples.covered_pressure,
         _load,
         accepted=1e-6,
     ),
-    Check("displacement", "DEPL", "displacement", _displacement, _elongation, by_zone=False),
-    Check("stress_components", None, "stress", _stress_components, _load, by_zone=False),
-    Check("balance", None, None, _balance, _unit, 1e-10, fixed=True, by_zone=False),
-    Check("observation", "OBSERVATION/PRES", _PRESSURE, _observed("pressure"), _load),
+    Check("displacement", "DEPL", "displacement", samples.displacement, _elongation, by_zone=False),
+    Check("stress_components", None, "stress", samples.stress_components, _load, by_zone=False),
+    Check("balance", None, None, samples.balance, _unit, 1e-10, fixed=True, by_zone=False),
+    Check("observation", "OBSERVATION/PRES", _PRESSURE, samples.observed("pressure"), _load),
     Check(
-        "observation_gap", "OBSERVATION/JEU", "gap", _observed("gap"), block_size, GAP, fixed=True
+        "observation_gap",
+        "OBSERVATION/JEU",
+        "gap",
+        samples.observed("gap"),
+        block_size,
+        GAP,
+        fixed=True,
+    ),
+    *(
+        Check(name, None, None, samples.norm(name), _unit, fixed=True, by_zone=False, norm="error")
+        for name in ERRORS
     ),
 )
 
@@ -286,11 +185,14 @@ def run_checks(
     expression has no finite value at one of the places.
     """
     accepted = accepted or {}
+    exact = solution.case.solution and ExactValues(solution, solution.case.solution)
     results = []
     for check in CHECKS:
-        reference = solution.case.reference.get(check.key) if check.key else 0.0
+        reference: samples.Reference = solution.case.reference.get(check.key) if check.key else 0.0
         if reference is None:
             continue
+        if isinstance(reference, Exact):
+            reference = exact
         for zone in solution.zones if check.by_zone else [None]:
             sample = check.sample(solution, zone, reference)
             if sample is not None:
@@ -302,7 +204,7 @@ def _judge(
     check: Check,
     solution: Solution,
     zone: ZoneResult | None,
-    sample: _Sample,
+    sample: samples.Sample,
     accepted: Mapping[str, Accepted],
 ) -> CheckResult:
     name = zone.name if zone else None

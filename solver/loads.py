@@ -8,6 +8,7 @@ from solver.batch import invert
 from solver.elements import face_rule, shape_functions, volume_rule
 from solver.errors import SolveError
 from solver.faces import area_vectors
+from solver.stress import traction
 
 # A value of position: points (n, dim) to values (n,) or (n, dim).
 Field = Callable[[np.ndarray], np.ndarray]
@@ -30,6 +31,25 @@ def face_forces(
     else:
         vectors = np.linalg.norm(vectors, axis=2)[..., None] * given
     return _gather(points, nodes, np.einsum("qa,fqd->fad", values, vectors))
+
+
+def stress_forces(
+    points: np.ndarray, nodes: np.ndarray, face_type: str, stress: Field, pressure: bool
+) -> np.ndarray:
+    """Forces (n_points, dim) of a stress field (n, 6) on faces (n, n_nodes) turned outward.
+
+    The traction is σ·n; where `pressure` is True, only its part along n.
+    """
+    reference, weights = face_rule(face_type)
+    values, slopes = shape_functions(face_type).both(reference)
+    vectors = area_vectors(points, nodes, slopes) * weights[:, None]
+    given = _at(points, nodes, values, stress)
+    flat = vectors.reshape(-1, vectors.shape[-1])
+    force = traction(given.reshape(len(flat), 6), flat)
+    if pressure:
+        along = np.einsum("nd,nd->n", force, flat) / np.einsum("nd,nd->n", flat, flat)
+        force = along[:, None] * flat
+    return _gather(points, nodes, np.einsum("qa,fqd->fad", values, force.reshape(vectors.shape)))
 
 
 def body_forces(points: np.ndarray, cells: np.ndarray, cell_type: str, value: Field) -> np.ndarray:

@@ -6,21 +6,19 @@ from itertools import pairwise
 import meshio
 import numpy as np
 
+from solver.attributes import Attributes
 from solver.bodies import body_numbers
-from solver.case import Case, Load, Scalar, Support, Zone
+from solver.case import Case, Zone
 from solver.clock import Clock
-from solver.elasticity import Block, lame_parameters
-from solver.elements import has_straight_edges
+from solver.elasticity import Block
 from solver.errors import InputError
-from solver.expressions import evaluate
-from solver.faces import FaceBlock, boundary_faces, nodal_normals, volume_cells
-from solver.groups import ALL, check_groups
-from solver.lac.cut import CutMesh, SubFaces, cut, needs_cut
+from solver.faces import FaceBlock, boundary_faces, volume_cells
+from solver.groups import check_groups
+from solver.lac.cut import CutMesh, SubFaces, cut
 from solver.lac.facets import Facets, facets
 from solver.lac.operator import GapOperator, gap_operator
-from solver.loads import body_forces, face_forces
-from solver.mesh.catalogue import BY_MESHIO, BY_NAME
-from solver.supports import Fixed, FreeMotion, free_motion
+from solver.mesh.catalogue import BY_NAME
+from solver.supports import FreeMotion
 
 # An average initial gap below this many roundings of the coordinates is none.
 _GAP_ROUND_OFF = 8 * np.finfo(float).eps
@@ -98,7 +96,7 @@ def build_scene(
             operator = _operator(points, zone, faces, master, count, noise)
             scenes.append(ZoneScene(zone, first, count, slave, master, faces, operator))
             first += count
-    groups = _Groups(case, local, cut_mesh, scenes, origin)
+    groups = Attributes(case, local, cut_mesh, scenes, origin)
     with clock.stage("assembly"):
         blocks = groups.blocks()
         free = groups.supports()
@@ -205,160 +203,3 @@ def _master_facets(points: np.ndarray, faces: list[FaceBlock]) -> list[Facets]:
         nodes = np.concatenate([block.nodes for block in faces if block.type.name == name])
         merged.append(facets(points, BY_NAME[name], nodes, np.arange(len(nodes))))
     return merged
-
-
-class _Groups:
-    """The groups of the mesh file, carried over to the cut mesh."""
-
-    def __init__(
-        self,
-        case: Case,
-        mesh: meshio.Mesh,
-        cut_mesh: CutMesh,
-        zones: list[ZoneScene],
-        origin: np.ndarray,
-    ):
-        self.case, self.mesh, self.cut = case, mesh, cut_mesh
-        self.points, self.origin, self.zones = cut_mesh.points, origin, zones
-
-    def whole_cell_mask(self, group: str) -> dict[str, np.ndarray]:
-        """Which volume cells (n,) of each type, as meshed, belong to a group."""
-        whole = {name: np.zeros(len(c), bool) for name, c in volume_cells(self.mesh).items()}
-        for block, members in zip(self.mesh.cells, self.mesh.cell_sets.get(group, []), strict=True):
-            name = _type_name(block.type)
-            if name in whole and members is not None:
-                whole[name][np.asarray(members, dtype=int)] = True
-        return whole
-
-    def cell_mask(self, group: str) -> dict[str, np.ndarray]:
-        """Which cells (n,) of each type of the cut mesh belong to a group of volume cells."""
-        whole = self.whole_cell_mask(group)
-        return {name: self.cut.members(name, whole) for name in self.cut.cells}
-
-    def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
-        """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
-        found: list[tuple[str, np.ndarray]] = []
-        for block in boundary_faces(self.mesh, group, self.case.path, key):
-            plain = np.ones(len(block.nodes), dtype=bool)
-            for zone in self.zones:
-                plain &= ~self._swap_sub_faces(block, zone, found)
-            found.append((block.type.name, block.nodes[plain]))
-        return [(name, nodes) for name, nodes in found if len(nodes)]
-
-    @staticmethod
-    def _swap_sub_faces(
-        block: FaceBlock, zone: ZoneScene, found: list[tuple[str, np.ndarray]]
-    ) -> np.ndarray:
-        """Mark the faces that are cut slave faces of the zone; append their sub-faces."""
-        hit = np.zeros(len(block.nodes), dtype=bool)
-        if not needs_cut(block.type.name):
-            return hit
-        for slave in zone.slave_faces:
-            if slave.owner_type is block.owner_type and slave.type is block.type:
-                mine, theirs = (10 * b.owner + b.local for b in (block, slave))
-                hit |= np.isin(mine, theirs)
-                macro = slave.number[np.isin(theirs, mine)]
-                found += [
-                    (sub.type.name, sub.nodes[np.isin(sub.macro, macro)]) for sub in zone.sub_faces
-                ]
-        return hit
-
-    def nodes(self, group: str, key: str) -> np.ndarray:
-        """All nodes of a group: of its volume cells, faces, edges and points."""
-        dim = self.points.shape[1]
-        parts = [np.asarray(self.mesh.point_sets.get(group, []), dtype=int)]
-        if group in self.mesh.cell_sets:
-            mask = self.cell_mask(group)
-            parts += [self.cut.cells[name][mask[name]].ravel() for name in mask]
-            dims = set()
-            for block, members in zip(self.mesh.cells, self.mesh.cell_sets[group], strict=True):
-                if members is not None and len(members):
-                    dims.add(BY_NAME[_type_name(block.type)].dim)
-                    parts.append(block.data[np.asarray(members, dtype=int)].ravel())
-            if dim - 1 in dims:
-                parts += [nodes.ravel() for _, nodes in self.faces(group, key)]
-        return np.unique(np.concatenate(parts))
-
-    def field(self, values: Scalar | tuple[Scalar, ...]):  # type: ignore[no-untyped-def]
-        """A case's number, expression or vector as a function of the local coordinates."""
-
-        def value(local: np.ndarray) -> np.ndarray:
-            place = local + self.origin
-            if isinstance(values, tuple):
-                return np.stack([evaluate(v, place) for v in values], axis=1)
-            return evaluate(values, place)
-
-        return value
-
-    def blocks(self) -> list[Block]:
-        """Cells with their materials; cells of rigid bodies, which need none, get a unit one."""
-        materials = self.case.materials
-        default = materials.get(ALL)
-        young = {n: np.ones(len(c)) for n, c in self.cut.cells.items()}
-        poisson = {n: np.zeros(len(c)) for n, c in self.cut.cells.items()}
-        if default:
-            for name in self.cut.cells:
-                young[name][:], poisson[name][:] = default.young, default.poisson
-        for group in (g for g in materials if g != ALL):
-            for name, mask in self.cell_mask(group).items():
-                young[name][mask] = materials[group].young
-                poisson[name][mask] = materials[group].poisson
-        return [
-            Block(
-                BY_NAME[name],
-                cells,
-                *lame_parameters(young[name], poisson[name]),
-                bool(has_straight_edges(BY_NAME[name], self.points[cells]).all()),
-            )
-            for name, cells in self.cut.cells.items()
-        ]
-
-    def supports(self) -> FreeMotion:
-        """What supports and rigid bodies leave free."""
-        fixed = [
-            self._fixed(i, support, direction)
-            for i, support in enumerate(self.case.supports)
-            for direction in support.fix
-        ]
-        dim = self.points.shape[1]
-        for group in sorted(self.case.rigid):
-            nodes = self.nodes(group, f"bodies.{group}")
-            for axis in np.eye(dim):
-                directions = np.tile(axis, (len(nodes), 1))
-                fixed.append(Fixed(f"bodies.{group}", nodes, directions, np.zeros(len(nodes))))
-        return free_motion(len(self.points), dim, fixed, self.case.path)
-
-    def _fixed(self, i: int, support: Support, direction: str) -> Fixed:
-        key = f"supports[{i}].fix.{direction}"
-        nodes = self.nodes(support.group, f"supports[{i}].group")
-        values = self.field(support.fix[direction])(self.points[nodes])
-        if direction == "normal":
-            return Fixed(key, nodes, self._normals(support.group, nodes, key), values)
-        axis = np.eye(self.points.shape[1])["xyz".index(direction)]
-        return Fixed(key, nodes, np.tile(axis, (len(nodes), 1)), values)
-
-    def _normals(self, group: str, nodes: np.ndarray, key: str) -> np.ndarray:
-        """Unit normals (n, dim) of a group's faces at its nodes, the mean over the faces there."""
-        return nodal_normals(self.points, self.faces(group, key))[nodes]
-
-    def forces(self) -> np.ndarray:
-        """Nodal forces (n, dim) of all loads at load factor 1."""
-        total = np.zeros_like(self.points)
-        for i, load in enumerate(self.case.loads):
-            total += self._force(load, f"loads[{i}].group")
-        return total
-
-    def _force(self, load: Load, key: str) -> np.ndarray:
-        value, total = self.field(load.value), np.zeros_like(self.points)
-        if load.kind == "body_force":
-            for name, cells in self.cut.cells.items():
-                mask = slice(None) if load.group == ALL else self.cell_mask(load.group)[name]
-                total += body_forces(self.points, cells[mask], name, value)
-            return total
-        for name, nodes in self.faces(load.group, key):
-            total += face_forces(self.points, nodes, name, value, load.kind == "pressure")
-        return total
-
-
-def _type_name(meshio_name: str) -> str:
-    return BY_MESHIO[meshio_name].name

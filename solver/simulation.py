@@ -19,6 +19,7 @@ from solver.naming import body_infos
 from solver.plan import made_plan
 from solver.scene import Scene, ZoneScene, build_scene
 from solver.solution import Solution, StepResult, ZoneResult
+from solver.stress import normal_stress
 
 Log = Callable[[str], Any]
 
@@ -86,7 +87,7 @@ def _recover(
         body=scene.body,
         bodies=body_infos(scene),
         zones=zones,
-        nodal_normal_stress=_along(stress, _contact_direction(scene)),
+        nodal_normal_stress=normal_stress(stress, _contact_direction(scene)),
         balance=imbalances(scene, last),
         steps=_step_results(scene, problem, states, scale),
         length=scene.length,
@@ -123,15 +124,6 @@ def _contact_direction(scene: Scene) -> np.ndarray:
     return mean / np.linalg.norm(mean)
 
 
-def _along(stress: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """d·σ·d (n,) from stress (n, 6) and unit directions (dim,) or (n, dim)."""
-    d = np.zeros((*direction.shape[:-1], 3))
-    d[..., : direction.shape[-1]] = direction
-    x, y, z = d[..., 0], d[..., 1], d[..., 2]
-    xx, yy, zz, xy, yz, xz = stress.T
-    return x * x * xx + y * y * yy + z * z * zz + 2 * (x * y * xy + y * z * yz + x * z * xz)
-
-
 def _zone_result(
     scene: Scene, problem: ContactProblem, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
 ) -> ZoneResult:
@@ -152,8 +144,8 @@ def _zone_result(
         gap=state.gap[part],
         closed=state.status.closed[part],
         coverage=problem.coverage[part],
-        stress_slave=_along(stress[slave_nodes], slave_normal),
-        stress_master=_along(stress[master_nodes], master_normal),
+        stress_slave=normal_stress(stress[slave_nodes], slave_normal),
+        stress_master=normal_stress(stress[master_nodes], master_normal),
         slave_nodes=slave_nodes,
         master_nodes=master_nodes,
     )

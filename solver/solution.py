@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from solver.case import Case
 
-STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-
 
 def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
     """The name of one solve of a case: direction and variant, where they are not the case's own."""
@@ -90,11 +88,12 @@ class Solution:
     """One solve, complete: everything the result file, the checks and the report need.
 
     `mesh` is the cut mesh (volume cells only; slave sub-faces are in the zones). `displacement`
-    (n, dim), `stress` (n, 6) in the order of STRESS_COMPONENTS and averaged per body, `body` (n,).
+    (n, dim), `stress` (n, 6) in the order of `solver.stress` and averaged per body, `body` (n,).
     `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone. `balance`
     names relative imbalances (of forces and moments, relative to the load). `length` is the largest
     extent of the mesh, `load_scale` the largest pressure of the load or else the largest stress.
-    `seconds` is wall time by stage, `peak_memory_mb` the process's largest resident size.
+    `errors` are the norms of `solver.norms` where the case names an exact solution. `seconds` is
+    wall time by stage, `peak_memory_mb` the process's largest resident size.
     """
 
     case: Case
@@ -116,6 +115,7 @@ class Solution:
     iterations: int
     linear_solver: str
     plan: list[tuple[str, str]]
+    errors: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")

@@ -39,6 +39,7 @@ _UNKNOWN: dict[str, Any] = {
     "bodies": [],
     "plan": [],
     "checks": [],
+    "errors": {},
     "provenance": {},
 }
 
@@ -79,6 +80,7 @@ def of_solution(
         "bodies": _bodies(solution),
         "plan": [list(entry) for entry in solution.plan],
         "checks": [asdict(check) for check in checks],
+        "errors": dict(solution.errors),
         "provenance": dict(provenance or {}),
     }
 

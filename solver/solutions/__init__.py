@@ -17,13 +17,20 @@ from typing import Any
 from solver.case import Material
 from solver.errors import InputError
 from solver.schemas import hint
-from solver.solutions.base import ElasticSolution, ExactSolution, ParameterError, Part, traction
+from solver.solutions.base import (
+    ERRORS,
+    ElasticSolution,
+    ExactSolution,
+    ParameterError,
+    Part,
+)
 from solver.solutions.hertz import HertzApproach, HertzCylinder, HertzSphere
 from solver.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.solutions.nested import NestedCylinders, NestedSpheres
 from solver.solutions.uniform import Hydrostatic, UniformCompression
 
 __all__ = [
+    "ERRORS",
     "SOLUTIONS",
     "ElasticSolution",
     "ExactSolution",
@@ -31,7 +38,6 @@ __all__ = [
     "ParameterError",
     "Part",
     "build",
-    "traction",
 ]
 
 _CLASSES: tuple[type[ExactSolution], ...] = (

@@ -16,6 +16,20 @@ from solver.case import Material
 
 Part = np.ndarray | int | None
 
+# The errors of `solver.norms`, and what a solution must have for each to be known.
+ERRORS: dict[str, str] = {
+    "displacement_l2": "displacement",
+    "displacement_h1": "gradient",
+    "stress_l2": "stress",
+    "stress_max": "stress",
+    "pressure_l2": "contact_pressure",
+    "pressure_max": "contact_pressure",
+    "pressure_means": "contact_pressure",
+    "pressure_oscillation": "contact_pressure",
+    "half_width": "half_width",
+    "peak": "peak",
+}
+
 
 class ParameterError(ValueError):
     """A parameter has a value that is not allowed."""
@@ -142,11 +156,3 @@ def lame_of(material: Material) -> tuple[float, float]:
     """Lamé's λ and μ of a material."""
     shear = material.young / (2 * (1 + material.poisson))
     return 2 * shear * material.poisson / (1 - 2 * material.poisson), shear
-
-
-def traction(stress: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """σ·n (n, dim) of stress (n, 6) on unit normals (n, dim)."""
-    xx, yy, zz, xy, yz, xz = stress.T
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    dim = normal.shape[1]
-    return np.einsum("ijn,nj->ni", tensor[:dim, :dim], normal)

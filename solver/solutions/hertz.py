@@ -19,10 +19,11 @@ _REGULAR = 0.8
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Hertz(ExactSolution):
+class Hertz(ExactSolution):
     """What all of them share: half an ellipse of pressure over the contact area."""
 
     parts: ClassVar[tuple[str, ...]] = ("lower", "upper")
+    quantities: ClassVar[frozenset[str]] = frozenset({"contact_pressure", "half_width", "peak"})
 
     radius: float = parameter("radius R₁ of the one body")
     lower: Material = parameter("material of the one body", source="material")
@@ -65,6 +66,16 @@ class _Hertz(ExactSolution):
         """Within 0.8 a."""
         return self._distance(x) <= _REGULAR * self.half_width
 
+    def fitted(self, x: np.ndarray, pressure: np.ndarray) -> tuple[float, float]:
+        """Half-width and peak of the half ellipse nearest to pressures (n,) found at points x.
+
+        p² = p₀² − (p₀/a)² ρ² is a straight line in ρ²; least squares over the regular points.
+        """
+        inside = self.regular(x)
+        square = self._distance(x[inside]) ** 2
+        slope, top = np.polyfit(square, pressure[inside] ** 2, 1)
+        return float(np.sqrt(-top / slope)) if top > 0 > slope else 0.0, float(np.sqrt(max(top, 0)))
+
     def level(self, x: np.ndarray) -> np.ndarray:
         """Height above the point of contact."""
         return x[:, -1] - self.centre[self.dim - 1]
@@ -74,7 +85,7 @@ class _Hertz(ExactSolution):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HertzCylinder(_Hertz):
+class HertzCylinder(Hertz):
     """Line contact under a force: a = √(4 F R/(π E*)), p₀ = 2 F/(π a), in plane strain."""
 
     name: ClassVar[str] = "hertz_cylinder"
@@ -98,7 +109,7 @@ class HertzCylinder(_Hertz):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HertzSphere(_Hertz):
+class HertzSphere(Hertz):
     """Point contact under a force: a = (3 F R/(4 E*))^⅓, p₀ = 3 F/(2π a²)."""
 
     name: ClassVar[str] = "hertz_sphere"
@@ -122,7 +133,7 @@ class HertzSphere(_Hertz):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HertzApproach(_Hertz):
+class HertzApproach(Hertz):
     """Point contact, distant points brought nearer by δ: a = √(R δ), p₀ = 2 E* a/(π R)."""
 
     name: ClassVar[str] = "hertz_approach"

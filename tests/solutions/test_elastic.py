@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from solver.case import Material
-from solver.solutions import traction
 from solver.solutions.base import ElasticSolution, ParameterError
 from solver.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.solutions.nested import NestedCylinders, NestedSpheres
 from solver.solutions.uniform import Hydrostatic, UniformCompression
+from solver.stress import traction
 
 SOFT, HARD = Material(2000.0, 0.3), Material(70000.0, 0.2)
 RADII = (20.0, 30.0, 40.0)

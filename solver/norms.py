@@ -1,0 +1,181 @@
+"""Errors of a solve against the exact solution that its case names.
+
+With u, σ, p exact, u_h, σ_h, p_h computed, σ_h by Hooke's law from u_h:
+
+    displacement_l2       ‖u_h − u‖ / ‖u‖                    ‖·‖: root of ∫ over deformable bodies
+    displacement_h1       ‖∇u_h − ∇u‖ / ‖∇u‖
+    stress_l2             ‖σ_h − σ‖ / ‖σ‖
+    stress_max            largest component of σ_h − σ at nodes, σ_h averaged there, over that of σ
+    pressure_l2           |p_h − p| / |p|                    |·|: root of ∫ over the slave surface,
+                                                             weighted by each element's coverage
+    pressure_max          largest |p_h − p| / largest p      where p is smooth
+    pressure_means        |p_h − p̄| / |p̄|                    p̄: mean of p over each macro-element
+    pressure_oscillation  largest |e₋ − 2 e + e₊| / largest p   e = p_h − p̄ of neighbours along
+                                                             the surface, where p is smooth (2D)
+    half_width, peak      of the half ellipse fitted to p_h (Hertz), relative
+
+Volume integrals use Gauss points two more each way than the degree of the cell, so that the
+quadrature is no part of what is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from solver.elasticity import physical_gradients
+from solver.elements import shape_functions
+from solver.elements.gauss import gauss_rule
+from solver.exact import ExactValues, deformable, surface_points
+from solver.mesh.catalogue import cell_type
+from solver.solution import Solution, ZoneResult
+from solver.solutions import ElasticSolution, ExactSolution
+from solver.solutions.hertz import Hertz
+
+_CHUNK = 1 << 20
+_TWICE = np.array([1, 1, 1, 2, 2, 2])  # off-diagonal components stand for two
+
+
+def errors(solution: Solution) -> dict[str, float]:
+    """The errors of a solve by name; empty where its case names no exact solution."""
+    exact = solution.case.solution
+    if exact is None:
+        return {}
+    found: dict[str, float] = {}
+    if isinstance(exact, ElasticSolution):
+        found |= _field_errors(solution, exact)
+    if solution.zones:
+        found |= _pressure_errors(solution, exact)
+    return found
+
+
+# Displacement and stress
+
+
+def _field_errors(solution: Solution, exact: ElasticSolution) -> dict[str, float]:
+    squares = sum(_squares(solution, exact), np.zeros((3, 2)))
+    names = ("displacement_l2", "displacement_h1", "stress_l2")
+    found = {name: _root(*pair) for name, pair in zip(names, squares, strict=True)}
+    nodes = np.flatnonzero(deformable(solution))
+    expected = ExactValues(solution, exact).stress(nodes)
+    deviation = np.abs(solution.stress[nodes] - expected).max()
+    return found | {"stress_max": _over(deviation, np.abs(expected).max())}
+
+
+def _squares(solution: Solution, exact: ElasticSolution) -> Iterator[np.ndarray]:
+    """By chunk of cells (3, 2): ∫ of squares of error and exact value, for u, ∇u, σ."""
+    points, parts = solution.mesh.points, ExactValues(solution, exact).part
+    moving = deformable(solution)
+    for block in solution.mesh.cells:
+        kind = cell_type(block.type)
+        reference, weights = gauss_rule(kind.name, kind.order + 2)
+        values = shape_functions(kind.name).values(reference)
+        cells = block.data[moving[block.data].all(axis=1)]
+        step = max(1, _CHUNK // (len(weights) * kind.n_nodes * kind.dim))
+        for start in range(0, len(cells), step):
+            chunk = cells[start : start + step]
+            gradient, determinant = physical_gradients(points, chunk, kind, reference)
+            nodal = solution.displacement[chunk]
+            place = np.einsum("qa,cad->cqd", values, points[chunk], optimize=True)
+            found = np.einsum("qa,cad->cqd", values, nodal, optimize=True)
+            slope = np.einsum("cai,cqaj->cqij", nodal - nodal[:, :1], gradient, optimize=True)
+            part = np.repeat(parts[chunk[:, 0]], len(weights))
+            flat = place.reshape(-1, kind.dim)
+            pairs = _with_exact(exact, flat, part, found.reshape(flat.shape), slope)
+            weight = (determinant * weights).ravel()
+            yield np.array([[_integral(weight, error), _integral(weight, u)] for error, u in pairs])
+
+
+def _with_exact(
+    exact: ElasticSolution, x: np.ndarray, part: np.ndarray, found: np.ndarray, slope: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Error and exact value (n, …) of displacement, gradient and stress at points."""
+    slope = slope.reshape(len(x), exact.dim, exact.dim)
+    u, gradient = exact.displacement(x, part), exact.gradient(x, part)
+    whole = np.sqrt(_TWICE)
+    stress = exact.hooke(gradient, part) * whole
+    return [
+        (found - u, u),
+        (slope - gradient, gradient),
+        (exact.hooke(slope, part) * whole - stress, stress),
+    ]
+
+
+def _integral(weight: np.ndarray, values: np.ndarray) -> float:
+    return float(weight @ (values.reshape(len(weight), -1) ** 2).sum(axis=1))
+
+
+# Pressure
+
+
+def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, float]:
+    squares, means = np.zeros(2), np.zeros(2)
+    largest, highest = 0.0, 0.0
+    second: list[float] = []
+    for zone in solution.zones:
+        at = surface_points(solution.mesh.points, zone.faces)
+        pressure = exact.contact_pressure(at.place)
+        error = zone.multiplier[at.macro] - pressure
+        covered = (zone.coverage > 0)[at.macro] & exact.regular(at.place)
+        weight = at.weight * zone.coverage[at.macro]
+        squares += _integral(weight, error), _integral(weight, pressure)
+        mean = at.means(pressure)
+        weight = zone.area * zone.coverage
+        means += _integral(weight, zone.multiplier - mean), _integral(weight, mean)
+        largest = max(largest, np.abs(error[covered]).max(initial=0.0))
+        highest = max(highest, pressure.max())
+        if exact.dim == 2:
+            smooth = exact.regular(zone.centre)
+            second.append(_second_difference(zone, zone.multiplier - mean, smooth))
+    found = {
+        "pressure_l2": _root(*squares),
+        "pressure_max": _over(largest, highest),
+        "pressure_means": _root(*means),
+    }
+    if second:
+        found["pressure_oscillation"] = _over(max(second), highest)
+    if isinstance(exact, Hertz):
+        found |= _ellipse_errors(solution.zones, exact)
+    return found
+
+
+def _ellipse_errors(zones: list[ZoneResult], exact: Hertz) -> dict[str, float]:
+    centre = np.concatenate([zone.centre for zone in zones])
+    if np.count_nonzero(exact.regular(centre)) < 3:
+        return {}
+    pressure = np.concatenate([zone.multiplier for zone in zones])
+    half_width, peak = exact.fitted(centre, pressure)
+    return {
+        "half_width": abs(half_width / exact.half_width - 1),
+        "peak": abs(peak / exact.peak - 1),
+    }
+
+
+def _second_difference(zone: ZoneResult, error: np.ndarray, smooth: np.ndarray) -> float:
+    """Largest |e₋ − 2 e + e₊| over macro-elements between two neighbours, all of them smooth."""
+    before, after = _neighbours(zone)
+    total, count = np.zeros(len(error)), np.zeros(len(error))
+    for one, other in ((before, after), (after, before)):
+        np.add.at(total, one, error[other] - error[one])
+        np.add.at(count, one, smooth[other])
+    between = (count == 2) & smooth
+    return float(np.abs(total[between]).max(initial=0.0))
+
+
+def _neighbours(zone: ZoneResult) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of macro-elements that share an end point."""
+    ends = np.concatenate([nodes[:, :2].ravel() for _, nodes, _ in zone.faces])
+    owner = np.concatenate([np.repeat(macro, 2) for _, _, macro in zone.faces])
+    order = np.argsort(ends, kind="stable")
+    ends, owner = ends[order], owner[order]
+    meet = (ends[1:] == ends[:-1]) & (owner[1:] != owner[:-1])
+    return owner[:-1][meet], owner[1:][meet]
+
+
+def _root(error: float, whole: float) -> float:
+    return _over(np.sqrt(error), np.sqrt(whole))
+
+
+def _over(error: float, whole: float) -> float:
+    return float(error / whole) if whole > 0 else float(error)
