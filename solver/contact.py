@@ -206,11 +206,13 @@ class ContactProblem:
             if held:
                 raise SolveError(f"{held} once {int((~closed).sum())} macro-elements are open")
             constraints = (self.gaps[closed] @ self.scene.free.basis).tocsr()
+            system: Constrained
             if self.has_own_unknowns:
                 system = condense(self.matrix, constraints, self._own_unknowns())
             else:
                 system = saddle_point(self.matrix, constraints)
             self._system = key, system
+            return system
         return self._system[1]
 
     def _own_unknowns(self) -> np.ndarray:

@@ -84,10 +84,11 @@ class _Builder:
         return content
 
     def value(self, event: yaml.Event, keys: Keys) -> object:
-        if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
             raise self.error(keys, event, "anchors and aliases are not allowed: write it out")
-        if event.tag is not None:
-            raise self.error(keys, event, f"the tag {event.tag} is not allowed")
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            raise self.error(keys, event, f"the tag {tag} is not allowed")
         if len(keys) > MAX_DEPTH:
             raise self.error(keys[:4], event, f"nested deeper than {MAX_DEPTH} levels")
         if isinstance(event, yaml.ScalarEvent):
@@ -130,5 +131,5 @@ class _Builder:
         return text
 
     def error(self, keys: Keys, event: yaml.Event, allowed: str) -> InputError:
-        line = f"line {event.start_mark.line + 1}"
+        line = f"line {event.start_mark.line + 1}" if event.start_mark else "somewhere"
         return InputError(self.path, key_path(keys) or line, None, f"{allowed} ({line})")

@@ -75,7 +75,9 @@ def cut(
         needs_cut(block.type.name) and not leave for block, leave in zip(faces, left, strict=True)
     ]
     slaves = _slave_faces_by_cell(
-        *(list(compress(a, chosen)) for a in (faces, macro, into_hexahedra))
+        list(compress(faces, chosen)),
+        list(compress(macro, chosen)),
+        list(compress(into_hexahedra, chosen)),
     )
     whole = [
         SubFaces(block.type, block.nodes, number)

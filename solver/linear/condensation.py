@@ -29,7 +29,9 @@ AnyIterate = TypeVar("AnyIterate", bound="Iterate")
 class Constrained(Protocol):
     """A factored system K x = f + Gᵀ p under constraints G x = b."""
 
-    factor: Factor
+    @property
+    def factor(self) -> Factor:
+        """The factor of the system that is solved."""
 
     def correction(self, force: np.ndarray, violation: np.ndarray) -> np.ndarray:
         """The change of x (n,) that removes f − K x = `force` and b − G x = `violation`."""

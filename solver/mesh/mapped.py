@@ -61,7 +61,8 @@ def shells(keys: Keys) -> meshio.Mesh:
     mesh = _flat(keys, 3)
 
     def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
-        direction = np.column_stack([x[:, :2], np.ones(len(x))])
+        # Equal angles, so that mid-edge nodes come to lie near the middle of their arc.
+        direction = np.column_stack([np.tan(np.pi / 4 * x[:, :2]), np.ones(len(x))])
         direction /= np.linalg.norm(direction, axis=1)[:, None]
         return _radius(height, radii)[:, None] * direction
 

@@ -3,7 +3,7 @@
 import numpy as np
 from markupsafe import Markup
 
-from solver.expressions import evaluate
+from solver.expressions import Expression, evaluate
 from solver.report.axes import Scale, draw_axes
 from solver.report.geometry import plane_cells
 from solver.report.layout import Frame, apart, edge_color, fit, tint
@@ -98,7 +98,7 @@ def _reference(
     drawing: Drawing, solution: Solution, zone: ZoneResult, x: Scale, y: Scale, along: np.ndarray
 ) -> None:
     scalar = solution.case.reference.get("contact_pressure")
-    if scalar is None or isinstance(scalar, tuple | dict):
+    if not isinstance(scalar, float | Expression):
         return
     position = zone.centre @ along
     order = np.argsort(position)
