@@ -16,7 +16,7 @@ INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report test accept format lint lock clean clean-all
+.PHONY: help all-cases family case report orders test accept format lint lock clean clean-all
 .PHONY: environment test-environment lint-environment
 
 help: ## list the targets
@@ -38,6 +38,10 @@ case: environment ## solve one case again, then report: make case CASE=ssnp170-e
 
 report: environment ## write the report again from the results there are
 	@$(SNAKEMAKE) report
+
+orders: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
+orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…
+	@$(SNAKEMAKE) orders
 
 test: test-environment ## run the tests
 	@.venv/bin/python -m pytest -n auto $(ARGS)

@@ -1,4 +1,4 @@
-"""Targets of the batch: `all_cases` (default), `report`, or the verdict of one case by its path."""
+"""Targets of the batch: `all_cases` (default), `report`, `orders`, or a verdict by its path."""
 
 from snakemake.utils import min_version
 
@@ -16,3 +16,4 @@ rule all_cases:
 include: "workflow/rules/mesh.smk"
 include: "workflow/rules/solve.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/orders.smk"

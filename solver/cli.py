@@ -90,6 +90,11 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
 
+    command = _add(commands, "orders", _orders, "write the page of orders of convergence")
+    command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
+    command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the levels")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+
     command = _add(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
     command.add_argument("--mesh", action="store_true", help="mesh them too and check the groups")
@@ -116,6 +121,9 @@ def _add_job(command: argparse.ArgumentParser) -> None:
     command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, taken as it is")
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
     command.add_argument("--hexahedra", choices=("pyramids", "hexahedra"), help="how they are cut")
+    command.add_argument(
+        "--refine", type=int, default=1, metavar="N", help="multiply the recipe's divisions"
+    )
 
 
 def _mesh(options: argparse.Namespace) -> int:
@@ -130,7 +138,7 @@ def _mesh(options: argparse.Namespace) -> int:
 def _job(options: argparse.Namespace) -> "Job":
     from solver.run import Job
 
-    return Job(options.case, options.mesh, options.swap, options.hexahedra)
+    return Job(options.case, options.mesh, options.swap, options.hexahedra, options.refine)
 
 
 def _solve(options: argparse.Namespace) -> int:
@@ -179,10 +187,20 @@ def _report(options: argparse.Namespace) -> int:
 
     verdicts = list(options.verdicts)
     if options.results:
-        verdicts += sorted(options.results.glob("**/verdict.json"))
+        found = sorted(options.results.glob("**/verdict.json"))
+        # The levels of ladders have a page of their own.
+        verdicts += [p for p in found if "orders" not in p.relative_to(options.results).parts]
     if not verdicts:
         raise InputError(options.results or "report", "VERDICT.json", None, "there is none")
     return write_report(verdicts, options.output)
+
+
+def _orders(options: argparse.Namespace) -> int:
+    from solver.ladders import read_ladders
+    from solver.report.orders import write_orders
+
+    write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
+    return PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:

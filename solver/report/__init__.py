@@ -21,7 +21,7 @@ def write_report(verdicts: Sequence[Path], folder: Path, log: Callable[[str], An
     folder.mkdir(parents=True, exist_ok=True)
     rows = read_rows(verdicts)
     contents = {
-        PAGE: to_html(rows, folder / "pictures"),
+        PAGE: to_html(rows, folder / "pictures", (folder / "orders.html").is_file()),
         "summary.json": tables.to_json(rows),
         "summary.csv": tables.to_csv(rows),
         "summary.md": tables.to_markdown(rows),

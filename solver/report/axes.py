@@ -48,8 +48,12 @@ class Scale:
         """A tick's text."""
         if not self.log:
             return f"{value:.6g}"
-        power = round(np.log10(value))
-        return f"{value:g}" if -2 <= power <= 3 else "10" + f"{power}".translate(_SUPERSCRIPT)
+        power = int(np.floor(np.log10(value) + 1e-9))
+        if -2 <= power <= 3:
+            return f"{value:g}"
+        mantissa = round(value / 10.0**power)
+        factor = "" if mantissa == 1 else f"{mantissa}·"
+        return f"{factor}10" + f"{power}".translate(_SUPERSCRIPT)
 
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

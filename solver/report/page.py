@@ -51,36 +51,54 @@ STAGES = {
 }
 
 
-def to_html(rows: Sequence[Row], pictures: Path) -> str:
-    """The page; pictures are kept in the folder `pictures` for the next time."""
-    environment = Environment(
+def to_html(rows: Sequence[Row], pictures: Path, orders: bool = False) -> str:
+    """The page; pictures are kept in the folder `pictures` for the next time.
+
+    `orders` says whether the page of orders of convergence is there beside it.
+    """
+    checks = {check["name"]: check for row in rows for check in row.checks or ()}
+    return (
+        environment()
+        .get_template("summary.html.jinja")
+        .render(
+            rows=rows,
+            orders=orders,
+            bad=[row for row in rows if row.word != "passed"],
+            outcome=outcome(rows),
+            counts=counted(rows),
+            families=[_section(name, members) for name, members in families(rows).items()],
+            facts=_facts(rows),
+            checks=[checks[name] for name in sorted(checks, key=_order)],
+            meaning=MEANING,
+            kinds=KINDS,
+            stages={name: STAGES.get(name, "#777777") for name in _stages(rows)},
+            picture=lambda row: picture(row, pictures),
+            formats=formats,
+            style=style(),
+        )
+    )
+
+
+def environment() -> Environment:
+    """Where the templates of all pages come from, with the formats of numbers."""
+    templates = Environment(
         loader=PackageLoader("solver.report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {
+    templates.filters |= {
         "error": formats.error,
         "number": formats.number,
         "seconds": formats.seconds,
     }
-    checks = {check["name"]: check for row in rows for check in row.checks or ()}
-    return environment.get_template("summary.html.jinja").render(
-        rows=rows,
-        bad=[row for row in rows if row.word != "passed"],
-        outcome=outcome(rows),
-        counts=counted(rows),
-        families=[_section(name, members) for name, members in families(rows).items()],
-        facts=_facts(rows),
-        checks=[checks[name] for name in sorted(checks, key=_order)],
-        meaning=MEANING,
-        kinds=KINDS,
-        stages={name: STAGES.get(name, "#777777") for name in _stages(rows)},
-        picture=lambda row: picture(row, pictures),
-        formats=formats,
-        style=Markup((Path(__file__).parent / "templates/style.css").read_text(encoding="utf-8")),
-    )
+    return templates
+
+
+def style() -> Markup:
+    """The style sheet of all pages."""
+    return Markup((Path(__file__).parent / "templates/style.css").read_text(encoding="utf-8"))
 
 
 def _section(name: str, rows: Sequence[Row]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import io
 import json
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from solver.report import formats
@@ -42,10 +42,16 @@ def to_csv(rows: Sequence[Row]) -> str:
     stages = list(dict.fromkeys(stage for row in rows for stage in row.stages))
     checks = list(dict.fromkeys(check["name"] for row in rows for check in row.checks or ()))
     records = [_record(row, stages, checks) for row in rows]
+    return as_csv(records) or "case\r\n"
+
+
+def as_csv(records: Sequence[Mapping[str, Any]]) -> str:
+    """Records that have the same keys, with a line of headings; empty where there are none."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(records[0]) if records else ["case"])
-    writer.writeheader()
-    writer.writerows(records)
+    if records:
+        writer = csv.DictWriter(text, fieldnames=list(records[0]))
+        writer.writeheader()
+        writer.writerows(records)
     return text.getvalue()
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from solver.errors import InputError
 
 CASE_SCHEMA = Path(__file__).with_name("case.schema.json")
+LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")
 
 
 def validate(content: object, schema: Path, where: object) -> None:

@@ -5,6 +5,7 @@ import re
 import shlex
 import sys
 from collections import namedtuple
+from functools import cache
 from pathlib import Path
 
 import yaml
@@ -63,7 +64,7 @@ def case_files():
                 f"cases = {folder}: no case file (*.yaml) in this folder"
             )
         files += found
-    return [f for f in files if f.name != "family.yaml"]
+    return [f for f in files if f.name not in ("family.yaml", "orders.yaml")]
 
 
 def peek(file):

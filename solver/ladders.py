@@ -1,0 +1,98 @@
+"""Refinement ladders as data: `orders.yaml` in the folder of a family of cases.
+
+    title: Contact on a parabola
+    levels: [1, 2, 4, 8, 16]      # what the divisions of the case's recipe are multiplied by
+    least:                        # slopes that must be reached, by degree of the slave's cells
+      linear: {displacement_l2: 1.9, pressure_l2: 0.95}
+    theory:                       # where the family's own differs: [guaranteed, best]
+      quadratic: {pressure_max: [0.5, 1.0]}
+    reference_code: {name: code_aster, version: …, remark: …}
+    ladders:
+      - {case: tria3.yaml, reference_code: {displacement_l2: 1.998, pressure_l2: 1.041}}
+      - {case: press-fit.yaml, problem: press fit}    # has plots of its own
+      - {case: hexa20.yaml, hexahedra: hexahedra, levels: [1, 2, 3, 4]}
+
+A ladder is solved in every direction of its case.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from solver.schemas import LADDERS_SCHEMA, validate
+from solver.solution import job_name
+from solver.strict_yaml import parse_mapping, read_text
+
+FILE_NAME = "orders.yaml"
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """One case file, and what the divisions of its recipe are multiplied by, level by level.
+
+    Ladders of the same `problem` share their plots. `observed` holds the reference code's own
+    slopes by error.
+    """
+
+    case: Path
+    levels: tuple[int, ...]
+    problem: str = ""
+    hexahedra: str | None = None
+    observed: Mapping[str, float] = field(default_factory=dict)
+
+    def folder(self, swapped: bool) -> str:
+        """The name of the folder in which the results of one direction lie."""
+        return job_name(self.case.stem, swapped, self.hexahedra)
+
+
+@dataclass(frozen=True)
+class ReferenceCode:
+    """The code whose slopes are shown beside ours."""
+
+    name: str = "reference code"
+    version: str = ""
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Family:
+    """The ladders of a family.
+
+    `least` and `theory` go by degree ("linear", "quadratic") and error; `theory` holds only what
+    differs from `orders.THEORY`. Where `title` or `description` is empty, `family.yaml` has it.
+    """
+
+    name: str
+    title: str
+    description: str
+    ladders: tuple[Ladder, ...]
+    least: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    theory: Mapping[str, Mapping[str, list[float | None]]] = field(default_factory=dict)
+    reference_code: ReferenceCode = field(default_factory=ReferenceCode)
+
+
+def read_ladders(path: Path) -> Family:
+    """The ladders in a file; `InputError` says what is refused, and what is allowed."""
+    content = parse_mapping(read_text(path), path)
+    validate(content, LADDERS_SCHEMA, path)
+    name = path.resolve().parent.name
+    return Family(
+        name=name,
+        title=content.get("title", ""),
+        description=content.get("description", ""),
+        ladders=tuple(_ladder(path, item, content["levels"]) for item in content["ladders"]),
+        least=content.get("least", {}),
+        theory=content.get("theory", {}),
+        reference_code=ReferenceCode(**content.get("reference_code", {})),
+    )
+
+
+def _ladder(path: Path, item: Mapping[str, Any], levels: list[int]) -> Ladder:
+    return Ladder(
+        case=path.parent / item["case"],
+        levels=tuple(item.get("levels", levels)),
+        problem=item.get("problem", ""),
+        hexahedra=item.get("hexahedra"),
+        observed=item.get("reference_code", {}),
+    )

@@ -1,0 +1,188 @@
+"""The page of orders on ladders whose errors are known powers, and on ladders that fall short."""
+
+import csv
+import json
+from html.parser import HTMLParser
+
+import pytest
+
+from solver.ladders import read_ladders
+from solver.report import orders
+from solver.report.curves import groups, read_curves
+from solver.report.orders import theory_text, write_orders
+
+LADDERS = """
+title: Powers of <h>
+levels: [1, 2, 4, 8]
+least: {linear: {displacement_l2: 1.9}, quadratic: {displacement_l2: 2.4}}
+reference_code: {name: other_code, version: "7"}
+ladders:
+  - {case: tria3.yaml, reference_code: {displacement_l2: 1.75}}
+  - {case: quad8.yaml}
+  - {case: hexa27.yaml, levels: [1, 2, 3], problem: cube}
+"""
+
+
+def put(folder, level, cells, dim, word="passed", **errors):
+    """One verdict of a ladder with 4 macro-elements along each edge at level 1."""
+    bodies = [("block", "slave", cells), ("die", "master", "QUAD4" if dim == 2 else "HEXA8")]
+    verdict = {
+        "verdict": word,
+        "reason": "" if errors else "no mesh",
+        "dofs": (4 * level) ** dim if errors else None,
+        "macro_elements": (4 * level) ** (dim - 1) if errors else None,
+        "bodies": [{"name": n, "role": r, "cells": {c: 9}} for n, r, c in bodies if errors],
+        "errors": errors,
+        "seconds": {"total": 1.0},
+        "checks": [],
+    }
+    path = folder / str(level) / "verdict.json"
+    path.parent.mkdir(parents=True)
+    path.write_text(json.dumps(verdict))
+
+
+@pytest.fixture
+def family(tmp_path):
+    path = tmp_path / "cases" / "powers" / "orders.yaml"
+    path.parent.mkdir(parents=True)
+    path.write_text(LADDERS)
+    return read_ladders(path)
+
+
+@pytest.fixture
+def results(tmp_path):
+    folder = tmp_path / "results" / "powers"
+    for level in (1, 2, 4, 8):
+        put(folder / "tria3", level, "TRIA3", 2, displacement_l2=level**-1.5, pressure_l2=1 / level)
+        put(folder / "quad8", level, "QUAD8", 2, displacement_l2=level**-3.0, pressure_l2=1e-14)
+        put(folder / "quad8-swapped", level, "QUAD8", 2, displacement_l2=level**-2.5)
+    for level in (1, 3):
+        put(folder / "hexa27", level, "HEXA27", 3, displacement_l2=level**-3.0)
+    put(folder / "hexa27", 2, "HEXA27", 3, word="refused")
+    return folder.parent
+
+
+@pytest.fixture
+def page(family, results, tmp_path):
+    said = []
+    write_orders([family], results, tmp_path, said.append)
+    assert len(said) == 1
+    return said[0]
+
+
+def read(path):
+    with path.open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_every_ladder_has_its_slopes_and_what_they_are_held_against(page, tmp_path):
+    rows = {(row["ladder"], row["error"]): row for row in read(tmp_path / orders.SLOPES)}
+    row = rows["tria3", "displacement_l2"]
+    assert float(row["slope"]) == pytest.approx(1.5)
+    assert (row["theory_least"], row["reference_code"], row["reached"]) == ("2.0", "1.75", "False")
+    assert float(rows["quad8", "displacement_l2"]["slope"]) == pytest.approx(3)
+    assert float(rows["quad8-swapped", "displacement_l2"]["slope"]) == pytest.approx(2.5)
+    assert (rows["quad8", "pressure_l2"]["slope"], rows["quad8", "pressure_l2"]["rounding"]) == (
+        "",
+        "True",
+    )
+
+
+def test_levels_without_a_result_are_points_and_failures_too(page, tmp_path):
+    points = {(row["ladder"], row["level"]): row for row in read(tmp_path / orders.POINTS)}
+    assert len(points) == 4 + 4 + 4 + 3
+    assert (points["hexa27", "2"]["verdict"], points["hexa27", "2"]["reason"]) == (
+        "refused",
+        "no mesh",
+    )
+    failures = (tmp_path / orders.FAILURES).read_text().splitlines()
+    assert failures == [
+        "powers/tria3: displacement, L2: 1.500 ± 0.000; at least 1.9 is asked for",
+        "powers/hexa27: level 2: no mesh",
+        "powers/hexa27: displacement, L2: not known; at least 2.4 is asked for",
+    ]
+    assert page.startswith("\n".join(failures))
+    assert "2 of 4 slopes asked for are reached, on 4 ladders. 1 levels have no result." in page
+
+
+def test_a_ladder_never_solved_is_missed(family, tmp_path):
+    write_orders([family], tmp_path / "nothing", tmp_path, lambda line: None)
+    failures = (tmp_path / orders.FAILURES).read_text()
+    assert failures.count("cannot be read") == 4 + 4 + 3
+
+
+def test_nothing_is_missed_where_all_is_reached(family, results, tmp_path):
+    (tmp_path / "cases/powers/orders.yaml").write_text(
+        "levels: [1, 2, 4, 8]\nleast: {quadratic: {displacement_l2: 2.4, pressure_l2: 1}}\n"
+        "ladders: [{case: quad8.yaml}]\n"
+    )
+    family = read_ladders(tmp_path / "cases/powers/orders.yaml")
+    swapped = [c for c in read_curves(family, results) if c.name == "quad8-swapped"]
+    assert swapped[0].reached("pressure_l2") is False  # it has no pressure at all
+    first = read_curves(family, results)[0]
+    assert first.reached("pressure_l2")  # rounding is as good as any slope
+    assert first.complaints == []
+
+
+def test_sizes_are_those_of_macro_elements(family, results):
+    curves = {curve.name: curve for curve in read_curves(family, results)}
+    assert curves["tria3"].sizes == pytest.approx([1 / 4, 1 / 8, 1 / 16, 1 / 32])
+    assert curves["hexa27"].sizes == pytest.approx([1 / 4, 1 / 12])
+
+
+def test_problems_and_dimensions_are_drawn_apart(family, results):
+    grouped = groups(read_curves(family, results))
+    assert {title: len(members) for title, members in grouped.items()} == {
+        "2D, slave: block": 3,
+        "Cube: 3D, slave: block": 1,
+    }
+
+
+def test_the_sentence_tells_the_slopes_by_degree(family, results):
+    assert orders.sentence(read_curves(family, results)) == (
+        "The displacement in L2 falls with slope 1.50 on linear cells (theory 2) and 2.50 … 3.00 "
+        "on quadratic cells (theory at least 2.5, at most 3); the pressure in L2 falls with slope "
+        "1.00 on linear cells (theory at least 0.5, at most 1)."
+    )
+
+
+def test_the_page_is_whole_and_escaped(page, tmp_path):
+    text = (tmp_path / orders.PAGE).read_text()
+    assert "Powers of &lt;h&gt;" in text
+    assert 'href="summary.html"' in text
+    assert "1.500 ± 0.000" in text
+    assert "other_code 1.750" in text
+    counter = Counter()
+    counter.feed(text)
+    assert counter.open == []
+    # Two errors in 2D, one in 3D, and a key for each ladder.
+    assert counter.drawings == 3 + 4
+
+
+class Counter(HTMLParser):
+    """Elements still open among those whose end has to be written, and drawings."""
+
+    WATCHED = ("svg", "section", "div", "table", "ul", "header", "p", "strong", "a")
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.drawings = [], 0
+
+    def handle_starttag(self, tag, attrs):
+        self.drawings += tag == "svg"
+        if tag in self.WATCHED:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag in self.WATCHED:
+            assert self.open.pop() == tag
+
+
+def test_own_theory_takes_the_place_of_the_general_one(results, tmp_path):
+    path = tmp_path / "cases" / "powers" / "orders.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(LADDERS + "theory: {quadratic: {pressure_l2: [1.5, null]}}\n")
+    curve = next(c for c in read_curves(read_ladders(path), results) if c.name == "quad8")
+    assert theory_text(curve.theory("pressure_l2")) == "theory at least 1.5"
+    assert theory_text(curve.theory("displacement_l2")) == "theory at least 2.5, at most 3"
+    assert theory_text(curve.theory("pressure_means")) == "theory –"
