@@ -35,9 +35,8 @@ def with_exact(solution, exact):
 
 def interpolated(solution, cells, exact, size):
     """The exact displacement and stress at the nodes of a mesh of that size around a point."""
-    section = {"cells": cells, "divisions": 2}
-    if cells[:4] in ("PENT", "PYRA"):
-        section["contact"] = "TRIA3"
+    cube = cells[:4] in ("PENT", "PYRA")
+    section = {"cells": cells} | ({"contact": "TRIA3"} if cube else {"divisions": 2})
     mesh = generate({"recipe": "blocks", "size": 1.0, "bottom": section, "top": section}, "test")
     dim = exact.dim
     points = size * mesh.points + np.array([0.3, 0.4, 0.35])[:dim]
