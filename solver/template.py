@@ -54,9 +54,12 @@ steps: [0.5, 1.0]                        # load factors
 observe:                                 # the contact element nearest to a point, at every step
   - {{zone: interface, nearest: [25.0, 25.0, 0.0]}}
 
-# What the results are checked against; leave out what you do not know.
+# What the results are checked against; leave out what you do not know. A documented solution is
+# named under `solution`, with its parameters; then `solution` stands for any value here, in loads
+# (traction: solution) and in supports (fix: {{x: solution}}), and errors are measured in norms.
 reference:
   kind: analytical                       # analytical, manufactured, refined or other_code
+  solution: {{name: uniform_compression, base: -50.0}}
   contact_pressure: 25.0                 # >= 0 in compression
   normal_stress: -25.0                   # > 0 in tension
   gap: 0.0                               # >= 0 open
