@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from solver.errors import InputError
 from solver.schemas import LADDERS_SCHEMA, validate
 from solver.solution import job_name
 from solver.strict_yaml import parse_mapping, read_text
@@ -81,17 +82,21 @@ def read_ladders(path: Path) -> Family:
         name=name,
         title=content.get("title", ""),
         description=content.get("description", ""),
-        ladders=tuple(_ladder(path, item, content["levels"]) for item in content["ladders"]),
+        ladders=tuple(_ladder(path, content, i) for i in range(len(content["ladders"]))),
         least=content.get("least", {}),
         theory=content.get("theory", {}),
         reference_code=ReferenceCode(**content.get("reference_code", {})),
     )
 
 
-def _ladder(path: Path, item: Mapping[str, Any], levels: list[int]) -> Ladder:
+def _ladder(path: Path, content: Mapping[str, Any], index: int) -> Ladder:
+    item = content["ladders"][index]
+    case = path.parent / item["case"]
+    if not case.is_file():
+        raise InputError(path, f"ladders[{index}].case", item["case"], "no such file")
     return Ladder(
-        case=path.parent / item["case"],
-        levels=tuple(item.get("levels", levels)),
+        case=case,
+        levels=tuple(item.get("levels", content["levels"])),
         problem=item.get("problem", ""),
         hexahedra=item.get("hexahedra"),
         observed=item.get("reference_code", {}),

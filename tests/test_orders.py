@@ -79,6 +79,8 @@ def file(tmp_path):
     path = tmp_path / "family" / "orders.yaml"
     path.parent.mkdir()
     path.write_text(LADDERS)
+    for case in ("tria3.yaml", "hexa20.yaml"):
+        (path.parent / case).touch()
     return path
 
 
@@ -99,6 +101,7 @@ def test_ladders_as_their_file_gives_them(file):
         ("levels: [1, 2, 4]", "levels: [2, 2]", r"levels = \[2, 2\]: .*each once"),
         ("displacement_l2: 1.9}", "displacment_l2: 1.9}", "did you mean displacement_l2"),
         ("- {case: tria3.yaml,", "- {", r"ladders\[0\].case: this key is needed"),
+        ("tria3.yaml", "tria5.yaml", r"ladders\[0\].case = 'tria5.yaml': no such file"),
         ("hexahedra: hexahedra", "hexahedra: cubes", "must be pyramids or hexahedra"),
         ("[0.5, null]", "[0.5]", r"must be \[guaranteed, best\]"),
     ],

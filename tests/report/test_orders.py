@@ -46,6 +46,8 @@ def family(tmp_path):
     path = tmp_path / "cases" / "powers" / "orders.yaml"
     path.parent.mkdir(parents=True)
     path.write_text(LADDERS)
+    for name in ("tria3", "quad8", "hexa27"):
+        (path.parent / f"{name}.yaml").touch()
     return read_ladders(path)
 
 
@@ -178,9 +180,8 @@ class Counter(HTMLParser):
             assert self.open.pop() == tag
 
 
-def test_own_theory_takes_the_place_of_the_general_one(results, tmp_path):
+def test_own_theory_takes_the_place_of_the_general_one(family, results, tmp_path):
     path = tmp_path / "cases" / "powers" / "orders.yaml"
-    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(LADDERS + "theory: {quadratic: {pressure_l2: [1.5, null]}}\n")
     curve = next(c for c in read_curves(read_ladders(path), results) if c.name == "quad8")
     assert theory_text(curve.theory("pressure_l2")) == "theory at least 1.5"
