@@ -3,6 +3,8 @@
 import numpy as np
 from markupsafe import Markup
 
+from solver.case import Exact
+from solver.exact import ExactValues
 from solver.expressions import Expression, evaluate
 from solver.report.axes import Scale, draw_axes
 from solver.report.geometry import plane_cells
@@ -97,13 +99,16 @@ def _extents(zone: ZoneResult, position: np.ndarray) -> tuple[np.ndarray, np.nda
 def _reference(
     drawing: Drawing, solution: Solution, zone: ZoneResult, x: Scale, y: Scale, along: np.ndarray
 ) -> None:
-    scalar = solution.case.reference.get("contact_pressure")
-    if not isinstance(scalar, float | Expression):
+    given, exact = solution.case.reference.get("contact_pressure"), solution.case.solution
+    if isinstance(given, float | Expression):
+        values = evaluate(given, zone.centre)
+    elif isinstance(given, Exact) and exact:
+        values = ExactValues(solution, exact).pressure(zone)
+    else:
         return
     position = zone.centre @ along
     order = np.argsort(position)
-    values = np.broadcast_to(evaluate(scalar, zone.centre), position.shape)[order]
-    position, values = position[order], values.copy()
+    position, values = position[order], values[order]
     if np.ptp(values) == 0:  # a constant reference is drawn over the whole width
         position, values = np.array([x.low, x.high]), values[[0, -1]]
     line = np.column_stack([x(position), y(values)])
