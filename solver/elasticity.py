@@ -103,13 +103,17 @@ def stiffness(points: np.ndarray, blocks: list[Block]) -> sparse.csr_matrix:
     n, dim = points.shape
     total = sparse.csr_matrix((n * dim, n * dim))
     for block in blocks:
-        values = element_matrices(points, block)
-        dofs = degrees_of_freedom(block.cells, dim).astype(np.int32)
-        rows = np.repeat(dofs, dofs.shape[1], axis=1)
-        columns = np.tile(dofs, dofs.shape[1])
-        entries = (values.ravel(), (rows.ravel(), columns.ravel()))
-        total = total + sparse.coo_matrix(entries, shape=total.shape).tocsr()
+        total = total + assembled(block.cells, element_matrices(points, block), total.shape[0], dim)
     return total
+
+
+def assembled(cells: np.ndarray, matrices: np.ndarray, n_dofs: int, dim: int) -> sparse.csr_matrix:
+    """The sum (n_dofs, n_dofs) of cell matrices (n, dim · n_nodes, dim · n_nodes)."""
+    dofs = degrees_of_freedom(cells, dim).astype(np.int32)
+    rows = np.repeat(dofs, dofs.shape[1], axis=1)
+    columns = np.tile(dofs, dofs.shape[1])
+    entries = (matrices.ravel(), (rows.ravel(), columns.ravel()))
+    return sparse.coo_matrix(entries, shape=(n_dofs, n_dofs)).tocsr()
 
 
 def internal_force(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> np.ndarray:

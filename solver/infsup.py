@@ -10,7 +10,7 @@ Comput. Struct. 79 (2001) 1473–1486.
 import numpy as np
 from scipy import sparse
 
-from solver.elasticity import Block, degrees_of_freedom, physical_gradients, stiffness
+from solver.elasticity import Block, assembled, physical_gradients, stiffness
 from solver.elements import shape_functions
 from solver.linear.direct import factorise
 from solver.scene import Scene
@@ -44,9 +44,5 @@ def mass(points: np.ndarray, blocks: list[Block]) -> sparse.csr_matrix:
         _, determinant = physical_gradients(points, block.cells, block.type, reference)
         scalar = np.einsum("cq,q,qa,qb->cab", determinant, weights, values, values, optimize=True)
         local = np.einsum("cab,ij->caibj", scalar, np.eye(dim))
-        dofs = degrees_of_freedom(block.cells, dim)
-        rows = np.repeat(dofs, dofs.shape[1], axis=1)
-        columns = np.tile(dofs, dofs.shape[1])
-        entries = (local.ravel(), (rows.ravel(), columns.ravel()))
-        total = total + sparse.coo_matrix(entries, shape=total.shape).tocsr()
+        total = total + assembled(block.cells, local, n * dim, dim)
     return total
