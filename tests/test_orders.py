@@ -1,15 +1,20 @@
 """Slopes fitted to errors that fall with a known order; ladders read from their files."""
 
 from math import sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from solver.case import load_case
 from solver.errors import InputError
 from solver.ladders import read_ladders
+from solver.norms import errors
 from solver.orders import ROUND_OFF, THEORY, element_size, fit_slope, is_rounding
+from solver.run import mesh_of, refined
+from solver.simulation import simulate
 
 SIZES = 2.0 ** -np.arange(1, 6)
 
@@ -112,3 +117,42 @@ def test_what_is_wrong_in_the_file_is_told_in_one_line(file, old, new, message):
     with pytest.raises(InputError, match=message) as refusal:
         read_ladders(file)
     assert str(refusal.value).startswith(str(file))
+
+
+MANUFACTURED = Path(__file__).parent.parent / "cases" / "manufactured"
+
+
+def solved(case):
+    """Size of the macro-elements, and errors, of a case."""
+    solution = simulate(case, mesh_of(case), log=lambda line: None)
+    return {"size": element_size(solution.macro_elements, 2)} | errors(solution)
+
+
+@pytest.mark.parametrize(
+    ("cells", "displacement", "gradient"), [("tria3", 1.9, 0.9), ("quad8", 2.4, 1.4)]
+)
+def test_a_small_ladder_shows_the_orders_of_theory(cells, displacement, gradient):
+    """The parabola problem on 16, 32 and 64 cells along each edge."""
+    case = load_case(MANUFACTURED / f"{cells}.yaml")
+    levels = [solved(refined(case, factor)) for factor in (1, 2, 4)]
+    slopes = {
+        error: fit_slope([level["size"] for level in levels], [level[error] for level in levels])
+        for error in ("displacement_l2", "displacement_h1", "pressure_l2", "pressure_means")
+    }
+    assert slopes["displacement_l2"].value >= displacement
+    assert slopes["displacement_h1"].value >= gradient
+    assert slopes["pressure_l2"].value >= 0.95
+    assert slopes["pressure_means"].value >= 0.95
+    # A piecewise constant cannot do better than 1; a slope far above would be an error in the norm.
+    assert slopes["pressure_l2"].value <= 1.1
+
+
+def test_the_mesh_of_a_file_cannot_be_refined(tmp_path):
+    text = (MANUFACTURED / "tria3.yaml").read_text()
+    start, end = text.index("mesh:"), text.index("plane:")
+    path = tmp_path / "case.yaml"
+    path.write_text(f"{text[:start]}mesh: {{file: some.med}}\n{text[end:]}")
+    case = load_case(path)
+    assert refined(case, 1) is case
+    with pytest.raises(InputError, match=r"mesh.file.*only the mesh of a recipe can"):
+        refined(case, 2)

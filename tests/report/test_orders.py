@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from solver.cli import main
 from solver.ladders import read_ladders
 from solver.report import orders
 from solver.report.curves import groups, read_curves
@@ -124,6 +125,14 @@ def test_nothing_is_missed_where_all_is_reached(family, results, tmp_path):
     first = read_curves(family, results)[0]
     assert first.reached("pressure_l2")  # rounding is as good as any slope
     assert first.complaints == []
+
+
+def test_levels_are_no_part_of_the_report_of_a_batch(results, tmp_path):
+    put(tmp_path / "batch" / "fam", "case", "TRIA3", 2, displacement_l2=1.0)
+    results.rename(tmp_path / "batch" / "orders")
+    output = tmp_path / "report"
+    assert main(["report", "--results", str(tmp_path / "batch"), "-o", str(output)]) == 0
+    assert len(json.loads((output / "summary.json").read_text())) == 1
 
 
 def test_sizes_are_those_of_macro_elements(family, results):
