@@ -128,7 +128,7 @@ def test_nothing_is_missed_where_all_is_reached(family, results, tmp_path):
 
 
 def test_levels_are_no_part_of_the_report_of_a_batch(results, tmp_path):
-    put(tmp_path / "batch" / "fam", "case", "TRIA3", 2, displacement_l2=1.0)
+    put(tmp_path / "batch" / "fam", 1, "TRIA3", 2, displacement_l2=1.0)
     results.rename(tmp_path / "batch" / "orders")
     output = tmp_path / "report"
     assert main(["report", "--results", str(tmp_path / "batch"), "-o", str(output)]) == 0
