@@ -21,6 +21,8 @@ from solver.orders import (
 )
 from solver.report.rows import Row, read_rows
 
+VERDICT = "verdict.json"
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -41,12 +43,12 @@ class Curve:
 
     @cached_property
     def missing(self) -> list[str]:
-        """What says why a level has no point."""
-        absent = [row for row in self.rows if row not in self.solved]
-        return [
-            f"level {row.folder.name}: {row.why or 'no errors against an exact solution'}"
-            for row in absent
-        ]
+        """Why levels have no point: a line for each reason, naming the levels."""
+        levels: dict[str, list[str]] = {}
+        for row in self.rows:
+            if row not in self.solved:
+                levels.setdefault(_reason(row), []).append(row.folder.name)
+        return [f"level {', '.join(names)}: {reason}" for reason, names in levels.items()]
 
     @cached_property
     def slave_cells(self) -> list[CellType]:
@@ -135,7 +137,7 @@ def read_curves(family: Family, results: Path) -> list[Curve]:
             folder = results / family.name / ladder.folder(swapped)
             if swapped and not folder.is_dir():
                 continue
-            found = read_rows(folder / str(k) / "verdict.json" for k in ladder.levels)
+            found = read_rows(folder / str(k) / VERDICT for k in ladder.levels)
             rows = sorted(found, key=lambda row: int(row.folder.name))
             curves.append(Curve(folder.name, family, ladder, rows))
     return curves
@@ -144,6 +146,13 @@ def read_curves(family: Family, results: Path) -> list[Curve]:
 def _errors(row: Row) -> Mapping[str, float | None]:
     """Errors against the exact solution, by the names of `orders.ERRORS`."""
     return row.verdict.get("errors") or {}
+
+
+def _reason(row: Row) -> str:
+    """Why a row has no errors."""
+    if not (row.folder / VERDICT).is_file():
+        return "not solved"
+    return row.why or "no errors against an exact solution"
 
 
 def groups(curves: Sequence[Curve]) -> dict[str, list[Curve]]:

@@ -51,7 +51,7 @@ def write_orders(
 def outcome(curves: Sequence[Curve]) -> str:
     """How many slopes were asked for and reached."""
     asked = [r for c in curves for e in ERRORS if (r := c.reached(e)) is not None]
-    lost = sum(len(curve.missing) for curve in curves)
+    lost = sum(len(curve.rows) - len(curve.solved) for curve in curves)
     text = f"{sum(asked)} of {len(asked)} slopes asked for are reached, on {len(curves)} ladders."
     return text + (f" {lost} levels have no result." if lost else "")
 
