@@ -99,7 +99,9 @@ def _draw_guides(drawing: Drawing, x: Scale, y: Scale, orders: Sequence[float]) 
     start = np.array([x.end - 0.36 * (x.end - x.start), y.start - 12])
     decades = 0.27 * np.log10(x.high / x.low)
     pixels = (y.start - y.end) / np.log10(y.high / y.low)
+    lowest = start[1]  # of the labels, which must not cover one another
     for order in orders:
         end = start + np.array([0.27 * (x.end - x.start), -order * decades * pixels])
         drawing.line(*start, *end, stroke=MUTED, stroke_width=1)
-        drawing.text(end[0] + 4, end[1] + 4, formats.number(order), size=10, color=MUTED)
+        lowest = min(lowest - 10, end[1] + 4)
+        drawing.text(end[0] + 4, lowest, formats.number(order), size=10, color=MUTED)

@@ -75,14 +75,12 @@ def sentence(curves: Sequence[Curve]) -> str:
 
 
 def theory_text(order: Order | None) -> str:
-    """What theory says, in words."""
-    if order is None:
-        return f"theory {formats.NOTHING}"
-    least, best = (None if v is None else f"{v:g}" for v in (order.least, order.best))
-    if least and least == best:
-        return f"theory {least}"
-    bounds = [f"{word} {v}" for word, v in (("at least", least), ("at most", best)) if v]
-    return f"theory {', '.join(bounds) or formats.NOTHING}"
+    """What theory says: the order guaranteed … the best there can be, or the one that is known."""
+    least, best = (order.least, order.best) if order else (None, None)
+    if least is None or best is None:
+        bounds = [f"{sign} {v:g}" for sign, v in (("≥", least), ("≤", best)) if v is not None]
+        return f"theory {''.join(bounds) or formats.NOTHING}"
+    return "theory " + " … ".join(dict.fromkeys([f"{least:g}", f"{best:g}"]))
 
 
 def _to_html(families: Sequence[Family], curves: dict[str, list[Curve]]) -> str:

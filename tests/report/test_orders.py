@@ -156,8 +156,8 @@ def test_problems_and_dimensions_are_drawn_apart(family, results):
 def test_the_sentence_tells_the_slopes_by_degree(family, results):
     assert orders.sentence(read_curves(family, results)) == (
         "The displacement in L2 falls with slope 1.50 on linear cells (theory 2) and 2.50 … 3.00 "
-        "on quadratic cells (theory at least 2.5, at most 3); the pressure in L2 falls with slope "
-        "1.00 on linear cells (theory at least 0.5, at most 1)."
+        "on quadratic cells (theory 2.5 … 3); the pressure in L2 falls with slope "
+        "1.00 on linear cells (theory 0.5 … 1)."
     )
 
 
@@ -197,6 +197,7 @@ def test_own_theory_takes_the_place_of_the_general_one(family, results, tmp_path
     path = tmp_path / "cases" / "powers" / "orders.yaml"
     path.write_text(LADDERS + "theory: {quadratic: {pressure_l2: [1.5, null]}}\n")
     curve = next(c for c in read_curves(read_ladders(path), results) if c.name == "quad8")
-    assert theory_text(curve.theory("pressure_l2")) == "theory at least 1.5"
-    assert theory_text(curve.theory("displacement_l2")) == "theory at least 2.5, at most 3"
+    assert theory_text(curve.theory("pressure_l2")) == "theory ≥ 1.5"
+    assert theory_text(curve.theory("displacement_l2")) == "theory 2.5 … 3"
+    assert theory_text(curve.theory("pressure_max")) == "theory ≤ 1"
     assert theory_text(curve.theory("pressure_means")) == "theory –"
