@@ -95,7 +95,8 @@ class Case:
 
     `mesh` is the file's mapping, the key `file` replaced by `path`, relative to the case file.
     `tolerance` holds the overrides by check name, under `all` where one number was given.
-    `source` is the file's text. `family` is the name of the file's folder.
+    `source` is the file's text. `family` is the name of the file's folder. `reference_uncertainty`
+    is relative, `reference_code` has the keys name and version.
     """
 
     name: str
@@ -116,6 +117,9 @@ class Case:
     observe: tuple[Observation, ...] = ()
     reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
     reference_kind: str | None = None
+    reference_uncertainty: float | None = None
+    reference_code: dict[str, str] | None = None
+    reference_remark: str = ""
     solution: "ExactSolution | None" = None
     tolerance: dict[str, float] = field(default_factory=dict)
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -186,6 +190,9 @@ class _Reader:
                 for item in content.get("observe", [])
             ),
             reference_kind=reference.get("kind"),
+            reference_uncertainty=reference.get("uncertainty"),
+            reference_code=reference.get("code"),
+            reference_remark=reference.get("remark", ""),
             solution=self.solution,
             reference={
                 key: self.value_or_exact("reference", key) for key in reference if key in _QUANTITY

@@ -58,7 +58,9 @@ observe:                                 # the contact element nearest to a poin
 # named under `solution`, with its parameters; then `solution` stands for any value here, in loads
 # (traction: solution) and in supports (fix: {{x: solution}}), and errors are measured in norms.
 reference:
-  kind: analytical                       # analytical, manufactured, refined or other_code
+  kind: analytical                       # analytical, manufactured, refined (with its relative
+                                         # uncertainty: 2.0e-3) or other_code (with code: {{name:
+                                         # …, version: "…"}})
   solution: {{name: uniform_compression, base: -50.0}}
   contact_pressure: 25.0                 # >= 0 in compression
   normal_stress: -25.0                   # > 0 in tension

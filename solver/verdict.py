@@ -18,6 +18,8 @@ from solver.solution import Solution, job_name
 
 PASSED, FAILED = "passed", "failed"
 REFUSED, CRASHED = "refused", "crashed"
+# What a verdict says of where the case's reference comes from.
+_ORIGIN = ("reference_kind", "reference_uncertainty", "reference_code", "reference_remark")
 # What a solve tells and a solve without an end cannot.
 _UNKNOWN: dict[str, Any] = {
     "result": None,
@@ -113,11 +115,11 @@ def to_json(content: Any) -> str:
 
 def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[str, Any]:
     if isinstance(case, Case):
-        name, family, title, kind = case.name, case.family, case.title, case.reference_kind
-        zones = _zones(case, swapped)
+        name, family, title = case.name, case.family, case.title
+        zones, origin = _zones(case, swapped), {key: getattr(case, key) for key in _ORIGIN}
     else:
-        name, family, title, kind = case.stem, case.resolve().parent.name, "", None
-        zones = []
+        name, family, title = case.stem, case.resolve().parent.name, ""
+        zones, origin = [], dict.fromkeys(_ORIGIN)
     return {
         "case": name,
         "family": family,
@@ -126,8 +128,8 @@ def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[s
         "swapped": swapped,
         "direction": "swapped" if swapped else "first",
         "variant": hexahedra or "",
-        "reference_kind": kind,
         "zones": zones,
+        **origin,
     }
 
 

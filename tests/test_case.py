@@ -109,6 +109,16 @@ def test_every_key_arrives():
     )
 
 
+def test_where_a_reference_comes_from_arrives():
+    origin = "reference: {kind: %s, gap: 0, remark: as told}\n"
+    refined = parse_case(MINIMAL + origin % "refined, uncertainty: 2.0e-3", PATH)
+    assert (refined.reference_kind, refined.reference_uncertainty) == ("refined", 2e-3)
+    assert (refined.reference_code, refined.reference_remark) == (None, "as told")
+    other = parse_case(MINIMAL + origin % "other_code, code: {name: solver, version: '14'}", PATH)
+    assert other.reference_code == {"name": "solver", "version": "14"}
+    assert other.reference == {"gap": 0.0}
+
+
 def test_defaults_are_those_of_the_contract():
     case = parse_case(MINIMAL + "contact: [{slave: S, master: M}]\n", PATH)
     zone = case.zones[0]
@@ -245,6 +255,24 @@ REFUSED = [
     ),
     ("reference: {gap: 0}", "reference.kind: this key is needed"),
     ("reference: {kind: guess}", "reference.kind = 'guess': must be analytical, manufactured"),
+    ("reference: {kind: refined, gap: 0}", "reference.uncertainty: this key is needed"),
+    (
+        "reference: {kind: refined, uncertainty: 0}",
+        "reference.uncertainty = 0: must be a positive number: how far the reference may be off",
+    ),
+    ("reference: {kind: other_code, gap: 0}", "reference.code: this key is needed"),
+    (
+        "reference: {kind: other_code, code: {name: solver}}",
+        "reference.code.version: this key is needed",
+    ),
+    (
+        "reference: {kind: other_code, code: {name: solver, version: 14.6}}",
+        "reference.code.version = 14.6: must be text (in quotes if it is a number)",
+    ),
+    (
+        "reference: {kind: analytical, code: {name: solver, version: '14'}}",
+        "must be left out: only the kind other_code has one",
+    ),
     (
         "reference: {kind: analytical, pressure: 1}",
         "reference.pressure = 1: unknown key; did you mean contact_pressure?",

@@ -7,7 +7,7 @@ import pytest
 
 from solver.checks import run_checks
 from solver.verdict import of_solution, to_json, without_result, write_verdict
-from tests.handmade import plane, solid
+from tests.handmade import PLANE, plane, solid
 
 CONTRACT = {
     *("case", "family", "swapped", "verdict", "passed", "reason", "dofs", "macro_elements"),
@@ -110,3 +110,12 @@ def test_a_verdict_that_cannot_be_written_leaves_the_old_one(tmp_path):
         write_verdict(path, {"verdict": object()})
     assert strict(path.read_text()) == {"verdict": "passed"}
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_verdict_says_where_the_reference_comes_from(tmp_path):
+    origin = "kind: other_code\n  code: {name: solver, version: '14'}\n  uncertainty: 0.01"
+    text = PLANE.replace("kind: analytical", origin)
+    verdict = verdict_of(plane(tmp_path, text))
+    assert verdict["reference_kind"] == "other_code"
+    assert verdict["reference_code"] == {"name": "solver", "version": "14"}
+    assert verdict["reference_uncertainty"] == 0.01
