@@ -8,7 +8,7 @@ from scipy import sparse
 from solver.bodies import rigid_motions, unheld_motion, unsupported
 from solver.elasticity import internal_force, stiffness
 from solver.errors import InputError, SolveError
-from solver.lac.status import StatusResult, find_status
+from solver.lac.status import StatusResult, find_status, likely_closed
 from solver.linear.condensation import (
     Constrained,
     choose_pivots,
@@ -151,9 +151,9 @@ class ContactProblem:
         return self._system[1].factor.name if self._system else "none"
 
     def solve(self, factor: float, start: np.ndarray | None = None) -> Equilibrium:
-        """Equilibrium at a load factor, the status search starting from `start` (all closed)."""
+        """Equilibrium at a load factor, the status search starting from `start` (a guess)."""
         scene = self.scene
-        start = self.eligible if start is None else start
+        start = self._first_guess(factor) if start is None else start
         force = factor * scene.force
         latest: list[tuple[Displacement, np.ndarray, float]] = []
 
@@ -176,6 +176,17 @@ class ContactProblem:
             residual,
             force,
         )
+
+    def _first_guess(self, factor: float) -> np.ndarray:
+        """Macro-elements (m,) that loads and imposed displacements are likely to close."""
+        scene = self.scene
+        imposed = factor * np.abs(scene.free.offset).max(initial=0.0)
+        moduli = 2 * np.concatenate([block.shear for block in scene.blocks])
+        force = abs(factor) * np.linalg.norm(scene.force, axis=1).sum()
+        push = force * (1 / moduli.min() + 1 / moduli.max())
+        gap = self.initial / np.where(self.eligible, self.covered, np.inf) - imposed
+        guess = likely_closed(gap, self.covered, self.eligible, push, scene.points.shape[1])
+        return self.eligible if self._unheld(guess) else guess
 
     def _average_gap(self, displacement: "Displacement") -> np.ndarray:
         opening = self.initial + displacement.opening(self.gaps)

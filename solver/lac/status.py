@@ -68,3 +68,22 @@ def find_status(
         f"the contact status did not settle within {_MAX_ITERATIONS} iterations "
         f"({changes[-1]} macro-elements still change)"
     )
+
+
+def likely_closed(
+    gap: np.ndarray, area: np.ndarray, eligible: np.ndarray, push: float, dim: int
+) -> np.ndarray:
+    """Which macro-elements (m,) a force is likely to close, judged by their initial gaps (m,).
+
+    Bodies that touch on an area A under a force F approach each other there by about F/(E* √A), in
+    the plane by F/E*; `push` is F/E*, F per thickness in the plane. Macro-elements close in the
+    order of their gaps up to that approach, from where bodies that are apart first touch. A first
+    guess that is too small grows in one iteration; one that is too large shrinks step by step.
+    """
+    order = np.argsort(np.where(eligible, gap, np.inf), kind="stable")
+    touching = np.cumsum(area[order])
+    approach = push / touching ** ((dim - 2) / (dim - 1))
+    above = gap[order] - max(gap[order[0]], 0.0)
+    closed = np.zeros(len(gap), dtype=bool)
+    closed[order[above <= approach]] = True
+    return closed & eligible

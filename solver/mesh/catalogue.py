@@ -23,9 +23,10 @@ class Face:
 class CellType:
     """One cell type.
 
-    `nodes` (n_nodes, dim) are the reference coordinates; `edges` the vertex pairs, in the order of
-    the mid-edge nodes; `mirror` the node permutation that reverses the orientation; `skeleton` the
-    name of the linear type with the same vertices.
+    `nodes` (n_nodes, dim) are the reference coordinates; `owners` the vertices in whose middle each
+    node lies; `edges` the vertex pairs, in the order of the mid-edge nodes; `mirror` the node
+    permutation that reverses the orientation; `skeleton` the name of the linear type with the same
+    vertices.
     """
 
     name: str
@@ -34,6 +35,7 @@ class CellType:
     order: int
     skeleton: str
     nodes: np.ndarray
+    owners: tuple[tuple[int, ...], ...]
     edges: tuple[tuple[int, int], ...]
     faces: tuple[Face, ...]
     mirror: tuple[int, ...]
@@ -174,6 +176,7 @@ def _build(name: str) -> CellType:
         order=order,
         skeleton=next(t for t in _TYPES if _shape_of(t) == _shape_of(name)),
         nodes=np.array([vertices[sorted(owner)].mean(axis=0) for owner in owners]),
+        owners=tuple(tuple(sorted(owner)) for owner in owners),
         edges=shape.edges,
         faces=tuple(faces),
         mirror=tuple(number[m] for m in mirrored),

@@ -18,18 +18,30 @@ interface is the image of height 0, and all groups are those of `blocks`.
     height: 0.05        # interface of the die at −height · ((x − ½)² + (y − ½)²), of the block at 0
 
     recipe: hertz       # 2D and 3D: a parabolic body (top, of radius R) on a flat one, symmetric
-    radius: 50          # about x = 0 (and y = 0), each of edge `size`; cells shrink towards the
-    size: 50            # contact by `grading` (0: even; 4: e⁴ between the largest and the smallest)
-    grading: 4
+    radius: 50          # about x = 0 (and y = 0), each of edge `size`. A `share` of the divisions
+    size: 20            # makes even cells as far as `core`, the others grow from there on.
+    core: 1.5
+    share: 0.5
+
+    recipe: punch       # 2D and 3D: a straight block on another, both from x = 0 (and y = 0) on
+    bottom_size: [5, 4] # along each axis
+    top_size: [8, 2]
+    gap: 0.1            # between them (0); negative: they overlap
+    loaded: 0.25        # where this share of `press` along x ends (1): press_left, press_right
 """
 
 from collections.abc import Callable
 
 import meshio
 import numpy as np
+from scipy.optimize import brentq
 
 from solver.mesh.blocks import stacked
+from solver.mesh.catalogue import cell_type
 from solver.mesh.keys import Keys
+
+# Nodes as near as this share of the side to the place where it is divided lie on it.
+_ON = 1e-9
 
 _SHAPES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "tilt": lambda x, y: x + y / 2,
@@ -43,7 +55,7 @@ _SHAPES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 def rings(keys: Keys) -> meshio.Mesh:
     """A quarter of two nested tubes, plane."""
     radii = _radii(keys)
-    mesh = _flat(keys)
+    mesh = _flat(keys, 2)
 
     def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
         angle = np.pi / 2 * x[:, 0]
@@ -98,36 +110,86 @@ def parabola(keys: Keys) -> meshio.Mesh:
 
 
 def hertz(keys: Keys) -> meshio.Mesh:
-    """A parabolic body on a flat one, their cells shrinking towards the point of contact."""
-    radius, size = keys.numbers("radius", 1)[0], keys.numbers("size", 1)[0]
-    grading = keys.number("grading")
-    if not 0 <= grading <= 12:
-        raise keys.refuse("grading", grading, "must lie between 0 and 12")
+    """A parabolic body on a flat one, their cells even around the point of contact."""
+    radius, size, core = (keys.numbers(key, 1)[0] for key in ("radius", "size", "core"))
+    share = keys.numbers("share", 1)[0]
+    if not size < 2 * radius:
+        raise keys.refuse("size", size, f"must be smaller than twice the radius of {radius:g}")
+    if not core / size < share < 1:
+        raise keys.refuse("share", share, f"must lie between core / size = {core / size:g} and 1")
     mesh = _flat(keys)
+    x = mesh.points
+    graded = np.sign(x) * _graded(np.abs(x), size, core, share)
+    mesh.points = _straightened(graded, mesh.cells)
 
-    def graded(x: np.ndarray) -> np.ndarray:
-        return size * (np.sinh(grading * x) / np.sinh(grading) if grading else x)
+    def risen(x: np.ndarray, height: np.ndarray) -> np.ndarray:
+        rise = (x[:, :-1] ** 2).sum(axis=1) / (2 * radius)
+        return np.column_stack([x[:, :-1], height + rise * (1 - height / size)])
 
-    def flat(x: np.ndarray, height: np.ndarray) -> np.ndarray:
-        return np.column_stack([graded(x[:, :-1]), graded(height)])
+    return _bent(mesh, risen, _nodes(mesh, "top"))
 
-    def curved(x: np.ndarray, height: np.ndarray) -> np.ndarray:
-        place = flat(x, height)
-        rise = (place[:, :-1] ** 2).sum(axis=1) / (2 * radius)
-        place[:, -1] += rise * (1 - place[:, -1] / size)
-        return place
 
-    top = _nodes(mesh, "top")
-    return _bent(_bent(mesh, flat, ~top), curved, top)
+def _graded(x: np.ndarray, size: float, core: float, share: float) -> np.ndarray:
+    """Places in [0, size] of positions in [0, 1]: even up to `core`, then growing like sinh.
+
+    The step is continuous where the even part ends.
+    """
+    rest = size - core
+    start = core / share * (1 - share) / rest
+    growth = brentq(lambda g: g / np.sinh(g) - start, 1e-9, 700)
+    beyond = np.maximum(x - share, 0) / (1 - share)
+    grown = core + rest * np.sinh(growth * beyond) / np.sinh(growth)
+    return np.where(x <= share, x / share * core, grown)
+
+
+def punch(keys: Keys) -> meshio.Mesh:
+    """Two straight blocks of their own sizes, with a gap or an overlap, the upper top divided."""
+    mesh = _unit(keys)
+    dim = mesh.points.shape[1]
+    bottom, top = (np.array(keys.numbers(key, dim)) for key in ("bottom_size", "top_size"))
+    gap = keys.number("gap") if keys.given("gap") else 0.0
+    loaded = keys.numbers("loaded", 1, 1.0)[0]
+    if loaded > 1:
+        raise keys.refuse("loaded", loaded, "must be a share of the side, at most 1")
+    keys.finish()
+    upper = _nodes(mesh, "top")
+    placed = _bent(
+        _bent(mesh, lambda x, _: x * bottom, ~upper),
+        lambda x, _: x * top + gap * (np.arange(dim) == dim - 1),
+        upper,
+    )
+    placed.cell_sets |= _divided(mesh, loaded, keys)
+    return placed
+
+
+def _divided(mesh: meshio.Mesh, share: float, keys: Keys) -> dict[str, list[np.ndarray]]:
+    """The sides `press_left` and `press_right` of the position x = `share`, without empty ones."""
+    left, right = [], []
+    for block, ids in zip(mesh.cells, mesh.cell_sets["press"], strict=True):
+        members = np.asarray(ids, dtype=int)
+        x = mesh.points[block.data[members], 0] - share
+        low, high = x.max(axis=1, initial=-1) <= _ON, x.min(axis=1, initial=1) >= -_ON
+        if not (low | high).all():
+            raise keys.refuse("loaded", share, "must be a share at which faces of press end")
+        left.append(members[low])
+        right.append(members[high])
+    sides = {"press_left": left, "press_right": right}
+    return {name: ids for name, ids in sides.items() if sum(map(len, ids))}
 
 
 Bend = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def _flat(keys: Keys, dim: int | None = None) -> meshio.Mesh:
+def _unit(keys: Keys) -> meshio.Mesh:
+    """The two blocks of edge 1, with as many coordinates as dimensions; keys may be left."""
     mesh = stacked(keys, 1.0)
-    keys.finish()
     mesh.points = mesh.points[:, : 3 if "symy" in mesh.cell_sets else 2]
+    return mesh
+
+
+def _flat(keys: Keys, dim: int | None = None) -> meshio.Mesh:
+    mesh = _unit(keys)
+    keys.finish()
     if dim and mesh.points.shape[1] != dim:
         raise keys.refuse("bottom.cells", None, f"must be a cell type of {dim}D")
     return mesh
@@ -139,6 +201,16 @@ def _bent(mesh: meshio.Mesh, bend: Bend, chosen: np.ndarray | None = None) -> me
     chosen = np.ones(len(points), dtype=bool) if chosen is None else chosen
     points[chosen] = bend(points[chosen], points[chosen, -1])
     return meshio.Mesh(points, mesh.cells, cell_sets=mesh.cell_sets)
+
+
+def _straightened(points: np.ndarray, cells: list[meshio.CellBlock]) -> np.ndarray:
+    """The points with all nodes that are no vertices in the middle of their vertices."""
+    points = points.copy()
+    for block in cells:
+        kind = cell_type(block.type)
+        for node in range(kind.n_vertices, kind.n_nodes):
+            points[block.data[:, node]] = points[block.data[:, kind.owners[node]]].mean(axis=1)
+    return points
 
 
 def _nodes(mesh: meshio.Mesh, group: str) -> np.ndarray:

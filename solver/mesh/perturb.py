@@ -27,7 +27,7 @@ def perturbed(mesh: meshio.Mesh, amplitude: float, seed: int) -> np.ndarray | No
     step = np.einsum("nij,nj->ni", _freedom(points, volumes), step)
     for cell, nodes in volumes:
         for i in range(cell.n_vertices, cell.n_nodes):
-            step[nodes[:, i]] = step[nodes[:, _between(cell, i)]].mean(axis=1)
+            step[nodes[:, i]] = step[nodes[:, cell.owners[i]]].mean(axis=1)
     moved = points + step
     return None if any(_folded(moved, nodes, cell) for cell, nodes in volumes) else moved
 
@@ -35,13 +35,6 @@ def perturbed(mesh: meshio.Mesh, amplitude: float, seed: int) -> np.ndarray | No
 def _folded(points: np.ndarray, nodes: np.ndarray, cell: CellType) -> bool:
     turned, bad = right_side_out(points, nodes, cell)
     return bool(bad.any() or (turned != nodes).any())
-
-
-def _between(cell: CellType, node: int) -> list[int]:
-    """The vertices in whose middle a node lies: of an edge, of a face, or all of the cell."""
-    parts = [*cell.edges, *(face.nodes for face in cell.faces), range(cell.n_vertices)]
-    vertices = [[i for i in part if i < cell.n_vertices] for part in parts]
-    return next(v for v in vertices if np.allclose(cell.nodes[v].mean(axis=0), cell.nodes[node]))
 
 
 def _shortest_edges(points: np.ndarray, volumes: _Volumes) -> np.ndarray:

@@ -20,6 +20,7 @@ _RECIPES = {
     "wavy": "solver.mesh.mapped:wavy",
     "parabola": "solver.mesh.mapped:parabola",
     "hertz": "solver.mesh.mapped:hertz",
+    "punch": "solver.mesh.mapped:punch",
 }
 
 

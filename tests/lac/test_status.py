@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.errors import SolveError
-from solver.lac.status import find_status
+from solver.lac.status import find_status, likely_closed
 
 
 def springs(push, stiffness=1.0):
@@ -68,3 +68,27 @@ def test_no_end_is_an_error_and_not_an_answer():
 
     with pytest.raises(SolveError, match="did not settle"):
         find_status(solve, np.full(3, True), np.full(3, True), 1.0, 1.0)
+
+
+# Macro-elements of length 1 with gaps 0, 1, 2 … under a force that brings the bodies 2.5 nearer.
+def test_the_guess_in_the_plane_is_the_force_over_the_stiffness():
+    gap, area, eligible = np.arange(5.0), np.ones(5), np.full(5, True)
+    assert likely_closed(gap, area, eligible, 2.5, 2).tolist() == [True] * 3 + [False] * 2
+
+
+def test_the_guess_in_space_falls_with_the_size_of_the_contact():
+    # On 1, 2, 3 … faces of area 1 the approach is 3, 2.12, 1.73, 1.5: the third face is out.
+    gap, area, eligible = np.arange(5.0), np.ones(5), np.full(5, True)
+    assert likely_closed(gap, area, eligible, 3.0, 3).tolist() == [True] * 2 + [False] * 3
+
+
+def test_the_guess_starts_from_where_the_bodies_first_touch():
+    area, eligible = np.ones(4), np.array([False, True, True, True])
+    apart = np.array([0.0, 10.0, 11.0, 13.0])
+    assert likely_closed(apart, area, eligible, 2.0, 2).tolist() == [False, True, True, False]
+    overlapping = np.array([0.0, -10.0, -1.0, 3.0])
+    assert likely_closed(overlapping, area, eligible, 2.0, 2).tolist() == [False, True, True, False]
+
+
+def test_surfaces_that_touch_are_all_closed():
+    assert likely_closed(np.zeros(9), np.ones(9), np.full(9, True), 1e-30, 3).all()
