@@ -24,8 +24,8 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     result: dict[str, float] = {}
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length)
-    internal = internal_force(points, scene.blocks, state.straining)
-    unbalanced = (internal - state.force - contact).ravel()
+    internal = internal_force(points, scene.blocks, state.straining, state.extended)
+    unbalanced = (internal - state.force - contact).astype(float).ravel()
     basis = scene.free.basis
     # What is left on held unknowns are the reactions; on free ones nothing may be left.
     free_part = (basis @ (basis.T @ unbalanced)).reshape(points.shape)

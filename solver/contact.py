@@ -5,8 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from solver.accuracy import (
+    EPSILON,
+    EPSILON_EXTENDED,
+    Accuracy,
+    pressure_of_forces,
+    pressure_of_gaps,
+)
 from solver.bodies import rigid_motions, unheld_motion, unsupported
-from solver.elasticity import internal_force, stiffness
+from solver.displacement import Displacement
+from solver.elasticity import cancellation, internal_force, stiffness
 from solver.errors import InputError, SolveError
 from solver.lac.status import StatusResult, find_status, likely_closed
 from solver.linear.condensation import (
@@ -21,6 +29,8 @@ from solver.scene import Scene
 
 # A macro-element covered by less than this share of its area is out of contact.
 MIN_COVERAGE = 0.01
+# An estimated error of the pressure from which residuals are summed in extended precision.
+_EXTEND = 1e-11
 # Coverage above one by more than this means that the master surface lies there twice.
 _TWICE = 1e-6
 
@@ -40,53 +50,8 @@ class Equilibrium:
     status: StatusResult
     residual: float
     force: np.ndarray
-
-
-@dataclass(frozen=True)
-class Displacement:
-    """A displacement as free rigid motions of the bodies plus a remainder, the part that strains.
-
-    A stiff body on a soft one moves far and strains little. Were its displacement stored as one
-    number a node, its strain would be lost in the rounding of the motion; the remainder keeps it.
-    The rigid motion is that of the contact surface, so that the remainder is smallest where the
-    other body feels it. `motions` (n_dofs, k) are the rigid motions that supports leave free, `fit`
-    (k, n_dofs) finds how much of each a displacement holds, `amount` (k,) is how far each goes. The
-    remainder is the sum, never evaluated, of two parts `straining` (2, n_dofs): what the first
-    loses to rounding is in the second, so that each refinement gains its digits in full.
-    """
-
-    motions: sparse.csr_matrix
-    fit: sparse.csr_matrix
-    amount: np.ndarray
-    straining: np.ndarray
-
-    @classmethod
-    def zero(cls, motions: sparse.csr_matrix, surface: np.ndarray) -> "Displacement":
-        """No displacement; `surface` (n_dofs,) marks the unknowns of the contact surfaces."""
-        seen = sparse.diags(surface.astype(float)) @ motions
-        fit = sparse.csr_matrix(np.linalg.pinv((seen.T @ seen).toarray())) @ seen.T
-        return cls(motions, fit.tocsr(), np.zeros(motions.shape[1]), np.zeros((2, len(surface))))
-
-    @property
-    def total(self) -> np.ndarray:
-        """The displacement (n_dofs,) itself."""
-        return self.motions @ self.amount + self.straining.sum(axis=0)
-
-    def moved(self, change: np.ndarray) -> "Displacement":
-        """This displacement with `change` (n_dofs,) added."""
-        more = self.fit @ change
-        first, second = self.straining
-        added = change - self.motions @ more
-        total = first + added
-        # What the sum lost (Knuth, The Art of Computer Programming, vol. 2, §4.2.2).
-        back = total - first
-        lost = (first - (total - back)) + (added - back)
-        straining = np.stack([total, second + lost])
-        return Displacement(self.motions, self.fit, self.amount + more, straining)
-
-    def opening(self, gaps: sparse.csr_matrix) -> np.ndarray:
-        """∫ gap (m,) that it opens, by the gap operator `gaps` (m, n_dofs)."""
-        return (gaps @ self.motions) @ self.amount + (gaps @ self.straining.T).sum(axis=1)
+    accuracy: Accuracy
+    extended: bool
 
 
 @dataclass(frozen=True)
@@ -97,20 +62,35 @@ class _Iterate:
     closed: np.ndarray
     force: np.ndarray
     displacement: Displacement
+    extended: bool = False
 
     def residual(self) -> np.ndarray:
-        scene = self.problem.scene
-        straining = self.displacement.straining.reshape(2, *self.force.shape)
-        internal = internal_force(scene.points, scene.blocks, straining)
-        return scene.free.basis.T @ (self.force - internal).ravel()
+        problem, scene = self.problem, self.problem.scene
+        if scene.cures.differences:
+            straining = self.displacement.straining.reshape(2, *self.force.shape)
+            internal = internal_force(scene.points, scene.blocks, straining, self.extended)
+            return scene.free.basis.T @ (self.force - internal).astype(float).ravel()
+        return scene.free.basis.T @ (
+            self.force.ravel() - problem.stiffness @ self.displacement.total
+        )
 
     def violation(self) -> np.ndarray:
         gaps, initial = self.problem.gaps[self.closed], self.problem.initial[self.closed]
-        return -(initial + self.displacement.opening(gaps))
+        return -(initial + self.problem.opening(self.displacement, gaps))
 
     def advanced(self, change: np.ndarray) -> "_Iterate":
         moved = self.displacement.moved(self.problem.scene.free.basis @ change)
         return replace(self, displacement=moved)
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """What one solve with given closed macro-elements found; `residual` is relative."""
+
+    iterate: _Iterate
+    pressure: np.ndarray
+    residual: float
+    accuracy: Accuracy
 
 
 class ContactProblem:
@@ -137,13 +117,20 @@ class ContactProblem:
                 self.own[(dim * faces.nodes[..., None] + np.arange(dim)).ravel()] = True
         self.motions = rigid_motions(scene.points, scene.body)
         free = unsupported(self.motions, scene.free.basis)
-        self.at_rest = Displacement.zero(free, np.diff(self.gaps.tocsc().indptr) > 0)
+        surface = np.diff(self.gaps.tocsc().indptr) > 0
+        self.at_rest = Displacement.zero(free, surface, scene.cures.remainder)
         self._refuse_unheld()
         self.has_own_unknowns = all(z.zone.treatment != "uncut" for z in scene.zones)
         if self.has_own_unknowns:
             self._refuse_lost_nodes()
-        self.matrix = scene.free.reduced(stiffness(scene.points, scene.blocks))
+        self.stiffness = stiffness(scene.points, scene.blocks)
+        self.matrix = scene.free.reduced(self.stiffness)
         self._system: tuple[bytes, Constrained] | None = None
+
+    @property
+    def system(self) -> Constrained | None:
+        """The last system solved."""
+        return self._system[1] if self._system else None
 
     @property
     def linear_solver(self) -> str:
@@ -155,26 +142,28 @@ class ContactProblem:
         scene = self.scene
         start = self._first_guess(factor) if start is None else start
         force = factor * scene.force
-        latest: list[tuple[Displacement, np.ndarray, float]] = []
+        latest: list[_Solved] = []
 
         def attempt(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            found, pressure, residual = self._solve_closed(closed, force, factor)
-            latest[:] = [(found, pressure, residual)]
-            return pressure, self._average_gap(found)
+            found = self._solve_closed(closed, force, factor)
+            latest[:] = [found]
+            return found.pressure, self._average_gap(found.iterate.displacement)
 
         load = float(np.abs(force).sum()) or 1.0
         pressure_scale = load / max(float(self.area.sum()), np.finfo(float).tiny)
         status = find_status(attempt, start, self.eligible, pressure_scale, scene.length)
-        found, pressure, residual = latest[0]
-        shape = scene.points.shape
+        solved, shape = latest[0], scene.points.shape
+        found = solved.iterate.displacement
         return Equilibrium(
             found.total.reshape(shape),
             found.straining.reshape(2, *shape),
-            pressure,
+            solved.pressure,
             self._average_gap(found),
             status,
-            residual,
+            solved.residual,
             force,
+            solved.accuracy,
+            solved.iterate.extended,
         )
 
     def _first_guess(self, factor: float) -> np.ndarray:
@@ -188,22 +177,57 @@ class ContactProblem:
         guess = likely_closed(gap, self.covered, self.eligible, push, scene.points.shape[1])
         return self.eligible if self._unheld(guess) else guess
 
-    def _average_gap(self, displacement: "Displacement") -> np.ndarray:
-        opening = self.initial + displacement.opening(self.gaps)
+    def opening(self, displacement: Displacement, gaps: sparse.csr_matrix) -> np.ndarray:
+        """∫ gap (m,) that a displacement opens, by rows `gaps` (m, n_dofs) of the operator."""
+        dim = self.scene.points.shape[1]
+        return displacement.opening(gaps, dim, self.scene.cures.differences)
+
+    def _average_gap(self, displacement: Displacement) -> np.ndarray:
+        opening = self.initial + self.opening(displacement, self.gaps)
         return opening / np.where(self.eligible, self.covered, np.inf)
 
-    def _solve_closed(
-        self, closed: np.ndarray, force: np.ndarray, factor: float
-    ) -> tuple["Displacement", np.ndarray, float]:
-        """Displacement and pressures with the given macro-elements closed, relative residual."""
+    def _solve_closed(self, closed: np.ndarray, force: np.ndarray, factor: float) -> _Solved:
+        """Equilibrium with the given macro-elements closed."""
         system = self._constrained(closed)
         offset = factor * self.scene.free.offset
         scale = self._force_scale(force, offset.reshape(self.scene.points.shape))
-        iterate = _Iterate(self, closed, force, self.at_rest.moved(offset))
-        iterate, multiplier, size = solve(system, iterate, scale)
-        pressure = np.zeros(len(closed))
-        pressure[closed] = multiplier
-        return iterate.displacement, pressure, size
+        start = _Iterate(self, closed, force, self.at_rest.moved(offset))
+        found, cures = self._refined(system, start, scale), self.scene.cures
+        if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
+            found = self._refined(system, replace(found.iterate, extended=True), scale)
+        return found
+
+    def _refined(self, system: Constrained, start: _Iterate, scale: float) -> _Solved:
+        refine = self.scene.cures.refinement
+        iterate, multiplier, residual = solve(system, start, scale, refine)
+        pressure = np.zeros(len(start.closed))
+        pressure[start.closed] = multiplier
+        accuracy = self._accuracy(iterate, pressure, residual, scale)
+        return _Solved(iterate, pressure, residual, accuracy)
+
+    def _accuracy(
+        self, iterate: _Iterate, pressure: np.ndarray, residual: float, force_scale: float
+    ) -> Accuracy:
+        """How many digits rounding leaves in the pressure; see `solver.accuracy`."""
+        scene, closed, dim = self.scene, iterate.closed, self.scene.points.shape[1]
+        straining = iterate.displacement.straining.reshape(2, *scene.points.shape)
+        terms, stress = cancellation(scene.points, scene.blocks, straining)
+        unit = EPSILON_EXTENDED if iterate.extended else EPSILON
+        scale = float(np.abs(pressure).max(initial=0.0))
+        if scale == 0:
+            return Accuracy({"forces": unit * float(terms.max()) / force_scale})
+        gaps = self.gaps[closed]
+        noise = np.repeat(unit * terms, dim) + residual * force_scale
+        known = scene.rounding * self.covered * (self.initial != 0)
+        known = known[closed] + EPSILON * iterate.displacement.opening_size(gaps, dim)
+        smallest = float(self.area.min()) ** (1 / (dim - 1))
+        causes = {
+            "forces": pressure_of_forces(gaps, noise),
+            "gap": pressure_of_gaps(gaps, known, self.stiffness.diagonal()),
+            "coordinates": scale * scene.rounding / smallest,
+            "stress": unit * stress,
+        }
+        return Accuracy({name: error / scale for name, error in causes.items()})
 
     def _force_scale(self, force: np.ndarray, imposed: np.ndarray) -> float:
         """The size of the forces at work: the loads, or those that imposed values bring up."""

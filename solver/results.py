@@ -5,6 +5,7 @@ the checks need again, so that a file can be judged without solving:
 
     /case          source text, name, family, path, swapped, hexahedra
     /solve         lengths, sizes, cost and the linear solver of the solve
+    /accuracy      what rounding alone may change, relative, by cause
     /errors        norms of the error against the case's exact solution, if it names one
     /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
@@ -76,6 +77,7 @@ def write_result(
         _write_grid(file.create_group(GRID), solution)
         _write_case(file.create_group("case"), solution)
         file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
+        file.create_group("accuracy").attrs.update(solution.accuracy)
         file.create_group("errors").attrs.update(solution.errors)
         contact = file.create_group("contact")
         for number, zone in enumerate(solution.zones):
@@ -130,6 +132,7 @@ def _read_solution(file: h5py.File) -> Solution:
         balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=_read_steps(file),
         plan=_read_pairs(file["plan"], "what", "why"),
+        accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
         seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
         **{key: _plain(file["solve"].attrs)[key] for key in _SCALARS},

@@ -10,6 +10,7 @@ from solver.attributes import Attributes
 from solver.bodies import body_numbers
 from solver.case import Case, Zone
 from solver.clock import Clock
+from solver.cures import Cures
 from solver.elasticity import Block
 from solver.errors import InputError
 from solver.faces import FaceBlock, boundary_faces, volume_cells
@@ -21,7 +22,7 @@ from solver.mesh.catalogue import BY_NAME
 from solver.supports import FreeMotion
 
 # An average initial gap below this many roundings of the coordinates is none.
-_GAP_ROUND_OFF = 8 * np.finfo(float).eps
+_GAP_ROUND_OFF = 8
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Scene:
     `points` (n, dim) are counted from `origin` (dim,), the mean of the mesh's nodes: far from the
     origin of the coordinates, differences would lose digits. `force` (n, dim) and `free.offset` are
     for load factor 1. `meshed`: the volume cells before the cut, by type, and `volume_groups` which
-    of them each named group holds.
+    of them each named group holds. `rounding`: how well the coordinates are known (a length).
     """
 
     case: Case
@@ -68,6 +69,8 @@ class Scene:
     length: float
     meshed: dict[str, np.ndarray]
     volume_groups: dict[str, dict[str, np.ndarray]]
+    rounding: float
+    cures: Cures
 
     @property
     def n_dofs(self) -> int:
@@ -76,11 +79,16 @@ class Scene:
 
 
 def build_scene(
-    case: Case, mesh: meshio.Mesh, swapped: bool, hexahedra: str | None, clock: Clock
+    case: Case,
+    mesh: meshio.Mesh,
+    swapped: bool,
+    hexahedra: str | None,
+    clock: Clock,
+    cures: Cures = Cures(),
 ) -> Scene:
     """The discrete problem of a case; raises InputError where case and mesh do not fit."""
     check_groups(case, mesh, swapped)
-    origin = mesh.points.mean(axis=0)
+    origin = mesh.points.mean(axis=0) * cures.local_coordinates
     local = replace_points(mesh, mesh.points - origin)
     length = float(np.ptp(local.points, axis=0).max())
     zones = [_as_solved(zone, swapped, hexahedra) for zone in case.zones]
@@ -88,12 +96,12 @@ def build_scene(
         surfaces = _surfaces(case, local, zones, swapped)
         cut_mesh, sub_faces = _cut(local, zones, surfaces)
     points = cut_mesh.points
-    noise = _GAP_ROUND_OFF * float(np.abs(mesh.points).max())
+    rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
     scenes, first = [], 0
     with clock.stage("pairing"):
         for zone, (slave, master), faces in zip(zones, surfaces, sub_faces, strict=True):
             count = sum(len(block.nodes) for block in slave)
-            operator = _operator(points, zone, faces, master, count, noise)
+            operator = _operator(points, zone, faces, master, count, rounding, cures)
             scenes.append(ZoneScene(zone, first, count, slave, master, faces, operator))
             first += count
     groups = Attributes(case, local, cut_mesh, scenes, origin)
@@ -115,6 +123,8 @@ def build_scene(
         length=length,
         meshed=volume_cells(mesh),
         volume_groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
+        rounding=rounding,
+        cures=cures,
     )
 
 
@@ -184,15 +194,17 @@ def _operator(
     sub_faces: list[SubFaces],
     master_faces: list[FaceBlock],
     count: int,
-    noise: float,
+    rounding: float,
+    cures: Cures,
 ) -> GapOperator:
     slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
     masters = _master_facets(points, master_faces)
     corners = np.concatenate([f.centre for f in [*slaves, *masters]])
     search = float(np.linalg.norm(np.ptp(corners, axis=0)))
     search += max(f.radius.max() for f in [*slaves, *masters])
-    operator = gap_operator(slaves, masters, count, len(points), search)
-    initial = np.where(np.abs(operator.initial) <= noise * operator.covered, 0.0, operator.initial)
+    operator = gap_operator(slaves, masters, count, len(points), search, cures.closure)
+    noise = _GAP_ROUND_OFF * rounding * operator.covered * cures.gap_threshold
+    initial = np.where(np.abs(operator.initial) <= noise, 0.0, operator.initial)
     return replace(operator, initial=initial - zone.interference * operator.covered)
 
 

@@ -12,6 +12,7 @@ from solver.balance import imbalances
 from solver.case import Case
 from solver.clock import Clock
 from solver.contact import ContactProblem, Equilibrium
+from solver.cures import Cures
 from solver.elasticity import nodal_stress
 from solver.faces import nodal_normals
 from solver.mesh.catalogue import BY_NAME
@@ -30,15 +31,17 @@ def simulate(
     swapped: bool = False,
     hexahedra: str | None = None,
     log: Log = lambda _: None,
+    cures: Cures = Cures(),
 ) -> Solution:
     """Solve a case on its mesh.
 
     `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
-    Raises InputError where the case and its mesh do not fit, SolveError where no solution is found.
+    `cures` turns what keeps the digits off, to show what it does. Raises InputError where the case
+    and its mesh do not fit, SolveError where no solution is found.
     """
     started = time.process_time()
     clock = Clock()
-    scene = build_scene(case, mesh, swapped, hexahedra, clock)
+    scene = build_scene(case, mesh, swapped, hexahedra, clock, cures)
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
     with clock.stage("assembly"):
         problem = ContactProblem(scene)
@@ -74,7 +77,7 @@ def _recover(
     hexahedra: str | None,
 ) -> Solution:
     last = states[-1]
-    stress = nodal_stress(scene.points, scene.blocks, last.straining)
+    stress = nodal_stress(scene.points, scene.blocks, last.straining, last.extended)
     scale = _stress_scale(scene, stress)
     zones = [_zone_result(scene, problem, zone, last, stress) for zone in scene.zones]
     return Solution(
@@ -97,6 +100,7 @@ def _recover(
         iterations=sum(state.status.iterations for state in states),
         linear_solver=problem.linear_solver,
         plan=made_plan(scene, states),
+        accuracy=last.accuracy.causes,
     )
 
 

@@ -92,6 +92,7 @@ class Solution:
     `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone. `balance`
     names relative imbalances (of forces and moments, relative to the load). `length` is the largest
     extent of the mesh, `load_scale` the largest pressure of the load or else the largest stress.
+    `accuracy` are the relative errors that rounding alone may cause, by cause (`solver.accuracy`).
     `errors` are the norms of `solver.norms` where the case names an exact solution. `seconds` is
     wall time by stage, `peak_memory_mb` the process's largest resident size.
     """
@@ -115,6 +116,7 @@ class Solution:
     iterations: int
     linear_solver: str
     plan: list[tuple[str, str]]
+    accuracy: dict[str, float] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from solver.accuracy import Accuracy
 from solver.case import Case
 from solver.checks import CheckResult
 from solver.files import replacing
 from solver.solution import Solution, job_name
 
-PASSED, FAILED = "passed", "failed"
+PASSED, FAILED, UNRELIABLE = "passed", "failed", "unreliable"
 REFUSED, CRASHED = "refused", "crashed"
 # What a verdict says of where the case's reference comes from.
 _ORIGIN = ("reference_kind", "reference_uncertainty", "reference_code", "reference_remark")
@@ -41,6 +42,8 @@ _UNKNOWN: dict[str, Any] = {
     "bodies": [],
     "plan": [],
     "checks": [],
+    "accuracy": {},
+    "attainable": None,
     "errors": {},
     "provenance": {},
 }
@@ -54,13 +57,18 @@ def of_solution(
 ) -> dict[str, Any]:
     """The verdict of a solve that came to its end: `passed` when every check holds.
 
+    `unreliable` whatever the checks say, where rounding may have left less than four digits; then
+    `attainable`, the relative error that rounding alone may cause, is the first reason.
     `result` is the name of the result file beside the verdict. Extremes are pairs of minimum and
     maximum over all zones; `worst` names the check nearest to its tolerance, or furthest past it.
     """
-    reasons = [check.reason for check in checks if not check.passed]
+    accuracy = Accuracy(solution.accuracy)
+    reasons = [accuracy.reason] if accuracy.reason else []
+    reasons += [check.reason for check in checks if not check.passed]
+    failed = UNRELIABLE if accuracy.reason else FAILED
     zones = solution.zones
     return _identity(solution.case, solution.swapped, solution.hexahedra) | {
-        "verdict": FAILED if reasons else PASSED,
+        "verdict": failed if reasons else PASSED,
         "passed": not reasons,
         "reason": _first_of(reasons),
         "result": result,
@@ -82,6 +90,8 @@ def of_solution(
         "bodies": _bodies(solution),
         "plan": [list(entry) for entry in solution.plan],
         "checks": [asdict(check) for check in checks],
+        "accuracy": dict(solution.accuracy),
+        "attainable": accuracy.estimate,
         "errors": dict(solution.errors),
         "provenance": dict(provenance or {}),
     }

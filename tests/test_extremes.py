@@ -12,8 +12,10 @@ from tests.scenes import block_case, block_mesh, with_points
 MESHES = {2: ("TRIA6", "QUAD4", (6, 4)), 3: ("TETRA10", "HEXA8", (3, 2))}
 
 
-def patch_errors(dim, lower=2000.0, upper=2000.0, poisson=0.3, pressure=25.0, move=None, **options):
-    """Relative errors of pressure and normal stress of the patch test, supports by plane."""
+def patch_solution(
+    dim, lower=2000.0, upper=2000.0, poisson=0.3, pressure=25.0, move=None, **options
+):
+    """The patch test, supports by plane."""
     text = block_case(dim).source
     materials = (
         f"{{bottom: {{young: {lower!r}, poisson: {poisson!r}}}, "
@@ -27,7 +29,12 @@ def patch_errors(dim, lower=2000.0, upper=2000.0, poisson=0.3, pressure=25.0, mo
     mesh = block_mesh(bottom, top, counts)
     if move:
         mesh = with_points(mesh, move(mesh.points))
-    solution = simulate(parse_case(text, Path("patch.yaml")), mesh, **options)
+    return simulate(parse_case(text, Path("patch.yaml")), mesh, **options)
+
+
+def patch_errors(dim, pressure=25.0, **scene):
+    """Relative errors of pressure and normal stress of the patch test."""
+    solution = patch_solution(dim, pressure=pressure, **scene)
     zone = solution.zones[0]
     return (
         np.abs(zone.multiplier / pressure - 1).max(),
@@ -53,11 +60,10 @@ def test_stiffness_ratio(dim, ratio, swapped):
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize(
-    ("poisson", "floor"), [(-0.9, 1e-13), (0.49, 1e-12), (0.4999, 1e-10), (0.499999, 2e-9)]
+    ("poisson", "most"), [(-0.9, 1e-13), (0.49, 1e-12), (0.4999, 1e-10), (0.499999, 1e-9)]
 )
-def test_nearly_incompressible(dim, poisson, floor):
-    """Within twenty times ε / (1 − 2ν), what rounding the exact displacement causes by itself."""
-    assert max(patch_errors(dim, poisson=poisson)) < max(floor, 20 * 2.2e-16 / (1 - 2 * poisson))
+def test_nearly_incompressible(dim, poisson, most):
+    assert max(patch_errors(dim, poisson=poisson)) < most
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -85,4 +91,4 @@ def test_stretched_along_the_interface(dim, stretch):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_stretched_across_the_interface(dim):
     factors = np.array([*[1.0] * (dim - 1), 1e3])
-    assert max(patch_errors(dim, move=lambda x: x * factors)) < 1e-8
+    assert max(patch_errors(dim, move=lambda x: x * factors)) < 1e-9

@@ -63,6 +63,18 @@ def test_one_failing_check_fails_the_solve_and_is_the_reason(tmp_path):
     assert verdict["worst"] == {"name": "element_status", "zone": "interface", "error": 1.0}
 
 
+def test_a_result_without_digits_is_unreliable_though_its_checks_hold(tmp_path):
+    solution = plane(tmp_path)
+    solution.accuracy = {"forces": 1e-9, "gap": 2e-4}
+    verdict = verdict_of(solution)
+    assert (verdict["verdict"], verdict["passed"]) == ("unreliable", False)
+    assert verdict["reason"].startswith("rounding alone may change")
+    assert "the gap is lost" in verdict["reason"]
+    assert verdict["attainable"] == 2e-4
+    solution.accuracy = {"forces": 1e-9, "gap": 9e-5}
+    assert verdict_of(solution)["verdict"] == "passed"
+
+
 def test_what_is_not_a_number_is_null_and_fails(tmp_path):
     solution = plane(tmp_path)
     solution.zones[0].multiplier[0] = np.nan
