@@ -31,3 +31,6 @@ class Cures:
     def none(cls) -> "Cures":
         """A plain implementation."""
         return cls(**{field.name: False for field in fields(cls)})
+
+
+ALL = Cures()

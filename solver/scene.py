@@ -10,7 +10,7 @@ from solver.attributes import Attributes
 from solver.bodies import body_numbers
 from solver.case import Case, Zone
 from solver.clock import Clock
-from solver.cures import Cures
+from solver.cures import ALL, Cures
 from solver.elasticity import Block
 from solver.errors import InputError
 from solver.faces import FaceBlock, boundary_faces, volume_cells
@@ -84,7 +84,7 @@ def build_scene(
     swapped: bool,
     hexahedra: str | None,
     clock: Clock,
-    cures: Cures = Cures(),
+    cures: Cures = ALL,
 ) -> Scene:
     """The discrete problem of a case; raises InputError where case and mesh do not fit."""
     check_groups(case, mesh, swapped)

@@ -12,7 +12,7 @@ from solver.balance import imbalances
 from solver.case import Case
 from solver.clock import Clock
 from solver.contact import ContactProblem, Equilibrium
-from solver.cures import Cures
+from solver.cures import ALL, Cures
 from solver.elasticity import nodal_stress
 from solver.faces import nodal_normals
 from solver.mesh.catalogue import BY_NAME
@@ -31,7 +31,7 @@ def simulate(
     swapped: bool = False,
     hexahedra: str | None = None,
     log: Log = lambda _: None,
-    cures: Cures = Cures(),
+    cures: Cures = ALL,
 ) -> Solution:
     """Solve a case on its mesh.
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.case import parse_case
-from solver.cures import Cures
+from solver.cures import ALL, Cures
 from solver.simulation import simulate
 from solver.verdict import of_solution
 from tests.scenes import block_case, block_mesh, errors, moved, with_points
@@ -15,7 +15,6 @@ from tests.test_extremes import MESHES, patch_errors, patch_solution, turn
 
 LONG = np.finfo(np.longdouble).eps < np.finfo(float).eps
 needs_extended = pytest.mark.skipif(not LONG, reason="extended precision is double precision here")
-ALL = Cures()
 
 
 def without(cure: str) -> Cures:
