@@ -89,6 +89,13 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
+    command.add_argument(
+        "--families",
+        type=Path,
+        nargs="*",
+        metavar="FAMILY.yaml",
+        help="what families are about; default: those in cases/",
+    )
 
     command = _add(commands, "orders", _orders, "write the page of orders of convergence")
     command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
@@ -192,7 +199,10 @@ def _report(options: argparse.Namespace) -> int:
         verdicts += [p for p in found if "orders" not in p.relative_to(options.results).parts]
     if not verdicts:
         raise InputError(options.results or "report", "VERDICT.json", None, "there is none")
-    return write_report(verdicts, options.output)
+    families = options.families
+    if families is None:
+        families = sorted(Path("cases").glob("*/family.yaml"))
+    return write_report(verdicts, options.output, families=families)
 
 
 def _orders(options: argparse.Namespace) -> int:

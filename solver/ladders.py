@@ -64,7 +64,7 @@ class Family:
     differs from `orders.THEORY`. Where `title` or `description` is empty, `family.yaml` has it.
     """
 
-    name: str
+    folder: Path
     title: str
     description: str
     ladders: tuple[Ladder, ...]
@@ -72,14 +72,18 @@ class Family:
     theory: Mapping[str, Mapping[str, list[float | None]]] = field(default_factory=dict)
     reference_code: ReferenceCode = field(default_factory=ReferenceCode)
 
+    @property
+    def name(self) -> str:
+        """The family's name: that of its folder."""
+        return self.folder.name
+
 
 def read_ladders(path: Path) -> Family:
     """The ladders in a file; `InputError` says what is refused, and what is allowed."""
     content = parse_mapping(read_text(path), path)
     validate(content, LADDERS_SCHEMA, path)
-    name = path.resolve().parent.name
     return Family(
-        name=name,
+        folder=path.resolve().parent,
         title=content.get("title", ""),
         description=content.get("description", ""),
         ladders=tuple(_ladder(path, content, i) for i in range(len(content["ladders"]))),

@@ -37,7 +37,8 @@ def _at_macro_elements(values: np.ndarray, expected: np.ndarray) -> Sample:
     return Sample(values, expected, "macro-element {}".format)
 
 
-def _expected_pressure(zone: ZoneResult, reference: Reference) -> np.ndarray:
+def expected_pressure(zone: ZoneResult, reference: Reference) -> np.ndarray:
+    """The reference's pressure (m,) on every macro-element: its mean, or that at the centre."""
     if isinstance(reference, ExactValues):
         return reference.pressure(zone)
     return evaluate(reference, zone.centre)
@@ -45,7 +46,7 @@ def _expected_pressure(zone: ZoneResult, reference: Reference) -> np.ndarray:
 
 def pressure(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The multiplier of every macro-element."""
-    return _at_macro_elements(zone.multiplier, _expected_pressure(zone, reference))
+    return _at_macro_elements(zone.multiplier, expected_pressure(zone, reference))
 
 
 def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
@@ -58,7 +59,7 @@ def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
 def status(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """In contact wherever the reference presses; either will do where its contact area ends."""
     found = zone.closed.astype(float)
-    expected = (_expected_pressure(zone, reference) > 0).astype(float)
+    expected = (expected_pressure(zone, reference) > 0).astype(float)
     if isinstance(reference, ExactValues):
         expected = np.where(reference.ends_within(zone), found, expected)
     return _at_macro_elements(found, expected)
@@ -74,7 +75,7 @@ def coverage(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
 
 def covered_pressure(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The multiplier times the coverage."""
-    expected = _expected_pressure(zone, reference)
+    expected = expected_pressure(zone, reference)
     return _at_macro_elements(zone.coverage * zone.multiplier, expected)
 
 

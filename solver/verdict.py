@@ -127,9 +127,10 @@ def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[s
     if isinstance(case, Case):
         name, family, title = case.name, case.family, case.title
         zones, origin = _zones(case, swapped), {key: getattr(case, key) for key in _ORIGIN}
+        exact = case.solution.name if case.solution else None
     else:
         name, family, title = case.stem, case.resolve().parent.name, ""
-        zones, origin = [], dict.fromkeys(_ORIGIN)
+        zones, origin, exact = [], dict.fromkeys(_ORIGIN), None
     return {
         "case": name,
         "family": family,
@@ -140,6 +141,7 @@ def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[s
         "variant": hexahedra or "",
         "zones": zones,
         **origin,
+        "reference_solution": exact,
     }
 
 

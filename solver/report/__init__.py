@@ -1,4 +1,4 @@
-"""The report of many verdicts: one page for people, tables for machines, failures first."""
+"""The report of many verdicts: pages for people, tables for machines, failures first."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -7,29 +7,47 @@ from typing import Any
 PAGE = "summary.html"
 
 
-def write_report(verdicts: Sequence[Path], folder: Path, log: Callable[[str], Any] = print) -> int:
+def write_report(
+    verdicts: Sequence[Path],
+    folder: Path,
+    log: Callable[[str], Any] = print,
+    families: Sequence[Path] = (),
+) -> int:
     """Write the report of the verdict files into `folder`; the exit status, always 0.
 
-    Every verdict stands in every file: summary.html, .json, .csv, .md, junit.xml, and failures.txt
-    (empty when all passed). Logs one line for each solve that did not pass, then the outcome.
+    Every verdict stands in every file: the main page and the page of its family, summary.json,
+    .csv, .md, junit.xml, and failures.txt (empty when all passed). `families` are files
+    `family.yaml`, each in the folder of its family. Logs one line for each solve that did not pass,
+    the outcome, and the processor time by family.
     """
     from solver.files import replacing
     from solver.report import tables
-    from solver.report.page import to_html
+    from solver.report.page import family_page, main_page
     from solver.report.rows import read_rows
+    from solver.report.sections import sections
 
     folder.mkdir(parents=True, exist_ok=True)
     rows = read_rows(verdicts)
+    files = {file.resolve().parent.name: file for file in families}
+    parts = sections(rows, files, folder / "pictures")
     contents = {
-        PAGE: to_html(rows, folder / "pictures", (folder / "orders.html").is_file()),
+        PAGE: main_page(parts, folder),
         "summary.json": tables.to_json(rows),
         "summary.csv": tables.to_csv(rows),
         "summary.md": tables.to_markdown(rows),
         "junit.xml": tables.to_junit(rows),
         "failures.txt": tables.to_failures(rows),
+        **{part.page: family_page(part, folder) for part in parts},
     }
     for name, content in contents.items():
         with replacing(folder / name) as temporary:
             temporary.write_text(content, encoding="utf-8")
-    log(f"{contents['failures.txt']}{tables.outcome(rows)} Report: {folder / PAGE}")
+    complaints = "".join(f"{c}\n" for part in parts if (c := part.family.complaint))
+    said = f"{tables.outcome(rows)} Report: {folder / PAGE}\n{_costs(parts)}"
+    log(f"{complaints}{contents['failures.txt']}{said}")
     return 0
+
+
+def _costs(sections: Sequence[Any]) -> str:
+    shares = ", ".join(f"{s.name} {s.cpu:.1f} s ({len(s.rows)})" for s in sections)
+    return f"Processor time by family (solves): {shares or 'none'}."

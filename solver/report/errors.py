@@ -13,11 +13,10 @@ from solver.report.rows import Row
 from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
 
 WIDTH, HEIGHT = 940, 470
-TOLERANCE = 1e-3
 EPSILON = float(np.finfo(float).eps)
 # One mark for each kind of reference: they are not compared with one another.
 KINDS = ("analytical", "manufactured", "refined", "other_code")
-_COLORS = {"analytical": BLUE, "manufactured": GREEN, "refined": PURPLE, "other_code": ORANGE}
+COLORS = {"analytical": BLUE, "manufactured": GREEN, "refined": PURPLE, "other_code": ORANGE}
 
 
 def drawn(rows: Sequence[Row]) -> list[Row]:
@@ -37,10 +36,12 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]
     times = np.array([row.total for row in shown])
     errors = np.array([max(row.accuracy[0], EPSILON / 4) for row in shown])  # type: ignore[index]
     x = Scale(*_around(times, 1.25), 62, WIDTH - 190, log=True)
-    y = Scale(EPSILON / 8, max(1e-2, 3 * errors.max(initial=0)), HEIGHT - 52, 34, log=True)
+    highest = max(1e-2, 3 * errors.max(initial=0), *(3 * (row.allowed or 0) for row in shown))
+    y = Scale(EPSILON / 8, highest, HEIGHT - 52, 34, log=True)
     _floor(drawing, x, y, shown)
     draw_axes(drawing, x, y, "wall time of the solve, s", "worst relative error")
-    _level(drawing, x, y, TOLERANCE, "tolerance 0.1 %", RED, ())
+    for tolerance in sorted({row.allowed for row in shown if row.allowed}):
+        _level(drawing, x, y, tolerance, f"tolerance {100 * tolerance:.3g} %", RED, ())
     for entry in reference_code:
         name = f"{entry.get('name', 'reference code')} {entry.get('version', '')}"
         label = f"{name.strip()}: {formats.error(float(entry['error']))}"
@@ -79,7 +80,7 @@ def _level(
 def _mark(drawing: Drawing, row: Row, point: np.ndarray) -> None:
     error, check = row.accuracy  # type: ignore[misc]
     tip = f"{row.name}: {formats.error(error)} ({check}), {formats.seconds(row.total)}, {row.word}"
-    color = _COLORS.get(row.reference_kind, INK)
+    color = COLORS.get(row.reference_kind, INK)
     drawing.open_link(f"#{quote(row.anchor)}", tip)
     if row.word == "passed":
         drawing.circles(point[None], 4, fill=color, fill_opacity=0.55, stroke=color)

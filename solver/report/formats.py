@@ -1,7 +1,10 @@
 """Numbers and lists as the tables of the report show them."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from markupsafe import Markup, escape
 
 NOTHING = "–"
 
@@ -50,3 +53,9 @@ def against(count: int, reference: int | None) -> str:
 def digits(value: float | None) -> str:
     """All the digits there are."""
     return NOTHING if value is None else f"{value + 0.0:.15g}"
+
+
+def formula(text: str) -> Markup:
+    """Text with what follows `_` set lower and what follows `^` higher: `r^d`, `σ_xx`."""
+    lowered = re.sub(r"_(\w+)", r"<sub>\1</sub>", str(escape(text)))
+    return Markup(re.sub(r"\^(\w+)", r"<sup>\1</sup>", lowered))

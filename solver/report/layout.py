@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from solver.report.svg import BLUE, MUTED, ORANGE, PAPER, mixed
-from solver.solution import BodyInfo, Solution
+from solver.solution import BodyInfo, Solution, ZoneResult
 
 Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
 Placement = Callable[[np.ndarray], np.ndarray]  # coordinates (…, dim) to pixels (…, 2)
@@ -52,3 +52,35 @@ def fit(points: np.ndarray, frame: Frame) -> Placement:
         return np.stack([left + moved[..., 0], bottom - moved[..., 1]], axis=-1)
 
     return place
+
+
+def tangent(zone: ZoneResult) -> np.ndarray:
+    """The direction along the interface, (2,): to the right, or upward."""
+    normal = zone.normal.mean(axis=0)
+    along = np.array([normal[1], -normal[0]])
+    if not along.any():  # a closed surface: its mean normal is none
+        return np.array([1.0, 0.0])
+    along /= np.linalg.norm(along)
+    return along if tuple(np.round(along, 9)) > (0.0, 0.0) else -along
+
+
+def plan_axes(zone: ZoneResult) -> tuple[np.ndarray, tuple[str, str]]:
+    """Two unit vectors (2, 3) in the mean plane, along coordinate axes if it can be; names."""
+    normal = zone.normal.mean(axis=0)
+    drop = int(np.argmax(np.abs(normal))) if np.abs(normal).max() > 1e-6 else 2
+    first, second = (i for i in range(3) if i != drop)
+    normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
+    u = np.eye(3)[first] - normal[first] * normal
+    u /= np.linalg.norm(u)
+    v = np.eye(3)[second] - normal[second] * normal
+    v -= (v @ u) * u
+    return np.stack([u, v / np.linalg.norm(v)]), ("xyz"[first], "xyz"[second])
+
+
+def extents(zone: ZoneResult, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First and last position of every macro-element, (m,) each."""
+    start, end = np.full(len(zone.centre), np.inf), np.full(len(zone.centre), -np.inf)
+    for _, nodes, owner in zone.faces:
+        np.minimum.at(start, owner, position[nodes].min(axis=1))
+        np.maximum.at(end, owner, position[nodes].max(axis=1))
+    return start, end

@@ -9,8 +9,8 @@ from solver.orders import DEGREES, ERRORS, LAST, Order
 from solver.report import formats
 from solver.report.curves import Curve, groups, read_curves, shown_errors
 from solver.report.curves_plot import draw_key, draw_panel
-from solver.report.families import read_family
-from solver.report.page import environment, style
+from solver.report.families import FILE_NAME, read_family
+from solver.report.html import environment
 from solver.report.tables import as_csv
 
 PAGE, SLOPES, POINTS, FAILURES = (
@@ -95,16 +95,14 @@ def _to_html(families: Sequence[Family], curves: dict[str, list[Curve]]) -> str:
             names=ERRORS,
             last=LAST,
             theory_text=theory_text,
-            formats=formats,
             key=draw_key,
-            style=style(),
         )
     )
 
 
 def _section(family: Family, curves: Sequence[Curve]) -> dict[str, Any]:
     """One family: its words, and its panels and tables by group."""
-    described = read_family(family.name)
+    described = read_family(family.folder / FILE_NAME)
     parts = []
     for title, members in groups(curves).items():
         shown = shown_errors(members)

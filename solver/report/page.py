@@ -1,121 +1,52 @@
-"""The page for people: one file that needs no network and no script."""
+"""The pages for people: the main one, and one a family; no network is needed."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-
-from solver.report import formats
-from solver.report.errors import draw_errors, drawn, floor
-from solver.report.families import read_family
+from solver.report.html import MEANING, NORMS, STAGES, environment
 from solver.report.pictures import picture
-from solver.report.rows import Row, counted, families
+from solver.report.rows import Row, counted
+from solver.report.sections import Section
 from solver.report.tables import outcome
 
-# What each check looks at, in the order of the table of checks.
-MEANING = {
-    "multiplier": "contact pressure: the multiplier of every macro-element",
-    "nodal_stress": "normal stress at every node of both bodies",
-    "surface_stress_slave": "normal stress on the slave surface",
-    "surface_stress_master": "normal stress on the master surface",
-    "element_pressure": "pressure of every contact element",
-    "element_gap": "average gap of every contact element, over the block size",
-    "element_status": "contact status of every contact element: 1 in contact, 0 open",
-    "coverage": "intersected area over the area of the macro-element",
-    "covered_pressure": "coverage × pressure",
-    "displacement": "displacement at every node",
-    "stress_components": "the other components of stress at every node",
-    "balance": "contact forces and reactions against the loads: forces and moments",
-    "observation": "pressure of one contact element at every load step",
-    "observation_gap": "gap of one contact element at every load step",
-}
-KINDS = {
-    "analytical": "an exact solution",
-    "manufactured": "a solution chosen first, loads derived from it",
-    "refined": "a much finer mesh",
-    "other_code": "another code's result",
-}
-# Stages in the order of the work, in colours that the colour-blind tell apart.
-STAGES = {
-    "read": "#999999",
-    "mesh": "#bbbbbb",
-    "cut": "#e69f00",
-    "pairing": "#56b4e9",
-    "assembly": "#009e73",
-    "solve": "#0072b2",
-    "recovery": "#cc79a7",
-    "checks": "#d55e00",
-    "write": "#f0e442",
-}
 
-
-def to_html(rows: Sequence[Row], pictures: Path, orders: bool = False) -> str:
-    """The page; pictures are kept in the folder `pictures` for the next time.
-
-    `orders` says whether the page of orders of convergence is there beside it.
-    """
+def main_page(sections: Sequence[Section], folder: Path) -> str:
+    """The main page: what was verified, failures first, one table a family."""
+    rows = [row for section in sections for row in section.rows]
     checks = {check["name"]: check for row in rows for check in row.checks or ()}
     return (
         environment()
         .get_template("summary.html.jinja")
         .render(
             rows=rows,
-            orders=orders,
+            orders=(folder / "orders.html").is_file(),
             bad=[row for row in rows if row.word != "passed"],
             outcome=outcome(rows),
             counts=counted(rows),
-            families=[_section(name, members) for name, members in families(rows).items()],
+            families=sections,
             facts=_facts(rows),
             checks=[checks[name] for name in sorted(checks, key=_order)],
             meaning=MEANING,
-            kinds=KINDS,
-            stages={name: STAGES.get(name, "#777777") for name in _stages(rows)},
-            picture=lambda row: picture(row, pictures),
-            formats=formats,
-            style=style(),
+            stages=_stages(rows),
+            folder=folder,
         )
     )
 
 
-def environment() -> Environment:
-    """Where the templates of all pages come from, with the formats of numbers."""
-    templates = Environment(
-        loader=PackageLoader("solver.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+def family_page(section: Section, folder: Path) -> str:
+    """The page of a family: problem, reference, figures, its solves case by case."""
+    return (
+        environment()
+        .get_template("family.html.jinja")
+        .render(
+            section=section,
+            orders=(folder / "orders.html").is_file(),
+            norms=NORMS,
+            stages=_stages(section.rows),
+            picture=lambda row: picture(row, section.pictures),
+            folder=folder,
+        )
     )
-    templates.filters |= {
-        "error": formats.error,
-        "number": formats.number,
-        "seconds": formats.seconds,
-    }
-    return templates
-
-
-def style() -> Markup:
-    """The style sheet of all pages."""
-    return Markup((Path(__file__).parent / "templates/style.css").read_text(encoding="utf-8"))
-
-
-def _section(name: str, rows: Sequence[Row]) -> dict[str, Any]:
-    """One family: its description, its rows by kind of reference, its figure."""
-    family = read_family(name)
-    points = drawn(rows)
-    kinds = {row.reference_kind: None for row in rows}
-    return {
-        "name": name,
-        "family": family,
-        "rows": rows,
-        "outcome": outcome(rows),
-        "by_kind": {kind: [r for r in rows if r.reference_kind == kind] for kind in kinds},
-        "figure": draw_errors(rows, family.reference_code) if points else "",
-        "floor": floor(points),
-        "not_drawn": [row for row in rows if row not in points],
-    }
 
 
 def _facts(rows: Sequence[Row]) -> list[tuple[str, str]]:
@@ -154,6 +85,8 @@ def _order(name: str) -> tuple[int, str]:
     return (known.index(name) if name in MEANING else len(known), name)
 
 
-def _stages(rows: Sequence[Row]) -> list[str]:
+def _stages(rows: Sequence[Row]) -> dict[str, str]:
+    """The stages that occur, in their order, with their colours."""
     found = dict.fromkeys(stage for row in rows for stage in row.stages)
-    return [stage for stage in STAGES if stage in found] + [s for s in found if s not in STAGES]
+    names = [stage for stage in STAGES if stage in found] + [s for s in found if s not in STAGES]
+    return {name: STAGES.get(name, "#777777") for name in names}

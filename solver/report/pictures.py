@@ -1,24 +1,50 @@
 """The pictures of the solves, drawn anew only where a result or the drawing has changed."""
 
+from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 
 from markupsafe import Markup
 
 from solver.errors import InputError
+from solver.expressions import Expression
 from solver.files import replacing
+from solver.report.plane import draw_plane
+from solver.report.profile import draw_profile
 from solver.report.rows import Row
+from solver.report.space import draw_space
+from solver.results import read_result
+from solver.solution import Solution
 
 MOST_CELLS = 100_000
 
 
 def picture(row: Row, folder: Path) -> Markup:
     """The picture of one solve, kept in `folder`; a line that says why there is none."""
+    return _kept(row, folder, "", _draw)
+
+
+def profile(row: Row, folder: Path, along: Expression | None = None) -> Markup:
+    """The pressure of one solve's first zone along the interface, kept in `folder` too."""
+
+    def draw(row: Row) -> Markup:
+        solution = _solution(row)
+        if not solution.zones:
+            raise ValueError("no contact, no pressure")
+        title = f"{row.name}: contact pressure along the interface"
+        return draw_profile(solution, solution.zones[0], title, along)
+
+    over = f"-{sha256(along.text.encode()).hexdigest()[:8]}" if along else ""
+    return _kept(row, folder, f"-profile{over}", draw)
+
+
+def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], Markup]) -> Markup:
     if row.result_file is None:
         return Markup("<p class=none>No result, no picture.</p>")
-    kept = folder / f"{row.group}-{row.folder.name}.svg"
+    kept = folder / f"{row.group}-{row.folder.name}{ending}.svg"
     if not _is_current(kept, row.result_file):
         try:
-            drawing = _draw(row)
+            drawing = draw(row)
         except (InputError, OSError, LookupError, ValueError, ArithmeticError) as error:
             reason = f"{type(error).__name__}: {error}"
             return Markup("<p class=none>No picture: {}</p>").format(reason)
@@ -34,17 +60,14 @@ def _is_current(kept: Path, result: Path) -> bool:
 
 
 def _draw(row: Row) -> Markup:
-    from solver.results import read_result
-
-    solution = read_result(row.result_file).solution  # type: ignore[arg-type]
+    solution = _solution(row)
     cells = sum(len(block.data) for block in solution.mesh.cells)
     if cells > MOST_CELLS:
         raise ValueError(f"{cells} cells are too many to draw")
     title = f"{row.name}: meshes and contact pressure"
-    if solution.mesh.points.shape[1] == 2:
-        from solver.report.plane import draw_plane
+    draw = draw_plane if solution.mesh.points.shape[1] == 2 else draw_space
+    return draw(solution, title)
 
-        return draw_plane(solution, title)
-    from solver.report.space import draw_space
 
-    return draw_space(solution, title)
+def _solution(row: Row) -> Solution:
+    return read_result(row.result_file).solution  # type: ignore[arg-type]

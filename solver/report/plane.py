@@ -3,12 +3,10 @@
 import numpy as np
 from markupsafe import Markup
 
-from solver.case import Exact
-from solver.exact import ExactValues
-from solver.expressions import Expression, evaluate
 from solver.report.axes import Scale, draw_axes
 from solver.report.geometry import plane_cells
-from solver.report.layout import Frame, apart, edge_color, fit, tint
+from solver.report.layout import Frame, apart, edge_color, extents, fit, tangent, tint
+from solver.report.profile import expected
 from solver.report.svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
 from solver.solution import Solution, ZoneResult
 
@@ -38,25 +36,34 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
                 stroke=mixed(edge_color(body), PAPER, 0.25),
                 stroke_width=0.6,
             )
-    right = float(place(points)[:, 0].max()) + 12
-    for number, body in enumerate(solution.bodies):
-        own = place(points[solution.body == number])
-        middle = float((own[:, 1].min() + own[:, 1].max()) / 2)
+    _names(drawing, solution, place(points))
+
+
+def _names(drawing: Drawing, solution: Solution, pixels: np.ndarray) -> None:
+    """Name, cells and role of every body beside it, one below the other where they would meet."""
+    right, free = float(pixels[:, 0].max()) + 12, 0.0
+    heights = [pixels[solution.body == number, 1] for number in range(len(solution.bodies))]
+    middles = [float((own.min() + own.max()) / 2) for own in heights]
+    for number in np.argsort(middles):
+        body, middle = solution.bodies[number], max(middles[number], free)
         drawing.text(right, middle - 4, body.name, weight="600")
         drawing.text(right, middle + 10, ", ".join(body.cells), color=MUTED)
         drawing.text(right, middle + 24, body.role, color=edge_color(body))
+        free = middle + 46
 
 
 def _interface(drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Frame) -> None:
     """Pressure by macro-element and surface stresses along the interface; both meshes below."""
     left, top, width, height = frame
     points = solution.mesh.points
-    along = _tangent(zone)
-    start, end = _extents(zone, points @ along)
+    along = tangent(zone)
+    start, end = extents(zone, points @ along)
     master = np.unique(np.concatenate([nodes[:, :2].ravel() for _, nodes in zone.master_faces]))
     low = min(start.min(), (points[master] @ along).min())
     high = max(end.max(), (points[master] @ along).max())
-    largest = max(float(zone.multiplier.max()), float(solution.load_scale), 1e-300)
+    means = expected(solution, zone)
+    pressures = zone.multiplier if means is None else np.concatenate([zone.multiplier, means])
+    largest = max(float(pressures.max()), 1e-300)
     x = Scale(low, high, left, left + width)
     y = Scale(min(0.0, float(zone.multiplier.min())), 1.25 * largest, top + height - 78, top + 36)
     draw_axes(drawing, x, y, "", f"pressure along {zone.name}")
@@ -66,45 +73,27 @@ def _interface(drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Fr
     ground[:, :, 1] = y(0.0)
     drawing.polygons(np.concatenate([steps, ground], axis=1), fill=mixed(BLUE, PAPER, 0.8))
     drawing.polygons(steps, closed=False, stroke=BLUE, stroke_width=2.2)
-    _reference(drawing, solution, zone, x, y, along)
+    _reference(drawing, zone, means, x, y, along)
     for nodes, stress, mark, color in (
         (zone.slave_nodes, zone.stress_slave, drawing.circles, BLUE),
         (zone.master_nodes, zone.stress_master, drawing.crosses, ORANGE),
     ):
-        at = np.column_stack([x(points[nodes] @ along), y(-np.asarray(stress))])
+        inside = (-stress >= y.low) & (-stress <= y.high)
+        at = np.column_stack([x(points[nodes] @ along), y(-stress)])[inside]
         mark(at, 2.6, stroke=color, stroke_width=1.1)
     _nodes_of_both(drawing, zone, points @ along, master, x, top + height - 46)
     _legend(drawing, left, top + height - 6)
 
 
-def _tangent(zone: ZoneResult) -> np.ndarray:
-    """The direction along the interface, (2,): to the right, or upward."""
-    normal = zone.normal.mean(axis=0)
-    along = np.array([normal[1], -normal[0]])
-    if not along.any():  # a closed surface: its mean normal is none
-        return np.array([1.0, 0.0])
-    along /= np.linalg.norm(along)
-    return along if tuple(np.round(along, 9)) > (0.0, 0.0) else -along
-
-
-def _extents(zone: ZoneResult, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First and last position of every macro-element, (m,) each."""
-    start, end = np.full(len(zone.centre), np.inf), np.full(len(zone.centre), -np.inf)
-    for _, nodes, owner in zone.faces:
-        np.minimum.at(start, owner, position[nodes].min(axis=1))
-        np.maximum.at(end, owner, position[nodes].max(axis=1))
-    return start, end
-
-
 def _reference(
-    drawing: Drawing, solution: Solution, zone: ZoneResult, x: Scale, y: Scale, along: np.ndarray
+    drawing: Drawing,
+    zone: ZoneResult,
+    values: np.ndarray | None,
+    x: Scale,
+    y: Scale,
+    along: np.ndarray,
 ) -> None:
-    given, exact = solution.case.reference.get("contact_pressure"), solution.case.solution
-    if isinstance(given, float | Expression):
-        values = evaluate(given, zone.centre)
-    elif isinstance(given, Exact) and exact:
-        values = ExactValues(solution, exact).pressure(zone)
-    else:
+    if values is None:
         return
     position = zone.centre @ along
     order = np.argsort(position)
@@ -124,7 +113,7 @@ def _nodes_of_both(
     at: float,
 ) -> None:
     """Two rulers: ends of macro-elements (long), nodes of the cut (short), master nodes below."""
-    start, end = _extents(zone, position)
+    start, end = extents(zone, position)
     inner = np.unique(np.concatenate([nodes[:, :2].ravel() for _, nodes, _ in zone.faces]))
     for positions, low, high, color in (
         (position[inner], 0, 6, BLUE),

@@ -1,12 +1,15 @@
 """The rows of the report: one for each verdict, failures first, with what every format shows."""
 
 import json
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+from solver.mesh.catalogue import BY_NAME
 
 # In this order they stand in every table.
 WORDS = ("crashed", "refused", "failed", "unreliable", "passed")
@@ -80,6 +83,35 @@ class Row:
         return next(iter(self.errors(ACCURACY)), None)
 
     @cached_property
+    def allowed(self) -> float | None:
+        """The tolerance of that check."""
+        names = self.accuracy[1:] if self.accuracy else ()
+        return next((c["tolerance"] for c in self.verdict["checks"] if c["name"] in names), None)
+
+    @cached_property
+    def norms(self) -> Mapping[str, float]:
+        """Errors against the exact solution by their names in `solver.norms`."""
+        errors = self.verdict.get("errors") or {}
+        return {name: value for name, value in errors.items() if value is not None}
+
+    def origin(self, kinds: Mapping[str, str]) -> str:
+        """Where the reference comes from, given the kinds in words; empty where there is none."""
+        kind = self.verdict.get("reference_kind") or ""
+        code = self.verdict.get("reference_code") or {}
+        named = f": {code.get('name')} {code.get('version')}" if code else ""
+        return f"{kinds.get(kind, kind)}{named}"
+
+    def files(self, folder: Path) -> list[tuple[str, str]]:
+        """What lies in the solve's folder: names, and paths as seen from `folder`."""
+        found = {"result": self.result_file, "verdict": self.folder / "verdict.json"}
+        found["log"] = self.folder / "log"
+        return [
+            (name, os.path.relpath(path, folder))
+            for name, path in found.items()
+            if path and path.is_file()
+        ]
+
+    @cached_property
     def total(self) -> float | None:
         """Wall time of the solve, seconds."""
         return (self.verdict.get("seconds") or {}).get("total")
@@ -94,6 +126,12 @@ class Row:
     def slave(self) -> str:
         """The names of the slave bodies."""
         return ", ".join(b["name"] for b in self.sides if b["role"] in ("slave", "both"))
+
+    @cached_property
+    def dim(self) -> int:
+        """The dimension of the bodies; 0 where it is not known."""
+        names = [name for body in self.sides for name in body["cells"]]
+        return BY_NAME[names[0]].dim if names and names[0] in BY_NAME else 0
 
     @cached_property
     def sides(self) -> list[Mapping[str, Any]]:

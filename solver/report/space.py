@@ -5,7 +5,16 @@ from markupsafe import Markup
 
 from solver.mesh.catalogue import cell_type
 from solver.report.geometry import boundary_faces, macro_edges, normals, outlines
-from solver.report.layout import Frame, Placement, apart, edge_color, fit, mean_normal, tint
+from solver.report.layout import (
+    Frame,
+    Placement,
+    apart,
+    edge_color,
+    fit,
+    mean_normal,
+    plan_axes,
+    tint,
+)
 from solver.report.svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
 from solver.solution import Solution, ZoneResult
 
@@ -91,7 +100,7 @@ def _macro_outlines(
 
 def _plan(drawing: Drawing, zone: ZoneResult, points: np.ndarray, frame: Frame) -> None:
     """Slave sub-faces coloured by pressure, macro-elements and master faces in outline."""
-    axes, names = _plan_axes(zone)
+    axes, names = plan_axes(zone)
     flat = points @ axes.T
     used = np.concatenate([nodes.ravel() for _, nodes, _ in zone.faces])
     place = fit(flat[used], frame)
@@ -128,19 +137,6 @@ def _ends(
     drawing.text(low[0] - 7, high[1], f"{first[1]:.4g}", "end", color=MUTED)
     drawing.text(low[0] - 7, (low[1] + high[1]) / 2, names[1], "end", color=MUTED)
     drawing.text(low[0] - 7, low[1] + 9, f"{last[1]:.4g}", "end", color=MUTED)
-
-
-def _plan_axes(zone: ZoneResult) -> tuple[np.ndarray, tuple[str, str]]:
-    """Two unit vectors (2, 3) in the mean plane, along coordinate axes if it can be; names."""
-    normal = zone.normal.mean(axis=0)
-    drop = int(np.argmax(np.abs(normal))) if np.abs(normal).max() > 1e-6 else 2
-    first, second = (i for i in range(3) if i != drop)
-    normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
-    u = np.eye(3)[first] - normal[first] * normal
-    u /= np.linalg.norm(u)
-    v = np.eye(3)[second] - normal[second] * normal
-    v -= (v @ u) * u
-    return np.stack([u, v / np.linalg.norm(v)]), ("xyz"[first], "xyz"[second])
 
 
 def pressure_color(share: float) -> str:

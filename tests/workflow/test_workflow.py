@@ -98,6 +98,7 @@ def test_results_lie_where_they_should(solved):
     assert not (solved / "results" / "tiny" / "tiny-a-swapped" / "mesh.vtkhdf").exists()
     assert summary(solved).keys() == {"tiny-a", "tiny-a-swapped", "tiny-b"}
     assert "Tiny cases" in (solved / "results" / "report" / "summary.html").read_text()
+    assert "<h1>Tiny cases</h1>" in (solved / "results" / "report" / "tiny.html").read_text()
 
 
 def test_nothing_to_do_is_said(solved):
@@ -152,6 +153,7 @@ def test_a_batch_with_every_kind_of_ending(project, tmp_path):
     write_case(mine, "wrong", pressure=26.0)
     write_case(mine, "doomed")
     (mine / "broken.yaml").write_text("name: [broken\n")
+    (mine / "family.yaml").write_text("title: Cases of mine\n")
     write_case(mine, "meshless")
     text = (mine / "meshless.yaml").read_text().replace("recipe: blocks", "recipe: nothing")
     (mine / "meshless.yaml").write_text(text)
@@ -176,8 +178,10 @@ def test_a_batch_with_every_kind_of_ending(project, tmp_path):
     assert "nothing" in reasons["meshless"]
     for name in verdicts.keys() - {"good"}:
         assert re.search(rf"^{name}: {verdicts[name]}: \S", run.stdout, re.MULTILINE), name
-    page = (project / "results" / "report" / "summary.html").read_text()
-    assert all(name in page for name in verdicts)
+    for page in ("summary.html", "my cases.html"):
+        text = (project / "results" / "report" / page).read_text()
+        assert all(name in text for name in verdicts)
+        assert "Cases of mine" in text
     assert not (project / "results" / "report" / "passed").exists()
 
 

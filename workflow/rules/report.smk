@@ -1,11 +1,23 @@
+from solver.report.families import page_name
+
 # Verdicts of the batch that are shown but not run: where one case is asked for, all others there.
 SHOWN = [verdict_of(job) for key, job in BATCH.items() if key not in RUN]
+
+
+# What the families are about, of whichever folder their cases lie in.
+FAMILY_FILES = sorted(
+    {
+        str(file)
+        for job in BATCH.values()
+        if (file := Path(job.file).with_name("family.yaml")).is_file()
+    }
+)
 
 
 rule report:
     input:
         verdicts=[verdict_of(job) for job in RUN.values()],
-        families=sorted(map(str, Path("cases").glob("*/family.yaml"))),
+        families=FAMILY_FILES,
         sources=REPORT_SOURCES,
     output:
         report(
@@ -13,6 +25,7 @@ rule report:
             category="Verification",
             caption="../report/summary.rst",
         ),
+        sorted({f"results/report/{page_name(job.family)}" for job in BATCH.values()}),
         multiext("results/report/summary", ".json", ".md", ".csv"),
         "results/report/junit.xml",
         "results/report/failures.txt",
@@ -25,7 +38,8 @@ rule report:
     message:
         "report of all cases"
     shell:
-        "{PYTHON} -m solver report {input.verdicts:q} {params.shown:q} -o results/report 2>&1"
+        "{PYTHON} -m solver report {input.verdicts:q} {params.shown:q} -o results/report"
+        " --families {input.families:q} 2>&1"
         " | tee {log:q}"
 
 

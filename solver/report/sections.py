@@ -1,0 +1,159 @@
+"""One family of the report: its rows by kind of reference, its figures, its cost."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from markupsafe import Markup
+
+from solver.report import formats
+from solver.report.errors import COLORS, draw_errors, drawn, floor
+from solver.report.families import Family, Figure, page_name, read_family
+from solver.report.html import KINDS, NORMS
+from solver.report.pictures import profile
+from solver.report.rows import Row, families
+from solver.report.svg import INK
+from solver.report.tables import outcome
+
+# Profiles on a page where the family does not say which.
+_MOST_PROFILES = 4
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The pressure of one solve along its interface."""
+
+    row: Row
+    drawing: Markup
+    caption: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """One family with its rows, failures first; `pictures` is where drawings are kept."""
+
+    family: Family
+    rows: Sequence[Row]
+    pictures: Path
+    ladders: bool
+
+    @property
+    def name(self) -> str:
+        """The family's name."""
+        return self.family.name
+
+    @property
+    def page(self) -> str:
+        """The file name of the family's page."""
+        return page_name(self.name)
+
+    @property
+    def outcome(self) -> str:
+        """How many solves passed."""
+        return outcome(self.rows)
+
+    @cached_property
+    def bad(self) -> list[Row]:
+        """The rows that did not pass."""
+        return [row for row in self.rows if row.word != "passed"]
+
+    @property
+    def counted(self) -> bool:
+        """Whether the numbers of cells or faces of a reference's meshes are known."""
+        bodies = [body for row in self.rows for body in row.sides]
+        keys = ("reference_cells", "reference_faces")
+        return any(body.get(key) is not None for body in bodies for key in keys)
+
+    @property
+    def cpu(self) -> float:
+        """Processor time of all solves, seconds, without the start of Python."""
+        return sum(row.cpu_seconds or 0.0 for row in self.rows)
+
+    @property
+    def cost(self) -> str:
+        """The processor time in words."""
+        return f"{formats.seconds(self.cpu)} of processor time."
+
+    @cached_property
+    def by_origin(self) -> dict[str, list[Row]]:
+        """Rows by where their reference comes from, in words."""
+        found: dict[str, list[Row]] = {}
+        for row in self.rows:
+            found.setdefault(row.origin(KINDS), []).append(row)
+        return found
+
+    @cached_property
+    def origins(self) -> dict[tuple[str, str, str, float | None], list[Row]]:
+        """Rows by kind, origin in words, exact solution and uncertainty of their reference."""
+        found: dict[tuple[str, str, str, float | None], list[Row]] = {}
+        for row in self.rows:
+            key = (
+                row.reference_kind or "",
+                row.origin(KINDS),
+                row.reference_solution or "",
+                row.reference_uncertainty,
+            )
+            found.setdefault(key, []).append(row)
+        return found
+
+    @cached_property
+    def norms(self) -> list[str]:
+        """The errors against exact solutions that any row has."""
+        return [name for name in NORMS if any(name in row.norms for row in self.rows)]
+
+    @cached_property
+    def profiles(self) -> list[Profile]:
+        """The pressure along the interface of the solves that the family names, or of some."""
+        found = []
+        for row, figure in self._figures():
+            drawing = profile(row, self.pictures, figure.along)
+            found.append(Profile(row, drawing, figure.caption))
+        return found
+
+    @property
+    def model(self) -> Row | None:
+        """The solve whose picture shows the problem: the first of the profiles, or any."""
+        with_result = [row for row in self.rows if row.result_file]
+        return next((row for row, _ in self._figures()), next(iter(with_result), None))
+
+    def _figures(self) -> list[tuple[Row, Figure]]:
+        by_name = {row.name: row for row in self.rows if row.result_file}
+        if self.family.figures:
+            return [(by_name[f.job], f) for f in self.family.figures if f.job in by_name]
+        first: dict[tuple[str, int], Row] = {}
+        for row in by_name.values():
+            first.setdefault((row.origin(KINDS), row.dim), row)
+        return [(row, Figure(row.name)) for row in list(first.values())[:_MOST_PROFILES]]
+
+    @cached_property
+    def figure(self) -> Markup | str:
+        """Error against run time; nothing where no solve has both."""
+        return draw_errors(self.rows, self.family.reference_code) if drawn(self.rows) else ""
+
+    @property
+    def floor(self) -> tuple[float, float]:
+        """The round-off floor of that figure."""
+        return floor(drawn(self.rows))
+
+    @property
+    def not_drawn(self) -> list[Row]:
+        """The rows that the figure cannot show."""
+        points = drawn(self.rows)
+        return [row for row in self.rows if row not in points]
+
+    @property
+    def colors(self) -> dict[str, str]:
+        """The colours of the figure's marks by kind of reference."""
+        return {row.reference_kind: COLORS.get(row.reference_kind, INK) for row in drawn(self.rows)}
+
+
+def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[Section]:
+    """The sections of all rows; `files` holds the `family.yaml` of a family by its name."""
+    found = []
+    for name, members in families(rows).items():
+        file = files.get(name)
+        family = read_family(file) if file else Family(name, name)
+        ladders = bool(file and file.with_name("orders.yaml").is_file())
+        found.append(Section(family, members, pictures, ladders))
+    return found

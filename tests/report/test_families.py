@@ -1,0 +1,231 @@
+"""The page of a family: what its file tells, and kinds of reference that are kept apart."""
+
+import json
+import xml.etree.ElementTree as ET
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from solver.cli import main
+from solver.report import formats, write_report
+from solver.report.families import FILE_NAME, page_name, paragraphs, read_family
+from solver.report.profile import draw_profile
+from solver.results import write_result
+from tests import handmade
+from tests.report.test_pictures import SVG, polygons
+from tests.report.test_report import verdict
+
+FAMILY = """\
+title: Blocks & <b>more</b>
+description: Two blocks.
+problem: |
+  Pressed from above.
+
+      p_0 = 25,
+      q^d < 3
+
+  Without friction.
+reference: It is uniform.
+figures:
+  - {job: two-blocks, along: 2*x, caption: As it should be}
+  - {job: not-solved}
+reference_code:
+  - {name: other, version: "7", error: 1.0e-9}
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "blocks" / FILE_NAME
+    path.parent.mkdir()
+    path.write_text(FAMILY)
+    return path
+
+
+def test_a_family_as_its_file_tells_it(file):
+    family = read_family(file)
+    assert (family.name, family.title) == ("blocks", "Blocks & <b>more</b>")
+    assert family.reference == "It is uniform."
+    assert [figure.job for figure in family.figures] == ["two-blocks", "not-solved"]
+    assert family.figures[0].along(np.array([[3.0, 0.0]])) == 6.0
+    assert family.complaint == ""
+
+
+def test_paragraphs_that_are_indented_are_formulas(file):
+    assert paragraphs(read_family(file).problem) == [
+        (False, "Pressed from above."),
+        (True, "p_0 = 25,\nq^d < 3"),
+        (False, "Without friction."),
+    ]
+    assert formats.formula("q^d < p_rr") == "q<sup>d</sup> &lt; p<sub>rr</sub>"
+
+
+def test_a_family_without_a_file_has_its_folder_s_name(tmp_path):
+    family = read_family(tmp_path / "mine" / FILE_NAME)
+    assert (family.name, family.title, family.complaint) == ("mine", "mine", "")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("description:", "descripton:", "descripton = 'Two blocks.': unknown key; did you mean"),
+        ("2*x", "2*open(x)", "figures[0].along = '2*open(x)': `open(x)` is not allowed"),
+        ('"7"', "7", "reference_code[0].version = 7: must be text (in quotes if it is a number)"),
+        ("1.0e-9", "-1", "reference_code[0].error = -1: must be a positive number"),
+        ("job: not-solved", "jobs: [a]", "figures[1].job: this key is needed"),
+        ("title:", "title", "file"),
+    ],
+)
+def test_a_file_that_is_refused_is_told_and_the_report_is_written(
+    file, tmp_path, old, new, message
+):
+    file.write_text(FAMILY.replace(old, new, 1))
+    assert message in read_family(file).complaint
+    logged = report(tmp_path, [verdict("a", "passed", family="blocks")], file)
+    assert message in logged
+    assert str(file) in text_of(tmp_path / "blocks.html")
+    assert str(file) in text_of(tmp_path / "summary.html")
+
+
+def test_pages_of_the_report_are_no_family_s():
+    assert page_name("lame") == "lame.html"
+    assert page_name("summary") == "family-summary.html"
+    assert "/" not in page_name("a/b")
+
+
+def report(folder, verdicts, *families):
+    """Write a report of verdicts into the folder; what was logged."""
+    paths, logged = [], []
+    for content in verdicts:
+        path = folder / "results" / content["family"] / content["job"] / "verdict.json"
+        path.parent.mkdir(parents=True)
+        path.write_text(json.dumps(content))
+        paths.append(path)
+    write_report(paths, folder, logged.append, families)
+    return "\n".join(logged)
+
+
+class Text(HTMLParser):
+    """Visible text, and the cells of tables row by row."""
+
+    def __init__(self):
+        super().__init__()
+        self.text, self.rows, self.inside = [], [], ""
+
+    def handle_starttag(self, tag, _):
+        self.inside = tag
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th") and self.rows:
+            self.rows[-1].append("")
+
+    def handle_data(self, data):
+        if self.inside not in ("style", "script"):
+            self.text.append(data)
+            if self.rows and self.rows[-1]:
+                self.rows[-1][-1] += data
+
+
+def parsed(path):
+    page = Text()
+    page.feed(path.read_text())
+    page.rows = [[" ".join(cell.split()) for cell in row] for row in page.rows if row]
+    return page
+
+
+def text_of(path):
+    return " ".join("".join(parsed(path).text).split())
+
+
+REFINED = {"reference_kind": "refined", "reference_uncertainty": 2e-3}
+OTHER = {"reference_kind": "other_code", "reference_code": {"name": "solver", "version": "14.6"}}
+
+
+def test_kinds_of_reference_are_kept_apart_with_uncertainty_code_and_version(tmp_path):
+    verdicts = [
+        verdict("a", "passed", reference_solution="nested_cylinders"),
+        verdict("b", "passed", **REFINED),
+        verdict("c", "passed", **OTHER),
+        verdict("d", "passed", reference_kind="manufactured"),
+        verdict("e", "passed", **OTHER),
+    ]
+    report(tmp_path, verdicts)
+    rows = parsed(tmp_path / "fam.html").rows
+    first = [row[0] for row in rows]
+    for page_rows in (first, [row[0] for row in parsed(tmp_path / "summary.html").rows]):
+        heads = [cell for cell in page_rows if cell.startswith("Reference: ")]
+        assert heads == [
+            "Reference: an exact solution",
+            "Reference: our own result on a much finer mesh",
+            "Reference: another code's result: solver 14.6",
+            "Reference: a solution chosen first, loads derived from it",
+        ]
+    html = (tmp_path / "summary.html").read_text()
+    heads = [
+        html.index(f"Reference: {what}") for what in ("an exact", "our own", "another", "a sol")
+    ]
+    at = [html.index(f'"fam.html#fam/{name}"') for name in "abced"]
+    assert heads[0] < at[0] < heads[1] < at[1] < heads[2] < at[2] < at[3] < heads[3] < at[4]
+    kinds = {row[0]: row[1:] for row in rows if row and row[0] in ("refined", "other code")}
+    assert kinds["refined"] == ["our own result on a much finer mesh", "–", "1", "± 2.0e-03"]
+    assert kinds["other code"] == ["another code's result: solver 14.6", "–", "2", "–"]
+    assert ["analytical", "an exact solution", "nested_cylinders", "1", "exact"] in rows
+
+
+def test_the_page_goes_from_problem_to_figure_to_verdict(file, tmp_path):
+    solution = handmade.plane(tmp_path)
+    content = verdict("two-blocks", "passed", family="blocks", result="result.vtkhdf")
+    write_result(tmp_path / "results/blocks/two-blocks/result.vtkhdf", solution, [], {})
+    (tmp_path / "results/blocks/two-blocks/verdict.json").write_text(json.dumps(content))
+    (tmp_path / "results/blocks/two-blocks/log").write_text("")
+    verdicts = [tmp_path / "results/blocks/two-blocks/verdict.json"]
+    command = ["report", *map(str, verdicts), "-o", str(tmp_path), "--families", str(file)]
+    assert main(command) == 0
+    html = (tmp_path / "blocks.html").read_text()
+    parts = ["id=problem", "id=reference", "id=pressure", "id=solves", "id=time", "Case by case"]
+    assert [html.count(part) for part in parts] == [1] * len(parts)
+    assert sorted(parts, key=html.index) == parts
+    assert "<h1>Blocks &amp; &lt;b&gt;more&lt;/b&gt;</h1>" in html
+    assert "<p class=formula>p<sub>0</sub> = 25,\nq<sup>d</sup> &lt; 3</p>" in html
+    assert "As it should be" in html
+    for name in ("result.vtkhdf", "verdict.json", "log"):
+        assert f'href="results/blocks/two-blocks/{name}"' in html
+    assert 'href="blocks.html"' in (tmp_path / "summary.html").read_text()
+
+
+def test_the_cost_of_each_family_is_told(tmp_path):
+    verdicts = [verdict("a", "passed"), verdict("b", "passed", family="other", cpu_seconds=2.0)]
+    logged = report(tmp_path, verdicts)
+    assert "Processor time by family (solves): fam 0.7 s (1), other 2.0 s (1)." in logged
+    assert "2.00 s of processor time" in text_of(tmp_path / "summary.html")
+
+
+def test_a_profile_shows_every_macro_element_and_its_deviation(tmp_path):
+    solution = handmade.plane(tmp_path)
+    solution.zones[0].multiplier[:] = 25.0, 26.0
+    svg = draw_profile(solution, solution.zones[0], "pressure")
+    assert polygons(svg) == 4  # two areas for the pressure, two for the deviation
+    words = {text.text for text in drawn(svg, "text")}
+    assert {"x", "contact pressure", "deviation, over the largest reference"} <= words
+    assert "0.04" in words  # 26 for 25
+
+
+def test_a_profile_without_a_reference_shows_no_deviation(tmp_path):
+    text = handmade.PLANE.replace("  contact_pressure: 25.0\n", "")
+    solution = handmade.plane(tmp_path, text)
+    svg = draw_profile(solution, solution.zones[0], "pressure")
+    assert polygons(svg) == 2
+    assert not any("deviation" in text.text for text in drawn(svg, "text"))
+
+
+def test_a_profile_in_space_has_a_mark_and_a_cross_for_each_macro_element(tmp_path):
+    solution = handmade.solid(tmp_path)
+    svg = draw_profile(solution, solution.zones[0], "pressure")
+    circles = [p.get("d").count("M") for p in drawn(svg, "path") if "a26 26" in p.get("d")]
+    assert sorted(circles) == [1, 2, 2]  # pressure, deviation, and the legend's
+    assert polygons(svg) == 0
+
+
+def drawn(svg, tag):
+    return list(ET.fromstring(svg).iter(f"{SVG}{tag}"))
