@@ -70,7 +70,10 @@ class Load:
 
 @dataclass(frozen=True)
 class Zone:
-    """One contact zone: its slave and master face groups, and how the slave side is treated."""
+    """One contact zone: its slave and master face groups, and how the interface is treated.
+
+    `points` each way on a slave face, for the treatment `quadrature`.
+    """
 
     slave: str
     master: str
@@ -79,6 +82,7 @@ class Zone:
     treatment: str = "lac"
     normal: str = "element"
     interference: float = 0.0
+    points: int | None = None
 
 
 @dataclass(frozen=True)
@@ -308,6 +312,9 @@ def _check_names(case: Case) -> None:
         if zone.name in names:
             allowed = "the name is given to two zones; each needs its own"
             raise InputError(case.path, f"contact[{i}].name", zone.name, allowed)
+        if zone.points and zone.treatment != "quadrature":
+            allowed = "only the treatment quadrature has points"
+            raise InputError(case.path, f"contact[{i}].points", zone.points, allowed)
         names.add(zone.name)
     for i, item in enumerate(case.observe):
         if item.zone not in names:

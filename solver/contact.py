@@ -31,6 +31,8 @@ from solver.scene import Scene
 MIN_COVERAGE = 0.01
 # An estimated error of the pressure from which residuals are summed in extended precision.
 _EXTEND = 1e-11
+# A multiplier that moves free unknowns by less than this share of all that it moves acts on none.
+_HELD = 1e-12
 # Coverage above one by more than this means that the master surface lies there twice.
 _TWICE = 1e-6
 
@@ -110,6 +112,8 @@ class ContactProblem:
         self.coverage = self.covered / self.area
         self.eligible = self.coverage > MIN_COVERAGE
         self._refuse_double_cover()
+        self.idle = self.eligible & ~self._acts()
+        self.eligible &= ~self.idle
         self.own = np.zeros(n, dtype=bool)
         dim = scene.points.shape[1]
         for zone in scene.zones:
@@ -120,12 +124,21 @@ class ContactProblem:
         surface = np.diff(self.gaps.tocsc().indptr) > 0
         self.at_rest = Displacement.zero(free, surface, scene.cures.remainder)
         self._refuse_unheld()
-        self.has_own_unknowns = all(z.zone.treatment != "uncut" for z in scene.zones)
-        if self.has_own_unknowns:
-            self._refuse_lost_nodes()
+        self.has_own_unknowns = self._find_own_unknowns()
         self.stiffness = stiffness(scene.points, scene.blocks)
         self.matrix = scene.free.reduced(self.stiffness)
         self._system: tuple[bytes, Constrained] | None = None
+
+    def _acts(self) -> np.ndarray:
+        """Which multipliers (k,) move anything: supports may hold the nodes of both surfaces.
+
+        Macro-elements that were cut to own a free unknown all do, or are refused later on.
+        """
+        free = self.gaps @ self.scene.free.basis
+        acts = _row_sizes(free) > _HELD * _row_sizes(self.gaps)
+        for zone in self.scene.zones:
+            acts[zone.numbers] |= zone.treatment.cut
+        return acts
 
     @property
     def system(self) -> Constrained | None:
@@ -245,10 +258,19 @@ class ContactProblem:
             if self.has_own_unknowns:
                 system = condense(self.matrix, constraints, self._own_unknowns())
             else:
-                system = saddle_point(self.matrix, constraints)
+                system = self._saddle_point(constraints)
             self._system = key, system
             return system
         return self._system[1]
+
+    def _saddle_point(self, constraints: sparse.csr_matrix) -> Constrained:
+        try:
+            return saddle_point(self.matrix, constraints)
+        except SolveError as error:
+            raise SolveError(
+                f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
+                "another, as where they outnumber the slave nodes or supports hold these"
+            ) from None
 
     def _own_unknowns(self) -> np.ndarray:
         """Free unknowns (n_free,) that belong to slave nodes."""
@@ -286,19 +308,27 @@ class ContactProblem:
                 key = f"contact[{i}].master"
                 raise InputError(self.scene.case.path, key, master, allowed)
 
-    def _refuse_lost_nodes(self) -> None:
-        """Each macro-element that may close needs an unknown that no support holds."""
+    def _find_own_unknowns(self) -> bool:
+        """Whether each multiplier that may act has an unknown of its own that no support holds.
+
+        Refuses macro-elements that were cut to own one and have none.
+        """
         constraints = (self.gaps[self.eligible] @ self.scene.free.basis).tocsr()
         _, _, found = choose_pivots(constraints, self._own_unknowns())
-        if found.all():
-            return
-        number = int(np.flatnonzero(self.eligible)[np.flatnonzero(~found)[0]])
-        zone = next(z for z in self.scene.zones if z.first <= number < z.first + z.count)
-        place = zone.operator.centre[number - zone.first] + self.scene.origin
-        at = ", ".join(f"{x:.6g}" for x in place)
-        allowed = (
-            f"{int((~found).sum())} macro-elements of zone {zone.zone.name} (the first, number "
-            f"{number - zone.first}, at ({at})) have no free unknown of their own: supports or "
-            "another zone hold their inner nodes"
-        )
-        raise InputError(self.scene.case.path, "supports", None, allowed)
+        lost = np.flatnonzero(self.eligible)[~found]
+        for zone in self.scene.zones:
+            mine = lost[(lost >= zone.numbers.start) & (lost < zone.numbers.stop)] - zone.first
+            if zone.treatment.cut and len(mine):
+                place = zone.operator.surface.centre[mine[0]] + self.scene.origin
+                at = ", ".join(f"{x:.6g}" for x in place)
+                allowed = (
+                    f"{len(mine)} macro-elements of zone {zone.zone.name} (the first, number "
+                    f"{mine[0]}, at ({at})) have no free unknown of their own: supports or "
+                    "another zone hold their inner nodes"
+                )
+                raise InputError(self.scene.case.path, "supports", None, allowed)
+        return not len(lost)
+
+
+def _row_sizes(matrix: sparse.csr_matrix) -> np.ndarray:
+    return np.sqrt(np.asarray(matrix.multiply(matrix).sum(axis=1)).ravel())

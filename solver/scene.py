@@ -20,6 +20,7 @@ from solver.lac.facets import Facets, facets
 from solver.lac.operator import GapOperator, gap_operator
 from solver.mesh.catalogue import BY_NAME
 from solver.supports import FreeMotion
+from solver.treatments import TREATMENTS, Treatment, scheme_of
 
 # An average initial gap below this many roundings of the coordinates is none.
 _GAP_ROUND_OFF = 8
@@ -27,10 +28,11 @@ _GAP_ROUND_OFF = 8
 
 @dataclass(frozen=True)
 class ZoneScene:
-    """One zone: the zone as solved (swapped or not), its macro-elements' numbers and its faces.
+    """One zone: the zone as solved (swapped or not), its multipliers' numbers and its faces.
 
     `slave_faces`, `master_faces` as meshed, `sub_faces` after the cut (their `macro` counts from 0
-    within the zone); macro-elements of the zone are `first` … `first + count − 1` of all.
+    within the zone). `count` macro-elements; the zone's multipliers, of which a treatment may have
+    others than one for each of these, start at `first` among all.
     """
 
     zone: Zone
@@ -42,9 +44,18 @@ class ZoneScene:
     operator: GapOperator
 
     @property
+    def treatment(self) -> Treatment:
+        """How the interface is treated."""
+        return TREATMENTS[self.zone.treatment]
+
+    @property
     def numbers(self) -> slice:
-        """The zone's macro-elements among all."""
-        return slice(self.first, self.first + self.count)
+        """The zone's multipliers among all."""
+        return slice(self.first, self.first + len(self.operator.initial))
+
+    def by_macro_element(self, values: np.ndarray) -> np.ndarray:
+        """Values (k,) of all multipliers averaged over each macro-element of the zone (m,)."""
+        return np.asarray(self.operator.mean @ values[self.numbers])
 
 
 @dataclass(frozen=True)
@@ -103,7 +114,7 @@ def build_scene(
             count = sum(len(block.nodes) for block in slave)
             operator = _operator(points, zone, faces, master, count, rounding, cures)
             scenes.append(ZoneScene(zone, first, count, slave, master, faces, operator))
-            first += count
+            first += len(operator.initial)
     groups = Attributes(case, local, cut_mesh, scenes, origin)
     with clock.stage("assembly"):
         blocks = groups.blocks()
@@ -149,6 +160,7 @@ def _surfaces(
     for i, zone in enumerate(zones):
         slave = boundary_faces(mesh, zone.slave, case.path, f"contact[{i}].{slave_key}")
         master = boundary_faces(mesh, zone.master, case.path, f"contact[{i}].{master_key}")
+        _refuse_untreated(case, i, zone, slave)
         nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave])).tolist()
         shared = [n for n in nodes if n in owner]
         if shared:
@@ -164,6 +176,18 @@ def _surfaces(
     return surfaces
 
 
+def _refuse_untreated(case: Case, i: int, zone: Zone, slave: list[FaceBlock]) -> None:
+    treatment = TREATMENTS[zone.treatment]
+    for block in slave:
+        if block.type.name not in treatment.faces:
+            others = [name for name, t in TREATMENTS.items() if block.type.name in t.faces]
+            allowed = (
+                f"does not exist for slave faces {block.type.name} of {block.owner_type.name}: "
+                f"{treatment.why}; allowed there: {', '.join(others)}"
+            )
+            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
+
+
 def _cut(
     mesh: meshio.Mesh,
     zones: list[Zone],
@@ -176,7 +200,7 @@ def _cut(
             faces.append(block)
             macro.append(first[-1] + block.number)
             into_hexahedra.append(zone.hexahedra == "hexahedra")
-            uncut.append(zone.treatment == "uncut")
+            uncut.append(not TREATMENTS[zone.treatment].cut)
         first.append(first[-1] + sum(len(block.nodes) for block in slave))
     cut_mesh = cut(mesh.points, volume_cells(mesh), faces, macro, into_hexahedra, uncut)
     sub_faces = []
@@ -202,7 +226,9 @@ def _operator(
     corners = np.concatenate([f.centre for f in [*slaves, *masters]])
     search = float(np.linalg.norm(np.ptp(corners, axis=0)))
     search += max(f.radius.max() for f in [*slaves, *masters])
-    operator = gap_operator(slaves, masters, count, len(points), search, cures.closure)
+    scheme = scheme_of(zone.treatment, zone.points)
+    scheme = replace(scheme, closure=scheme.closure and cures.closure)
+    operator = gap_operator(slaves, masters, count, len(points), search, scheme)
     noise = _GAP_ROUND_OFF * rounding * operator.covered * cures.gap_threshold
     initial = np.where(np.abs(operator.initial) <= noise, 0.0, operator.initial)
     return replace(operator, initial=initial - zone.interference * operator.covered)

@@ -24,6 +24,9 @@ from solver.stress import normal_stress
 
 Log = Callable[[str], Any]
 
+# Half, but for round-off.
+_HALF = 0.5 - 1e-9
+
 
 def simulate(
     case: Case,
@@ -79,7 +82,7 @@ def _recover(
     last = states[-1]
     stress = nodal_stress(scene.points, scene.blocks, last.straining, last.extended)
     scale = _stress_scale(scene, stress)
-    zones = [_zone_result(scene, problem, zone, last, stress) for zone in scene.zones]
+    zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
     return Solution(
         case=scene.case,
         swapped=swapped,
@@ -92,14 +95,14 @@ def _recover(
         zones=zones,
         nodal_normal_stress=normal_stress(stress, _contact_direction(scene)),
         balance=imbalances(scene, last),
-        steps=_step_results(scene, problem, states, scale),
+        steps=_step_results(scene, states, scale),
         length=scene.length,
         load_scale=scale,
         dofs=scene.n_dofs,
         macro_elements=sum(zone.count for zone in scene.zones),
         iterations=sum(state.status.iterations for state in states),
         linear_solver=problem.linear_solver,
-        plan=made_plan(scene, states),
+        plan=made_plan(scene, states, problem.idle),
         accuracy=last.accuracy.causes,
     )
 
@@ -123,15 +126,15 @@ def _contact_direction(scene: Scene) -> np.ndarray:
     dim = scene.points.shape[1]
     if not scene.zones:
         return np.eye(dim)[-1]
-    operator = scene.zones[0].operator
-    mean = operator.area @ operator.normal
+    surface = scene.zones[0].operator.surface
+    mean = surface.area @ surface.normal
     return mean / np.linalg.norm(mean)
 
 
 def _zone_result(
-    scene: Scene, problem: ContactProblem, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
+    scene: Scene, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
 ) -> ZoneResult:
-    operator, part = zone.operator, zone.numbers
+    surface = zone.operator.surface
     slave_nodes, slave_normal = _nodal_normals(
         scene, [(f.type.name, f.nodes) for f in zone.sub_faces]
     )
@@ -141,18 +144,23 @@ def _zone_result(
         name=zone.zone.name,
         faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
         master_faces=master,
-        centre=operator.centre + scene.origin,
-        normal=operator.normal,
-        area=operator.area,
-        multiplier=state.pressure[part],
-        gap=state.gap[part],
-        closed=state.status.closed[part],
-        coverage=problem.coverage[part],
+        centre=surface.centre + scene.origin,
+        normal=surface.normal,
+        area=surface.area,
+        multiplier=zone.by_macro_element(state.pressure),
+        gap=zone.by_macro_element(state.gap),
+        closed=_closed(zone, state),
+        coverage=surface.covered / surface.area,
         stress_slave=normal_stress(stress[slave_nodes], slave_normal),
         stress_master=normal_stress(stress[master_nodes], master_normal),
         slave_nodes=slave_nodes,
         master_nodes=master_nodes,
     )
+
+
+def _closed(zone: ZoneScene, state: Equilibrium) -> np.ndarray:
+    """The macro-elements (m,) of which the closed multipliers have at least half."""
+    return zone.by_macro_element(state.status.closed.astype(float)) >= _HALF
 
 
 def _nodal_normals(
@@ -164,25 +172,23 @@ def _nodal_normals(
     return nodes, total[nodes]
 
 
-def _step_results(
-    scene: Scene, problem: ContactProblem, states: list[Equilibrium], scale: float
-) -> list[StepResult]:
+def _step_results(scene: Scene, states: list[Equilibrium], scale: float) -> list[StepResult]:
     results = []
     for factor, state in zip(scene.case.steps, states, strict=True):
         seen = []
         for wanted in scene.case.observe:
             zone = next(z for z in scene.zones if z.zone.name == wanted.zone)
-            offset = zone.operator.centre + scene.origin - np.array(wanted.nearest)
+            surface = zone.operator.surface
+            offset = surface.centre + scene.origin - np.array(wanted.nearest)
             local = int(np.linalg.norm(offset, axis=1).argmin())
-            number = zone.first + local
             seen.append(
                 {
                     "zone": wanted.zone,
                     "macro_element": local,
-                    "pressure": float(state.pressure[number]),
-                    "gap": float(state.gap[number]),
-                    "status": int(state.status.closed[number]),
-                    "coverage": float(problem.coverage[number]),
+                    "pressure": float(zone.by_macro_element(state.pressure)[local]),
+                    "gap": float(zone.by_macro_element(state.gap)[local]),
+                    "status": int(_closed(zone, state)[local]),
+                    "coverage": float(surface.covered[local] / surface.area[local]),
                 }
             )
         product = float(np.abs(state.pressure * state.gap).max(initial=0.0))

@@ -47,6 +47,8 @@ contact:
     slave: bottom_contact
     master: top_contact
     hexahedra: pyramids                  # how slave hexahedra are cut: pyramids or hexahedra
+    treatment: lac                       # or uncut, nodal, nodal_dual, node_to_segment, quadrature
+    # points: 4                          # each way on a slave face, for quadrature alone
     interference: 0.0                    # overlap at the start, of bodies modelled apart
 
 directions: first                        # or both: solved again with slave and master exchanged

@@ -185,7 +185,18 @@ REFUSED = [
     ),
     (
         "contact: [{slave: S, master: M, treatment: penalty}]",
-        "contact[0].treatment = 'penalty': must be lac",
+        (
+            "contact[0].treatment = 'penalty': must be lac, uncut, quadrature, "
+            "node_to_segment, nodal or nodal_dual"
+        ),
+    ),
+    (
+        "contact: [{slave: S, master: M, points: 4}]",
+        "contact[0].points = 4: only the treatment quadrature has points",
+    ),
+    (
+        "contact: [{slave: S, master: M, treatment: quadrature, points: 0}]",
+        "contact[0].points = 0: must be a number from 1 to 16",
     ),
     (
         "contact: [{slave: S, master: M, normal: smooth}]",

@@ -6,7 +6,6 @@ reference face, since the place of a point on them is then no polynomial of its 
 defect is returned to the segments such that gaps of linear displacement fields stay exact.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +13,9 @@ from scipy import sparse
 from scipy.sparse.linalg import lsmr
 
 from solver.elements import face_rule, shape_functions
-from solver.faces import area_vectors
-from solver.lac.facets import Facets
-from solver.lac.segments import Segments
+from solver.elements.gauss import gauss_rule
+from solver.lac.facets import Facets, surface_vectors
+from solver.lac.multipliers import Found, Multipliers
 
 # A face counts as fully covered when the segments miss less than this share of its area.
 _FULL = 1e-11
@@ -27,22 +26,24 @@ _CHORDS = 0.02
 # The conditions of a plane closure count as met to this share of the largest integral; each pass
 # gains the digits that the one before lost to rounding.
 _CLOSED, _PASSES = 1e-11, 3
+# Points each way that integrate a product of shape functions over a face with bent edges.
+_WHOLE_POINTS = 5
 # Normals that differ by less are one normal.
 _ONE_NORMAL = 1e-9
-
-Found = Sequence[tuple[int, int, Segments]]
 
 
 @dataclass
 class Integrals:
-    """Per segment: ∫ N n dS of both sides (s, n_nodes, dim), ∫ gap dS, area (s,), normal (s, dim).
+    """Per segment: ∫ φ N n dS of both sides (s, k, n_nodes, dim) for k multipliers φ, and more.
 
-    The normal is that of the segment's first point.
+    `gap`, `weight` (s, k): ∫ φ gap dS and ∫ φ dS; `area` (s,); `normal` (s, dim) that of the first
+    point.
     """
 
     slave: np.ndarray
     master: np.ndarray
     gap: np.ndarray
+    weight: np.ndarray
     area: np.ndarray
     normal: np.ndarray
 
@@ -52,9 +53,10 @@ def close_faces(
 ) -> int:
     """Return the defect of ∫ N_a dS on fully covered faces to their segments, in place.
 
-    In proportion to area. The defect sums to zero, and so does its first moment, since both
-    integrals are exact for linear functions. Slave faces must be flat, master faces straight as
-    well (the segments follow a bent master edge by a chord). Returns the number of faces treated.
+    In proportion to area, and in each segment to the integrals of the multipliers, which sum to
+    the area. The defect sums to zero, and so does its first moment, since both integrals are exact
+    for linear functions. Slave faces must be flat, master faces straight as well (the segments
+    follow a bent master edge by a chord). Returns the number of faces treated.
     """
     count = 0
     for blocks, index, side in ((slaves, 0, "slave"), (masters, 1, "master")):
@@ -91,25 +93,25 @@ def _close_block(
         area += np.bincount(face, part.area, minlength=n)
         np.minimum.at(lowest, face, c)
         np.maximum.at(highest, face, c)
-        np.add.at(summed, face, np.einsum("sad,sd->sa", vectors, part.normal))
+        np.add.at(summed, face, np.einsum("skad,sd->sa", vectors, part.normal))
     exact = shape_integrals(block) * highest[:, None]
     whole = exact.sum(axis=1)
     full = np.abs(area - whole) <= _FULL * whole
     full &= shape & (highest - lowest <= _ONE_NORMAL)
     defect = np.where(full[:, None], exact - summed, 0.0)
     for face, part, vectors in mine:
-        share = defect[face] * (part.area / area[face])[:, None]
-        np.add(vectors, share[..., None] * part.normal[:, None], out=vectors)
+        share = defect[face][:, None] * (part.weight / area[face][:, None])[..., None]
+        np.add(vectors, share[..., None] * part.normal[:, None, None], out=vectors)
     return int(full.sum())
 
 
 def close_plane(
-    slaves: list[Facets], masters: list[Facets], covering: sparse.csr_matrix, n_nodes: int
+    slaves: list[Facets], masters: list[Facets], space: Multipliers, covering: sparse.csr_matrix
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix] | None:
     """The closed integrals of plane parallel surfaces that cover each other, where edges are bent.
 
-    `covering` (m, n_nodes) holds ∫ N_b dS over each of m macro-elements as the segments give it,
-    which follow bent edges by chords. Returns ∫ N_a dS of slave nodes (m, n_nodes), exact, and of
+    `covering` (k, n_nodes) holds ∫ φ N_b dS for each of k multipliers as the segments give it,
+    which follow bent edges by chords. Returns ∫ φ N_a dS of slave nodes (k, n_nodes), exact, and of
     master nodes: the smallest change of `covering` (least squares, on its own pattern) that gives
     each master node its exact integral, and each row the sum and first moment of its slave row.
     None where the surfaces are not plane and parallel, do not cover each other, or have straight
@@ -121,7 +123,8 @@ def close_plane(
     flat = all(b.flat.all() for b in blocks) and tilt <= _ONE_NORMAL
     if not flat or all(b.straight.all() for b in blocks):
         return None
-    slave = _whole_integrals(slaves, covering.shape)
+    slave = _whole_integrals(slaves, space, covering.shape)
+    n_nodes = covering.shape[1]
     master = np.zeros(n_nodes)
     for block in masters:
         master += np.bincount(block.nodes.ravel(), shape_integrals(block).ravel(), n_nodes)
@@ -137,11 +140,21 @@ def close_plane(
     return None if closed is None else (slave, closed)
 
 
-def _whole_integrals(slaves: list[Facets], shape: tuple[int, int]) -> sparse.csr_matrix:
-    """∫ N_a dS (m, n_nodes) over whole macro-elements."""
-    rows = [np.repeat(b.number, b.type.n_nodes) for b in slaves]
-    columns = [b.nodes.ravel() for b in slaves]
-    values = [shape_integrals(b).ravel() for b in slaves]
+def _whole_integrals(
+    slaves: list[Facets], space: Multipliers, shape: tuple[int, int]
+) -> sparse.csr_matrix:
+    """∫ φ N_a dS (k, n_nodes) over whole slave faces, flat ones."""
+    rows, columns, values = [], [], []
+    for a, block in enumerate(slaves):
+        places, weights = gauss_rule(block.type.name, _WHOLE_POINTS)
+        shapes, slopes = shape_functions(block.type.name).both(places)
+        measure = np.einsum("fqd,fd,q->fq", surface_vectors(block, slopes), block.normal, weights)
+        everywhere = np.broadcast_to(shapes, (len(measure), *shapes.shape))
+        functions = space.at(a, np.arange(len(measure)), everywhere)
+        part = np.einsum("fq,fqk,qa->fka", measure, functions, shapes, optimize=True)
+        rows.append(np.broadcast_to(space.number[a][:, :, None], part.shape).ravel())
+        columns.append(np.broadcast_to(block.nodes[:, None], part.shape).ravel())
+        values.append(part.ravel())
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     return sparse.coo_matrix(entries, shape=shape).tocsr()
 
@@ -187,10 +200,3 @@ def shape_integrals(block: Facets) -> np.ndarray:
     values, slopes = shape_functions(block.type.name).both(reference)
     vectors = surface_vectors(block, slopes)
     return np.einsum("q,qa,fqd,fd->fa", weights, values, vectors, block.normal, optimize=True)
-
-
-def surface_vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
-    """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`."""
-    n, n_nodes, dim = block.corner.shape
-    nodes = np.arange(n * n_nodes).reshape(n, n_nodes)
-    return area_vectors(block.corner.reshape(-1, dim), nodes, slopes)

@@ -102,6 +102,13 @@ def shift(face: Facets, chosen: np.ndarray, origin: np.ndarray) -> np.ndarray:
     return face.corner[chosen] - origin[:, None]
 
 
+def surface_vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
+    """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`."""
+    n, n_nodes, dim = block.corner.shape
+    nodes = np.arange(n * n_nodes).reshape(n, n_nodes)
+    return area_vectors(block.corner.reshape(-1, dim), nodes, slopes)
+
+
 def locate(
     kind: CellType,
     corner: np.ndarray,

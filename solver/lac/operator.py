@@ -1,37 +1,99 @@
-"""The gap operator of a zone: average gap of each macro-element as a linear map of displacement.
+"""The gap operator of a zone: the average gap that each multiplier sees, linear in displacement.
 
 With ḡ = (initial + matrix · u) / covered area, the contact forces of pressures p are matrixᵀ · p.
 Source: Abbas, Drouet, Hild, CMAME 339 (2018) 488–513, §2–4.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
-from solver.elements import face_rule, shape_functions
-from solver.lac.closure import Integrals, close_faces, close_plane, surface_vectors
+from solver.elements import mortar_degree
+from solver.lac.closure import Integrals, close_faces, close_plane
 from solver.lac.facets import Facets
+from solver.lac.multipliers import Found, Meeting, Multipliers, Space, constants
+from solver.lac.samples import Samples, face_samples
 from solver.lac.segments import Segments, intersect
+
+# Slave-side entries of dual multipliers below this share of their row's largest are round-off.
+_ROUND_OFF = 1e-13
+
+Meet = Callable[[list[Facets], list[Samples], list[Facets], float], list[tuple[int, int, Segments]]]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The m macro-elements of a slave surface.
+
+    `area`, `covered` (m,): whole and intersected area; `centre`, `normal` (m, dim).
+    """
+
+    area: np.ndarray
+    covered: np.ndarray
+    centre: np.ndarray
+    normal: np.ndarray
 
 
 @dataclass(frozen=True)
 class GapOperator:
-    """Gap integrals of m macro-elements.
+    """Gap integrals seen by k multipliers φ; LAC has one on each macro-element, φ = 1.
 
-    `matrix` (m, n_dofs): derivative of ∫ gap; `initial` (m,): ∫ gap of the undeformed bodies;
-    `area`, `covered` (m,): whole and intersected area; `centre`, `normal` (m, dim); `segments`:
-    how many there are; `closed_faces`: on how many faces the closure of integrals was used.
+    `matrix` (k, n_dofs): derivative of ∫ φ gap; `initial` (k,): ∫ φ gap of the undeformed bodies;
+    `area`, `covered` (k,): ∫ φ over the whole and the intersected surface; `mean` (m, k): values
+    by multiplier averaged over the macro-elements of `surface`; `nodes` (k,): the nodes that
+    multipliers belong to, None for macro-elements; `segments`: how many there are; `closed_faces`:
+    on how many faces the closure of integrals was used.
     """
 
     matrix: sparse.csr_matrix
     initial: np.ndarray
     area: np.ndarray
     covered: np.ndarray
-    centre: np.ndarray
-    normal: np.ndarray
+    mean: sparse.csr_matrix
+    nodes: np.ndarray | None
+    surface: Surface
     segments: int
     closed_faces: int
+
+
+def meet_in_segments(
+    slaves: list[Facets],
+    _: list[Samples],
+    masters: list[Facets],
+    reach: float,
+    weighted: bool = False,
+) -> list[tuple[int, int, Segments]]:
+    """Segments between all pairs of blocks: (slave block, master block, segments).
+
+    `weighted`: with quadrature for integrands weighted by linear shape functions of the slave.
+    """
+    return [
+        (a, b, segments)
+        for a, slave in enumerate(slaves)
+        for b, master in enumerate(masters)
+        for segments in intersect(
+            slave, master, reach, mortar_degree(slave.type.skeleton) if weighted else 0
+        )
+    ]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """How the gap is integrated: which points, which multipliers, and whether closure is due.
+
+    `sample` gives points that measure whole slave faces, `meet` those where the surfaces meet,
+    `space` the multipliers.
+    """
+
+    sample: Callable[[list[Facets]], list[Samples]] = face_samples
+    meet: Meet = meet_in_segments
+    space: Space = constants
+    closure: bool = True
+
+
+LAC = Scheme()
 
 
 def gap_operator(
@@ -40,101 +102,75 @@ def gap_operator(
     n_macro: int,
     n_nodes: int,
     search: float,
-    closure: bool = True,
+    scheme: Scheme = LAC,
 ) -> GapOperator:
     """Gap operator of slave sub-faces (numbered by macro-element) over master faces.
 
     `search` is the largest distance (a length) at which surfaces are looked for. They are first
     looked for nearby, and farther away only for sub-faces that found no partner there.
     """
-    found = _search(slaves, masters, search)
-    parts = [_integrals(s) for _, _, s in found]
-    closed = close_faces(slaves, masters, found, parts) if closure else 0
-    dim = slaves[0].centre.shape[1]
-    rows, columns, values = [], [], []
-    initial, covered = np.zeros(n_macro), np.zeros(n_macro)
-    for (a, b, segments), part in zip(found, parts, strict=True):
-        macro = slaves[a].number[segments.slave]
-        initial += np.bincount(macro, part.gap, minlength=n_macro)
-        covered += np.bincount(macro, part.area, minlength=n_macro)
-        for side, chosen, vectors, sign in (
-            (slaves[a], segments.slave, part.slave, -1.0),
-            (masters[b], segments.master, part.master, 1.0),
-        ):
-            dofs = dim * side.nodes[chosen][:, :, None] + np.arange(dim)
-            rows.append(np.broadcast_to(macro[:, None, None], dofs.shape).ravel())
-            columns.append(dofs.ravel())
-            values.append(sign * vectors.ravel())
-    entries = (_joined(values), (_joined(rows).astype(int), _joined(columns).astype(int)))
-    matrix = sparse.coo_matrix(entries, shape=(n_macro, dim * n_nodes)).tocsr()
-    area, centre, normal = _macro_geometry(slaves, n_macro)
-    if closure and found:
-        plane = _plane_closure(slaves, masters, found, parts, (n_macro, n_nodes))
+    samples = scheme.sample(slaves)
+    found = _search(slaves, samples, masters, search, scheme.meet)
+    space = scheme.space(Meeting(slaves, samples, found, n_macro))
+    parts = [_integrals(space, a, segments) for a, _, segments in found]
+    closed = close_faces(slaves, masters, found, parts) if scheme.closure else 0
+    slave = _assembled(space, slaves, found, [p.slave for p in parts], n_nodes, "slave")
+    master = _assembled(space, masters, found, [p.master for p in parts], n_nodes, "master")
+    matrix = (master - (_diagonal(slave) if space.dual else slave)).tocsr()
+    initial, covered = np.zeros(space.count), np.zeros(space.count)
+    for (a, _, segments), part in zip(found, parts, strict=True):
+        number = space.number[a][segments.slave]
+        np.add.at(initial, number, part.gap)
+        np.add.at(covered, number, part.weight)
+    averages = space.averages(samples, [block.number for block in slaves], n_macro)
+    surface = _surface(slaves, samples, found, n_macro)
+    if scheme.closure and found:
+        plane = _plane_closure(slaves, masters, space, found, parts, n_nodes)
         if plane is not None:
             matrix = sparse.kron(plane, slaves[0].normal[:1]).tocsr()
-            initial, covered = initial * (area / covered), area
+            initial, covered = initial * (averages.area / covered), averages.area
+            surface = replace(surface, covered=surface.area)
             closed = sum(len(block.number) for block in [*slaves, *masters])
     count = sum(len(s.slave) for _, _, s in found)
-    return GapOperator(matrix, initial, area, covered, centre, normal, count, closed)
-
-
-def _plane_closure(
-    slaves: list[Facets],
-    masters: list[Facets],
-    found: list[tuple[int, int, Segments]],
-    parts: list[Integrals],
-    shape: tuple[int, int],
-) -> sparse.csr_matrix | None:
-    """∫ (N_b − N_a) dS (m, n_nodes), closed over whole plane surfaces, where that is needed."""
-    rows, columns, values = [], [], []
-    for (a, b, segments), part in zip(found, parts, strict=True):
-        nodes = masters[b].nodes[segments.master]
-        rows.append(np.broadcast_to(slaves[a].number[segments.slave][:, None], nodes.shape).ravel())
-        columns.append(nodes.ravel())
-        values.append(np.einsum("sad,sd->sa", part.master, part.normal).ravel())
-    entries = (_joined(values), (_joined(rows), _joined(columns)))
-    covering = sparse.coo_matrix(entries, shape=shape).tocsr()
-    closed = close_plane(slaves, masters, covering, shape[1])
-    return None if closed is None else closed[1] - closed[0]
-
-
-def _joined(parts: list[np.ndarray]) -> np.ndarray:
-    return np.concatenate(parts) if parts else np.empty(0)
+    return GapOperator(
+        matrix,
+        initial,
+        averages.area,
+        covered,
+        averages.mean,
+        space.nodes,
+        surface,
+        count,
+        closed,
+    )
 
 
 def _search(
-    slaves: list[Facets], masters: list[Facets], search: float
+    slaves: list[Facets],
+    samples: list[Samples],
+    masters: list[Facets],
+    search: float,
+    meet: Meet,
 ) -> list[tuple[int, int, Segments]]:
     """Segments of all pairs of blocks, nearby first, then within the whole search distance."""
     nearby = max(f.radius.max() for f in [*slaves, *masters])
     reach = min(nearby, search)
-    found = _segments(slaves, masters, reach)
+    found = meet(slaves, samples, masters, reach)
     if reach == search:
         return found
-    for a, block in enumerate(slaves):
+    for a, (block, sample) in enumerate(zip(slaves, samples, strict=True)):
         covered = np.zeros(len(block.number))
         for segments in [f[2] for f in found if f[0] == a]:
             covered += np.bincount(
                 segments.slave, segments.weight.sum(axis=1), minlength=len(covered)
             )
-        lonely = np.flatnonzero(covered < (1 - 1e-6) * _areas(block))
+        lonely = np.flatnonzero(covered < (1 - 1e-6) * sample.weight.sum(axis=1))
         if len(lonely):
             found = [(i, b, _without(s, lonely) if i == a else s) for i, b, s in found]
             subset = _subset(block, lonely)
-            for _, b, segments in _segments([subset], masters, search):
+            for _, b, segments in meet([subset], [sample.of(lonely)], masters, search):
                 found.append((a, b, _renumbered(segments, lonely)))
     return found
-
-
-def _segments(
-    slaves: list[Facets], masters: list[Facets], reach: float
-) -> list[tuple[int, int, Segments]]:
-    return [
-        (a, b, segments)
-        for a, slave in enumerate(slaves)
-        for b, master in enumerate(masters)
-        for segments in intersect(slave, master, reach)
-    ]
 
 
 def _subset(face: Facets, chosen: np.ndarray) -> Facets:
@@ -151,36 +187,93 @@ def _renumbered(segments: Segments, slaves: np.ndarray) -> Segments:
     return Segments(**{**vars(segments), "slave": slaves[segments.slave]})
 
 
-def _integrals(segments: Segments) -> Integrals:
-    measure = segments.weight[..., None] * segments.normal
+def _integrals(space: Multipliers, block: int, segments: Segments) -> Integrals:
+    functions = space.at(block, segments.slave, segments.slave_values)
+    weights = segments.weight[..., None] * functions
+    measure = weights[..., None] * segments.normal[:, :, None]
     return Integrals(
-        np.einsum("sqa,sqd->sad", segments.slave_values, measure),
-        np.einsum("sqa,sqd->sad", segments.master_values, measure),
-        (segments.weight * segments.gap).sum(axis=1),
+        np.einsum("sqa,sqkd->skad", segments.slave_values, measure),
+        np.einsum("sqa,sqkd->skad", segments.master_values, measure),
+        np.einsum("sqk,sq->sk", weights, segments.gap),
+        weights.sum(axis=1),
         segments.weight.sum(axis=1),
         segments.normal[:, 0],
     )
 
 
-def _areas(block: Facets) -> np.ndarray:
-    reference, weights = face_rule(block.type.name)
-    vectors = surface_vectors(block, shape_functions(block.type.name).gradients(reference))
-    return np.linalg.norm(vectors, axis=2) @ weights
+def _assembled(
+    space: Multipliers,
+    blocks: list[Facets],
+    found: Found,
+    vectors: list[np.ndarray],
+    n_nodes: int,
+    side: str,
+) -> sparse.csr_matrix:
+    """∫ φ N n of one side (k, n_dofs) from those of the segments (s, k, n_nodes, dim)."""
+    dim = blocks[0].centre.shape[1]
+    rows, columns, values = [], [], []
+    for (a, b, segments), part in zip(found, vectors, strict=True):
+        nodes = blocks[a if side == "slave" else b].nodes[getattr(segments, side)]
+        dofs = dim * nodes[:, None, :, None] + np.arange(dim)
+        rows.append(_spread(space.number[a][segments.slave][:, :, None, None], part))
+        columns.append(_spread(dofs, part))
+        values.append(part.ravel())
+    entries = (_joined(values), (_joined(rows).astype(int), _joined(columns).astype(int)))
+    return sparse.coo_matrix(entries, shape=(space.count, dim * n_nodes)).tocsr()
 
 
-def _macro_geometry(
-    slaves: list[Facets], n_macro: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Area (m,), centroid (m, dim) and mean unit normal (m, dim) of each macro-element."""
+def _spread(numbers: np.ndarray, part: np.ndarray) -> np.ndarray:
+    return np.broadcast_to(numbers, part.shape).ravel()
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _diagonal(slave: sparse.csr_matrix) -> sparse.csr_matrix:
+    """Without the round-off that dual multipliers leave at other nodes than their own."""
+    largest = abs(slave).max(axis=1).toarray().ravel()
+    limit = np.repeat(_ROUND_OFF * largest, np.diff(slave.indptr))
+    slave.data[np.abs(slave.data) <= limit] = 0.0
+    slave.eliminate_zeros()
+    return slave
+
+
+def _plane_closure(
+    slaves: list[Facets],
+    masters: list[Facets],
+    space: Multipliers,
+    found: Found,
+    parts: list[Integrals],
+    n_nodes: int,
+) -> sparse.csr_matrix | None:
+    """∫ φ (N_b − N_a) dS (k, n_nodes), closed over whole plane surfaces, where that is needed."""
+    rows, columns, values = [], [], []
+    for (a, b, segments), part in zip(found, parts, strict=True):
+        normal = np.einsum("skad,sd->ska", part.master, part.normal)
+        nodes = masters[b].nodes[segments.master][:, None]
+        rows.append(_spread(space.number[a][segments.slave][:, :, None], normal))
+        columns.append(_spread(nodes, normal))
+        values.append(normal.ravel())
+    entries = (_joined(values), (_joined(rows), _joined(columns)))
+    covering = sparse.coo_matrix(entries, shape=(space.count, n_nodes)).tocsr()
+    closed = close_plane(slaves, masters, space, covering)
+    return None if closed is None else closed[1] - closed[0]
+
+
+def _surface(slaves: list[Facets], samples: list[Samples], found: Found, n_macro: int) -> Surface:
     dim = slaves[0].centre.shape[1]
-    area, centre, normal = np.zeros(n_macro), np.zeros((n_macro, dim)), np.zeros((n_macro, dim))
-    for block in slaves:
-        reference, weights = face_rule(block.type.name)
-        values, slopes = shape_functions(block.type.name).both(reference)
-        vectors = surface_vectors(block, slopes) * weights[:, None]
-        measure = np.linalg.norm(vectors, axis=2)
-        area += np.bincount(block.number, measure.sum(axis=1), minlength=n_macro)
-        place = np.einsum("fq,qa,fad->fd", measure, values, block.corner, optimize=True)
+    area, covered = np.zeros(n_macro), np.zeros(n_macro)
+    centre, normal = np.zeros((n_macro, dim)), np.zeros((n_macro, dim))
+    for block, sample in zip(slaves, samples, strict=True):
+        area += np.bincount(block.number, sample.weight.sum(axis=1), minlength=n_macro)
+        place = np.einsum(
+            "fq,qa,fad->fd", sample.weight, sample.values, block.corner, optimize=True
+        )
         np.add.at(centre, block.number, place)
-        np.add.at(normal, block.number, vectors.sum(axis=1))
-    return area, centre / area[:, None], normal / np.linalg.norm(normal, axis=1)[:, None]
+        np.add.at(normal, block.number, np.einsum("fq,fqd->fd", sample.weight, sample.normal))
+    for a, _, segments in found:
+        macro = slaves[a].number[segments.slave]
+        covered += np.bincount(macro, segments.weight.sum(axis=1), minlength=n_macro)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    return Surface(area, covered, centre / area[:, None], normal)

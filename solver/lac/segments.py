@@ -47,32 +47,42 @@ class Segments:
     gap: np.ndarray
 
 
-def intersect(slave: Facets, master: Facets, reach: float) -> list[Segments]:
-    """All segments between two blocks of faces, looked for within `reach` (a length)."""
-    i, j = candidate_pairs(slave.centre, slave.radius, master.centre, master.radius, reach)
-    facing = np.einsum("pd,pd->p", slave.normal[i], master.normal[j]) < -_FACING
-    i, j = i[facing], j[facing]
+def intersect(slave: Facets, master: Facets, reach: float, more: int = 0) -> list[Segments]:
+    """All segments between two blocks of faces, looked for within `reach` (a length).
+
+    Their quadrature is exact for shape functions of affine faces times polynomials of degree
+    `more`.
+    """
+    i, j = facing_pairs(slave, master, reach)
     straight = slave.straight[i]
     parts = []
     for chosen, chart in ((straight, _in_plane), (~straight, _in_reference)):
         if chosen.any():
-            parts.append(chart(slave, master, i[chosen], j[chosen], reach))
+            parts.append(chart(slave, master, (i[chosen], j[chosen]), reach, more))
     return [part for part in parts if len(part.slave)]
 
 
+def facing_pairs(slave: Facets, master: Facets, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (slave number, master number) of faces within `reach` that look at each other."""
+    i, j = candidate_pairs(slave.centre, slave.radius, master.centre, master.radius, reach)
+    facing = np.einsum("pd,pd->p", slave.normal[i], master.normal[j]) < -_FACING
+    return i[facing], j[facing]
+
+
 def _in_plane(
-    slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray, reach: float
+    slave: Facets, master: Facets, pair: tuple[np.ndarray, np.ndarray], reach: float, more: int
 ) -> Segments:
     """Segments of straight slave faces, cut in the plane of the slave face."""
+    i, j = pair
     tangents = slave.tangents[i]
     outline = _outline(slave.type, bent=False)
     window = _plane(shift(slave, i, slave.centre[i])[:, outline], tangents)
     outline = _outline(master.type, bent=not master.straight[j].all())
     subject = _plane(shift(master, j, slave.centre[i])[:, outline[::-1]], tangents)
-    degree = _degree(slave, master, i, j)
+    degree = _degree(slave, master, i, j) + more
     count = np.full(len(i), subject.shape[1])
-    pair, places, weight = _cut_pieces(window, subject, count, degree)
-    i, j = i[pair], j[pair]
+    which, places, weight = _cut_pieces(window, subject, count, degree)
+    i, j = i[which], j[which]
     points = np.einsum("sqt,std->sqd", places, slave.tangents[i])
     normal = np.broadcast_to(slave.normal[i][:, None], points.shape)
     place, height = locate(slave.type, shift(slave, i, slave.centre[i]), points, normal)
@@ -81,9 +91,10 @@ def _in_plane(
 
 
 def _in_reference(
-    slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray, reach: float
+    slave: Facets, master: Facets, pair: tuple[np.ndarray, np.ndarray], reach: float, more: int
 ) -> Segments:
     """Segments of bent slave faces, cut in the reference face of the slave."""
+    i, j = pair
     kind = slave.type
     corner = shift(slave, i, slave.centre[i])
     outline = _outline(master.type, bent=True)
@@ -98,8 +109,9 @@ def _in_reference(
     subject, _ = locate(kind, corner, rim, direction, outline=True)
     window = kind.nodes[_outline(kind, bent=False)]
     window = np.broadcast_to(window, (len(i), *window.shape))
-    pair, place, weight = _cut_pieces(window, subject, count, _degree(slave, master, i, j))
-    i, j = i[pair], j[pair]
+    degree = _degree(slave, master, i, j) + more
+    which, place, weight = _cut_pieces(window, subject, count, degree)
+    i, j = i[which], j[which]
     values, slopes = shape_functions(kind.name).both(place)
     corner = shift(slave, i, slave.centre[i])
     points = np.einsum("sqa,sad->sqd", values, corner)

@@ -75,19 +75,28 @@ class Condensed:
 
 @dataclass(frozen=True)
 class Saddle:
-    """The system with the multipliers as unknowns, for constraints without a pivot of their own."""
+    """The system with the multipliers as unknowns, for constraints without a pivot of their own.
+
+    `scaled` are the constraints with rows of unit size; the matrix is K + `weight` Ĝᵀ Ĝ, which
+    changes no solution and is positive definite: K alone is singular where contact holds a body.
+    """
 
     constraints: sparse.csr_matrix
+    scaled: sparse.csr_matrix
+    size: np.ndarray
+    weight: float
     factor: Factor
 
     def correction(self, force: np.ndarray, violation: np.ndarray) -> np.ndarray:
         """Solved for x and p together."""
-        return self.factor.solve(np.concatenate([force, -violation]))[: len(force)]
+        wanted = violation / self.size
+        pulled = force + self.weight * (self.scaled.T @ wanted)
+        return self.factor.solve(np.concatenate([pulled, -wanted]))[: len(force)]
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """The multipliers of the same system with nothing violated."""
         right = np.concatenate([force, np.zeros(self.constraints.shape[0])])
-        return self.factor.solve(right)[len(force) :]
+        return self.factor.solve(right)[len(force) :] / self.size
 
     def imbalance(self, force: np.ndarray) -> float:
         """The largest force left with the multipliers acting."""
@@ -97,8 +106,12 @@ class Saddle:
 
 def saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> Saddle:
     """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular."""
-    rows = [[matrix, -constraints.T], [-constraints, None]]
-    return Saddle(constraints, factorise_indefinite(sparse.bmat(rows, format="csr")))
+    size = np.sqrt(np.asarray(constraints.multiply(constraints).sum(axis=1)).ravel())
+    scaled = (sparse.diags(1 / size) @ constraints).tocsr()
+    weight = float(matrix.diagonal().max(initial=0.0))
+    rows = [[matrix + weight * (scaled.T @ scaled), -scaled.T], [-scaled, None]]
+    factor = factorise_indefinite(sparse.bmat(rows, format="csr"))
+    return Saddle(constraints, scaled, size, weight, factor)
 
 
 def choose_pivots(

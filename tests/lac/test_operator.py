@@ -1,30 +1,15 @@
 """Gap operators of small patches, derived by hand, and what every gap operator must keep."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from solver.elements import shape_functions
 from solver.lac.closure import shape_integrals
 from solver.lac.facets import facets
-from solver.lac.operator import gap_operator
+from solver.lac.operator import LAC, gap_operator
 from solver.lac.pairing import candidate_pairs
-from solver.mesh.catalogue import BY_NAME
-
-
-def segment_pair(slave_x, master_x, height=0.0):
-    """Slave edges on y = 0 facing up over master edges on y = `height` facing down."""
-    slave = np.array([[x, 0.0] for x in slave_x])
-    master = np.array([[x, height] for x in master_x])
-    points = np.vstack([slave, master])
-    # Outward normals: up for edges walked to the left, down for edges walked to the right.
-    down = len(slave) + np.array([[i, i + 1] for i in range(len(master) - 1)])
-    up = np.array([[i + 1, i] for i in range(len(slave) - 1)])
-    kind = BY_NAME["SEG2"]
-    return (
-        points,
-        facets(points, kind, up, np.arange(len(up))),
-        facets(points, kind, down, np.arange(len(down))),
-    )
+from tests.patches import segment_pair, square_pair
 
 
 def vertical(operator, n_points):
@@ -39,7 +24,7 @@ def test_one_slave_edge_over_two_master_edges_by_hand():
     assert np.abs(operator.matrix.toarray().reshape(5, 2)[:, 0]).max() < 1e-15
     assert operator.area == pytest.approx([3.0])
     assert operator.covered == pytest.approx([3.0])
-    assert operator.normal[0] == pytest.approx([0.0, 1.0])
+    assert operator.surface.normal[0] == pytest.approx([0.0, 1.0])
 
 
 def test_overlapping_edges_by_hand():
@@ -76,31 +61,6 @@ def test_faces_that_look_the_same_way_do_not_meet():
     assert gap_operator([slave], [turned], 1, len(points), 1.0).segments == 0
 
 
-def square_pair(slave_type, master_type, seed=0):
-    """One slave face over four master faces of the unit square, distorted inside the plane."""
-    rng = np.random.default_rng(seed)
-    low, high = BY_NAME[slave_type], BY_NAME[master_type]
-    slave = np.column_stack([low.nodes, np.zeros(low.n_nodes)])
-    corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]])
-    middle = np.array([0.5, 0.5]) + rng.uniform(0.1, 0.2, 2) * rng.choice([-1, 1], 2)
-    corner = np.vstack([corner, middle])
-    quads = [(0, 7, 8, 4), (4, 8, 5, 1), (8, 6, 2, 5), (7, 3, 6, 8)]  # facing down
-    points, faces = [], []
-    for quad in quads:
-        values = shape_functions("QUAD4").values(high.nodes)
-        faces.append(np.arange(high.n_nodes) + sum(map(len, points)))
-        points.append(values @ corner[list(quad)])
-    master = np.column_stack([np.vstack(points), np.zeros(4 * high.n_nodes)])
-    all_points = np.vstack([slave, master])
-    up = np.arange(low.n_nodes)[None]
-    down = np.array(faces) + len(slave)
-    return (
-        all_points,
-        facets(all_points, low, up, np.array([0])),
-        facets(all_points, high, down, np.arange(4)),
-    )
-
-
 @pytest.mark.parametrize("slave_type", ["QUAD4", "QUAD8", "QUAD9"])
 @pytest.mark.parametrize("master_type", ["QUAD4", "QUAD8", "QUAD9"])
 def test_skew_master_faces_get_their_exact_integrals(slave_type, master_type):
@@ -112,7 +72,7 @@ def test_skew_master_faces_get_their_exact_integrals(slave_type, master_type):
     assert entries[master.nodes] == pytest.approx(exact, abs=1e-15)
     assert -entries[slave.nodes] == pytest.approx(shape_integrals(slave), abs=1e-15)
     # and without the closure they are missed by far more than round-off
-    rough = gap_operator([slave], [master], 1, len(points), 1.0, closure=False)
+    rough = gap_operator([slave], [master], 1, len(points), 1.0, replace(LAC, closure=False))
     missed = rough.matrix.toarray().reshape(-1, 3)[:, 2][master.nodes] - exact
     assert np.abs(missed).max() > 1e-12
 
