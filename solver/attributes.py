@@ -1,6 +1,6 @@
 """What a case gives to groups of the mesh, on the cut mesh: materials, supports, loads."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import Protocol
 
@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 
 from solver.bodies import body_numbers
-from solver.case import Case, Exact, Load, Scalar, Support
+from solver.case import Case, Exact, Load, Material, Scalar, Support
 from solver.elasticity import Block, lame_parameters
 from solver.elements import has_straight_edges
 from solver.exact import node_parts
@@ -18,6 +18,7 @@ from solver.groups import ALL
 from solver.lac.cut import CutMesh, SubFaces, needs_cut
 from solver.loads import Field, body_forces, face_forces, stress_forces
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME
+from solver.mixed import MeanStress, in_mixed_form, split
 from solver.solutions import ExactSolution
 from solver.supports import Fixed, FreeMotion, free_motion
 
@@ -138,20 +139,16 @@ class Attributes:
         for number in np.unique(part).tolist():
             yield number, nodes[part == number]
 
-    def blocks(self) -> list[Block]:
-        """Cells with their materials; cells of rigid bodies, which need none, get a unit one."""
-        materials = self.case.materials
-        default = materials.get(ALL)
-        young = {n: np.ones(len(c)) for n, c in self.cut.cells.items()}
-        poisson = {n: np.zeros(len(c)) for n, c in self.cut.cells.items()}
-        if default:
-            for name in self.cut.cells:
-                young[name][:], poisson[name][:] = default.young, default.poisson
-        for group in (g for g in materials if g != ALL):
-            for name, mask in self.cell_mask(group).items():
-                young[name][mask] = materials[group].young
-                poisson[name][mask] = materials[group].poisson
-        return [
+    def elasticity(self, mixed_form: bool = True) -> tuple[list[Block], MeanStress]:
+        """Cells with their materials, and the mean stress of those in mixed form.
+
+        Cells of rigid bodies, which need no material, get a unit one. Without `mixed_form` none is
+        in it, whatever the case says.
+        """
+        young = self._by_material(lambda m: m.young, 1.0)
+        poisson = self._by_material(lambda m: m.poisson, 0.0)
+        mixed = self._by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
+        blocks = [
             Block(
                 BY_NAME[name],
                 cells,
@@ -160,6 +157,28 @@ class Attributes:
             )
             for name, cells in self.cut.cells.items()
         ]
+        meshed, number = {}, 0
+        for name, cells in volume_cells(self.mesh).items():
+            meshed[name] = number + np.arange(len(cells))
+            number += len(cells)
+        return split(
+            self.points,
+            blocks,
+            [(mixed[name] > 0) & mixed_form for name in self.cut.cells],
+            [self.cut.members(name, meshed) for name in self.cut.cells],
+        )
+
+    def _by_material(
+        self, value: Callable[[Material], float], otherwise: float
+    ) -> dict[str, np.ndarray]:
+        """A value of the material of each cell (n,) by type; a group's own goes before `all`."""
+        materials = self.case.materials
+        start = value(materials[ALL]) if ALL in materials else otherwise
+        values = {name: np.full(len(c), float(start)) for name, c in self.cut.cells.items()}
+        for group in (g for g in materials if g != ALL):
+            for name, mask in self.cell_mask(group).items():
+                values[name][mask] = value(materials[group])
+        return values
 
     def supports(self) -> FreeMotion:
         """What supports and rigid bodies leave free."""

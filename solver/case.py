@@ -45,10 +45,14 @@ _QUANTITY = {
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic linear elasticity: Young's modulus (stress) and Poisson's ratio."""
+    """Isotropic linear elasticity: Young's modulus (stress) and Poisson's ratio.
+
+    `form` of its cells is displacement, mixed (see `solver.mixed`), or automatic.
+    """
 
     young: float
     poisson: float
+    form: str = field(default="automatic", compare=False)
 
 
 @dataclass(frozen=True)
@@ -158,7 +162,7 @@ class _Reader:
         self.path = path
         self.content = content
         self.materials = {
-            group: Material(float(m["young"]), float(m["poisson"]))
+            group: Material(float(m["young"]), float(m["poisson"]), m.get("form", "automatic"))
             for group, m in content["materials"].items()
         }
         self.zones = tuple(map(self.zone, content.get("contact", [])))

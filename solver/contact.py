@@ -1,6 +1,7 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -42,11 +43,12 @@ class Equilibrium:
     """A solved load factor: displacement (n, dim), pressure and gap (m,), status, residual.
 
     `straining` (2, n, dim): both parts of the displacement less a rigid motion of each body, from
-    which strains are taken (see `Displacement`).
+    which strains are taken (see `Displacement`). `mean_stress` (k,) is that of cells in mixed form.
     """
 
     displacement: np.ndarray
     straining: np.ndarray
+    mean_stress: np.ndarray
     pressure: np.ndarray
     gap: np.ndarray
     status: StatusResult
@@ -64,25 +66,42 @@ class _Iterate:
     closed: np.ndarray
     force: np.ndarray
     displacement: Displacement
+    mean_stress: np.ndarray
     extended: bool = False
 
+    @property
+    def straining(self) -> np.ndarray:
+        """Both parts (2, n, dim) of the displacement that strains."""
+        return self.displacement.straining.reshape(2, *self.force.shape)
+
+    @cached_property
+    def defect(self) -> np.ndarray:
+        """By how much the mean stress differs from λ div u; see `solver.mixed`."""
+        return self.problem.scene.mean.defect(self.straining, self.mean_stress)
+
     def residual(self) -> np.ndarray:
-        problem, scene = self.problem, self.problem.scene
+        scene = self.problem.scene
         if scene.cures.differences:
-            straining = self.displacement.straining.reshape(2, *self.force.shape)
-            internal = internal_force(scene.points, scene.blocks, straining, self.extended)
-            return scene.free.basis.T @ (self.force - internal).astype(float).ravel()
-        return scene.free.basis.T @ (
-            self.force.ravel() - problem.stiffness @ self.displacement.total
-        )
+            internal = internal_force(scene.points, scene.blocks, self.straining, self.extended)
+        else:
+            product = self.problem.stiffness @ self.displacement.total
+            internal = product.reshape(self.force.shape)
+        internal += scene.mean.force(self.mean_stress)
+        return scene.free.basis.T @ (self.force - internal).astype(float).ravel()
+
+    def condensed(self, force: np.ndarray) -> np.ndarray:
+        scene = self.problem.scene
+        return force + scene.free.basis.T @ scene.mean.condensed_force(self.defect)
 
     def violation(self) -> np.ndarray:
         gaps, initial = self.problem.gaps[self.closed], self.problem.initial[self.closed]
         return -(initial + self.problem.opening(self.displacement, gaps))
 
     def advanced(self, change: np.ndarray) -> "_Iterate":
-        moved = self.displacement.moved(self.problem.scene.free.basis @ change)
-        return replace(self, displacement=moved)
+        scene = self.problem.scene
+        move = scene.free.basis @ change
+        stress = self.mean_stress + scene.mean.change(move, self.defect)
+        return replace(self, displacement=self.displacement.moved(move), mean_stress=stress)
 
 
 @dataclass(frozen=True)
@@ -126,7 +145,7 @@ class ContactProblem:
         self._refuse_unheld()
         self.has_own_unknowns = self._find_own_unknowns()
         self.stiffness = stiffness(scene.points, scene.blocks)
-        self.matrix = scene.free.reduced(self.stiffness)
+        self.matrix = scene.free.reduced(self.stiffness + scene.mean.stiffness())
         self._system: tuple[bytes, Constrained] | None = None
 
     def _acts(self) -> np.ndarray:
@@ -163,13 +182,14 @@ class ContactProblem:
             return found.pressure, self._average_gap(found.iterate.displacement)
 
         load = float(np.abs(force).sum()) or 1.0
-        pressure_scale = load / max(float(self.area.sum()), np.finfo(float).tiny)
+        pressure_scale = load / (float(self.area.sum()) or 1.0)
         status = find_status(attempt, start, self.eligible, pressure_scale, scene.length)
         solved, shape = latest[0], scene.points.shape
         found = solved.iterate.displacement
         return Equilibrium(
             found.total.reshape(shape),
-            found.straining.reshape(2, *shape),
+            solved.iterate.straining,
+            solved.iterate.mean_stress,
             solved.pressure,
             self._average_gap(found),
             status,
@@ -204,7 +224,8 @@ class ContactProblem:
         system = self._constrained(closed)
         offset = factor * self.scene.free.offset
         scale = self._force_scale(force, offset.reshape(self.scene.points.shape))
-        start = _Iterate(self, closed, force, self.at_rest.moved(offset))
+        at_rest = self.at_rest.moved(offset)
+        start = _Iterate(self, closed, force, at_rest, np.zeros(self.scene.mean.size))
         found, cures = self._refined(system, start, scale), self.scene.cures
         if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
             found = self._refined(system, replace(found.iterate, extended=True), scale)
@@ -223,14 +244,15 @@ class ContactProblem:
     ) -> Accuracy:
         """How many digits rounding leaves in the pressure; see `solver.accuracy`."""
         scene, closed, dim = self.scene, iterate.closed, self.scene.points.shape[1]
-        straining = iterate.displacement.straining.reshape(2, *scene.points.shape)
-        terms, stress = cancellation(scene.points, scene.blocks, straining)
+        terms, stress = cancellation(scene.points, scene.blocks, iterate.straining)
+        mean_terms, mean_stress = scene.mean.cancellation(iterate.mean_stress)
         unit = EPSILON_EXTENDED if iterate.extended else EPSILON
+        forces = unit * terms + EPSILON * mean_terms
         scale = float(np.abs(pressure).max(initial=0.0))
         if scale == 0:
-            return Accuracy({"forces": unit * float(terms.max()) / force_scale})
+            return Accuracy({"forces": float(forces.max()) / force_scale})
         gaps = self.gaps[closed]
-        noise = np.repeat(unit * terms, dim) + residual * force_scale
+        noise = np.repeat(forces, dim) + residual * force_scale
         known = scene.rounding * self.covered * (self.initial != 0)
         known = known[closed] + EPSILON * iterate.displacement.opening_size(gaps, dim)
         smallest = float(self.area.min()) ** (1 / (dim - 1))
@@ -238,7 +260,7 @@ class ContactProblem:
             "forces": pressure_of_forces(gaps, noise),
             "gap": pressure_of_gaps(gaps, known, self.stiffness.diagonal()),
             "coordinates": scale * scene.rounding / smallest,
-            "stress": unit * stress,
+            "stress": max(unit * stress, EPSILON * mean_stress),
         }
         return Accuracy({name: error / scale for name, error in causes.items()})
 

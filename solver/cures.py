@@ -15,6 +15,7 @@ class Cures:
         is the product with the assembled stiffness.
     remainder: a displacement is kept as rigid motions plus a remainder in two parts, else as one
         number for each unknown.
+    mixed: nearly incompressible material is solved with displacement and pressure as unknowns.
     extended: where double precision would lose too many digits of the residual, it is summed in
         extended precision.
     """
@@ -25,6 +26,7 @@ class Cures:
     refinement: bool = True
     differences: bool = True
     remainder: bool = True
+    mixed: bool = True
     extended: bool = True
 
     @classmethod

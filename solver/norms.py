@@ -1,6 +1,7 @@
 """Errors of a solve against the exact solution that its case names.
 
-With u, σ, p exact, u_h, σ_h, p_h computed, σ_h by Hooke's law from u_h:
+With u, σ, p exact, u_h, σ_h, p_h computed, σ_h by Hooke's law from u_h (and from the mean stress
+in cells in mixed form):
 
     displacement_l2       ‖u_h − u‖ / ‖u‖                    ‖·‖: root of ∫ over deformable bodies
     displacement_h1       ‖∇u_h − ∇u‖ / ‖∇u‖
@@ -31,6 +32,7 @@ from solver.exact import ExactValues, deformable, surface_points
 from solver.mesh.catalogue import cell_type
 from solver.solution import Solution, ZoneResult
 from solver.solutions import ElasticSolution, ExactSolution
+from solver.solutions.base import lame_of
 from solver.solutions.hertz import Hertz
 
 _CHUNK = 1 << 20
@@ -71,7 +73,9 @@ def _squares(solution: Solution, exact: ElasticSolution) -> Iterator[np.ndarray]
         kind = cell_type(block.type)
         reference, weights = gauss_rule(kind.name, kind.order + 2)
         values = shape_functions(kind.name).values(reference)
-        cells = block.data[moving[block.data].all(axis=1)]
+        deforming = moving[block.data].all(axis=1)
+        cells = block.data[deforming]
+        own = solution.mean_stress.get(kind.name, np.full(block.data.shape, np.nan))[deforming]
         step = max(1, _CHUNK // (len(weights) * kind.n_nodes * kind.dim))
         for start in range(0, len(cells), step):
             chunk = cells[start : start + step]
@@ -82,23 +86,40 @@ def _squares(solution: Solution, exact: ElasticSolution) -> Iterator[np.ndarray]
             slope = np.einsum("cai,cqaj->cqij", nodal - nodal[:, :1], gradient, optimize=True)
             part = np.repeat(parts[chunk[:, 0]], len(weights))
             flat = place.reshape(-1, kind.dim)
-            pairs = _with_exact(exact, flat, part, found.reshape(flat.shape), slope)
+            slope = slope.reshape(len(flat), kind.dim, kind.dim)
+            mean = (own[start : start + step] @ values.T).ravel()
+            stress = _hooke(exact, slope, part, mean)
+            pairs = _with_exact(exact, flat, part, found.reshape(flat.shape), slope, stress)
             weight = (determinant * weights).ravel()
             yield np.array([[_integral(weight, error), _integral(weight, u)] for error, u in pairs])
 
 
+def _hooke(
+    exact: ElasticSolution, slope: np.ndarray, part: np.ndarray, mean: np.ndarray
+) -> np.ndarray:
+    """Stress (n, 6) by Hooke's law; where there is a mean stress (n,), it stands for λ div u."""
+    stress = exact.hooke(slope, part)
+    lame = np.array([lame_of(material)[0] for material in exact.materials])[part]
+    stress[:, :3] += np.nan_to_num(mean - lame * np.einsum("nii->n", slope))[:, None]
+    return stress
+
+
 def _with_exact(
-    exact: ElasticSolution, x: np.ndarray, part: np.ndarray, found: np.ndarray, slope: np.ndarray
+    exact: ElasticSolution,
+    x: np.ndarray,
+    part: np.ndarray,
+    found: np.ndarray,
+    slope: np.ndarray,
+    stress_found: np.ndarray,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Error and exact value (n, …) of displacement, gradient and stress at points."""
-    slope = slope.reshape(len(x), exact.dim, exact.dim)
     u, gradient = exact.displacement(x, part), exact.gradient(x, part)
     whole = np.sqrt(_TWICE)
     stress = exact.hooke(gradient, part) * whole
     return [
         (found - u, u),
         (slope - gradient, gradient),
-        (exact.hooke(slope, part) * whole - stress, stress),
+        (stress_found * whole - stress, stress),
     ]
 
 

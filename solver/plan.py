@@ -6,6 +6,7 @@ import numpy as np
 
 from solver.contact import MIN_COVERAGE, Equilibrium
 from solver.lac.cut import needs_cut
+from solver.mixed import AUTOMATIC_ABOVE
 from solver.scene import Scene
 from solver.treatments import scheme_of
 
@@ -18,6 +19,9 @@ def made_plan(
     `idle` (k,): the multipliers that act on no free unknown.
     """
     plan = []
+    if scene.mean.n_cells:
+        why = f"nearly incompressible (Poisson's ratio above {AUTOMATIC_ABOVE:g}), or as chosen"
+        plan.append((f"mixed form in {scene.mean.n_cells} cells", why))
     for zone in scene.zones:
         name = zone.zone.name
         kinds = sorted({block.type.name for block in zone.slave_faces})

@@ -7,6 +7,7 @@ the checks need again, so that a file can be judged without solving:
     /solve         lengths, sizes, cost and the linear solver of the solve
     /accuracy      what rounding alone may change, relative, by cause
     /errors        norms of the error against the case's exact solution, if it names one
+    /mean_stress   by cell type, that of cells in mixed form at their nodes
     /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
     /provenance    versions, revision, hashes, machine
@@ -79,6 +80,9 @@ def write_result(
         file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
         file.create_group("accuracy").attrs.update(solution.accuracy)
         file.create_group("errors").attrs.update(solution.errors)
+        mean_stress = file.create_group("mean_stress")
+        for kind, values in solution.mean_stress.items():
+            mean_stress[kind] = values
         contact = file.create_group("contact")
         for number, zone in enumerate(solution.zones):
             _write_zone(contact.create_group(zone.name), zone, number)
@@ -133,6 +137,7 @@ def _read_solution(file: h5py.File) -> Solution:
         steps=_read_steps(file),
         plan=_read_pairs(file["plan"], "what", "why"),
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
+        mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
         seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
         **{key: _plain(file["solve"].attrs)[key] for key in _SCALARS},

@@ -19,6 +19,7 @@ from solver.lac.cut import CutMesh, SubFaces, cut
 from solver.lac.facets import Facets, facets
 from solver.lac.operator import GapOperator, gap_operator
 from solver.mesh.catalogue import BY_NAME
+from solver.mixed import MeanStress
 from solver.supports import FreeMotion
 from solver.treatments import TREATMENTS, Treatment, scheme_of
 
@@ -64,8 +65,9 @@ class Scene:
 
     `points` (n, dim) are counted from `origin` (dim,), the mean of the mesh's nodes: far from the
     origin of the coordinates, differences would lose digits. `force` (n, dim) and `free.offset` are
-    for load factor 1. `meshed`: the volume cells before the cut, by type, and `volume_groups` which
-    of them each named group holds. `rounding`: how well the coordinates are known (a length).
+    for load factor 1. `blocks` of cells in mixed form have λ = 0; `mean` makes up for it. `meshed`:
+    the volume cells before the cut, by type, and `volume_groups` which of them each named group
+    holds. `rounding`: how well the coordinates are known (a length).
     """
 
     case: Case
@@ -73,6 +75,7 @@ class Scene:
     origin: np.ndarray
     mesh: CutMesh
     blocks: list[Block]
+    mean: MeanStress
     body: np.ndarray
     free: FreeMotion
     force: np.ndarray
@@ -117,7 +120,7 @@ def build_scene(
             first += len(operator.initial)
     groups = Attributes(case, local, cut_mesh, scenes, origin)
     with clock.stage("assembly"):
-        blocks = groups.blocks()
+        blocks, mean = groups.elasticity(cures.mixed)
         free = groups.supports()
         force = groups.forces()
     body = body_numbers(len(points), cut_mesh.cells)
@@ -127,6 +130,7 @@ def build_scene(
         origin=origin,
         mesh=cut_mesh,
         blocks=blocks,
+        mean=mean,
         body=body,
         free=free,
         force=force,

@@ -81,6 +81,7 @@ def _recover(
 ) -> Solution:
     last = states[-1]
     stress = nodal_stress(scene.points, scene.blocks, last.straining, last.extended)
+    stress += scene.mean.nodal_stress(last.mean_stress, scene.blocks)
     scale = _stress_scale(scene, stress)
     zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
     return Solution(
@@ -104,6 +105,7 @@ def _recover(
         linear_solver=problem.linear_solver,
         plan=made_plan(scene, states, problem.idle),
         accuracy=last.accuracy.causes,
+        mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),
     )
 
 

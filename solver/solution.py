@@ -93,8 +93,10 @@ class Solution:
     names relative imbalances (of forces and moments, relative to the load). `length` is the largest
     extent of the mesh, `load_scale` the largest pressure of the load or else the largest stress.
     `accuracy` are the relative errors that rounding alone may cause, by cause (`solver.accuracy`).
-    `errors` are the norms of `solver.norms` where the case names an exact solution. `seconds` is
-    wall time by stage, `peak_memory_mb` the process's largest resident size.
+    `mean_stress` holds, by cell type, the stress s of cells in mixed form at their nodes (n_cells,
+    n_nodes), NaN in other cells (see `solver.mixed`). `errors` are the norms of `solver.norms`
+    where the case names an exact solution. `seconds` is wall time by stage, `peak_memory_mb` the
+    process's largest resident size.
     """
 
     case: Case
@@ -117,6 +119,7 @@ class Solution:
     linear_solver: str
     plan: list[tuple[str, str]]
     accuracy: dict[str, float] = field(default_factory=dict)
+    mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")

@@ -26,9 +26,10 @@ mesh:
 
 # plane: strain                          # for plane meshes, and only there
 
-# By group of volume cells, or `all`.
+# By group of volume cells, or `all`. `form` of the unknowns: displacement, or mixed (displacement
+# and pressure) for nearly incompressible material; automatic takes the latter above 0.499.
 materials:
-  all: {{young: 2000.0, poisson: 0.3}}
+  all: {{young: 2000.0, poisson: 0.3, form: automatic}}
 
 # Directions x, y, z, or `normal` (a plane of symmetry that lies any way); with a colon, a value.
 supports:

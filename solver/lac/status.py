@@ -80,6 +80,8 @@ def likely_closed(
     order of their gaps up to that approach, from where bodies that are apart first touch. A first
     guess that is too small grows in one iteration; one that is too large shrinks step by step.
     """
+    if not eligible.any():
+        return eligible
     order = np.argsort(np.where(eligible, gap, np.inf), kind="stable")
     touching = np.cumsum(area[order])
     approach = push / touching ** ((dim - 2) / (dim - 1))

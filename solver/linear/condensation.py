@@ -186,6 +186,12 @@ class Iterate(Protocol):
     def residual(self) -> np.ndarray:
         """The forces f − K x (n,)."""
 
+    def condensed(self, force: np.ndarray) -> np.ndarray:
+        """The forces (n,) that a correction has to balance, for residual forces (n,).
+
+        They differ where other unknowns, with residuals of their own, were eliminated from K.
+        """
+
     def violation(self) -> np.ndarray:
         """The gaps b − G x (m,)."""
 
@@ -204,7 +210,8 @@ def solve(
     """
     force, last = iterate.residual(), np.inf
     for _ in range(_MAX_REFINEMENTS if refine else 1):
-        following = iterate.advanced(system.correction(force, iterate.violation()))
+        correction = system.correction(iterate.condensed(force), iterate.violation())
+        following = iterate.advanced(correction)
         following_force = following.residual()
         size = system.imbalance(following_force) / scale
         if not np.isfinite(size):

@@ -141,9 +141,8 @@ class _Reader:
         if given == _RIGID:
             return Material(inf, 0.0)
         if isinstance(given, Mapping) and given.keys() == {"young", "poisson"}:
-            material = Material(
-                *(self.number(f"{name}.{k}", given[k]) for k in ("young", "poisson"))
-            )
+            young, poisson = (self.number(f"{name}.{k}", given[k]) for k in ("young", "poisson"))
+            material = Material(young, poisson)
             if material.young > 0 and -1 < material.poisson < 0.5:
                 return material
         elif given is None and (name in groups or _ALL in groups):
