@@ -76,7 +76,8 @@ class Load:
 class Zone:
     """One contact zone: its slave and master face groups, and how the interface is treated.
 
-    `points` each way on a slave face, for the treatment `quadrature`.
+    `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
+    gap; None: what lies between the faces as meshed.
     """
 
     slave: str
@@ -87,6 +88,7 @@ class Zone:
     normal: str = "element"
     interference: float = 0.0
     points: int | None = None
+    clearance: Scalar | None = None
 
 
 @dataclass(frozen=True)
@@ -165,7 +167,7 @@ class _Reader:
             group: Material(float(m["young"]), float(m["poisson"]), m.get("form", "automatic"))
             for group, m in content["materials"].items()
         }
-        self.zones = tuple(map(self.zone, content.get("contact", [])))
+        self.zones = tuple(map(self.zone, range(len(content.get("contact", [])))))
         self.solution = self.exact_solution()
 
     def case(self, source: str) -> Case:
@@ -223,9 +225,12 @@ class _Reader:
         fix = {axis: self.value_or_exact(*keys, axis) for axis in item["fix"]}
         return Support(item["group"], fix)
 
-    def zone(self, item: dict[str, Any]) -> Zone:
+    def zone(self, index: int) -> Zone:
+        item = dict(self.content["contact"][index])
         if "interference" in item:
-            item = item | {"interference": float(item["interference"])}
+            item["interference"] = float(item["interference"])
+        if "clearance" in item:
+            item["clearance"] = self.value("contact", index, "clearance")
         return Zone(**item)
 
     def load(self, index: int) -> Load:
@@ -319,6 +324,9 @@ def _check_names(case: Case) -> None:
         if zone.points and zone.treatment != "quadrature":
             allowed = "only the treatment quadrature has points"
             raise InputError(case.path, f"contact[{i}].points", zone.points, allowed)
+        if zone.normal == "nodal" and zone.treatment in ("quadrature", "node_to_segment"):
+            allowed = f"the treatment {zone.treatment} has normals of its own; allowed: element"
+            raise InputError(case.path, f"contact[{i}].normal", zone.normal, allowed)
         names.add(zone.name)
     for i, item in enumerate(case.observe):
         if item.zone not in names:
@@ -393,6 +401,7 @@ def _expressions(case: Case) -> Iterable[Expression]:
     values: list[Any] = [support.fix for support in case.supports]
     values += [load.value for load in case.loads]
     values += case.reference.values()
+    values += [zone.clearance for zone in case.zones]
     while values:
         value = values.pop()
         if isinstance(value, Expression):

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from solver.elements import shape_functions
-from solver.elements.gauss import gauss_rule
-from solver.faces import area_vectors, nodal_normals
-from solver.mesh.catalogue import cell_type
+from solver.faces import nodal_normals, surface_points
 from solver.solution import Solution, ZoneResult
 from solver.solutions import ExactSolution
 from solver.stress import normal_stress
-
-# Points each way on a face: enough for pressures that end with a vertical tangent.
-_FACE_POINTS = 8
 
 
 def node_parts(exact: ExactSolution, points: np.ndarray, body: np.ndarray) -> np.ndarray:
@@ -37,36 +30,6 @@ def deformable(solution: Solution) -> np.ndarray:
         ):
             nodes[block.data[np.asarray(members, dtype=int)].ravel()] = False
     return nodes
-
-
-@dataclass(frozen=True)
-class SurfacePoints:
-    """Quadrature points on faces: `place` (k, dim), `weight` (k,), `macro` (k,) of the face."""
-
-    place: np.ndarray
-    weight: np.ndarray
-    macro: np.ndarray
-
-    def means(self, values: np.ndarray) -> np.ndarray:
-        """The mean of values (k,) over each macro-element."""
-        return np.bincount(self.macro, self.weight * values) / np.bincount(self.macro, self.weight)
-
-
-def surface_points(
-    points: np.ndarray, faces: Sequence[tuple[str, np.ndarray, np.ndarray]]
-) -> SurfacePoints:
-    """Points all over a slave surface: (type, nodes, macro-element) by block."""
-    place, weight, macro = [], [], []
-    for name, nodes, owner in faces:
-        kind = cell_type(name)
-        reference, weights = gauss_rule(kind.name, _FACE_POINTS)
-        values, slopes = shape_functions(kind.name).both(reference)
-        measure = np.linalg.norm(area_vectors(points, nodes, slopes), axis=2) * weights
-        where = np.einsum("qa,fad->fqd", values, points[nodes], optimize=True)
-        place.append(where.reshape(-1, points.shape[1]))
-        weight.append(measure.ravel())
-        macro.append(np.repeat(owner, len(weights)))
-    return SurfacePoints(np.concatenate(place), np.concatenate(weight), np.concatenate(macro))
 
 
 class ExactValues:

@@ -1,13 +1,18 @@
 """Faces of a group on the boundary of the bodies: owner cell, outward orientation, geometry."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import meshio
 import numpy as np
 
 from solver.elements import face_rule, shape_functions
+from solver.elements.gauss import gauss_rule
 from solver.errors import InputError
 from solver.mesh.catalogue import BY_MESHIO, CellType, cell_type
+
+# Points each way on a face: enough for pressures that end with a vertical tangent.
+_FACE_POINTS = 8
 
 
 @dataclass(frozen=True)
@@ -180,17 +185,47 @@ def face_integrals(
 def nodal_normals(points: np.ndarray, faces: list[tuple[str, np.ndarray]]) -> np.ndarray:
     """Unit normals (n_points, dim) of a surface of faces (type, nodes) at its nodes.
 
-    The mean over the faces around a node, weighted by area; zero away from the surface. Components
-    of round-off size are zero, so that a plane along the axes has normals along the axes.
+    The mean of the normals there of the faces around a node, weighted by area; zero away from the
+    surface. Components of round-off size are zero, so that a plane along the axes has normals along
+    the axes.
     """
     total = np.zeros_like(points)
     for name, nodes in faces:
         kind = cell_type(name)
-        slopes = shape_functions(name).gradients(kind.nodes.mean(axis=0)[None])
-        normal = area_vectors(points, nodes, slopes)[:, 0]
-        for column in nodes.T:
-            np.add.at(total, column, normal)
+        np.add.at(
+            total, nodes, area_vectors(points, nodes, shape_functions(name).gradients(kind.nodes))
+        )
     length = np.linalg.norm(total, axis=1, keepdims=True)
     total /= np.where(length > 0, length, 1.0)
     total[np.abs(total) < 16 * np.finfo(float).eps] = 0.0
     return total
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Quadrature points on faces: `place` (k, dim), `weight` (k,), `macro` (k,) of the face."""
+
+    place: np.ndarray
+    weight: np.ndarray
+    macro: np.ndarray
+
+    def means(self, values: np.ndarray) -> np.ndarray:
+        """The mean of values (k,) over each macro-element."""
+        return np.bincount(self.macro, self.weight * values) / np.bincount(self.macro, self.weight)
+
+
+def surface_points(
+    points: np.ndarray, faces: Sequence[tuple[str, np.ndarray, np.ndarray]]
+) -> SurfacePoints:
+    """Points all over a slave surface: (type, nodes, macro-element) by block."""
+    place, weight, macro = [], [], []
+    for name, nodes, owner in faces:
+        kind = cell_type(name)
+        reference, weights = gauss_rule(kind.name, _FACE_POINTS)
+        values, slopes = shape_functions(kind.name).both(reference)
+        measure = np.linalg.norm(area_vectors(points, nodes, slopes), axis=2) * weights
+        where = np.einsum("qa,fad->fqd", values, points[nodes], optimize=True)
+        place.append(where.reshape(-1, points.shape[1]))
+        weight.append(measure.ravel())
+        macro.append(np.repeat(owner, len(weights)))
+    return SurfacePoints(np.concatenate(place), np.concatenate(weight), np.concatenate(macro))

@@ -28,7 +28,8 @@ import numpy as np
 from solver.elasticity import physical_gradients
 from solver.elements import shape_functions
 from solver.elements.gauss import gauss_rule
-from solver.exact import ExactValues, deformable, surface_points
+from solver.exact import ExactValues, deformable
+from solver.faces import surface_points
 from solver.mesh.catalogue import cell_type
 from solver.solution import Solution, ZoneResult
 from solver.solutions import ElasticSolution, ExactSolution

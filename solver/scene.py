@@ -13,10 +13,11 @@ from solver.clock import Clock
 from solver.cures import ALL, Cures
 from solver.elasticity import Block
 from solver.errors import InputError
-from solver.faces import FaceBlock, boundary_faces, volume_cells
+from solver.expressions import evaluate
+from solver.faces import FaceBlock, boundary_faces, surface_points, volume_cells
 from solver.groups import check_groups
 from solver.lac.cut import CutMesh, SubFaces, cut
-from solver.lac.facets import Facets, facets
+from solver.lac.facets import Facets, facets, with_nodal_normals
 from solver.lac.operator import GapOperator, gap_operator
 from solver.mesh.catalogue import BY_NAME
 from solver.mixed import MeanStress
@@ -115,7 +116,10 @@ def build_scene(
     with clock.stage("pairing"):
         for zone, (slave, master), faces in zip(zones, surfaces, sub_faces, strict=True):
             count = sum(len(block.nodes) for block in slave)
-            operator = _operator(points, zone, faces, master, count, rounding, cures)
+            operator = _operator(points, zone, faces, master, count, cures)
+            noise = _GAP_ROUND_OFF * rounding * cures.gap_threshold
+            initial = _initial_gaps(zone, operator, points, faces, origin, noise)
+            operator = replace(operator, initial=initial)
             scenes.append(ZoneScene(zone, first, count, slave, master, faces, operator))
             first += len(operator.initial)
     groups = Attributes(case, local, cut_mesh, scenes, origin)
@@ -222,20 +226,36 @@ def _operator(
     sub_faces: list[SubFaces],
     master_faces: list[FaceBlock],
     count: int,
-    rounding: float,
     cures: Cures,
 ) -> GapOperator:
     slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
+    if zone.normal == "nodal":
+        slaves = with_nodal_normals(slaves, points)
     masters = _master_facets(points, master_faces)
     corners = np.concatenate([f.centre for f in [*slaves, *masters]])
     search = float(np.linalg.norm(np.ptp(corners, axis=0)))
     search += max(f.radius.max() for f in [*slaves, *masters])
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and cures.closure)
-    operator = gap_operator(slaves, masters, count, len(points), search, scheme)
-    noise = _GAP_ROUND_OFF * rounding * operator.covered * cures.gap_threshold
-    initial = np.where(np.abs(operator.initial) <= noise, 0.0, operator.initial)
-    return replace(operator, initial=initial - zone.interference * operator.covered)
+    return gap_operator(slaves, masters, count, len(points), search, scheme)
+
+
+def _initial_gaps(
+    zone: Zone,
+    operator: GapOperator,
+    points: np.ndarray,
+    sub_faces: list[SubFaces],
+    origin: np.ndarray,
+    noise: float,
+) -> np.ndarray:
+    """∫ φ gap (k,) at the start: as meshed, without those below `noise`, or as the case says."""
+    initial = np.where(np.abs(operator.initial) <= noise * operator.covered, 0.0, operator.initial)
+    if zone.clearance is not None:
+        at = surface_points(points, [(f.type.name, f.nodes, f.macro) for f in sub_faces])
+        means = at.means(evaluate(zone.clearance, at.place + origin))
+        whole = operator.mean.T @ (operator.surface.area * means)
+        initial = whole * operator.covered / operator.area
+    return initial - zone.interference * operator.covered
 
 
 def _master_facets(points: np.ndarray, faces: list[FaceBlock]) -> list[Facets]:

@@ -50,7 +50,11 @@ contact:
     hexahedra: pyramids                  # how slave hexahedra are cut: pyramids or hexahedra
     treatment: lac                       # or uncut, nodal, nodal_dual, node_to_segment, quadrature
     # points: 4                          # each way on a slave face, for quadrature alone
+    normal: element                      # gaps are measured along: element (normals of faces),
+                                         # nodal (their means at the nodes)
     interference: 0.0                    # overlap at the start, of bodies modelled apart
+#   clearance: 0.0                       # the gap at the start, a number or an expression, in place
+                                         # of the one between the faces as meshed
 
 directions: first                        # or both: solved again with slave and master exchanged
 steps: [0.5, 1.0]                        # load factors

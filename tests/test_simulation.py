@@ -78,7 +78,8 @@ def test_pulled_apart_the_surfaces_open_and_carry_nothing():
     assert np.abs(solution.stress).max() < 1e-9
 
 
-def test_interference_presses_as_an_imposed_overlap_would():
+@pytest.mark.parametrize("overlap", [", interference: 0.01", ", clearance: -0.01"])
+def test_interference_presses_as_an_imposed_overlap_would(overlap):
     case = replaced(
         [
             (
@@ -87,11 +88,22 @@ def test_interference_presses_as_an_imposed_overlap_would():
             ),
             ("loads:\n  - {group: press, pressure: 25.0}\n", ""),
         ],
-        zone=", interference: 0.01",
+        zone=overlap,
     )
     solution = simulate(case, block_mesh("TRIA6", "QUAD4", (4, 3)))
     pressure = solution.zones[0].multiplier
     assert pressure == pytest.approx(np.full(4, 0.005 * 2000 / (1 - 0.3**2)), rel=1e-12)
+
+
+def test_a_clearance_stands_for_the_gap_as_meshed():
+    """The mean of 0.01 x over each macro-element is its value at the centre."""
+    mesh = block_mesh("QUAD4", "TRIA3", (4, 3))
+    mesh.points[:, 0] += 7.0
+    case = replaced([], zone=", clearance: '0.01 * x', interference: 0.02")
+    zone = build_scene(case, mesh, False, None, Clock()).zones[0]
+    centre = 7.0 + (np.arange(4) + 0.5) / 4
+    mean = zone.operator.initial / zone.operator.covered
+    assert np.sort(mean) == pytest.approx(0.01 * centre - 0.02, rel=1e-12)
 
 
 def test_several_zones_carry_the_patch_together():

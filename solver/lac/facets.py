@@ -1,13 +1,13 @@
 """Faces as the mortar module sees them: frames, sizes, shape, and points found along a line."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver.batch import invert
 from solver.elements import shape_functions
 from solver.errors import SolveError
-from solver.faces import area_vectors
+from solver.faces import area_vectors, nodal_normals
 from solver.mesh.catalogue import CellType
 
 # Below these shares of a face's size, its bending and the skew of its map are round-off.
@@ -26,7 +26,8 @@ class Facets:
     `centre` (n, dim); `radius` (n,); `normal` (n, dim) outward at the centre; `tangents`
     (n, dim − 1, dim) completing it to a right-handed frame; `flat` (n,): planar; `straight` (n,):
     planar with straight edges; `affine` (n,): straight, and the image of the reference face under
-    an affine map.
+    an affine map; `directions` (n, n_nodes, dim): the unit normals along which a slave face meets
+    its master, at its nodes. None: those of the face itself.
     """
 
     type: CellType
@@ -40,6 +41,21 @@ class Facets:
     flat: np.ndarray
     straight: np.ndarray
     affine: np.ndarray
+    directions: np.ndarray | None = None
+
+
+def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]:
+    """The faces of one surface, with the mean normals at its nodes as their directions.
+
+    On a plane these are the face's own, and the faces stay as they are. Source: Yang, Laursen,
+    Meng, Two dimensional mortar contact methods for large deformation frictional sliding, Int. J.
+    Numer. Meth. Engng 62 (2005) 1183–1225, §3.
+    """
+    normals = nodal_normals(points, [(block.type.name, block.nodes) for block in blocks])
+    differ = max(np.abs(normals[b.nodes] - b.normal[:, None]).max(initial=0.0) for b in blocks)
+    if differ <= _FLAT:
+        return blocks
+    return [replace(block, directions=normals[block.nodes]) for block in blocks]
 
 
 def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.ndarray) -> Facets:

@@ -107,8 +107,11 @@ def gap_operator(
     """Gap operator of slave sub-faces (numbered by macro-element) over master faces.
 
     `search` is the largest distance (a length) at which surfaces are looked for. They are first
-    looked for nearby, and farther away only for sub-faces that found no partner there.
+    looked for nearby, and farther away only for sub-faces that found no partner there. Faces that
+    meet along directions other than their own normals have no closure.
     """
+    if any(block.directions is not None for block in slaves):
+        scheme = replace(scheme, closure=False)
     samples = scheme.sample(slaves)
     found = _search(slaves, samples, masters, search, scheme.meet)
     space = scheme.space(Meeting(slaves, samples, found, n_macro))
@@ -174,7 +177,7 @@ def _search(
 
 
 def _subset(face: Facets, chosen: np.ndarray) -> Facets:
-    arrays = {k: v[chosen] for k, v in vars(face).items() if k != "type"}
+    arrays = {k: v[chosen] for k, v in vars(face).items() if isinstance(v, np.ndarray)}
     return Facets(type=face.type, **arrays)
 
 

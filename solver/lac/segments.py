@@ -2,8 +2,9 @@
 
 Straight slave faces are cut in their own plane, seen along their normal; bent ones in their
 reference face, into which the master's outline is projected. Every quadrature point of a segment
-knows its place on both faces, found along the slave's normal at that point, so that both sides of
-an integral share one normal and one surface measure. Source: Puso, Laursen, A mortar
+knows its place on both faces, found along the slave's normal at that point (that of the face, or
+one interpolated between the mean normals at its nodes), so that both sides of an integral share one
+normal and one surface measure. Source: Puso, Laursen, A mortar
 segment-to-segment contact method, CMAME 193 (2004) 601–629, for segments; Abbas et al. (2018), §4.
 """
 
@@ -87,6 +88,7 @@ def _in_plane(
     normal = np.broadcast_to(slave.normal[i][:, None], points.shape)
     place, height = locate(slave.type, shift(slave, i, slave.centre[i]), points, normal)
     points = points + height[..., None] * normal
+    normal = _directions(slave, i, place, normal)
     return _with_master(slave, master, (i, j), place, points, weight, normal, reach)
 
 
@@ -117,8 +119,17 @@ def _in_reference(
     points = np.einsum("sqa,sad->sqd", values, corner)
     vectors = _area_vectors_at(corner, slopes)
     stretch = np.linalg.norm(vectors, axis=-1)
-    normal = vectors / stretch[..., None]
+    normal = _directions(slave, i, place, vectors / stretch[..., None])
     return _with_master(slave, master, (i, j), place, points, weight * stretch, normal, reach)
+
+
+def _directions(slave: Facets, i: np.ndarray, place: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Unit vectors (s, q, dim) towards the master: the given normals, or those between nodes."""
+    if slave.directions is None:
+        return normal
+    values = shape_functions(slave.type.name).values(place)
+    between = np.einsum("sqa,sad->sqd", values, slave.directions[i])
+    return between / np.linalg.norm(between, axis=-1, keepdims=True)
 
 
 def _area_vectors_at(corner: np.ndarray, slopes: np.ndarray) -> np.ndarray:
@@ -172,7 +183,7 @@ def _plane(corner: np.ndarray, tangents: np.ndarray) -> np.ndarray:
 
 def _degree(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> int:
     degree = max(mortar_degree(slave.type.name), mortar_degree(master.type.name))
-    affine = slave.affine[i].all() and master.affine[j].all()
+    affine = slave.affine[i].all() and master.affine[j].all() and slave.directions is None
     return degree if affine else degree + _BENT_DEGREES
 
 

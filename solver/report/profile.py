@@ -7,8 +7,9 @@ import numpy as np
 from markupsafe import Markup
 
 from solver.case import Exact
-from solver.exact import ExactValues, surface_points
+from solver.exact import ExactValues
 from solver.expressions import Expression, evaluate
+from solver.faces import surface_points
 from solver.report.axes import Scale, draw_axes
 from solver.report.layout import extents, plan_axes, tangent
 from solver.report.svg import BLUE, INK, PAPER, Drawing, mixed

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from solver.lac.closure import shape_integrals
-from solver.lac.facets import facets
+from solver.lac.facets import facets, with_nodal_normals
 from solver.lac.operator import LAC, gap_operator
 from solver.lac.pairing import candidate_pairs
+from solver.mesh.catalogue import BY_NAME
 from tests.patches import segment_pair, square_pair
 
 
@@ -120,3 +121,46 @@ def test_pairs_grow_with_the_faces_alone():
         radius = np.full(n * n, 0.75 / n)
         counts.append(len(candidate_pairs(centre, radius, centre, radius, 0.0)[0]) / n**2)
     assert counts[2] < 1.2 * counts[1] < 1.44 * counts[0] * 1.2
+
+
+def roof(rise):
+    """Two slave edges that meet at the height `rise` over x = 0, under a flat master above."""
+    points = np.array([[-1.0, 0.0], [0.0, rise], [1.0, 0.0], [-2.0, 1.0], [2.0, 1.0]])
+    kind = BY_NAME["SEG2"]
+    slave = facets(points, kind, np.array([[1, 0], [2, 1]]), np.arange(2))
+    return points, slave, facets(points, kind, np.array([[3, 4]]), np.arange(1))
+
+
+def test_nodal_normals_are_the_means_of_the_faces_around_a_node():
+    points, slave, _ = roof(0.5)
+    (bent,) = with_nodal_normals([slave], points)
+    own = np.array([-0.5, 1.0]) / np.hypot(0.5, 1)
+    assert bent.directions[0] == pytest.approx(np.array([[0.0, 1.0], own]), abs=1e-15)
+    points, flat, _ = roof(0.0)
+    assert with_nodal_normals([flat], points)[0].directions is None
+
+
+def test_the_gap_is_measured_along_nodal_normals():
+    """Over the face (−1, 0)–(0, ½), at the share s of its length, the gap is (1 − s/2)/cos.
+
+    cos being the height of the unit vector between (−½, 1)/√1.25 (s = 0) and (0, 1) (s = 1).
+    """
+    points, slave, master = roof(0.5)
+    operator = gap_operator(with_nodal_normals([slave], points), [master], 2, len(points), 4.0)
+    share, weight = np.polynomial.legendre.leggauss(20)
+    share, length = (share + 1) / 2, np.sqrt(1.25)
+    along = np.stack([-(1 - share) / 2 / length, (1 - share) / length + share])
+    expected = weight / 2 * length @ ((1 - share / 2) * np.linalg.norm(along, axis=0) / along[1])
+    assert operator.initial == pytest.approx([expected, expected], rel=1e-7)
+
+
+@pytest.mark.parametrize("rise", [0.3, 0.7])
+def test_nodal_normals_keep_forces_and_moments_in_balance(rise):
+    points, slave, master = roof(rise)
+    points[3:, 1] += [0.2, -0.1]
+    master = facets(points, BY_NAME["SEG2"], master.nodes, np.arange(1))
+    operator = gap_operator(with_nodal_normals([slave], points), [master], 2, len(points), 4.0)
+    rotation = np.stack([-points[:, 1], points[:, 0]], axis=1)
+    for motion in (np.tile([1.0, 0.0], 5), np.tile([0.0, 1.0], 5), rotation.ravel()):
+        assert operator.matrix @ motion == pytest.approx(np.zeros(2), abs=1e-14)
+    assert operator.closed_faces == 0
