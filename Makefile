@@ -16,7 +16,7 @@ INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report orders test accept format lint lock clean clean-all
+.PHONY: help all-cases family case report orders study test accept format lint lock clean clean-all
 .PHONY: environment test-environment lint-environment
 
 help: ## list the targets
@@ -42,6 +42,10 @@ report: environment ## write the report again from the results there are
 orders: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
 orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…
 	@$(SNAKEMAKE) orders
+
+study: override CONFIG += $(if $(LEVEL),study=$(LEVEL))
+study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
+	@$(SNAKEMAKE) study
 
 test: test-environment ## run the tests
 	@.venv/bin/python -m pytest -n auto $(ARGS)

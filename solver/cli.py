@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from solver.errors import InputError, SolveError
+from solver.study.commands import add_commands
 
 if TYPE_CHECKING:
     from solver.run import Job
@@ -101,6 +102,9 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
     command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the levels")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+
+    command = commands.add_parser("study", help="error against run time: points and their page")
+    add_commands(command)
 
     command = _add(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")

@@ -1,21 +1,27 @@
-"""Wall time by stage."""
+"""Time by stage: wall time, and processor time of all threads of the process."""
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+# The stages of `simulate`, in the order of the work; `pairing` holds the intersections too.
+SOLVING = ("cut", "pairing", "assembly", "solve", "recovery")
+
 
 class Clock:
-    """Adds up the wall time (seconds) spent in each named stage."""
+    """Adds up wall time `seconds` and processor time `cpu_seconds` spent in each named stage."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self.cpu_seconds: dict[str, float] = {}
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Count the time within the block to the stage `name`."""
-        start = time.perf_counter()
+        wall, cpu = time.perf_counter(), time.process_time()
         try:
             yield
         finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+            spent = time.process_time() - cpu
+            self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + spent
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - wall

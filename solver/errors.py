@@ -8,10 +8,14 @@ class InputError(Exception):
     """
 
     def __init__(self, where: object, key: str, value: object, allowed: str):
-        """Compose the line; `value` None leaves the value out (a key that is missing)."""
+        """Compose the line; `value` None leaves the value out (a key that is missing).
+
+        `told` is the line without the file.
+        """
         self.where, self.key, self.value, self.allowed = str(where), key, value, allowed
         shown = "" if value is None else f" = {_shorten(value)}"
-        super().__init__(f"{self.where}: {key}{shown}: {allowed}")
+        self.told = f"{key}{shown}: {allowed}"
+        super().__init__(f"{self.where}: {self.told}")
 
 
 class SolveError(Exception):

@@ -35,15 +35,17 @@ def simulate(
     hexahedra: str | None = None,
     log: Log = lambda _: None,
     cures: Cures = ALL,
+    clock: Clock | None = None,
 ) -> Solution:
     """Solve a case on its mesh.
 
     `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
-    `cures` turns what keeps the digits off, to show what it does. Raises InputError where the case
-    and its mesh do not fit, SolveError where no solution is found.
+    `cures` turns what keeps the digits off, to show what it does. The time of every stage is added
+    to `clock`, where one is given. Raises InputError where the case and its mesh do not fit,
+    SolveError where no solution is found.
     """
     started = time.process_time()
-    clock = Clock()
+    clock = Clock() if clock is None else clock
     scene = build_scene(case, mesh, swapped, hexahedra, clock, cures)
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
     with clock.stage("assembly"):

@@ -10,6 +10,9 @@ round-off in about three iterations (Carson and Higham, SIAM J. Sci. Comput. 40 
 iterative refinement in the same way).
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Self
 
 import numpy as np
@@ -30,6 +33,20 @@ SINGULAR_INDEFINITE = 1e-12
 TRUSTED_SINGLE = 1e-6
 """The same for a factor in single precision; below it the factor is made in double precision."""
 MAX_ITERATIONS = 50
+_auto: ContextVar[str] = ContextVar("auto", default="auto")
+
+
+@contextmanager
+def standing_for_auto(kind: str) -> Iterator[None]:
+    """Within the block `auto` stands for `kind`, the name of a solver.
+
+    Raises SolveError there for a solver that is not installed, or not for that kind of matrix.
+    """
+    token = _auto.set(kind)
+    try:
+        yield
+    finally:
+        _auto.reset(token)
 
 
 class Factor:
@@ -118,6 +135,12 @@ def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Fact
 def _choose(kind: str, order: tuple[str, ...]) -> Backend:
     if kind != "auto":
         return BACKENDS[kind]
+    if (wanted := _auto.get()) != "auto":
+        if wanted not in (*order, "superlu"):
+            raise SolveError(f"{BACKENDS[wanted].name} factors positive definite matrices only")
+        if not BACKENDS[wanted].available():
+            raise SolveError(f"{BACKENDS[wanted].name} is not installed")
+        return BACKENDS[wanted]
     return next(BACKENDS[name] for name in (*order, "superlu") if BACKENDS[name].available())
 
 

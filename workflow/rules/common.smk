@@ -64,7 +64,8 @@ def case_files():
                 f"cases = {folder}: no case file (*.yaml) in this folder"
             )
         files += found
-    return [f for f in files if f.name not in ("family.yaml", "orders.yaml")]
+    others = ("family.yaml", "orders.yaml", "study.yaml")
+    return [f for f in files if f.name not in others]
 
 
 def peek(file):

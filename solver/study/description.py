@@ -1,0 +1,279 @@
+"""The study as data: `study.yaml`, and the case that each of its points is.
+
+    title: Error against run time
+    threads: 1                    # that every point may use
+    repetitions: 5                # after a warm-up, in one process
+    limit: 120                    # seconds that a point may take, start-up included
+    treatments:                   # of the interface: what is set in the contact of a case
+      - {name: lac, title: LAC, zone: {treatment: lac}}
+      - name: lac-hexahedra       # only for these cell types on the slave side
+        title: LAC, hexahedra cut into hexahedra
+        zone: {treatment: lac, hexahedra: hexahedra}
+        slaves: [HEXA8, HEXA20]
+    problems:
+      - name: patch-2d
+        title: Patch test
+        case: templates/patch-2d.yaml      # a case file; its cell types are replaced by the pair's
+        pairs: [[TRIA3, QUAD4]]            # slave, master
+        levels: [1, 2, 4]                  # what the divisions of the recipe are multiplied by
+        reference: {cells: QUAD9, divisions: [96, 96]}     # where there is no exact solution
+    linear_solvers:               # varied here, and left to the program elsewhere
+      - {problem: patch-2d, pair: [TRIA3, QUAD4], treatment: lac, solvers: [cholmod, superlu]}
+    quick:                        # a part of it, for a first look
+      {repetitions: 1, levels: 3, pairs: {patch-2d: [[TRIA3, QUAD4]]}}
+
+A point is one problem, pair, treatment, level and linear solver. Its name is the path of its result
+file: `patch-2d/tria3-quad4/lac/4`, `patch-2d/tria3-quad4/lac+cholmod/4`.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from solver.case import Case, parse_case
+from solver.errors import InputError
+from solver.mesh.catalogue import BY_NAME
+from solver.schemas import STUDY_SCHEMA, hint, validate
+from solver.strict_yaml import parse_mapping, read_text
+from solver.study import FULL, QUICK
+
+FILE_NAME = "study.yaml"
+AUTO = "auto"
+
+
+class _Plain(yaml.SafeDumper):
+    """Writes out what occurs twice: case files have no aliases."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        """Always."""
+        return True
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """A way to treat the interface; `slaves` are the only slave cells that it is for, if any."""
+
+    name: str
+    title: str
+    zone: Mapping[str, Any]
+    slaves: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The regular mesh whose result stands for an exact solution."""
+
+    cells: str
+    divisions: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A case file, the pairs (slave, master) of cell types put into it, and its levels."""
+
+    name: str
+    title: str
+    description: str
+    case: Path
+    pairs: tuple[tuple[str, str], ...]
+    levels: tuple[int, ...]
+    reference: Reference | None = None
+
+    @cached_property
+    def template(self) -> dict[str, Any]:
+        """What the case file says."""
+        return parse_mapping(read_text(self.case), self.case)
+
+    @property
+    def sides(self) -> tuple[str, str]:
+        """The sections of the mesh that are slave and master."""
+        zone = self.template["contact"][0]
+        slave, master = (zone[role].removesuffix("_contact") for role in ("slave", "master"))
+        return slave, master
+
+    @property
+    def divisions(self) -> tuple[list[int], list[int]]:
+        """The divisions of slave and master at level 1."""
+        slave, master = (self.template["mesh"][side]["divisions"] for side in self.sides)
+        return slave, master
+
+
+@dataclass(frozen=True)
+class Point:
+    """What one measurement is of."""
+
+    problem: Problem
+    slave: str
+    master: str
+    treatment: Treatment
+    level: int
+    linear_solver: str = AUTO
+
+    @property
+    def pair(self) -> str:
+        """The cell types, slave first."""
+        return f"{self.slave}–{self.master}"
+
+    @property
+    def name(self) -> str:
+        """The path of the point's result file, without its suffix."""
+        pair = f"{self.slave}-{self.master}".lower()
+        solver = "" if self.linear_solver == AUTO else f"+{self.linear_solver}"
+        return f"{self.problem.name}/{pair}/{self.treatment.name}{solver}/{self.level}"
+
+    def case(self) -> Case:
+        """The point as a case; InputError where there is no such treatment of these cells."""
+        return self._case({"cells": self.slave}, {"cells": self.master}, self.level)
+
+    def reference_case(self, reference: Reference) -> Case:
+        """The problem on the mesh that stands for an exact solution."""
+        section = {"cells": reference.cells, "divisions": list(reference.divisions)}
+        return self._case(section, section, 1)
+
+    def _case(self, slave: Mapping[str, Any], master: Mapping[str, Any], level: int) -> Case:
+        template = self.problem.template
+        mesh = template["mesh"] | {"refine": level}
+        for side, section in zip(self.problem.sides, (slave, master), strict=True):
+            mesh[side] = mesh[side] | section
+        content = template | {
+            "name": f"{self.problem.name}-{self.treatment.name}",
+            "mesh": mesh,
+            "contact": [zone | self.treatment.zone for zone in template["contact"]],
+        }
+        return parse_case(yaml.dump(content, Dumper=_Plain), self.problem.case)
+
+
+@dataclass(frozen=True)
+class Study:
+    """All of it. `varied`: (problem, slave, master, treatment, linear solver) beside `auto`."""
+
+    path: Path
+    title: str
+    size: str
+    threads: int
+    repetitions: int
+    limit: float
+    treatments: tuple[Treatment, ...]
+    problems: tuple[Problem, ...]
+    varied: tuple[tuple[str, str, str, str, str], ...] = ()
+
+    @cached_property
+    def points(self) -> tuple[Point, ...]:
+        """Every point, level by level within each curve."""
+        curves = [
+            (problem, slave, master, treatment, AUTO)
+            for problem in self.problems
+            for slave, master in problem.pairs
+            for treatment in self.treatments
+            if not treatment.slaves or slave in treatment.slaves
+        ]
+        problems, treatments = _by_name(self.problems), _by_name(self.treatments)
+        curves += [(problems[p], s, m, treatments[t], solver) for p, s, m, t, solver in self.varied]
+        return tuple(Point(p, s, m, t, k, solver) for p, s, m, t, solver in curves for k in p.levels)
+
+    def point(self, name: str) -> Point:
+        """The point of that name; InputError where there is none."""
+        for point in self.points:
+            if point.name == name:
+                return point
+        allowed = f"no such point; {hint(name, (point.name for point in self.points))}"
+        raise InputError(self.path, "point", name, allowed)
+
+
+def read_study(path: Path, size: str = FULL) -> Study:
+    """The study in a file, or its quick part; InputError says what is refused, what allowed."""
+    content = parse_mapping(read_text(path), path)
+    validate(content, STUDY_SCHEMA, path)
+    treatments = tuple(
+        Treatment(t["name"], t["title"], t["zone"], tuple(t.get("slaves", ())))
+        for t in content["treatments"]
+    )
+    problems = tuple(_problem(path, i, p) for i, p in enumerate(content["problems"]))
+    _refuse_twins(path, "treatments", treatments)
+    _refuse_twins(path, "problems", problems)
+    study = Study(
+        path=path,
+        title=content["title"],
+        size=size,
+        threads=content["threads"],
+        repetitions=content["repetitions"],
+        limit=float(content["limit"]),
+        treatments=treatments,
+        problems=problems,
+        varied=tuple(_varied(path, content, problems, treatments)),
+    )
+    return study if size == FULL else _quick(study, content)
+
+
+def _problem(path: Path, index: int, item: Mapping[str, Any]) -> Problem:
+    case = path.parent / item["case"]
+    if not case.is_file():
+        raise InputError(path, f"problems[{index}].case", item["case"], "no such file")
+    pairs = tuple((slave, master) for slave, master in item["pairs"])
+    for number, pair in enumerate(pairs):
+        if BY_NAME[pair[0]].dim != BY_NAME[pair[1]].dim:
+            key, allowed = f"problems[{index}].pairs[{number}]", "must be of one dimension"
+            raise InputError(path, key, list(pair), allowed)
+    given = item.get("reference")
+    reference = Reference(given["cells"], tuple(given["divisions"])) if given else None
+    return Problem(
+        name=item["name"],
+        title=item["title"],
+        description=item.get("description", ""),
+        case=case,
+        pairs=pairs,
+        levels=tuple(sorted(item["levels"])),
+        reference=reference,
+    )
+
+
+def _varied(
+    path: Path,
+    content: Mapping[str, Any],
+    problems: Sequence[Problem],
+    treatments: Sequence[Treatment],
+) -> Iterable[tuple[str, str, str, str, str]]:
+    """The curves whose linear solver is chosen; refuses one whose problem or treatment is not."""
+    known = {"problem": _by_name(problems), "treatment": _by_name(treatments)}
+    for i, item in enumerate(content.get("linear_solvers", ())):
+        for key, names in known.items():
+            if item[key] not in names:
+                allowed = f"there is no such {key}; {hint(item[key], names)}"
+                raise InputError(path, f"linear_solvers[{i}].{key}", item[key], allowed)
+        for solver in item["solvers"]:
+            yield item["problem"], *item["pair"], item["treatment"], solver
+
+
+def _quick(study: Study, content: Mapping[str, Any]) -> Study:
+    """The part under `quick`: a few pairs of some problems, the coarse levels alone."""
+    if "quick" not in content:
+        raise InputError(study.path, "quick", None, "this key is needed for the quick study")
+    quick, problems = content["quick"], _by_name(study.problems)
+    chosen = []
+    for name, pairs in quick["pairs"].items():
+        if name not in problems:
+            allowed = f"there is no such problem; {hint(name, problems)}"
+            raise InputError(study.path, f"quick.pairs.{name}", pairs, allowed)
+        levels = problems[name].levels[: quick["levels"]]
+        kept = tuple((slave, master) for slave, master in pairs)
+        chosen.append(replace(problems[name], pairs=kept, levels=levels))
+    return replace(
+        study, repetitions=quick["repetitions"], problems=tuple(chosen), varied=(), size=QUICK
+    )
+
+
+def _by_name(items: Iterable[Any]) -> dict[str, Any]:
+    return {item.name: item for item in items}
+
+
+def _refuse_twins(path: Path, key: str, items: Sequence[Any]) -> None:
+    seen: set[str] = set()
+    for i, item in enumerate(items):
+        if item.name in seen:
+            allowed = "the name is given twice; each needs its own"
+            raise InputError(path, f"{key}[{i}].name", item.name, allowed)
+        seen.add(item.name)

@@ -1,0 +1,87 @@
+"""The process that measures one point: `python -m solver.study.measure JOB`, JOB a JSON object.
+
+Its numerical libraries read the number of threads when they are loaded, and peak memory is the
+process's own: hence a process for each point.
+"""
+
+import json
+import resource
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from solver.clock import SOLVING, Clock
+from solver.errors import InputError, SolveError
+from solver.study.description import Point, Study, read_study
+from solver.study.point import SOLVED
+from solver.study.timing import now, repeated
+
+
+def main(job: Mapping[str, Any]) -> None:
+    """Measure the point, write what was found: also where the solve is refused or fails."""
+    from solver.verdict import to_json
+
+    study = read_study(Path(job["study"]), job["size"])
+    point = study.point(job["point"])
+    reference = Path(job["reference"]) if job["reference"] else None
+    try:
+        found = measure(study, point, reference, job["started"])
+    except InputError as error:
+        found = {"outcome": "refused", "reason": error.told}
+    except SolveError as error:
+        found = {"outcome": "failed", "reason": str(error)}
+    Path(job["output"]).write_text(to_json(found), encoding="utf-8")
+
+
+def measure(study: Study, point: Point, reference: Path | None, started: float) -> dict[str, Any]:
+    """The outcome of a point: a first solve as a warm-up, then the repetitions.
+
+    `started` is when the process was, by `timing.now`. Raises InputError and SolveError.
+    """
+    from solver.linear.direct import standing_for_auto
+    from solver.norms import errors
+    from solver.provenance import gather
+    from solver.run import mesh_of
+    from solver.simulation import simulate
+    from solver.study.reference import read_reference
+
+    case = point.case()
+    mesh = mesh_of(case)
+
+    def run(clock: Clock) -> Any:
+        return simulate(case, mesh, clock=clock)
+
+    with standing_for_auto(point.linear_solver):
+        solution = run(Clock())
+        process = _process(started)
+        times = repeated(run, study.repetitions)
+    exact = read_reference(reference) if reference else None
+    order = [stage for stage in SOLVING if stage in times]
+    order += [stage for stage in times if stage not in order]
+    return {
+        "outcome": SOLVED,
+        "reason": "",
+        "dim": solution.mesh.points.shape[1],
+        "dofs": solution.dofs,
+        "macro_elements": solution.macro_elements,
+        "iterations": solution.iterations,
+        "factor": solution.linear_solver,
+        "errors": errors(solution, exact),
+        "times": {stage: times[stage] for stage in order},
+        "process": process,
+        "machine": gather(case.path, None),
+    }
+
+
+def _process(started: float) -> dict[str, float]:
+    return {
+        "wall": now() - started,
+        "cpu": time.process_time(),
+        "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))

@@ -1,0 +1,90 @@
+# Error against run time: each point of the study is a job of its own, so that what is measured is
+# not measured again. A point takes all cores of the run, whatever it uses: nothing runs beside it.
+STUDY_FILE = "cases/study/study.yaml"
+SIZE = config["study"]
+POINTS = f"results/study/{SIZE}"
+PAGE = "study" if SIZE == "full" else f"study-{SIZE}"
+MEASURING_SOURCES = [STUDY_FILE, *SOLVER_SOURCES]
+
+
+@cache
+def study():
+    """The study and its points by name; says how long those that are missing will take."""
+    from solver.study.description import read_study
+    from solver.study.expected import announcement
+
+    content = read_study(Path(STUDY_FILE), SIZE)
+    newest = max(Path(source).stat().st_mtime for source in MEASURING_SOURCES)
+    pending = [point for point in content.points if older(record_of(point.name), newest)]
+    logger.info(announcement(content, Path(POINTS), pending))
+    return {point.name: point for point in content.points}
+
+
+def record_of(point):
+    return f"{POINTS}/{point}.json"
+
+
+def older(file, time):
+    """Whether a file is missing, or was written before that time."""
+    return not Path(file).is_file() or Path(file).stat().st_mtime < time
+
+
+def reference_of(w):
+    """The refined result that a point is compared with, where its problem has no exact solution."""
+    problem = study()[w.point].problem
+    return [f"results/study/references/{problem.name}.vtkhdf"] * bool(problem.reference)
+
+
+rule study_reference:
+    input:
+        case=lambda w: next(
+            str(p.problem.case) for p in study().values() if p.problem.name == w.problem
+        ),
+        sources=MEASURING_SOURCES,
+    output:
+        "results/study/references/{problem}.vtkhdf",
+    log:
+        "results/study/references/{problem}.log",
+    message:
+        "reference of {wildcards.problem}"
+    shell:
+        "{PYTHON} -m solver study reference {STUDY_FILE:q} {wildcards.problem:q} -o {output:q}"
+        " > {log:q} 2>&1"
+
+
+# A point always ends with a record, whatever became of it.
+rule study_point:
+    input:
+        case=lambda w: str(study()[w.point].problem.case),
+        reference=reference_of,
+        sources=MEASURING_SOURCES,
+    output:
+        f"{POINTS}/{{point}}.json",
+    wildcard_constraints:
+        point=".+/.+/.+/[0-9]+",
+    threads: workflow.cores
+    params:
+        reference=lambda w, input: [f"--reference {r}" for r in input.reference],
+    message:
+        "measure {wildcards.point}"
+    shell:
+        "{PYTHON} -m solver study point {STUDY_FILE:q} {wildcards.point:q} --size {SIZE}"
+        " {params.reference} -o {output:q}"
+
+
+rule study:
+    input:
+        records=lambda w: [record_of(point) for point in study()],
+        study=STUDY_FILE,
+        sources=REPORT_SOURCES,
+    output:
+        f"results/report/{PAGE}.html",
+        f"results/report/{PAGE}.csv",
+        directory(f"results/report/{PAGE}"),
+    log:
+        f"results/report/{PAGE}.log",
+    message:
+        "error against run time"
+    shell:
+        "{PYTHON} -m solver study page {input.study:q} --size {SIZE} --results {POINTS:q}"
+        " -o results/report 2>&1 | tee {log:q}"
