@@ -1,7 +1,7 @@
 """The README's commands, run from top to bottom as a newcomer would.
 
 They run as they stand, in a copy of the project where long ones are short: `cases/` holds only the
-case that the README names, and `tests/` a single test. The installation is left out:
+case that the README names and a study of one point, and `tests/` a single test. The installation is left out:
 the copy borrows this environment.
 """
 
@@ -51,6 +51,20 @@ def write_part(case: dict, path: Path) -> None:
         gmsh.finalize()
 
 
+def write_study(folder: Path) -> None:
+    """The project's study with a single point in its quick part."""
+    shutil.copytree(ROOT / "cases" / "study", folder)
+    study = yaml.safe_load((folder / "study.yaml").read_text())
+    pair = study["problems"][0]["pairs"][0]
+    study["treatments"] = study["treatments"][:1]
+    study["quick"] = {
+        "repetitions": 1,
+        "levels": 1,
+        "pairs": {study["problems"][0]["name"]: [pair]},
+    }
+    (folder / "study.yaml").write_text(yaml.safe_dump(study))
+
+
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
     """The copy with little to do."""
@@ -62,6 +76,7 @@ def project(tmp_path: Path) -> Path:
     (tmp_path / "cases" / "ssnp170").mkdir(parents=True)
     for name in ("e.yaml", "family.yaml"):
         shutil.copy(ROOT / "cases" / "ssnp170" / name, tmp_path / "cases" / "ssnp170")
+    write_study(tmp_path / "cases" / "study")
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "test_start.py").write_text("def test_start():\n    import solver.cli\n")
     (tmp_path / "my-cases").mkdir()

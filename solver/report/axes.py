@@ -4,7 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.report.svg import INK, MUTED, RULE, Drawing
+from solver.report.svg import INK, MUTED, RULE, Drawing, Style
+
+EPSILON = float(np.finfo(float).eps)
+# The colour of the round-off floor.
+FLOOR = "#e6eaee"
 
 
 @dataclass(frozen=True)
@@ -59,13 +63,16 @@ class Scale:
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def draw_axes(drawing: Drawing, x: Scale, y: Scale, x_label: str, y_label: str) -> None:
-    """Grid lines, ticks and labels of a plot."""
+def draw_axes(
+    drawing: Drawing, x: Scale, y: Scale, x_label: str, y_label: str, numbered: bool = True
+) -> None:
+    """Grid lines, ticks and labels of a plot; `numbered`: the ticks of y have their values."""
     left, right, bottom, top = x.start, x.end, y.start, y.end
     for value in y.ticks():
         at = float(y(value))
         drawing.line(left, at, right, at, stroke=RULE, stroke_width=0.6)
-        drawing.text(left - 6, at + 4, y.label(value), "end", color=MUTED)
+        if numbered:
+            drawing.text(left - 6, at + 4, y.label(value), "end", color=MUTED)
     for value in x.ticks():
         at = float(x(value))
         drawing.line(at, bottom, at, bottom + 4, stroke=MUTED, stroke_width=0.8)
@@ -73,3 +80,34 @@ def draw_axes(drawing: Drawing, x: Scale, y: Scale, x_label: str, y_label: str) 
     drawing.line(left, bottom, right, bottom, stroke=MUTED, stroke_width=0.8)
     drawing.text((left + right) / 2, bottom + 33, x_label, "middle", color=INK)
     drawing.text(left, top - 10, y_label, color=INK)
+
+
+def draw_level(
+    drawing: Drawing,
+    x: Scale,
+    y: Scale,
+    value: float,
+    label: str,
+    color: str,
+    dashes: tuple[float, ...] = (),
+) -> None:
+    """A line across the plot at a value, its label on the right of it."""
+    at = float(y(value))
+    dashed: dict[str, Style] = {"stroke_dasharray": dashes} if dashes else {}
+    drawing.line(x.start, at, x.end, at, stroke=color, stroke_width=1.2, **dashed)
+    drawing.text(x.end + 8, at + 4, label, color=color)
+
+
+def round_off(unknowns: int) -> tuple[float, float]:
+    """The round-off floor: the unit round-off ε, and ε√N for N unknowns."""
+    return EPSILON, EPSILON * max(1, unknowns) ** 0.5
+
+
+def draw_floor(drawing: Drawing, x: Scale, y: Scale, unknowns: int, labelled: bool = True) -> None:
+    """The band of round-off from ε to ε√N, N `unknowns`."""
+    low, high = round_off(unknowns)
+    top, bottom = float(y(high)), float(y(low))
+    drawing.rectangle(x.start, top, x.end - x.start, bottom - top, fill=FLOOR)
+    if labelled:
+        drawing.text(x.end + 8, bottom + 4, f"ε = {low:.1e}", color=MUTED)
+        drawing.text(x.end + 8, min(top, bottom - 12) + 4, f"ε√N = {high:.1e}", color=MUTED)

@@ -7,10 +7,10 @@ from markupsafe import Markup
 
 from solver.orders import ERRORS
 from solver.report import formats
-from solver.report.axes import Scale, draw_axes
+from solver.report.axes import EPSILON, Scale, draw_axes
 from solver.report.curves import Curve
-from solver.report.errors import EPSILON
-from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PAPER, PURPLE, Drawing, Style
+from solver.report.marks import draw_marks
+from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, Drawing, Style
 
 WIDTH, HEIGHT = 400, 330
 # Shapes of cells by colour and mark, so that either tells them apart; QUAD9 and HEXA27 have theirs.
@@ -23,11 +23,6 @@ _LOOKS = {
     "HEXA": (ORANGE, "square"),
     "PENTA": (GREEN, "triangle"),
     "PYRA": (PURPLE, "diamond"),
-}
-_CORNERS = {
-    "square": [(-3.4, -3.4), (3.4, -3.4), (3.4, 3.4), (-3.4, 3.4)],
-    "triangle": [(-4.2, 3.2), (4.2, 3.2), (0, -4.4)],
-    "diamond": [(-4.6, 0), (0, -4.6), (4.6, 0), (0, 4.6)],
 }
 
 
@@ -77,14 +72,7 @@ def _line(curve: Curve) -> dict[str, Style]:
 def _draw_marks(drawing: Drawing, curve: Curve, at: np.ndarray) -> None:
     """Marks hollow on linear cells, filled on quadratic ones."""
     color, mark = _look(curve)
-    fill = PAPER if curve.degree == "linear" else color
-    if mark == "cross":
-        drawing.crosses(at, 3.6, stroke=color, stroke_width=1.8)
-    elif mark == "circle":
-        drawing.circles(at, 3.6, fill=fill, stroke=color, stroke_width=1.4)
-    else:
-        corners = at[:, None] + np.array(_CORNERS[mark])
-        drawing.polygons(corners, fill=fill, stroke=color, stroke_width=1.4)
+    draw_marks(drawing, mark, at, color, filled=curve.degree != "linear")
 
 
 def _guides(error: str, curves: Sequence[Curve]) -> list[float]:

@@ -7,13 +7,12 @@ from urllib.parse import quote
 import numpy as np
 from markupsafe import Markup
 
-from solver.report import formats
-from solver.report.axes import Scale, draw_axes
+from solver.report import formats, stages
+from solver.report.axes import EPSILON, Scale, draw_axes, draw_floor, draw_level, round_off
 from solver.report.rows import Row
 from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
 
 WIDTH, HEIGHT = 940, 470
-EPSILON = float(np.finfo(float).eps)
 # One mark for each kind of reference: they are not compared with one another.
 KINDS = ("analytical", "manufactured", "refined", "other_code")
 COLORS = {"analytical": BLUE, "manufactured": GREEN, "refined": PURPLE, "other_code": ORANGE}
@@ -26,7 +25,11 @@ def drawn(rows: Sequence[Row]) -> list[Row]:
 
 def floor(rows: Sequence[Row]) -> tuple[float, float]:
     """The round-off floor: the unit round-off ε, and ε√N for the largest N unknowns."""
-    return EPSILON, EPSILON * max((row.dofs or 1 for row in rows), default=1) ** 0.5
+    return round_off(_unknowns(rows))
+
+
+def _unknowns(rows: Sequence[Row]) -> int:
+    return max((row.dofs or 1 for row in rows), default=1)
 
 
 def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]) -> Markup:
@@ -38,14 +41,14 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]
     x = Scale(*_around(times, 1.25), 62, WIDTH - 190, log=True)
     highest = max(1e-2, 3 * errors.max(initial=0), *(3 * (row.allowed or 0) for row in shown))
     y = Scale(EPSILON / 8, highest, HEIGHT - 52, 34, log=True)
-    _floor(drawing, x, y, shown)
+    draw_floor(drawing, x, y, _unknowns(shown))
     draw_axes(drawing, x, y, "wall time of the solve, s", "worst relative error")
     for tolerance in sorted({row.allowed for row in shown if row.allowed}):
-        _level(drawing, x, y, tolerance, f"tolerance {100 * tolerance:.3g} %", RED, ())
+        draw_level(drawing, x, y, tolerance, f"tolerance {100 * tolerance:.3g} %", RED)
     for entry in reference_code:
         name = f"{entry.get('name', 'reference code')} {entry.get('version', '')}"
         label = f"{name.strip()}: {formats.error(float(entry['error']))}"
-        _level(drawing, x, y, float(entry["error"]), label, MUTED, (6, 4))
+        draw_level(drawing, x, y, float(entry["error"]), label, MUTED, (6, 4))
     at = np.column_stack([x(times), y(errors)])
     for row, point in zip(shown, at, strict=True):
         _mark(drawing, row, point)
@@ -60,26 +63,12 @@ def _around(values: np.ndarray, factor: float) -> tuple[float, float]:
     return float(low / widen), float(high * widen)
 
 
-def _floor(drawing: Drawing, x: Scale, y: Scale, rows: Sequence[Row]) -> None:
-    low, high = floor(rows)
-    top, bottom = float(y(high)), float(y(low))
-    drawing.rectangle(x.start, top, x.end - x.start, bottom - top, fill="#eef1f4")
-    drawing.text(x.end + 8, bottom + 4, f"ε = {low:.1e}", color=MUTED)
-    drawing.text(x.end + 8, min(top, bottom - 12) + 4, f"ε√N = {high:.1e}", color=MUTED)
-
-
-def _level(
-    drawing: Drawing, x: Scale, y: Scale, value: float, label: str, color: str, dashes: tuple
-) -> None:
-    at = float(y(value))
-    dashed = {"stroke_dasharray": dashes} if dashes else {}
-    drawing.line(x.start, at, x.end, at, stroke=color, stroke_width=1.2, **dashed)
-    drawing.text(x.end + 8, at + 4, label, color=color)
-
-
 def _mark(drawing: Drawing, row: Row, point: np.ndarray) -> None:
     error, check = row.accuracy  # type: ignore[misc]
-    tip = f"{row.name}: {formats.error(error)} ({check}), {formats.seconds(row.total)}, {row.word}"
+    tip = (
+        f"{row.name}: {formats.error(error)} ({check}), {formats.seconds(row.total)}, {row.word}; "
+        f"{stages.told(row.stages)}"
+    )
     color = COLORS.get(row.reference_kind, INK)
     drawing.open_link(f"#{quote(row.anchor)}", tip)
     if row.word == "passed":

@@ -1,4 +1,4 @@
-"""What all pages of the report share: templates, style, and the words for kinds, checks, stages."""
+"""What all pages of the report share: templates, style, and the words for kinds and checks."""
 
 from pathlib import Path
 
@@ -40,18 +40,6 @@ KINDS = {
     "manufactured": "a solution chosen first, loads derived from it",
     "refined": "our own result on a much finer mesh",
     "other_code": "another code's result",
-}
-# Stages in the order of the work, in colours that the colour-blind tell apart.
-STAGES = {
-    "read": "#999999",
-    "mesh": "#bbbbbb",
-    "cut": "#e69f00",
-    "pairing": "#56b4e9",
-    "assembly": "#009e73",
-    "solve": "#0072b2",
-    "recovery": "#cc79a7",
-    "checks": "#d55e00",
-    "write": "#f0e442",
 }
 
 

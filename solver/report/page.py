@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from solver.report.html import MEANING, NORMS, STAGES, environment
+from solver.report import stages
+from solver.report.html import MEANING, NORMS, environment
 from solver.report.pictures import picture
 from solver.report.rows import Row, counted
 from solver.report.sections import Section
@@ -87,6 +88,4 @@ def _order(name: str) -> tuple[int, str]:
 
 def _stages(rows: Sequence[Row]) -> dict[str, str]:
     """The stages that occur, in their order, with their colours."""
-    found = dict.fromkeys(stage for row in rows for stage in row.stages)
-    names = [stage for stage in STAGES if stage in found] + [s for s in found if s not in STAGES]
-    return {name: STAGES.get(name, "#777777") for name in names}
+    return stages.colors(stage for row in rows for stage in row.stages)

@@ -59,7 +59,7 @@ def _reference(options: argparse.Namespace) -> int:
 
 
 def _page(options: argparse.Namespace) -> int:
-    from solver.report.study import write_study
+    from solver.report.work_precision.page import write_study
     from solver.study.description import read_study
 
     write_study(read_study(options.study, options.size), options.results, options.output)

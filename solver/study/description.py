@@ -16,7 +16,8 @@
         case: templates/patch-2d.yaml      # a case file; its cell types are replaced by the pair's
         pairs: [[TRIA3, QUAD4]]            # slave, master
         levels: [1, 2, 4]                  # what the divisions of the recipe are multiplied by
-        reference: {cells: QUAD9, divisions: [96, 96]}     # where there is no exact solution
+        reference:                         # where there is no exact solution
+          {cells: QUAD9, divisions: [96, 96], uncertainty: {pressure_l2: 1.0e-4}}
     linear_solvers:               # varied here, and left to the program elsewhere
       - {problem: patch-2d, pair: [TRIA3, QUAD4], treatment: lac, solvers: [cholmod, superlu]}
     quick:                        # a part of it, for a first look
@@ -27,7 +28,7 @@ file: `patch-2d/tria3-quad4/lac/4`, `patch-2d/tria3-quad4/lac+cholmod/4`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ AUTO = "auto"
 class _Plain(yaml.SafeDumper):
     """Writes out what occurs twice: case files have no aliases."""
 
-    def ignore_aliases(self, data: object) -> bool:
+    def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002 -- PyYAML asks for it
         """Always."""
         return True
 
@@ -65,10 +66,11 @@ class Treatment:
 
 @dataclass(frozen=True)
 class Reference:
-    """The regular mesh whose result stands for an exact solution."""
+    """The regular mesh that stands for an exact solution, and how far it may be off, by error."""
 
     cells: str
     divisions: tuple[int, int]
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -173,7 +175,9 @@ class Study:
         ]
         problems, treatments = _by_name(self.problems), _by_name(self.treatments)
         curves += [(problems[p], s, m, treatments[t], solver) for p, s, m, t, solver in self.varied]
-        return tuple(Point(p, s, m, t, k, solver) for p, s, m, t, solver in curves for k in p.levels)
+        return tuple(
+            Point(p, s, m, t, k, solver) for p, s, m, t, solver in curves for k in p.levels
+        )
 
     def point(self, name: str) -> Point:
         """The point of that name; InputError where there is none."""
@@ -218,8 +222,10 @@ def _problem(path: Path, index: int, item: Mapping[str, Any]) -> Problem:
         if BY_NAME[pair[0]].dim != BY_NAME[pair[1]].dim:
             key, allowed = f"problems[{index}].pairs[{number}]", "must be of one dimension"
             raise InputError(path, key, list(pair), allowed)
-    given = item.get("reference")
-    reference = Reference(given["cells"], tuple(given["divisions"])) if given else None
+    reference = None
+    if given := item.get("reference"):
+        first, second = given["divisions"]
+        reference = Reference(given["cells"], (first, second), given["uncertainty"])
     return Problem(
         name=item["name"],
         title=item["title"],

@@ -16,8 +16,8 @@ from scipy.interpolate import CubicSpline
 from solver.batch import invert
 from solver.case import Material
 from solver.elements import shape_functions
-from solver.mesh.catalogue import cell_type
 from solver.errors import InputError
+from solver.mesh.catalogue import cell_type
 from solver.solution import Solution
 from solver.solutions import ElasticSolution, Part
 from solver.study.description import Study
@@ -51,7 +51,9 @@ class _Grid:
         corners, at = self.corners[cell], self.type.nodes[:4]
         centre, middle = corners.mean(axis=1), at.mean(axis=0)
         # The affine map that takes the reference corners to those of the cell.
-        jacobian = np.einsum("nci,cj->nij", corners - centre[:, None], np.linalg.pinv(at - middle).T)
+        jacobian = np.einsum(
+            "nci,cj->nij", corners - centre[:, None], np.linalg.pinv(at - middle).T
+        )
         _, inverse = invert(jacobian)
         local = middle + np.einsum("nij,nj->ni", inverse, x - centre)
         values, slopes = shape_functions(self.type.name).both(local)

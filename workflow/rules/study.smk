@@ -15,7 +15,9 @@ def study():
 
     content = read_study(Path(STUDY_FILE), SIZE)
     newest = max(Path(source).stat().st_mtime for source in MEASURING_SOURCES)
-    pending = [point for point in content.points if older(record_of(point.name), newest)]
+    pending = [
+        point for point in content.points if older(record_of(point.name), newest)
+    ]
     logger.info(announcement(content, Path(POINTS), pending))
     return {point.name: point for point in content.points}
 
@@ -38,7 +40,9 @@ def reference_of(w):
 rule study_reference:
     input:
         case=lambda w: next(
-            str(p.problem.case) for p in study().values() if p.problem.name == w.problem
+            str(p.problem.case)
+            for p in study().values()
+            if p.problem.name == w.problem
         ),
         sources=MEASURING_SOURCES,
     output:

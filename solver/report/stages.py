@@ -1,0 +1,29 @@
+"""The stages of a solve as every page shows them: order, colours, and times in words."""
+
+from collections.abc import Iterable, Mapping
+
+# In the order of the work, in colours that the colour-blind tell apart.
+COLORS = {
+    "read": "#999999",
+    "mesh": "#bbbbbb",
+    "cut": "#e69f00",
+    "pairing": "#56b4e9",
+    "assembly": "#009e73",
+    "solve": "#0072b2",
+    "recovery": "#cc79a7",
+    "checks": "#d55e00",
+    "write": "#f0e442",
+}
+_OTHER = "#777777"
+
+
+def colors(found: Iterable[str]) -> dict[str, str]:
+    """The stages found, each once, in the order of the work, with their colours."""
+    every = dict.fromkeys(found)
+    known = [stage for stage in COLORS if stage in every]
+    return {s: COLORS.get(s, _OTHER) for s in [*known, *(s for s in every if s not in COLORS)]}
+
+
+def told(seconds: Mapping[str, float]) -> str:
+    """The times of the stages in one line."""
+    return ", ".join(f"{stage} {seconds[stage]:.3f} s" for stage in colors(seconds))

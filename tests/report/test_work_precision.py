@@ -1,0 +1,280 @@
+"""The page of error against run time on records whose errors and times are chosen."""
+
+import csv
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from solver.report.work_precision import words
+from solver.report.work_precision.figure import LIMIT, Looks, draw_figure
+from solver.report.work_precision.page import outcome, write_study
+from solver.report.work_precision.records import (
+    TARGETS,
+    Measured,
+    Panel,
+    failures,
+    lines,
+    panels,
+    read_points,
+)
+from solver.study.description import read_study
+
+ROOT = Path(__file__).parents[2]
+STUDY = """
+title: A <study>
+threads: 1
+repetitions: 3
+limit: 60
+treatments:
+  - {name: lac, title: LAC, zone: {treatment: lac}}
+  - {name: uncut, title: whole faces, zone: {treatment: uncut}}
+  - {name: nodal, title: nodal, zone: {treatment: nodal}}
+problems:
+  - {name: patch, title: Patch, case: case.yaml, pairs: [[TRIA3, QUAD4], [QUAD4, TRIA3]],
+     levels: [1, 2, 4]}
+linear_solvers:
+  - {problem: patch, pair: [TRIA3, QUAD4], treatment: lac, solvers: [superlu]}
+"""
+MACHINE = {"cpu": "a cpu", "revision": "abc", "python": "3", "time_utc": "2026-01-01T00:00:00"}
+
+
+@pytest.fixture
+def study(tmp_path):
+    text = (ROOT / "cases/study/templates/patch-2d.yaml").read_text()
+    (tmp_path / "case.yaml").write_text(text)
+    (tmp_path / "study.yaml").write_text(STUDY)
+    return read_study(tmp_path / "study.yaml")
+
+
+def record(point, error, seconds):
+    """A solved point: three repetitions, a tenth more and a tenth less than `seconds`."""
+    walls = [0.9 * seconds, seconds, 1.1 * seconds]
+    half = [wall / 2 for wall in walls]
+    return {
+        "point": point.name,
+        "outcome": "solved",
+        "reason": "",
+        "dofs": 100 * point.level**2,
+        "macro_elements": 4 * point.level,
+        "iterations": 1,
+        "factor": "CHOLMOD",
+        "errors": {"pressure_l2": error, "displacement_l2": error**2},
+        "times": {
+            "solve": {"wall": half, "cpu": half},
+            "recovery": {"wall": half, "cpu": half},
+            "total": {"wall": walls, "cpu": walls},
+        },
+        "process": {"wall": seconds + 1, "cpu": seconds + 0.5, "peak_memory_mb": 100.0},
+        "machine": MACHINE,
+        "threads": 1,
+        "load": 0.3,
+    }
+
+
+def refusal(point):
+    reason = f"no such treatment of {point.slave} & others"
+    return {"point": point.name, "outcome": "refused", "reason": reason, "errors": {}, "times": {}}
+
+
+def chosen(point):
+    """LAC exact; whole faces of order 2; nodal of order 1, slower, and not on QUAD4 at level 4."""
+    seconds = 0.1 * point.level
+    if point.treatment.name == "lac":
+        return record(point, 1e-15, seconds)
+    if point.treatment.name == "uncut":
+        return record(point, 4e-3 / point.level**2, 2 * seconds)
+    if point.slave == "QUAD4" and point.level == 4:
+        return refusal(point)
+    return record(point, 0.02 / point.level, 3 * seconds)
+
+
+@pytest.fixture
+def results(study, tmp_path):
+    for point in study.points:
+        path = tmp_path / "records" / f"{point.name}.json"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(chosen(point)))
+    return tmp_path / "records"
+
+
+@pytest.fixture
+def panel(study, results):
+    return pressure(study, read_points(study, results))
+
+
+def pressure(study, points):
+    plain = [m for m in points if m.point.linear_solver == "auto"]
+    return panels(study.problems[0], lines(plain))[0]
+
+
+def test_the_cheapest_way_is_the_quickest_solve_that_is_accurate_enough(panel):
+    cheapest = panel.cheapest("whole faces", 1e-3)
+    assert (cheapest.point.level, cheapest.time.median) == (2, pytest.approx(0.4))
+    assert panel.cheapest("whole faces", 1e-4) is None
+    assert [title for title, _ in panel.ranked(1e-2)] == ["LAC", "whole faces", "nodal"]
+    assert [title for title, _ in panel.ranked(1e-6)] == ["LAC"]
+
+
+def test_orders_are_observed_level_by_level(panel):
+    whole, nodal = (panel.of(title)[0] for title in ("whole faces", "nodal"))
+    assert whole.order("pressure_l2").value == pytest.approx(2)
+    assert nodal.order("pressure_l2").value == pytest.approx(1)
+    assert panel.of("LAC")[0].order("pressure_l2") is None
+    assert panel.of("LAC")[0].at_round_off("pressure_l2")
+
+
+def test_the_paragraph_tells_the_chosen_numbers(panel):
+    text = words.paragraph(panel)
+    assert text.startswith("LAC reaches 0.1 % soonest, in 0.1 s (TRIA3–QUAD4, level 1); ")
+    assert "whole faces is next and takes 4 times as long, 0.4 s (TRIA3–QUAD4, level 2)." in text
+    assert "nodal (smallest error 0.5 %) never does." in text
+    assert "LAC is at round-off (below 1.0e-11) at every level of every pair" in text
+    assert "between 1.0e-15 (LAC, TRIA3–QUAD4) and 0.5 % (nodal, TRIA3–QUAD4)" in text
+    assert "1 of 18 points have no solve" in text
+
+
+def test_times_within_the_spread_are_not_told_apart(study, results):
+    points = read_points(study, results)
+    for m in points:
+        if m.solved and m.point.treatment.name == "uncut":
+            m.record["times"]["total"]["wall"] = [0.05 * m.point.level] * 2 + [0.5]
+            m.record["errors"]["pressure_l2"] = 1e-4
+    text = words.paragraph(pressure(study, points))
+    assert text.startswith("whole faces reaches 0.1 % soonest, in 50 ms")
+    assert "LAC is next with 0.1 s (TRIA3–QUAD4, level 1), no later within the spread" in text
+
+
+def test_where_none_is_accurate_enough_the_nearest_is_told(study, results):
+    points = [m for m in read_points(study, results) if m.point.treatment.name == "nodal"]
+    text = words.paragraph(pressure(study, points))
+    assert text.startswith("No solve reaches 0.1 %; nodal comes nearest with 0.5 %.")
+    assert "soonest" not in text
+    assert "never" not in text
+
+
+@given(st.lists(st.tuples(st.floats(1e-17, 10), st.floats(1e-4, 1e3)), min_size=18, max_size=18))
+def test_whatever_the_numbers_the_sentences_are_true(tmp_path_factory, numbers):
+    folder = tmp_path_factory.getbasetemp() / "any"
+    folder.mkdir(exist_ok=True)
+    (folder / "case.yaml").write_text((ROOT / "cases/study/templates/patch-2d.yaml").read_text())
+    (folder / "study.yaml").write_text(STUDY)
+    study = read_study(folder / "study.yaml")
+    plain = [p for p in study.points if p.linear_solver == "auto"]
+    points = [
+        Measured(p, record(p, error, seconds))
+        for p, (error, seconds) in zip(plain, numbers, strict=True)
+    ]
+    text = words.paragraph(pressure(study, points))
+    good = [m for m in points if m.error("pressure_l2") <= LIMIT]
+    if good:
+        best = min(good, key=lambda m: m.time.median)
+        title, when = best.point.treatment.title, words.seconds(best.time.median)
+        assert text.startswith(f"{title} reaches 0.1 % soonest, in {when} (")
+    else:
+        assert text.startswith("No solve reaches 0.1 %")
+    for title in ("LAC", "whole faces", "nodal"):
+        mine = [m.error("pressure_l2") for m in points if m.point.treatment.title == title]
+        never = f"{title} (smallest error {words.percent(min(mine))})"
+        assert (never in text) == (bool(good) and min(mine) > LIMIT)
+        exact = text.partition("at round-off")[0].rpartition(". ")[2]
+        assert (title in exact and "at round-off" in text) == (max(mine) <= 1e-11)
+
+
+def test_failures_are_listed_once_for_each_reason(study, results):
+    [(why, what, where)] = failures(read_points(study, results))
+    assert why == "refused: no such treatment of QUAD4 & others"
+    assert (what, where) == ("nodal", "Patch, QUAD4–TRIA3: level 4")
+
+
+def test_a_line_is_broken_where_a_level_has_no_solve(study, results):
+    gone = results / "patch/tria3-quad4/uncut/2.json"
+    whole = draw(study, results)
+    gone.unlink()
+    broken = draw(study, results)
+    style = 'stroke="#d55e00" stroke-width="17"'
+    assert sum(style in part for part in whole) == 2
+    assert sum(style in part for part in broken) == 3
+    assert "not measured" in failures(read_points(study, results))[0][0]
+
+
+def draw(study, results):
+    panel = pressure(study, read_points(study, results))
+    drawing = draw_figure(panel, Looks(panel.lines))
+    return [ET.tostring(part, encoding="unicode") for part in ET.fromstring(drawing)]
+
+
+def test_no_two_treatments_look_alike(panel):
+    looks = Looks(panel.lines)
+    keys = {looks.draw_key(title).split("</title>")[1] for title in panel.titles}
+    assert len(keys) == 3
+
+
+class Text(HTMLParser):
+    """The text of a page."""
+
+    def __init__(self):
+        super().__init__()
+        self.parts = []
+
+    def handle_data(self, data):
+        self.parts.append(data)
+
+
+def test_the_page_its_table_and_its_figures(study, results, tmp_path):
+    said = []
+    write_study(study, results, tmp_path / "report", said.append)
+    assert said[0].startswith("20 of 21 points are measured. 1 have no solve")
+    text = Text()
+    text.feed((tmp_path / "report/study.html").read_text())
+    page = " ".join(" ".join(text.parts).split())
+    assert "A <study>" in page
+    assert "no such treatment of QUAD4 & others" in page
+    assert "Choice of the linear solver" in page
+    assert all(target in page for target in TARGETS.values())
+    assert words.paragraph(pressure(study, read_points(study, results))) in page
+    for name in ("patch-pressure-l2", "patch-displacement-l2", "linear-solver-patch-pressure-l2"):
+        ET.parse(tmp_path / f"report/study/{name}.svg")
+
+    with (tmp_path / "report/study.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(study.points)
+    row = next(
+        r for r in rows if (r["treatment"], r["slave"], r["level"]) == ("uncut", "TRIA3", "2")
+    )
+    keys = ("pressure_l2", "total_wall_median", "total_wall_low", "solve_cpu_high")
+    values = [float(row[key]) for key in keys]
+    assert values == pytest.approx([1e-3, 0.4, 0.36, 0.22])
+    assert [r["reason"] for r in rows if r["outcome"] != "solved"] == [
+        "no such treatment of QUAD4 & others"
+    ]
+
+
+def test_a_study_without_any_record_still_has_a_page(study, tmp_path):
+    write_study(study, tmp_path / "nothing", tmp_path, lambda line: None)
+    page = (tmp_path / "study.html").read_text()
+    assert "not measured" in page
+    assert "No point of this problem is measured" in page
+    assert outcome(read_points(study, tmp_path)).startswith("0 of 21")
+
+
+def test_numbers_in_sentences():
+    assert words.listed(["a"]) == "a"
+    assert words.listed(["a", "b", "c"]) == "a, b and c"
+    assert [words.seconds(t) for t in (0.0123, 0.123, 1.23, 123.4)] == [
+        "12 ms",
+        "0.12 s",
+        "1.2 s",
+        "123 s",
+    ]
+    assert [words.percent(e) for e in (0.0123, 1e-5, 25.0)] == ["1.2 %", "1.0e-05", "2.5e+01"]
+
+
+def test_panels_share_their_problem_s_lines(panel):
+    assert isinstance(panel, Panel)
+    assert panel.pairs == ["TRIA3–QUAD4", "QUAD4–TRIA3"]
+    assert panel.name == "patch-pressure-l2"
