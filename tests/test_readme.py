@@ -1,8 +1,8 @@
 """The README's commands, run from top to bottom as a newcomer would.
 
 They run as they stand, in a copy of the project where long ones are short: `cases/` holds only the
-case that the README names and a study of one point, and `tests/` a single test. The installation is left out:
-the copy borrows this environment.
+case that the README names and a study of one point, and `tests/` a single test. The installation
+is left out: the copy borrows this environment.
 """
 
 import os
@@ -60,7 +60,7 @@ def write_study(folder: Path) -> None:
     study["quick"] = {
         "repetitions": 1,
         "levels": 1,
-        "pairs": {study["problems"][0]["name"]: [pair]},
+        "pairs": {study["problems"][0]["name"]: [list(pair)]},
     }
     (folder / "study.yaml").write_text(yaml.safe_dump(study))
 

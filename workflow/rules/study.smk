@@ -10,10 +10,14 @@ MEASURING_SOURCES = [STUDY_FILE, *SOLVER_SOURCES]
 @cache
 def study():
     """The study and its points by name; says how long those that are missing will take."""
+    from solver.errors import InputError
     from solver.study.description import read_study
     from solver.study.expected import announcement
 
-    content = read_study(Path(STUDY_FILE), SIZE)
+    try:
+        content = read_study(Path(STUDY_FILE), SIZE)
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
     newest = max(Path(source).stat().st_mtime for source in MEASURING_SOURCES)
     pending = [
         point for point in content.points if older(record_of(point.name), newest)

@@ -17,6 +17,7 @@ from solver.study.timing import TOTAL, Spread, medians, spread
 # Errors in the order in which they are shown, with what they are errors of.
 ERRORS = {
     "pressure_l2": "pressure, L2",
+    "pressure_means": "pressure, macro-element means",
     "pressure_max": "pressure, maximum",
     "pressure_oscillation": "pressure, oscillation",
     "displacement_l2": "displacement, L2",
