@@ -11,6 +11,7 @@
       - {case: tria3.yaml, reference_code: {displacement_l2: 1.998, pressure_l2: 1.041}}
       - {case: press-fit.yaml, problem: press fit}    # has plots of its own
       - {case: hexa20.yaml, hexahedra: hexahedra, levels: [1, 2, 3, 4]}
+      - {case: sphere.yaml, finest: {peak: 0.01}}     # the largest error allowed at the finest level
 
 A ladder is solved in every direction of its case.
 """
@@ -33,7 +34,7 @@ class Ladder:
     """One case file, and what the divisions of its recipe are multiplied by, level by level.
 
     Ladders of the same `problem` share their plots. `observed` holds the reference code's own
-    slopes by error.
+    slopes by error, `finest` the largest errors allowed at the finest level.
     """
 
     case: Path
@@ -41,6 +42,7 @@ class Ladder:
     problem: str = ""
     hexahedra: str | None = None
     observed: Mapping[str, float] = field(default_factory=dict)
+    finest: Mapping[str, float] = field(default_factory=dict)
 
     def folder(self, swapped: bool) -> str:
         """The name of the folder in which the results of one direction lie."""
@@ -104,4 +106,5 @@ def _ladder(path: Path, content: Mapping[str, Any], index: int) -> Ladder:
         problem=item.get("problem", ""),
         hexahedra=item.get("hexahedra"),
         observed=item.get("reference_code", {}),
+        finest=item.get("finest", {}),
     )

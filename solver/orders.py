@@ -22,6 +22,9 @@ ERRORS = {
     "pressure_l2": "pressure, L2",
     "pressure_max": "pressure, maximum",
     "pressure_means": "pressure, macro-element means",
+    "pressure_oscillation": "pressure, second difference",
+    "half_width": "contact half-width",
+    "peak": "peak pressure",
 }
 LAST = 3
 # Relative errors below are rounding: no slope is fitted to them.

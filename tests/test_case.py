@@ -192,8 +192,10 @@ REFUSED = [
     ),
     (
         "contact: [{slave: S, master: M, treatment: node_to_segment, normal: nodal}]",
-        "contact[0].normal = 'nodal': the treatment node_to_segment has normals of its own; "
-        "allowed: element",
+        (
+            "contact[0].normal = 'nodal': the treatment node_to_segment has normals of its own; "
+            "allowed: element"
+        ),
     ),
     (
         "contact: [{slave: S, master: M, points: 4}]",

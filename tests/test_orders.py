@@ -108,6 +108,8 @@ def test_ladders_as_their_file_gives_them(file):
         ("- {case: tria3.yaml,", "- {", r"ladders\[0\].case: this key is needed"),
         ("tria3.yaml", "tria5.yaml", r"ladders\[0\].case = 'tria5.yaml': no such file"),
         ("hexahedra: hexahedra", "hexahedra: cubes", "must be pyramids or hexahedra"),
+        ("levels: [1, 2]}", "finest: {peek: 1}}", "did you mean peak"),
+        ("levels: [1, 2]}", "finest: {peak: 0}}", r"finest.peak = 0: must be a positive number"),
         ("[0.5, null]", "[0.5]", r"must be \[guaranteed, best\]"),
     ],
 )

@@ -113,15 +113,30 @@ class Curve:
             return None
         return self.rounding(error) or (slope is not None and slope.value >= least)
 
+    def at_finest(self, error: str) -> float | None:
+        """The error at the finest level that has it."""
+        sizes, values = self.errors(error)
+        return float(values[sizes.argmin()]) if len(sizes) else None
+
+    def kept(self, error: str) -> bool | None:
+        """Whether the error at the finest level is as small as asked; None where none is asked."""
+        bound, found = self.ladder.finest.get(error), self.at_finest(error)
+        return None if bound is None else found is not None and found <= bound
+
     @cached_property
     def complaints(self) -> list[str]:
-        """Levels without a result, and slopes that are not reached, one line each."""
+        """Levels without a result, slopes and finest errors that are not reached, one line each."""
         lines = [f"{self.family.name}/{self.name}: {line}" for line in self.missing]
         for error in ERRORS:
             if self.reached(error) is False:
                 slope = self.slope(error)
                 shown = f"{slope.value:.3f} ± {slope.spread:.3f}" if slope else "not known"
                 asked = f"at least {self.least(error):g} is asked for"
+                lines.append(f"{self.family.name}/{self.name}: {ERRORS[error]}: {shown}; {asked}")
+            if self.kept(error) is False:
+                found = self.at_finest(error)
+                shown = "not known" if found is None else f"{found:.1e}"
+                asked = f"at most {self.ladder.finest[error]:g} is asked for at the finest level"
                 lines.append(f"{self.family.name}/{self.name}: {ERRORS[error]}: {shown}; {asked}")
         return lines
 

@@ -49,10 +49,12 @@ def write_orders(
 
 
 def outcome(curves: Sequence[Curve]) -> str:
-    """How many slopes were asked for and reached."""
-    asked = [r for c in curves for e in ERRORS if (r := c.reached(e)) is not None]
+    """How many slopes and errors at the finest levels were asked for and reached."""
+    slopes = [r for c in curves for e in ERRORS if (r := c.reached(e)) is not None]
+    finest = [r for c in curves for e in ERRORS if (r := c.kept(e)) is not None]
     lost = sum(len(curve.rows) - len(curve.solved) for curve in curves)
-    text = f"{sum(asked)} of {len(asked)} slopes asked for are reached, on {len(curves)} ladders."
+    text = f"{sum(slopes)} of {len(slopes)} slopes asked for are reached, on {len(curves)} ladders"
+    text += f"; {sum(finest)} of {len(finest)} errors at finest levels." if finest else "."
     return text + (f" {lost} levels have no result." if lost else "")
 
 

@@ -64,6 +64,10 @@ def _refusal(error: Any, where: object) -> InputError:
     if rule == "required":
         missing = next(key for key in error.validator_value if key not in error.instance)
         return InputError(where, key_path([*keys, missing]), None, "this key is needed")
+    if rule == "enum" and "propertyNames" in error.absolute_schema_path:
+        unknown = error.instance
+        path = key_path([*keys, unknown])
+        return InputError(where, path, None, f"unknown key; {hint(unknown, error.validator_value)}")
     allowed = f"must be {error.schema.get('description', error.message)}"
     if rule == "uniqueItems":
         allowed += ", each once"

@@ -131,6 +131,20 @@ def test_nothing_is_missed_where_all_is_reached(family, results, tmp_path):
     assert first.complaints == []
 
 
+def test_errors_at_the_finest_level_are_held_against_what_is_allowed(family, results, tmp_path):
+    (tmp_path / "cases/powers/orders.yaml").write_text(
+        "levels: [1, 2, 4, 8]\n"
+        "ladders: [{case: tria3.yaml, finest: {pressure_l2: 0.125, displacement_l2: 0.01, peak: 1}}]"
+    )
+    (curve,) = read_curves(read_ladders(tmp_path / "cases/powers/orders.yaml"), results)
+    assert curve.kept("pressure_l2")
+    assert curve.kept("stress_l2") is None
+    assert curve.complaints == [
+        "powers/tria3: displacement, L2: 4.4e-02; at most 0.01 is asked for at the finest level",
+        "powers/tria3: peak pressure: not known; at most 1 is asked for at the finest level",
+    ]
+
+
 def test_levels_are_no_part_of_the_report_of_a_batch(results, tmp_path):
     put(tmp_path / "batch" / "fam", 1, "TRIA3", 2, displacement_l2=1.0)
     results.rename(tmp_path / "batch" / "orders")
