@@ -11,7 +11,7 @@
       - {case: tria3.yaml, reference_code: {displacement_l2: 1.998, pressure_l2: 1.041}}
       - {case: press-fit.yaml, problem: press fit}    # has plots of its own
       - {case: hexa20.yaml, hexahedra: hexahedra, levels: [1, 2, 3, 4]}
-      - {case: sphere.yaml, finest: {peak: 0.01}}     # the largest error allowed at the finest level
+      - {case: sphere.yaml, finest: {peak: 0.01}}     # largest error allowed at the finest level
 
 A ladder is solved in every direction of its case.
 """

@@ -134,7 +134,8 @@ def test_nothing_is_missed_where_all_is_reached(family, results, tmp_path):
 def test_errors_at_the_finest_level_are_held_against_what_is_allowed(family, results, tmp_path):
     (tmp_path / "cases/powers/orders.yaml").write_text(
         "levels: [1, 2, 4, 8]\n"
-        "ladders: [{case: tria3.yaml, finest: {pressure_l2: 0.125, displacement_l2: 0.01, peak: 1}}]"
+        "ladders: [{case: tria3.yaml,"
+        " finest: {pressure_l2: 0.125, displacement_l2: 0.01, peak: 1}}]"
     )
     (curve,) = read_curves(read_ladders(tmp_path / "cases/powers/orders.yaml"), results)
     assert curve.kept("pressure_l2")
