@@ -7,7 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.faces import nodal_normals, surface_points
+from solver.elements import shape_functions
+from solver.elements.gauss import gauss_rule
+from solver.faces import FACE_POINTS, nodal_normals, surface_points
+from solver.mesh.catalogue import cell_type
 from solver.solution import Solution, ZoneResult
 from solver.solutions import ExactSolution
 from solver.stress import normal_stress
@@ -30,6 +33,27 @@ def deformable(solution: Solution) -> np.ndarray:
         ):
             nodes[block.data[np.asarray(members, dtype=int)].ravel()] = False
     return nodes
+
+
+def computed_pressure(zone: ZoneResult) -> np.ndarray:
+    """The computed pressure (k,) at the `surface_points` of a zone.
+
+    That of each macro-element, or, between multipliers at nodes, linear (or what the shape
+    functions make of it where all nodes of a face have one).
+    """
+    parts = []
+    for name, nodes, owner in zone.faces:
+        kind = cell_type(name)
+        reference, weights = gauss_rule(kind.name, FACE_POINTS)
+        if zone.nodal is None:
+            parts.append(np.repeat(zone.multiplier[owner], len(weights)))
+            continue
+        at_all = np.isin(nodes, zone.nodal.nodes).all()
+        shape = kind.name if at_all else kind.skeleton
+        own = nodes if at_all else nodes[:, : kind.n_vertices]
+        pressure = zone.nodal.multiplier[np.searchsorted(zone.nodal.nodes, own)]
+        parts.append((pressure @ shape_functions(shape).values(reference).T).ravel())
+    return np.concatenate(parts)
 
 
 class ExactValues:

@@ -12,7 +12,7 @@ from solver.errors import InputError
 from solver.mesh.catalogue import BY_MESHIO, CellType, cell_type
 
 # Points each way on a face: enough for pressures that end with a vertical tangent.
-_FACE_POINTS = 8
+FACE_POINTS = 8
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ def surface_points(
     place, weight, macro = [], [], []
     for name, nodes, owner in faces:
         kind = cell_type(name)
-        reference, weights = gauss_rule(kind.name, _FACE_POINTS)
+        reference, weights = gauss_rule(kind.name, FACE_POINTS)
         values, slopes = shape_functions(kind.name).both(reference)
         measure = np.linalg.norm(area_vectors(points, nodes, slopes), axis=2) * weights
         where = np.einsum("qa,fad->fqd", values, points[nodes], optimize=True)

@@ -15,6 +15,10 @@ in cells in mixed form):
                                                              the surface, where p is smooth (2D)
     half_width, peak      of the half ellipse fitted to p_h (Hertz), relative
 
+In the first two of the pressure p_h is the field that the treatment of the interface solves for:
+constant on each macro-element, or, with multipliers at nodes, interpolated between these; in the
+others its mean over each macro-element.
+
 Volume integrals use Gauss points two more each way than the degree of the cell, so that the
 quadrature is no part of what is seen.
 """
@@ -28,7 +32,7 @@ import numpy as np
 from solver.elasticity import physical_gradients
 from solver.elements import shape_functions
 from solver.elements.gauss import gauss_rule
-from solver.exact import ExactValues, deformable
+from solver.exact import ExactValues, computed_pressure, deformable
 from solver.faces import surface_points
 from solver.mesh.catalogue import cell_type
 from solver.solution import Solution, ZoneResult
@@ -141,7 +145,7 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
     for zone in solution.zones:
         at = surface_points(solution.mesh.points, zone.faces)
         pressure = exact.contact_pressure(at.place)
-        error = zone.multiplier[at.macro] - pressure
+        error = computed_pressure(zone) - pressure
         covered = (zone.coverage > 0)[at.macro] & exact.regular(at.place)
         weight = at.weight * zone.coverage[at.macro]
         squares += _integral(weight, error), _integral(weight, pressure)

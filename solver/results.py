@@ -8,7 +8,8 @@ the checks need again, so that a file can be judged without solving:
     /accuracy      what rounding alone may change, relative, by cause
     /errors        norms of the error against the case's exact solution, if it names one
     /mean_stress   by cell type, that of cells in mixed form at their nodes
-    /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces
+    /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces; in `nodal` those
+                   of nodes where the treatment has its multipliers there
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
     /provenance    versions, revision, hashes, machine
 """
@@ -32,7 +33,7 @@ from solver.errors import InputError
 from solver.files import replacing
 from solver.mesh.catalogue import cell_type
 from solver.mesh.vtkhdf import read_grid, write_grid
-from solver.solution import BodyInfo, Solution, StepResult, ZoneResult
+from solver.solution import BodyInfo, NodalContact, Solution, StepResult, ZoneResult
 
 GRID = "VTKHDF"
 _SCALARS = (
@@ -55,6 +56,12 @@ _BY_MACRO_ELEMENT = {  # data set: attribute of ZoneResult
     "coverage": "coverage",
 }
 _BY_NODE = ("stress_slave", "stress_master", "slave_nodes", "master_nodes")
+_AT_MULTIPLIER_NODES = {
+    "nodes": "nodes",
+    "multiplier": "multiplier",
+    "gap": "gap",
+    "status": "closed",
+}
 _ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
@@ -236,6 +243,10 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     faces = group.create_group("master_faces")
     for kind, connectivity in zone.master_faces:
         faces[kind] = connectivity
+    if zone.nodal:
+        nodal = group.create_group("nodal")
+        for name, attribute in _AT_MULTIPLIER_NODES.items():
+            nodal[name] = getattr(zone.nodal, attribute)
 
 
 def _read_zone(
@@ -247,7 +258,12 @@ def _read_zone(
         master_faces=[(kind, data[()]) for kind, data in group["master_faces"].items()],
         **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
         **{key: group[key][()] for key in _BY_NODE},
+        nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
     )
+
+
+def _read_nodal(group: h5py.Group) -> NodalContact:
+    return NodalContact(**{a: group[name][()] for name, a in _AT_MULTIPLIER_NODES.items()})
 
 
 def _write_bodies(group: h5py.Group, bodies: Sequence[BodyInfo]) -> None:

@@ -19,7 +19,7 @@ from solver.mesh.catalogue import BY_NAME
 from solver.naming import body_infos
 from solver.plan import made_plan
 from solver.scene import Scene, ZoneScene, build_scene
-from solver.solution import Solution, StepResult, ZoneResult
+from solver.solution import NodalContact, Solution, StepResult, ZoneResult
 from solver.stress import normal_stress
 
 Log = Callable[[str], Any]
@@ -159,7 +159,15 @@ def _zone_result(
         stress_master=normal_stress(stress[master_nodes], master_normal),
         slave_nodes=slave_nodes,
         master_nodes=master_nodes,
+        nodal=_nodal_contact(zone, state),
     )
+
+
+def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
+    nodes, mine = zone.operator.nodes, zone.numbers
+    if nodes is None:
+        return None
+    return NodalContact(nodes, state.pressure[mine], state.gap[mine], state.status.closed[mine])
 
 
 def _closed(zone: ZoneScene, state: Equilibrium) -> np.ndarray:

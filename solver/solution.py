@@ -38,6 +38,20 @@ class BodyInfo:
 
 
 @dataclass
+class NodalContact:
+    """Contact by node, where the treatment of the interface has its multipliers there.
+
+    `nodes` (k,) into the mesh's points; `multiplier` (pressure ≥ 0), the average `gap` that it sees
+    and `closed` (bool), all (k,).
+    """
+
+    nodes: np.ndarray
+    multiplier: np.ndarray
+    gap: np.ndarray
+    closed: np.ndarray
+
+
+@dataclass
 class ZoneResult:
     """The contact state of one zone, by macro-element, and the stress on both surfaces.
 
@@ -45,7 +59,8 @@ class ZoneResult:
     points, macro-element number (s,)); `master_faces`: (type, connectivity). `centre` and `normal`
     (m, dim), `area`, `multiplier` (pressure ≥ 0), `gap`, `closed` (bool) and `coverage`
     (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
-    `slave_nodes` and `master_nodes`, taken from the body of that surface alone.
+    `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
+    belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
     """
 
     name: str
@@ -62,6 +77,7 @@ class ZoneResult:
     stress_master: np.ndarray
     slave_nodes: np.ndarray
     master_nodes: np.ndarray
+    nodal: NodalContact | None = None
 
 
 @dataclass

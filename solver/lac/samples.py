@@ -15,7 +15,7 @@ class Samples:
     """Points on the n faces of one block, the same q places on each.
 
     `values` (q, n_nodes) shape functions; `weight` (n, q) surface measure × quadrature weight;
-    `normal` (n, q, dim) unit normals.
+    `normal` (n, q, dim) the unit normals along which the faces meet the master.
     """
 
     values: np.ndarray
@@ -38,4 +38,7 @@ def sampled(block: Facets, rule: Rule) -> Samples:
     values, slopes = shape_functions(block.type.name).both(places)
     vectors = surface_vectors(block, slopes)
     measure = np.linalg.norm(vectors, axis=2)
-    return Samples(values, measure * weights, vectors / measure[..., None])
+    if block.directions is not None:
+        vectors = np.einsum("qa,fad->fqd", values, block.directions)
+    normal = vectors / np.linalg.norm(vectors, axis=2, keepdims=True)
+    return Samples(values, measure * weights, normal)
