@@ -12,7 +12,8 @@ in cells in mixed form):
     pressure_max          largest |p_h − p| / largest p      where p is smooth
     pressure_means        |p_h − p̄| / |p̄|                    p̄: mean of p over each macro-element
     pressure_oscillation  largest |e₋ − 2 e + e₊| / largest p   e = p_h − p̄ of neighbours along
-                                                             the surface, where p is smooth (2D)
+                                                             the surface, where p is smooth (2D);
+                                                             of nodal multipliers p_h − p at nodes
     half_width, peak      of the half ellipse fitted to p_h (Hertz), relative
 
 In the first two of the pressure p_h is the field that the treatment of the interface solves for:
@@ -35,7 +36,7 @@ from solver.elements.gauss import gauss_rule
 from solver.exact import ExactValues, computed_pressure, deformable
 from solver.faces import surface_points
 from solver.mesh.catalogue import cell_type
-from solver.solution import Solution, ZoneResult
+from solver.solution import NodalContact, Solution, ZoneResult
 from solver.solutions import ElasticSolution, ExactSolution
 from solver.solutions.base import lame_of
 from solver.solutions.hertz import Hertz
@@ -155,8 +156,7 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
         largest = max(largest, np.abs(error[covered]).max(initial=0.0))
         highest = max(highest, pressure.max())
         if exact.dim == 2:
-            smooth = exact.regular(zone.centre)
-            second.append(_second_difference(zone, zone.multiplier - mean, smooth))
+            second.append(_oscillation(solution, zone, exact, mean))
     found = {
         "pressure_l2": _root(*squares),
         "pressure_max": _over(largest, highest),
@@ -181,9 +181,26 @@ def _ellipse_errors(zones: list[ZoneResult], exact: Hertz) -> dict[str, float]:
     }
 
 
-def _second_difference(zone: ZoneResult, error: np.ndarray, smooth: np.ndarray) -> float:
-    """Largest |e₋ − 2 e + e₊| over macro-elements between two neighbours, all of them smooth."""
-    before, after = _neighbours(zone)
+def _oscillation(
+    solution: Solution, zone: ZoneResult, exact: ExactSolution, mean: np.ndarray
+) -> float:
+    """Largest second difference of the error, by macro-element or, of nodal multipliers, by node.
+
+    The average of two nodes would hide a pressure that alternates from node to node.
+    """
+    if zone.nodal is None:
+        smooth = exact.regular(zone.centre)
+        return _second_difference(_neighbours(zone), zone.multiplier - mean, smooth)
+    place = solution.mesh.points[zone.nodal.nodes]
+    error = zone.nodal.multiplier - exact.contact_pressure(place)
+    return _second_difference(_nodal_neighbours(zone, zone.nodal), error, exact.regular(place))
+
+
+def _second_difference(
+    pairs: tuple[np.ndarray, np.ndarray], error: np.ndarray, smooth: np.ndarray
+) -> float:
+    """Largest |e₋ − 2 e + e₊| over places between two neighbours, all of them smooth."""
+    before, after = pairs
     total, count = np.zeros(len(error)), np.zeros(len(error))
     for one, other in ((before, after), (after, before)):
         np.add.at(total, one, error[other] - error[one])
@@ -200,6 +217,18 @@ def _neighbours(zone: ZoneResult) -> tuple[np.ndarray, np.ndarray]:
     ends, owner = ends[order], owner[order]
     meet = (ends[1:] == ends[:-1]) & (owner[1:] != owner[:-1])
     return owner[:-1][meet], owner[1:][meet]
+
+
+def _nodal_neighbours(zone: ZoneResult, nodal: NodalContact) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of multipliers that follow each other along the faces of a line."""
+    paths = [nodes[:, cell_type(name).boundary] for name, nodes, _ in zone.faces]
+    before, after = [], []
+    for path in paths:
+        own = path[:, np.isin(path[0], nodal.nodes)]
+        number = np.searchsorted(nodal.nodes, own)
+        before.append(number[:, :-1].ravel())
+        after.append(number[:, 1:].ravel())
+    return np.concatenate(before), np.concatenate(after)
 
 
 def _root(error: float, whole: float) -> float:
