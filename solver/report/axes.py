@@ -64,10 +64,21 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_axes(
-    drawing: Drawing, x: Scale, y: Scale, x_label: str, y_label: str, numbered: bool = True
+    drawing: Drawing,
+    x: Scale,
+    y: Scale,
+    x_label: str,
+    y_label: str,
+    numbered: bool = True,
+    bottom: float | None = None,
 ) -> None:
-    """Grid lines, ticks and labels of a plot; `numbered`: the ticks of y have their values."""
-    left, right, bottom, top = x.start, x.end, y.start, y.end
+    """Grid lines, ticks and labels of a plot.
+
+    `numbered`: the ticks of y have their values; `bottom`: where the axis of x lies, if it is not at
+    the end of y.
+    """
+    left, right, top = x.start, x.end, y.end
+    bottom = y.start if bottom is None else bottom
     for value in y.ticks():
         at = float(y(value))
         drawing.line(left, at, right, at, stroke=RULE, stroke_width=0.6)

@@ -7,7 +7,7 @@
     treatments:                   # of the interface: what is set in the contact of a case
       - {name: lac, title: LAC, zone: {treatment: lac}}
       - name: lac-hexahedra       # only for these cell types on the slave side
-        title: LAC, hexahedra cut into hexahedra
+        title: LAC into hexahedra
         zone: {treatment: lac, hexahedra: hexahedra}
         slaves: [HEXA8, HEXA20]
     problems:

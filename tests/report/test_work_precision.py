@@ -2,14 +2,17 @@
 
 import csv
 import json
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from solver.report.svg import Drawing
 from solver.report.work_precision import words
 from solver.report.work_precision.figure import LIMIT, Looks, draw_figure
 from solver.report.work_precision.page import outcome, write_study
@@ -43,12 +46,18 @@ linear_solvers:
 MACHINE = {"cpu": "a cpu", "revision": "abc", "python": "3", "time_utc": "2026-01-01T00:00:00"}
 
 
+@cache
+def any_study(folder):
+    folder.mkdir(exist_ok=True)
+    text = (ROOT / "cases/study/templates/patch-2d.yaml").read_text()
+    (folder / "case.yaml").write_text(text)
+    (folder / "study.yaml").write_text(STUDY)
+    return read_study(folder / "study.yaml")
+
+
 @pytest.fixture
 def study(tmp_path):
-    text = (ROOT / "cases/study/templates/patch-2d.yaml").read_text()
-    (tmp_path / "case.yaml").write_text(text)
-    (tmp_path / "study.yaml").write_text(STUDY)
-    return read_study(tmp_path / "study.yaml")
+    return any_study(tmp_path)
 
 
 def record(point, error, seconds):
@@ -145,7 +154,7 @@ def test_times_within_the_spread_are_not_told_apart(study, results):
             m.record["times"]["total"]["wall"] = [0.05 * m.point.level] * 2 + [0.5]
             m.record["errors"]["pressure_l2"] = 1e-4
     text = words.paragraph(pressure(study, points))
-    assert text.startswith("whole faces reaches 0.1 % soonest, in 50 ms")
+    assert text.startswith("Whole faces reaches 0.1 % soonest, in 50 ms")
     assert "LAC is next with 0.1 s (TRIA3–QUAD4, level 1), no later within the spread" in text
 
 
@@ -157,13 +166,15 @@ def test_where_none_is_accurate_enough_the_nearest_is_told(study, results):
     assert "never" not in text
 
 
-@given(st.lists(st.tuples(st.floats(1e-17, 10), st.floats(1e-4, 1e3)), min_size=18, max_size=18))
+# Chosen values make ties and values at the very limit likely.
+ERROR = st.one_of(st.floats(1e-17, 10), st.sampled_from([1e-12, LIMIT, 0.5]))
+SECONDS = st.one_of(st.floats(1e-4, 1e3), st.sampled_from([1.0, 2.0]))
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(ERROR, SECONDS), min_size=18, max_size=18))
 def test_whatever_the_numbers_the_sentences_are_true(tmp_path_factory, numbers):
-    folder = tmp_path_factory.getbasetemp() / "any"
-    folder.mkdir(exist_ok=True)
-    (folder / "case.yaml").write_text((ROOT / "cases/study/templates/patch-2d.yaml").read_text())
-    (folder / "study.yaml").write_text(STUDY)
-    study = read_study(folder / "study.yaml")
+    study = any_study(tmp_path_factory.getbasetemp() / "any")
     plain = [p for p in study.points if p.linear_solver == "auto"]
     points = [
         Measured(p, record(p, error, seconds))
@@ -172,9 +183,11 @@ def test_whatever_the_numbers_the_sentences_are_true(tmp_path_factory, numbers):
     text = words.paragraph(pressure(study, points))
     good = [m for m in points if m.error("pressure_l2") <= LIMIT]
     if good:
-        best = min(good, key=lambda m: m.time.median)
-        title, when = best.point.treatment.title, words.seconds(best.time.median)
-        assert text.startswith(f"{title} reaches 0.1 % soonest, in {when} (")
+        soonest = min(m.time.median for m in good)
+        when = words.seconds(soonest)
+        titles = {m.point.treatment.title for m in good if m.time.median == soonest}
+        starts = [f"{t[:1].upper()}{t[1:]} reaches 0.1 % soonest, in {when} (" for t in titles]
+        assert text.startswith(tuple(starts))
     else:
         assert text.startswith("No solve reaches 0.1 %")
     for title in ("LAC", "whole faces", "nodal"):
@@ -197,8 +210,9 @@ def test_a_line_is_broken_where_a_level_has_no_solve(study, results):
     gone.unlink()
     broken = draw(study, results)
     style = 'stroke="#d55e00" stroke-width="17"'
-    assert sum(style in part for part in whole) == 2
-    assert sum(style in part for part in broken) == 3
+    # One in the legend, one a pair.
+    assert sum(style in part for part in whole) == 1 + 2
+    assert sum(style in part for part in broken) == 1 + 3
     assert "not measured" in failures(read_points(study, results))[0][0]
 
 
@@ -210,8 +224,12 @@ def draw(study, results):
 
 def test_no_two_treatments_look_alike(panel):
     looks = Looks(panel.lines)
-    keys = {looks.draw_key(title).split("</title>")[1] for title in panel.titles}
-    assert len(keys) == 3
+    keys = set()
+    for title in panel.titles:
+        drawing = Drawing(50, 14, "key")
+        looks.draw_marks(drawing, title, np.zeros((1, 2)))
+        keys.add((drawing.svg(), str(looks.line(title))))
+    assert len({mark for mark, _ in keys}) == len({line for _, line in keys}) == 3
 
 
 class Text(HTMLParser):
@@ -271,7 +289,7 @@ def test_numbers_in_sentences():
         "1.2 s",
         "123 s",
     ]
-    assert [words.percent(e) for e in (0.0123, 1e-5, 25.0)] == ["1.2 %", "1.0e-05", "2.5e+01"]
+    assert [words.percent(e) for e in (0.0123, 1e-5, 25.0)] == ["1.2 %", "1.0e-05", "2500 %"]
 
 
 def test_panels_share_their_problem_s_lines(panel):

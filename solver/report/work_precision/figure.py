@@ -19,8 +19,11 @@ from solver.report.svg import INK, MUTED, RED, Drawing, Style
 from solver.report.work_precision.records import ERRORS, Line, Measured, Panel, shown
 
 PLOT, HEIGHT, LEFT, RIGHT, APART = 268, 340, 58, 112, 14
+# A row of the legend, and about the width of a letter in it.
+_ROW, _LETTER = 18, 5.5
 # The strip under a plot that does not reach down to round-off.
 _STRIP = 16
+_BOTTOM = HEIGHT - 48
 _NEAR = 1e-11
 LIMIT = 1e-3
 # Okabe and Ito's colours; yellow is left out, which paper does not show.
@@ -59,12 +62,11 @@ class Looks:
         color, mark, variant = self._looks[title]
         draw_marks(drawing, mark, at, color, filled=not variant, size=size)
 
-    def draw_key(self, title: str) -> Markup:
-        """The line and mark of a treatment, for the legend."""
-        drawing = Drawing(46, 14, title)
-        drawing.line(2, 7, 44, 7, **self.line(title))
-        self.draw_marks(drawing, title, np.array([[23.0, 7.0]]))
-        return drawing.svg()
+    def draw_key(self, drawing: Drawing, title: str, x: float, y: float) -> None:
+        """Draw a piece of a treatment's line with its mark, 38 pixels long, and its name."""
+        drawing.line(x, y, x + 38, y, **self.line(title))
+        self.draw_marks(drawing, title, np.array([[x + 19.0, y]]))
+        drawing.text(x + 44, y + 4, title, color=INK)
 
 
 def draw_figure(panel: Panel, looks: Looks) -> Markup:
@@ -72,28 +74,49 @@ def draw_figure(panel: Panel, looks: Looks) -> Markup:
     pairs = panel.pairs
     width = LEFT + len(pairs) * (PLOT + APART) - APART + RIGHT
     name = ERRORS[panel.error]
-    drawing = Drawing(width, HEIGHT, f"{panel.problem.title}: error of {name}, against run time")
+    legend = _legend(panel, width)
+    drawing = Drawing(
+        width,
+        HEIGHT + _ROW * (1 + legend[-1][2]),
+        f"{panel.problem.title}: error of {name}, against run time",
+    )
+    drawing.text(LEFT, HEIGHT + 10, panel.problem.title, weight="bold")
+    for title, at, row in legend:
+        looks.draw_key(drawing, title, at, HEIGHT + 6 + _ROW * row)
     points = [m for line in panel.lines for m in line.having(panel.error)]
     times = np.array([[m.time.low, m.time.high] for m in points])
     errors = np.array([shown(m.error(panel.error) or 0) for m in points])
+    values = np.append(errors, panel.uncertainty or errors[0])
     unknowns = max(m.record["dofs"] for m in points)
     low, high = times.min() / 1.3, times.max() * 1.3
     for number, pair in enumerate(pairs):
         start = LEFT + number * (PLOT + APART)
         x = Scale(low, high, start, start + PLOT, log=True)
         last = number == len(pairs) - 1
-        y = _heights(drawing, x, errors, unknowns, last)
+        y = _heights(drawing, x, values, unknowns, last)
         label = f"relative error: {name}" if number == 0 else ""
-        draw_axes(drawing, x, y, "time of a warm solve, s", label, numbered=number == 0)
+        draw_axes(drawing, x, y, "time of a warm solve, s", label, number == 0, _BOTTOM)
         draw_level(drawing, x, y, LIMIT, "0.1 %" if last else "", RED)
         if panel.uncertainty:
             label = "reference ±" if last else ""
             draw_level(drawing, x, y, panel.uncertainty, label, MUTED, (6, 4))
-        drawing.text(start + PLOT, 22, pair, "end", color=INK, weight="bold")
+        drawing.text(start + PLOT, 14, pair, "end", color=INK, weight="bold")
         for line in panel.lines:
             if line.pair == pair:
                 _draw_line(drawing, x, y, line, panel.error, looks)
     return drawing.svg()
+
+
+def _legend(panel: Panel, width: float) -> list[tuple[str, float, int]]:
+    """The treatments' places under the plots, behind the problem's name: title, x, row."""
+    at, row, places = LEFT + 20 + _LETTER * len(panel.problem.title), 0, []
+    for title in panel.titles:
+        length = 60 + _LETTER * len(title)
+        if at + length > width:
+            at, row = float(LEFT), row + 1
+        places.append((title, at, row))
+        at += length
+    return places
 
 
 def _heights(
@@ -104,7 +127,7 @@ def _heights(
     Where no error comes near round-off, the axis is broken above the floor: the plot would be empty
     for the most part.
     """
-    top, bottom = max(1.0, 2 * errors.max()), HEIGHT - 48
+    top, bottom = max(1.0, 2 * errors.max()), _BOTTOM
     if errors.min() < _NEAR:
         y = Scale(EPSILON / 8, top, bottom, 42, log=True)
         draw_floor(drawing, x, y, unknowns, labelled)

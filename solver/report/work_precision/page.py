@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver.report import stages
+from solver.report import raster, stages
 from solver.report.html import environment
 from solver.report.tables import as_csv
 from solver.report.work_precision import words
@@ -50,12 +50,17 @@ def write_study(
     solvers = _linear_solvers(study, points)
     contents = {f"{name}.html": _to_html(study, points, sections, solvers)}
     contents[f"{name}.csv"] = as_csv(rows(points))
-    for section in (*sections, *solvers):
-        for part in section["panels"]:
-            contents[f"{name}/{part['file']}"] = part["figure"]
-    for file, content in contents.items():
+    figures = {
+        f"{name}/{part['file']}": part["figure"]
+        for section in (*sections, *solvers)
+        for part in section["panels"]
+    }
+    for file, content in (contents | figures).items():
         with replacing(folder / file) as temporary:
             temporary.write_text(content, encoding="utf-8")
+    for file, figure in figures.items() if raster.available() else ():
+        with replacing((folder / file).with_suffix(".png")) as temporary:
+            temporary.write_bytes(raster.to_png(figure))
     log(f"{outcome(points)} Page: {folder / name}.html")
 
 
@@ -112,7 +117,6 @@ def _section(problem: Problem, points: Sequence[Measured]) -> dict[str, Any]:
 def _shown(problem: Problem, found: Sequence[Line]) -> dict[str, Any]:
     looks = Looks(found)
     return {
-        "keys": [(title, looks.draw_key(title)) for title in dict.fromkeys(x.title for x in found)],
         "panels": [_part(panel, looks) for panel in panels(problem, found)],
         "costs": _costs(found),
     }
@@ -181,6 +185,7 @@ def _to_html(
             limit=LIMIT,
             errors=ERRORS,
             overview=_OVERVIEW,
+            png=raster.available(),
             words=words,
             stages=stages.colors(s for m in points for s in m.record["times"] if s != TOTAL),
         )

@@ -13,7 +13,8 @@ def paragraph(panel: Panel) -> str:
     solved = [title for title in panel.titles if panel.smallest(title) is not None]
     parts = [_soonest(panel, solved), _never(panel, solved), _exact(panel, solved)]
     parts += [_finest(panel), _reference(panel), _lost(panel)]
-    return " ".join(part for part in parts if part)
+    text = " ".join(part for part in parts if part)
+    return text[:1].upper() + text[1:]
 
 
 def seconds(value: float) -> str:
@@ -25,7 +26,9 @@ def seconds(value: float) -> str:
 
 def percent(error: float) -> str:
     """An error in per cent where that is readable, else as a power of ten."""
-    return f"{100 * error:.2g} %" if 1e-4 <= error < 9.95 else formats.error(error)
+    if error < 1e-4:
+        return formats.error(error)
+    return f"{100 * error:.2g} %" if error < 0.995 else f"{100 * error:.0f} %"
 
 
 def listed(names: Sequence[str]) -> str:
