@@ -74,7 +74,7 @@ def draw_axes(
 ) -> None:
     """Grid lines, ticks and labels of a plot.
 
-    `numbered`: the ticks of y have their values; `bottom`: where the axis of x lies, if it is not at
+    `numbered`: the ticks of y have their values; `bottom`: where the axis of x lies, if not at
     the end of y.
     """
     left, right, top = x.start, x.end, y.end
