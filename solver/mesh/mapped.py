@@ -113,12 +113,13 @@ def hertz(keys: Keys) -> meshio.Mesh:
     """A parabolic body on a flat one, their cells even around the point of contact."""
     radius, size, core = (keys.numbers(key, 1)[0] for key in ("radius", "size", "core"))
     share = keys.numbers("share", 1)[0]
-    if not size < 2 * radius:
-        raise keys.refuse("size", size, f"must be smaller than twice the radius of {radius:g}")
     if not core / size < share < 1:
         raise keys.refuse("share", share, f"must lie between core / size = {core / size:g} and 1")
     mesh = _flat(keys)
     x = mesh.points
+    largest = 2 * radius / (x.shape[1] - 1)
+    if not size < largest:
+        raise keys.refuse("size", size, f"must be smaller than {largest:g}, or it folds")
     graded = np.sign(x) * _graded(np.abs(x), size, core, share)
     mesh.points = _straightened(graded, mesh.cells)
 
