@@ -16,7 +16,7 @@ INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report orders study test accept format lint lock clean clean-all
+.PHONY: help all-cases family case report orders study stability test accept format lint lock clean clean-all
 .PHONY: environment test-environment lint-environment
 
 help: ## list the targets
@@ -46,6 +46,10 @@ orders: environment ## refine step by step and fit orders of convergence: all or
 study: override CONFIG += $(if $(LEVEL),study=$(LEVEL))
 study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
 	@$(SNAKEMAKE) study
+
+stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
+stability: environment ## push one quantity after another until it breaks: LEVEL=quick for a few
+	@$(SNAKEMAKE) stability
 
 test: test-environment ## run the tests
 	@.venv/bin/python -m pytest -n auto $(ARGS)

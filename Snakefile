@@ -1,4 +1,4 @@
-"""Targets of the batch: `all_cases` (default), `report`, `orders`, `study`, or a verdict by its path."""
+"""Targets of the batch: `all_cases` (default), `report`, `orders`, `study`, `stability`, or a verdict by its path."""
 
 from snakemake.utils import min_version
 
@@ -18,3 +18,4 @@ include: "workflow/rules/solve.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/orders.smk"
 include: "workflow/rules/study.smk"
+include: "workflow/rules/stability.smk"

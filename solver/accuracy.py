@@ -9,6 +9,7 @@ pressure by what it acts on; it is relative to the largest pressure:
                  difference of; the stiffness behind it makes a pressure of that
     coordinates  stored to the rounding of their distance from the origin, they tilt the faces
     stress       as forces, for the stress in the bodies
+    slender      the errors of forces seen on the small faces of slender cells, as a stress there
 
 The largest one counts.
 """
@@ -28,6 +29,7 @@ _REASONS = {
     "gap": "the gap is lost in the rounding of displacements and coordinates",
     "coordinates": "the coordinates are rounded too far from the origin for cells so small",
     "stress": "the strains are lost in the rounding of the displacements",
+    "slender": "on the small faces of slender cells the rounding of forces is a large stress",
 }
 
 

@@ -105,6 +105,16 @@ def _parser() -> argparse.ArgumentParser:
 
     command = commands.add_parser("study", help="error against run time: points and their page")
     add_commands(command)
+    command = _add(commands, "sweep", _sweep, "push one quantity of a case through its values")
+    command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
+    command.add_argument("--quick", action="store_true", help="some of the values only")
+    command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
+
+    command = _add(commands, "stability", _stability, "write the page of numerical stability")
+    command.add_argument("records", type=Path, nargs="+", metavar="RECORD.json")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    command.add_argument("--quick", action="store_true", help="say that values are left out")
 
     command = _add(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -214,6 +224,21 @@ def _orders(options: argparse.Namespace) -> int:
     from solver.report.orders import write_orders
 
     write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
+    return PASSED
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    from solver.stability.points import run_sweep
+    from solver.stability.sweeps import read_sweep
+
+    record = run_sweep(read_sweep(options.sweep, options.quick), options.output, print)
+    return PASSED if all(point["holds"] for point in record["points"]) else FAILED
+
+
+def _stability(options: argparse.Namespace) -> int:
+    from solver.report.stability import read_records, write_stability
+
+    write_stability(read_records(options.records), options.output, options.quick)
     return PASSED
 
 

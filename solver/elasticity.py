@@ -155,14 +155,15 @@ def _in_precision(
 
 def cancellation(
     points: np.ndarray, blocks: list[Block], displacement: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """The sizes of what is summed up to forces (n_nodes,) and, at most, to a stress.
+) -> tuple[np.ndarray, float, float]:
+    """The sizes of what is summed up to forces (n_nodes,), and to stresses, at most.
 
     A sum keeps no more digits than its largest term leaves: times the unit of rounding, these are
-    the errors of `internal_force` and of stresses. Taken at the middle of each cell, from a
-    displacement (n_nodes, dim) or several parts of it.
+    the errors of `internal_force` and of stresses. The third is the largest stress that the forces
+    stand for, which is large on the small faces of a slender cell. Taken at the middle of each
+    cell, from a displacement (n_nodes, dim) or several parts of it.
     """
-    force, highest = np.zeros(len(points)), 0.0
+    force, highest, slender = np.zeros(len(points)), 0.0, 0.0
     displacement = displacement.reshape(-1, *points.shape).sum(axis=0)
     for block in blocks:
         reference, weights = block.rule
@@ -172,10 +173,13 @@ def cancellation(
         nodal = displacement[block.cells]
         apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
         stress = (block.lame + 2 * block.shear) * np.einsum("ca,ca->c", slope, apart)
+        extent = np.linalg.norm(np.ptp(points[block.cells], axis=1), axis=1)
         nodal_force = (determinant[:, 0] * weights.sum() * stress)[:, None] * slope
         force += np.bincount(block.cells.ravel(), nodal_force.ravel(), minlength=len(points))
         highest = max(highest, float(stress.max(initial=0.0)))
-    return force, highest
+        on_small_faces = stress * extent * slope.max(axis=1)
+        slender = max(slender, float(on_small_faces.max(initial=0.0)))
+    return force, highest, slender
 
 
 def _stress(

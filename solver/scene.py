@@ -147,6 +147,14 @@ def build_scene(
     )
 
 
+def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndarray:
+    """Values (n, dim) at the nodes of the mesh, interpolated at those of the scene's cut mesh."""
+    surfaces = [(zone.slave_faces, zone.master_faces) for zone in scene.zones]
+    return _cut(replace_points(mesh, values), [zone.zone for zone in scene.zones], surfaces)[
+        0
+    ].points
+
+
 def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
     """The same cells and groups on other points."""
     return meshio.Mesh(points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets)

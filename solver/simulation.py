@@ -50,13 +50,25 @@ def simulate(
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
     with clock.stage("assembly"):
         problem = ContactProblem(scene)
-    with clock.stage("solve"):
-        states = _walk(problem, case.steps, log)
-    with clock.stage("recovery"):
-        solution = _recover(scene, problem, states, swapped, hexahedra)
-    solution.seconds = clock.seconds
+    solution = solve_problem(problem, clock, swapped, hexahedra, log)
     solution.cpu_seconds = time.process_time() - started
     solution.peak_memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return solution
+
+
+def solve_problem(
+    problem: ContactProblem,
+    clock: Clock,
+    swapped: bool = False,
+    hexahedra: str | None = None,
+    log: Log = lambda _: None,
+) -> Solution:
+    """Solve an assembled problem at all load factors; how it was assembled goes on record."""
+    with clock.stage("solve"):
+        states = _walk(problem, problem.scene.case.steps, log)
+    with clock.stage("recovery"):
+        solution = _recover(problem.scene, problem, states, swapped, hexahedra)
+    solution.seconds = clock.seconds
     return solution
 
 

@@ -200,13 +200,18 @@ class Iterate(Protocol):
 
 
 def solve(
-    system: Constrained, iterate: AnyIterate, scale: float, refine: bool = True
+    system: Constrained,
+    iterate: AnyIterate,
+    scale: float,
+    refine: bool = True,
+    round_off: float = _ROUND_OFF,
 ) -> tuple[AnyIterate, np.ndarray, float]:
     """Solve from an iterate; return the last one, multipliers (m,) and the relative residual.
 
     `scale` is the size of the forces. Newton's method with a fixed factor: one step solves, further
     ones refine until the residual no longer falls (Higham, Accuracy and Stability of Numerical
-    Algorithms, §12). Raises SolveError where the solution is not finite.
+    Algorithms, §12), or is less than `round_off` of the forces. Raises SolveError where the
+    solution is not finite.
     """
     force, last = iterate.residual(), np.inf
     for _ in range(_MAX_REFINEMENTS if refine else 1):
@@ -218,7 +223,7 @@ def solve(
             raise SolveError("the solution is not finite")
         if size < last:
             iterate, force = following, following_force
-        enough = size <= _ROUND_OFF or size > _MIN_GAIN * last
+        enough = size <= round_off or size > _MIN_GAIN * last
         last = min(size, last)
         if enough:
             break

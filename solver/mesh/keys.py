@@ -46,6 +46,13 @@ class Keys:
             raise self.refuse(key, value, f"allowed: {', '.join(allowed)}")
         return value
 
+    def text(self, key: str) -> str:
+        """A text that is not empty."""
+        value = self._get(key)
+        if not isinstance(value, str) or not value:
+            raise self.refuse(key, value, "must be a name")
+        return value
+
     def numbers(self, key: str, count: int, default: float | None = None) -> list[float]:
         """Positive numbers; a single one stands for all `count` of them."""
         value = self._get(key)
@@ -94,6 +101,15 @@ class Keys:
         if not isinstance(value, dict):
             raise self.refuse(key, value, f"must be {what}")
         return Keys(value, self._where, f"{self._path}.{key}")
+
+    def sections(self, key: str, what: str) -> list[Keys]:
+        """One mapping of keys below this one, or a list of them."""
+        value = self._get(key)
+        if not isinstance(value, list):
+            return [self.section(key, what)]
+        if not all(isinstance(item, dict) for item in value):
+            raise self.refuse(key, value, f"must be {what}, or a list of them")
+        return [Keys(v, self._where, f"{self._path}.{key}[{i}]") for i, v in enumerate(value)]
 
     def finish(self) -> None:
         """Refuse keys that nobody asked for."""

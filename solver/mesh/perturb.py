@@ -15,25 +15,43 @@ _Volumes = list[tuple[CellType, np.ndarray]]
 _ONE_PLANE = 1e-12
 
 
-def perturbed(mesh: meshio.Mesh, amplitude: float, seed: int) -> np.ndarray | None:
+def perturbed(
+    mesh: meshio.Mesh, amplitude: float, seed: int, chosen: np.ndarray | None = None
+) -> np.ndarray | None:
     """The points (n, dim) moved by at most `amplitude` of the shortest edge at each.
 
-    None where a cell is folded over by it.
+    Only those `chosen` (n,), where given. None where a cell is folded over by it.
     """
-    points, dim = mesh.points, mesh.points.shape[1]
-    volumes = [(c, b.data) for b in mesh.cells if (c := cell_type(b.type)).dim == dim]
+    points, dim = np.asarray(mesh.points, dtype=float), mesh.points.shape[1]
+    volumes = _volumes(mesh)
     step = np.random.default_rng(seed).uniform(-1, 1, points.shape) / np.sqrt(dim)
     step *= amplitude * _shortest_edges(points, volumes)[:, None]
     step = np.einsum("nij,nj->ni", _freedom(points, volumes), step)
+    if chosen is not None:
+        step[~chosen] = 0.0
+    return stepped(mesh, step)
+
+
+def stepped(mesh: meshio.Mesh, step: np.ndarray) -> np.ndarray | None:
+    """The points (n, dim) with the vertices moved by `step`, mid-nodes going with them.
+
+    None where a cell is folded over by it.
+    """
+    volumes, step = _volumes(mesh), step.copy()
     for cell, nodes in volumes:
         for i in range(cell.n_vertices, cell.n_nodes):
             step[nodes[:, i]] = step[nodes[:, cell.owners[i]]].mean(axis=1)
-    moved = points + step
+    moved = mesh.points + step
     return None if any(_folded(moved, nodes, cell) for cell, nodes in volumes) else moved
 
 
+def _volumes(mesh: meshio.Mesh) -> _Volumes:
+    dim = mesh.points.shape[1]
+    return [(c, b.data) for b in mesh.cells if (c := cell_type(b.type)).dim == dim]
+
+
 def _folded(points: np.ndarray, nodes: np.ndarray, cell: CellType) -> bool:
-    turned, bad = right_side_out(points, nodes, cell)
+    turned, bad = right_side_out(np.asarray(points, dtype=float), nodes, cell)
     return bool(bad.any() or (turned != nodes).any())
 
 

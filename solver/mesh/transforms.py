@@ -4,8 +4,14 @@ scale: 1.0e-3                          # by one positive number
 stretch: [1, 1, 10]                    # by one along each axis
 rotate: 30                             # degrees, in the plane; in 3D {axis: [1, 1, 0], angle: 30}
 translate: [100, 0, 0]
-perturb: {amplitude: 0.2, seed: 1}     # random moves, as a share of the shortest edge at each node
+perturb: {amplitude: 0.2, seed: 1}     # random moves, as a share of the shortest edge at each node;
+                                       # with `group`, of the nodes of that group alone
 renumber: 1                            # a seed: another order of the nodes and of the cells
+shift: {group: top, by: [0, 0.1]}      # the nodes of a group's cells
+turn: {group: top, angle: 1.0e-9}      # degrees, about the last axis; see `parts.turned`
+pick: {from: bottom_contact, low: [0, -1], high: [0.5, 1], name: corner, rest: others}
+                                       # two groups of a group's cells, by the place of their nodes;
+                                       # or a list of such
 """
 
 from collections.abc import Callable, Mapping
@@ -14,6 +20,7 @@ from typing import Any
 import meshio
 import numpy as np
 
+from solver.mesh import parts
 from solver.mesh.keys import Keys
 from solver.mesh.perturb import perturbed
 
@@ -94,11 +101,47 @@ def _perturb(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
     section = keys.one_or_section(key, "amplitude")
     amplitude = section.numbers("amplitude", 1)[0]
     seed = section.integers("seed", 1, [0], least=0)[0]
+    chosen = parts.nodes_of(mesh, section) if section.given("group") else None
     section.finish()
-    points = perturbed(mesh, amplitude, seed)
+    points = perturbed(mesh, amplitude, seed, chosen)
     if points is None:
         raise section.refuse("amplitude", amplitude, "folds cells over: must be smaller")
     return _moved(mesh, points)
+
+
+def _shift(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
+    section = keys.section(key, "{group: name, by: vector}")
+    chosen, by = parts.nodes_of(mesh, section), section.vector("by", mesh.points.shape[1])
+    section.finish()
+    return _moved(mesh, mesh.points + chosen[:, None] * np.array(by))
+
+
+def _turn(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
+    section = keys.section(key, "{group: name, angle: degrees}")
+    chosen, angle = parts.nodes_of(mesh, section), section.number("angle")
+    section.finish()
+    points = parts.turned(mesh, chosen, np.radians(angle))
+    if points is None:
+        raise section.refuse("angle", angle, "folds cells over: must be smaller")
+    return _moved(mesh, points)
+
+
+def _pick(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
+    for section in keys.sections(key, "{from: group, low: vector, high: vector, name: new group}"):
+        mesh = _picked(mesh, section)
+    return mesh
+
+
+def _picked(mesh: meshio.Mesh, section: Keys) -> meshio.Mesh:
+    members = parts.cells_of(mesh, section, "from")
+    low, high = (np.array(section.vector(k, mesh.points.shape[1])) for k in ("low", "high"))
+    inside, outside = parts.picked(mesh, members, low, high)
+    sets = {section.text("name"): inside}
+    if section.given("rest"):
+        sets[section.text("rest")] = outside
+    section.finish()
+    sets = {**mesh.cell_sets, **sets}
+    return meshio.Mesh(mesh.points, mesh.cells, cell_sets=sets, point_sets=mesh.point_sets)
 
 
 _STEPS: dict[str, Callable[[meshio.Mesh, str, Keys], meshio.Mesh]] = {
@@ -108,4 +151,7 @@ _STEPS: dict[str, Callable[[meshio.Mesh, str, Keys], meshio.Mesh]] = {
     "translate": _translate,
     "perturb": _perturb,
     "renumber": _renumber,
+    "shift": _shift,
+    "turn": _turn,
+    "pick": _pick,
 }

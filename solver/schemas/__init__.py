@@ -16,6 +16,7 @@ CASE_SCHEMA = Path(__file__).with_name("case.schema.json")
 LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")
 FAMILY_SCHEMA = Path(__file__).with_name("family.schema.json")
 STUDY_SCHEMA = Path(__file__).with_name("study.schema.json")
+SWEEP_SCHEMA = Path(__file__).with_name("sweep.schema.json")
 
 
 def validate(content: object, schema: Path, where: object) -> None:

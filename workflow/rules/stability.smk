@@ -1,0 +1,57 @@
+# Sweeps of numerical stability: each is one process, all its values in it.
+SWEEP_FILES = {f.stem: str(f) for f in Path("cases/stability/sweeps").glob("*.yaml")}
+QUICK = " --quick" * (config["stability"] == "quick")
+
+
+rule sweep:
+    input:
+        sweep="cases/stability/sweeps/{sweep}.yaml",
+        cases=sorted(map(str, Path("cases/stability/base").glob("*.yaml"))),
+        sources=SOLVER_SOURCES,
+    output:
+        "results/stability/{level}/{sweep}.json",
+    log:
+        "results/stability/{level}/{sweep}.log",
+    benchmark:
+        "results/stability/{level}/{sweep}.benchmark"
+    params:
+        quick=QUICK,
+    message:
+        "sweep {wildcards.sweep}"
+    shell:
+        # Points that do not hold are for the gate to judge, once the page is there.
+        "{PYTHON} -m solver sweep {input.sweep:q} -o {output:q}{params.quick} --threads 1"
+        " > {log:q} 2>&1 || test -s {output:q}"
+
+
+rule stability_page:
+    input:
+        records=expand(
+            "results/stability/{level}/{sweep}.json",
+            level=config["stability"],
+            sweep=sorted(SWEEP_FILES),
+        ),
+        sources=REPORT_SOURCES,
+    output:
+        "results/report/stability.html",
+        "results/report/stability.csv",
+        "results/report/stability-failures.txt",
+    log:
+        "results/report/stability.log",
+    params:
+        quick=QUICK,
+    message:
+        "numerical stability"
+    shell:
+        "{PYTHON} -m solver stability {input.records:q} -o results/report{params.quick}"
+        " 2>&1 | tee {log:q}"
+
+
+# The gate: fails when a point does not hold; the page is there by then.
+rule stability:
+    input:
+        "results/report/stability-failures.txt",
+    message:
+        "all points hold?"
+    shell:
+        "! test -s {input:q}"
