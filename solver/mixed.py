@@ -132,6 +132,14 @@ class MeanStress:
         added[:, :3] = (total / np.maximum(count, 1))[:, None]
         return added
 
+    def holding(self, nodal: np.ndarray) -> np.ndarray:
+        """The s (size,) that takes the values (n_nodes,) at the nodes, as near as it can."""
+        stress = np.zeros(self.size)
+        for part in self._parts:
+            read = np.linalg.pinv(part.at_nodes)
+            stress[part.unknowns] = np.einsum("cka,ca->ck", read, nodal[part.cells])
+        return stress
+
     def _nodal(self, stress: np.ndarray) -> Iterator[tuple[_Cells, np.ndarray]]:
         for part in self._parts:
             yield part, np.einsum("cak,ck->ca", part.at_nodes, stress[part.unknowns])

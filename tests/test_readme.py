@@ -65,6 +65,13 @@ def write_study(folder: Path) -> None:
     (folder / "study.yaml").write_text(yaml.safe_dump(study))
 
 
+def write_sweep(folder: Path) -> None:
+    """One of the project's sweeps, with its base cases."""
+    shutil.copytree(ROOT / "cases" / "stability" / "base", folder / "base")
+    (folder / "sweeps").mkdir()
+    shutil.copy(ROOT / "cases" / "stability" / "sweeps" / "stiffness.yaml", folder / "sweeps")
+
+
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
     """The copy with little to do."""
@@ -77,6 +84,7 @@ def project(tmp_path: Path) -> Path:
     for name in ("e.yaml", "family.yaml"):
         shutil.copy(ROOT / "cases" / "ssnp170" / name, tmp_path / "cases" / "ssnp170")
     write_study(tmp_path / "cases" / "study")
+    write_sweep(tmp_path / "cases" / "stability")
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "test_start.py").write_text("def test_start():\n    import solver.cli\n")
     (tmp_path / "my-cases").mkdir()

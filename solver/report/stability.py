@@ -8,11 +8,11 @@ from typing import Any
 from solver.errors import InputError
 from solver.files import replacing
 from solver.report import formats
-from solver.report.page import environment, style
+from solver.report.html import environment
 from solver.report.stability_map import anchor, draw_key, draw_map
 from solver.report.tables import as_csv
 
-PAGE, TABLE, FAILURES = "stability.html", "stability.csv", "stability-failures.txt"
+PAGE, TABLE, FAILURES = ".html", ".csv", "-failures.txt"
 MEASURES = {
     "pressure": "pressure",
     "stress": "stress",
@@ -43,7 +43,11 @@ def read_records(paths: Sequence[Path]) -> list[Record]:
 def write_stability(
     records: Sequence[Record], folder: Path, quick: bool, log: Callable[[str], Any] = print
 ) -> None:
-    """Write the page, the table and the failures of the sweeps into `folder`."""
+    """Write the page, the table and the failures of the sweeps into `folder`.
+
+    They are called stability…, or stability-quick… for the quick version.
+    """
+    stem = "stability-quick" if quick else "stability"
     lines = [line for record in records for line in complaints(record)]
     contents = {
         PAGE: _to_html(records, quick, lines),
@@ -51,9 +55,9 @@ def write_stability(
         FAILURES: "".join(f"{line}\n" for line in lines),
     }
     for name, content in contents.items():
-        with replacing(folder / name) as temporary:
+        with replacing(folder / f"{stem}{name}") as temporary:
             temporary.write_text(content, encoding="utf-8")
-    log("".join(f"{line}\n" for line in lines) + f"{outcome(records)} Page: {folder / PAGE}")
+    log("".join(f"{line}\n" for line in lines) + f"{outcome(records)} Page: {folder / stem}{PAGE}")
 
 
 def complaints(record: Record) -> list[str]:
@@ -87,12 +91,12 @@ def _to_html(records: Sequence[Record], quick: bool, lines: Sequence[str]) -> st
             quick=quick,
             outcome=outcome(records),
             complaints=lines,
+            table=f"stability{'-quick' * quick}{TABLE}",
             map=draw_map(records),
             key=draw_key(),
             anchor=anchor,
             measures=MEASURES,
             seconds=sum(record["cpu_seconds"] for record in records),
-            style=style(),
         )
     )
 

@@ -130,7 +130,7 @@ def _square(
 def anchor(record: Record, point: Record) -> str:
     """The name of a point's row on the page."""
     number = list(record["values"]).index(point["label"])
-    return f"{record['sweep']}-{point['series'].replace(', ', '-')}-{number}"
+    return f"{record['sweep']}-{point['series'].replace(', ', '-').replace(' ', '-')}-{number}"
 
 
 def _series(record: Record) -> list[str]:

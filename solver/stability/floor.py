@@ -2,7 +2,8 @@
 
 The exact displacement at the nodes of the exact geometry is rounded to double precision in the
 form in which the solver keeps it, as rigid motions plus a remainder (one number for each unknown;
-the second part of the solver's remainder goes below this floor), and read on the mesh of the stored
+the second part of the solver's remainder goes below this floor) and, in mixed form, a mean stress,
+and read on the mesh of the stored
 coordinates by the solver's own recovery: the pressure from the residual at each macro-element's own
 unknown, the stress at the nodes. Sums are in extended precision, so that the rounding of
 displacements and coordinates alone is seen.
@@ -38,16 +39,20 @@ def floor(
     assert system is not None, "nothing has been solved"
     points = scene.points + scene.origin.astype(np.longdouble)
     points += carried_over(scene, mesh, misplaced(scene.case, raw, mesh))
-    exact = state.displacement(points, upper_nodes(scene)).ravel()
+    upper = upper_nodes(scene)
+    exact = state.displacement(points, upper).ravel()
+    mean_stress = scene.mean.holding(state.volumetric[upper.astype(int)].astype(float))
     motions, fit = problem.at_rest.motions, problem.at_rest.fit
     amount = fit @ exact.astype(float)
     remainder = (exact - motions.astype(np.longdouble) @ amount).reshape(scene.points.shape)
     found = []
     for straining in _roundings(remainder):
         internal = internal_force(scene.points, scene.blocks, straining, extended=True)
+        internal += scene.mean.force(mean_stress)
         left = scene.free.basis.T @ (scene.force - internal).astype(float).ravel()
         pressure = system.multiplier(left)
         stress = nodal_stress(scene.points, scene.blocks, straining, extended=True)
+        stress += scene.mean.nodal_stress(mean_stress, scene.blocks)
         error = float(np.abs(pressure / state.pressure - 1).max(initial=0.0))
         found.append((error, stress_error(stress, scene, state)))
     highest = np.max(found, axis=0)

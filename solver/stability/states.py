@@ -27,7 +27,8 @@ _INSIDE = ("perturb", "renumber", "turn", "pick")
 class State:
     """Strain of the lower and the upper body (2, dim, dim), and where each has no displacement.
 
-    `corner` (2, dim); `lowered` (dim,): by how much the upper body moves. `stress` (2, 6).
+    `corner` (2, dim); `lowered` (dim,): by how much the upper body moves. `stress` (2, 6);
+    `volumetric` (2,): its part λ div u.
     """
 
     pressure: float
@@ -36,6 +37,7 @@ class State:
     corner: np.ndarray
     lowered: np.ndarray
     stress: np.ndarray
+    volumetric: np.ndarray
 
     def displacement(self, points: np.ndarray, upper: np.ndarray) -> np.ndarray:
         """Displacement (n, dim) at points (n, dim); `upper` (n,) tells the body."""
@@ -64,9 +66,11 @@ def exact_state(case: Case, kind: str, mesh: meshio.Mesh) -> State:
         strain.append(lateral * (identity - along) + axial * along)
     tensor = -pressure * (identity if kind == HYDROSTATIC else along)
     stress = np.array([_six(tensor, material) for material in materials])
+    opened = np.trace(np.array(strain), axis1=1, axis2=2)
+    volumetric = np.array([_lame(material) for material in materials]) * opened
     gap = normal @ (head[1] - head[0])
     lowered = normal * (normal @ (strain[0] @ up) - gap)
-    return State(pressure, normal, np.array(strain), corner, lowered, stress)
+    return State(pressure, normal, np.array(strain), corner, lowered, stress, volumetric)
 
 
 def _corners(
@@ -98,6 +102,11 @@ def _strains(
     if dim == 2:
         young, poisson = young / (1 - poisson**2), poisson / (1 - poisson)
     return poisson * pressure / young, -pressure / young
+
+
+def _lame(material: Material) -> np.longdouble:
+    young, poisson = np.longdouble(material.young), np.longdouble(material.poisson)
+    return young * poisson / ((1 + poisson) * (1 - 2 * poisson))
 
 
 def _six(tensor: np.ndarray, material: Material) -> np.ndarray:

@@ -252,3 +252,67 @@ def test_the_patch_test_holds_after_it(name, spec):
     assert np.abs(solution.displacement - exact).max() < 1e-12 * np.abs(exact).max()
     assert np.abs(solution.zones[0].coverage - 1).max() < 1e-12
     assert np.abs(solution.zones[0].gap).max() < 1e-14 * np.ptp(x, axis=0).max()
+
+
+def test_shift_moves_one_body_alone():
+    mesh = MESHES["plane"]
+    moved = transform(mesh, {"shift": {"group": "top", "by": [0.25, 3]}}, "case.yaml")
+    top = mesh.points[:, 1] > 0
+    np.testing.assert_array_equal(moved.points[top], mesh.points[top] + [0.25, 3])
+    base = mesh.points[:, 1] < 0
+    np.testing.assert_array_equal(moved.points[base], mesh.points[base])
+
+
+@pytest.mark.parametrize(("name", "angle"), [("plane", 5.0), ("solids", 5.0), ("solids", 1e-12)])
+def test_turn_keeps_the_sides_and_turns_the_middle(name, angle):
+    mesh = MESHES[name]
+    moved = transform(mesh, {"turn": {"group": "bottom", "angle": angle}}, "case.yaml")
+    step = moved.points - mesh.points
+    assert (step[:, -1] == 0).all()
+    assert (step[mesh.points[:, -1] > 0] == 0).all()
+    lateral = mesh.points[:, :-1]
+    assert (step[((lateral == 0) | (lateral == 2)).any(axis=1)] == 0).all()
+    assert_right_side_out(moved)
+    # Half of the block's edge 2 is the largest arm.
+    assert 0 < np.linalg.norm(step, axis=1).max() <= np.radians(angle)
+
+
+def test_turn_is_refused_where_cells_fold():
+    with pytest.raises(InputError, match=r"transform.turn.angle = 300.0: folds cells over"):
+        transform(MESHES["solids"], {"turn": {"group": "top", "angle": 300}}, "case.yaml")
+
+
+def test_pick_parts_a_surface_in_two():
+    mesh = MESHES["plane"]
+    pick = {"from": "bottom_contact", "low": [-1, -1], "high": [1, 1], "name": "left"}
+    picked = transform(mesh, {"pick": [pick | {"rest": "right"}]}, "case.yaml")
+    whole, left, right = (
+        {
+            tuple(c)
+            for b, i in zip(picked.cells, picked.cell_sets[g], strict=True)
+            for c in b.data[i]
+        }
+        for g in ("bottom_contact", "left", "right")
+    )
+    assert len(whole) == 4
+    assert len(left) == len(right) == 2
+    assert left | right == whole
+    assert all(picked.points[list(nodes), 0].max() <= 1 for nodes in left)
+
+
+def test_perturb_moves_one_group_where_one_is_named():
+    mesh = MESHES["solids"]
+    moved = transform(mesh, {"perturb": {"amplitude": 0.2, "seed": 1, "group": "top"}}, "case.yaml")
+    changed = (moved.points != mesh.points).any(axis=1)
+    assert changed.any()
+    assert (mesh.points[changed, 2] >= 0).all()
+
+
+@pytest.mark.parametrize("step", ["shift", "turn", "perturb", "pick"])
+def test_a_group_that_is_not_there_is_refused(step):
+    spec = {"group": "lid", "by": [0, 1], "angle": 1, "amplitude": 0.1}
+    keys = {"shift": ("group", "by"), "turn": ("group", "angle"), "perturb": ("group", "amplitude")}
+    picked = {"from": "lid", "low": [0, 0], "high": [1, 1], "name": "part"}
+    given = picked if step == "pick" else {key: spec[key] for key in keys[step]}
+    with pytest.raises(InputError, match=r"= 'lid': no such group; there are .*top_contact"):
+        transform(MESHES["plane"], {step: given}, "case.yaml")

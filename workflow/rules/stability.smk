@@ -1,6 +1,7 @@
 # Sweeps of numerical stability: each is one process, all its values in it.
 SWEEP_FILES = {f.stem: str(f) for f in Path("cases/stability/sweeps").glob("*.yaml")}
 QUICK = " --quick" * (config["stability"] == "quick")
+STABILITY = "results/report/stability" + "-quick" * bool(QUICK)
 
 
 rule sweep:
@@ -33,11 +34,11 @@ rule stability_page:
         ),
         sources=REPORT_SOURCES,
     output:
-        "results/report/stability.html",
-        "results/report/stability.csv",
-        "results/report/stability-failures.txt",
+        STABILITY + ".html",
+        STABILITY + ".csv",
+        STABILITY + "-failures.txt",
     log:
-        "results/report/stability.log",
+        STABILITY + ".log",
     params:
         quick=QUICK,
     message:
@@ -50,7 +51,7 @@ rule stability_page:
 # The gate: fails when a point does not hold; the page is there by then.
 rule stability:
     input:
-        "results/report/stability-failures.txt",
+        STABILITY + "-failures.txt",
     message:
         "all points hold?"
     shell:
