@@ -72,3 +72,11 @@ def test_solid_cells_stay_above_a_bound_with_the_cut(cells, hexahedra, bound):
 def test_solid_cells_lose_control_without_the_cut():
     found = constants("HEXA8", (4, 8), 2, treatment="uncut")
     assert found[1] < 0.4 * found[0]
+
+
+@pytest.mark.parametrize("coarser", [1, 4])
+@pytest.mark.parametrize("treatment", ["nodal", "nodal_dual", "quadrature"])
+def test_the_other_stable_treatments_level_off_too(treatment, coarser):
+    found = constants("QUAD4", (8, 16, 32), coarser, treatment=treatment)
+    assert found[-1] > 0.3
+    assert found[-1] > 0.97 * found[-2]
