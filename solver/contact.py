@@ -322,7 +322,8 @@ class ContactProblem:
 
     def _refuse_double_cover(self) -> None:
         for i, zone in enumerate(self.scene.zones):
-            worst = float(self.coverage[zone.numbers].max())
+            surface = zone.operator.surface
+            worst = float((surface.covered / surface.area).max())
             if worst > 1 + _TWICE:
                 allowed = f"covers a macro-element {worst:.3g} times: it must not fold over itself"
                 key = f"contact[{i}].master"
