@@ -10,7 +10,7 @@ the edges have along each axis; blocks of QUAD and HEXA cells are regular grids.
 TETRA cells are unstructured inside; there `far` (divisions of the lateral edges on the side away
 from the interface, by default as on it), `inner` (size of the inner cells, as a share of what the
 edges suggest) and `algorithm` (for the surfaces) shape the mesh.
-Blocks of PENTA and PYRA cells are a single cube cut in pieces (see `hybrid`).
+Blocks of PENTA and PYRA cells are boxes cut in pieces (see `hybrid`).
 
 The interface lies in y = 0 (2D) or z = 0 (3D), the corner of both blocks at x = 0 (and y = 0).
 Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (the lower side of the
@@ -59,7 +59,7 @@ def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys, refine: int)
     if name == "bottom":
         origin[-1] = -size[-1]
     if cell.name.startswith(("PENTA", "PYRA")):
-        return cube(name, cell, origin, size, keys)
+        return cube(name, cell, origin, size, keys, refine)
     return _Block(name, cell, origin, size, keys, refine).mesh()
 
 

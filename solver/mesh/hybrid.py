@@ -1,11 +1,15 @@
-"""A cube cut into two prisms or five pyramids, for the recipe `blocks`.
+"""A box cut into prisms or pyramids, for the recipe `blocks`.
 
-    top: {cells: PENTA6, contact: TRIA3}    # both triangular ends lie on the interface
-    top: {cells: PENTA6, contact: QUAD4}    # lying: one prism has a lateral side on it
-    top: {cells: PYRA5, contact: TRIA3}     # the apex is in the middle of the interface
-    top: {cells: PYRA5, contact: QUAD4}     # the apex is in the middle of the opposite side
+    top: {cells: PENTA6, contact: TRIA3}    # the triangular ends of prisms lie on the interface
+    top: {cells: PENTA6, contact: QUAD4}    # lying: a lateral side of every other prism does
+    top: {cells: PYRA5, contact: TRIA3}     # apexes lie on the interface
+    top: {cells: PYRA5, contact: QUAD4}     # bases do
+    top: {cells: PYRA5, contact: QUAD4, divisions: [4, 4, 2]}
 
-`contact` is the type of the faces on the interface: TRIA6 and QUAD8 for PENTA15 and PYRA13.
+`contact` is the type of the faces on the interface: TRIA6 and QUAD8 for PENTA15 and PYRA13. The box
+is divided into smaller ones (by default it is one), each cut into two prisms, or into six pyramids
+whose apex is its centre. In one layer the apex is in the middle of a side instead, and there are
+five of them: next to the interface where its faces are triangles, else furthest from it.
 """
 
 from collections import defaultdict
@@ -25,15 +29,20 @@ _LYING = [(0, 1, 5, 3, 2, 6), (0, 5, 4, 3, 6, 7)]
 
 
 def cube(
-    name: str, cell: CellType, origin: np.ndarray, size: np.ndarray, keys: Keys
+    name: str, cell: CellType, origin: np.ndarray, size: np.ndarray, keys: Keys, refine: int = 1
 ) -> meshio.Mesh:
-    """The block `name` of PENTA or PYRA cells, with its groups."""
+    """The block `name` of PENTA or PYRA cells, with its groups; `refine` multiplies divisions."""
     contact = keys.choice("contact", sorted({face.type for face in cell.faces}))
+    divisions = refine * np.array(keys.integers("divisions", 3, [1, 1, 1]))
     keys.finish()
     on_triangles = contact.startswith("TRIA")
-    nodes, pieces = _CUBE.nodes, np.array(_STANDING if on_triangles else _LYING)
     if cell.name.startswith("PYRA"):
-        nodes, pieces = _pyramids(apex_height=float(on_triangles == (name == "bottom")))
+        at_top = on_triangles == (name == "bottom")
+        corners = _pyramids(divisions, divisions[2] - 1 if at_top else 0, float(at_top))
+    else:
+        corners = _copies(_CUBE.nodes[_STANDING if on_triangles else _LYING], divisions)
+    halves, pieces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    nodes, pieces = halves / (2 * divisions), pieces.reshape(corners.shape[:2])
     linear = BY_NAME[cell.skeleton]
     with session(Mesh__SecondOrderIncomplete=1):
         volume = gmsh.model.addDiscreteEntity(3)
@@ -46,15 +55,22 @@ def cube(
         return current_model(unnamed=False)
 
 
-def _pyramids(apex_height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes of the cube with the middle of its lower (0) or upper (1) side, and five pyramids."""
-    apex = np.array([0.5, 0.5, apex_height])
-    bases = [
-        face.nodes
-        for face in _CUBE.faces
-        if (_CUBE.nodes[list(face.nodes), 2] != apex_height).any()
-    ]
-    return np.vstack([_CUBE.nodes, apex]), np.array([(*base, 8) for base in bases])
+def _copies(cells: np.ndarray, divisions: np.ndarray) -> np.ndarray:
+    """Cells (n, corners, 3) of the unit cube in every box, in half steps of the boxes."""
+    offsets = np.indices(tuple(divisions)).reshape(3, -1).T
+    moved = np.rint(2 * (cells[None] + offsets[:, None, None])).astype(int)
+    return moved.reshape(-1, *cells.shape[1:])
+
+
+def _pyramids(divisions: np.ndarray, layer: int, apex_height: float) -> np.ndarray:
+    """Corners (n, 5, 3) in half steps: apexes at a height in the boxes of one layer, else amid."""
+    parts = []
+    for k, height in enumerate(np.where(np.arange(divisions[2]) == layer, apex_height, 0.5)):
+        apex = np.array([0.5, 0.5, height])
+        bases = [_CUBE.nodes[list(face.nodes)] for face in _CUBE.faces]
+        cells = np.array([[*b, apex] for b in bases if (b[:, 2] != height).any()])
+        parts.append(_copies(cells, np.array([*divisions[:2], 1])) + np.array([0, 0, 2 * k]))
+    return np.concatenate(parts)
 
 
 _Cells = list[tuple[str, np.ndarray]]

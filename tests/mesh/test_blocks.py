@@ -1,5 +1,6 @@
 """The recipe `blocks` and the case files of ssnp170 that use it."""
 
+from collections import Counter
 from pathlib import Path
 
 import meshio
@@ -184,6 +185,36 @@ def test_pyramids_and_prisms_stand_as_told():
         if kind == "PYRA5":
             height = 0.0 if contact == "TRIA3" else 2.0
             assert mesh.points[cells[:, 4]].tolist() == [[1.0, 1.0, height]] * 5
+
+
+@pytest.mark.parametrize(
+    ("kind", "contact", "cells", "faces"),
+    [
+        ("PENTA6", "TRIA3", 24, 12),
+        ("PENTA15", "QUAD8", 24, 6),
+        ("PYRA5", "TRIA3", 6 * 5 + 6 * 6, 24),
+        ("PYRA13", "QUAD8", 6 * 5 + 6 * 6, 6),
+    ],
+)
+@pytest.mark.parametrize("name", ["bottom", "top"])
+def test_boxes_of_pyramids_and_prisms_fit_together(name, kind, contact, cells, faces):
+    """Divided by 3 × 2 × 2: every face belongs to two cells, or lies on a side of the block."""
+    section = {"cells": kind, "contact": contact, "divisions": [3, 2, 2]}
+    sections = {"bottom": block("HEXA8", 1), "top": block("HEXA8", 1)} | {name: section}
+    mesh = generate({"recipe": "blocks", "size": 2.0, **sections}, "case.yaml")
+    [nodes] = members(mesh, name)
+    assert len(nodes) == cells
+    assert measure(mesh.points, nodes, kind) == pytest.approx(8)
+    assert all(measure(mesh.points, cell[None], kind) > 0 for cell in nodes)
+    assert sum(map(len, members(mesh, f"{name}_contact"))) == faces
+    seen = Counter()
+    for face in BY_NAME[kind].faces:
+        corners = nodes[:, [i for i in face.nodes if i < BY_NAME[kind].n_vertices]]
+        seen.update(tuple(sorted(rim)) for rim in corners.tolist())
+    assert set(seen.values()) == {1, 2}
+    for rim in (rim for rim, count in seen.items() if count == 1):
+        places = mesh.points[list(rim)]
+        assert any(np.ptp(x) == 0 and x[0] in (-2.0, 0.0, 2.0) for x in places.T)
 
 
 GOOD = {"cells": "QUAD4", "divisions": [2, 2]}
