@@ -7,6 +7,7 @@
     theory:                       # where the family's own differs: [guaranteed, best]
       quadratic: {pressure_max: [0.5, 1.0]}
     reference_code: {name: code_aster, version: …, remark: …}
+    shortfalls: why some slopes stay below theory, where they do
     ladders:
       - {case: tria3.yaml, reference_code: {displacement_l2: 1.998, pressure_l2: 1.041}}
       - {case: press-fit.yaml, problem: press fit}    # has plots of its own
@@ -63,7 +64,8 @@ class Family:
     """The ladders of a family.
 
     `least` and `theory` go by degree ("linear", "quadratic") and error; `theory` holds only what
-    differs from `orders.THEORY`. Where `title` or `description` is empty, `family.yaml` has it.
+    differs from `orders.THEORY`. `shortfalls` says why slopes stay below theory. Where `title` or
+    `description` is empty, `family.yaml` has it.
     """
 
     folder: Path
@@ -73,6 +75,7 @@ class Family:
     least: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     theory: Mapping[str, Mapping[str, list[float | None]]] = field(default_factory=dict)
     reference_code: ReferenceCode = field(default_factory=ReferenceCode)
+    shortfalls: str = ""
 
     @property
     def name(self) -> str:
@@ -92,6 +95,7 @@ def read_ladders(path: Path) -> Family:
         least=content.get("least", {}),
         theory=content.get("theory", {}),
         reference_code=ReferenceCode(**content.get("reference_code", {})),
+        shortfalls=content.get("shortfalls", ""),
     )
 
 

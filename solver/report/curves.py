@@ -22,6 +22,8 @@ from solver.orders import (
 from solver.report.rows import Row, read_rows
 
 VERDICT = "verdict.json"
+# A slope this much below an order is still that order: levels are few, and not yet the limit.
+LEEWAY = 0.1
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,13 @@ class Curve:
         """Whether the error at the finest level is as small as asked; None where none is asked."""
         bound, found = self.ladder.finest.get(error), self.at_finest(error)
         return None if bound is None else found is not None and found <= bound
+
+    def below_theory(self, error: str) -> bool:
+        """Whether the slope is less than theory guarantees, by more than its spread explains."""
+        slope, theory = self.slope(error), self.theory(error)
+        if slope is None or theory is None or theory.least is None:
+            return False
+        return slope.value + max(2 * slope.spread, LEEWAY) < theory.least
 
     @cached_property
     def complaints(self) -> list[str]:

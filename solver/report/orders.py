@@ -76,6 +76,18 @@ def sentence(curves: Sequence[Curve]) -> str:
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
+def below_theory(curves: Sequence[Curve]) -> list[str]:
+    """The slopes that are less than theory guarantees, in words."""
+    return [
+        f"{title}, {curve.label}: {ERRORS[error]} {slope.value:.2f} ± {slope.spread:.2f}, "
+        f"{theory_text(curve.theory(error))}"
+        for title, members in groups(curves).items()
+        for curve in members
+        for error in ERRORS
+        if curve.below_theory(error) and (slope := curve.slope(error))
+    ]
+
+
 def theory_text(order: Order | None) -> str:
     """What theory says: the order guaranteed … the best there can be, or the one that is known."""
     least, best = (order.least, order.best) if order else (None, None)
@@ -115,6 +127,7 @@ def _section(family: Family, curves: Sequence[Curve]) -> dict[str, Any]:
         "title": family.title or described.title,
         "description": family.description or described.description,
         "sentence": sentence(curves),
+        "below": below_theory(curves),
         "groups": parts,
     }
 

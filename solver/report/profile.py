@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from solver.case import Exact
 from solver.exact import ExactValues
 from solver.expressions import Expression, evaluate
 from solver.faces import surface_points
@@ -51,21 +50,27 @@ def draw_profile(
 
 def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
     """The pressure (m,) that the reference has on every macro-element; None where it has none."""
-    given = solution.case.reference.get("contact_pressure")
-    if isinstance(given, Exact) and solution.case.solution:
-        return expected_pressure(zone, ExactValues(solution, solution.case.solution))
+    reference = _reference(solution)
+    return None if reference is None else expected_pressure(zone, reference)
+
+
+def _reference(solution: Solution) -> float | Expression | ExactValues | None:
+    """What tells the right pressure, be it checked or not."""
+    given, exact = solution.case.reference.get("contact_pressure"), solution.case.solution
     if isinstance(given, float | Expression):
-        return expected_pressure(zone, given)
+        return given
+    if exact and "contact_pressure" in exact.quantities:
+        return ExactValues(solution, exact)
     return None
 
 
 def _curve(solution: Solution, zone: ZoneResult) -> tuple[np.ndarray, np.ndarray]:
     """Places (k, dim) all over the slave surface, and the reference's pressure (k,) there."""
-    given = solution.case.reference["contact_pressure"]
     place = surface_points(solution.mesh.points, zone.faces).place
-    if isinstance(given, float | Expression):
-        return place, evaluate(given, place)
-    return place, solution.case.solution.contact_pressure(place)  # type: ignore[union-attr]
+    reference = _reference(solution)
+    if isinstance(reference, ExactValues):
+        return place, reference.exact.contact_pressure(place)
+    return place, evaluate(reference, place)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

@@ -79,8 +79,11 @@ class Row:
 
     @cached_property
     def accuracy(self) -> tuple[float, str] | None:
-        """The worst relative error of pressure, stress and displacement, and its check."""
-        return next(iter(self.errors(ACCURACY)), None)
+        """The worst relative error of pressure, stress and displacement, and its check.
+
+        Where no place is compared, but a norm of the error, it is the largest of these.
+        """
+        return next(iter(self.errors(ACCURACY) or self.errors(self.norms)), None)
 
     @cached_property
     def allowed(self) -> float | None:

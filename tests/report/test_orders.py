@@ -208,6 +208,20 @@ class Counter(HTMLParser):
             assert self.open.pop() == tag
 
 
+def test_slopes_below_theory_are_told_with_the_reason_where_it_is_known(family, results, tmp_path):
+    """Displacement 1.5 where theory has 2; 2.5 where it guarantees as much is not below."""
+    [told] = orders.below_theory(read_curves(family, results))
+    assert told == "2D, slave: block, TRIA3: displacement, L2 1.50 ± 0.00, theory 2"
+    write_orders([family], results, tmp_path, lambda line: None)
+    text = (tmp_path / orders.PAGE).read_text()
+    assert "Slopes below theory (▽), by more than their spread explains: 1<" in text
+    assert "Why is not known." in text
+    path = tmp_path / "cases" / "powers" / "orders.yaml"
+    path.write_text(LADDERS + "shortfalls: Few <levels>.\n")
+    write_orders([read_ladders(path)], results, tmp_path, lambda line: None)
+    assert "<p>Few &lt;levels&gt;.</p>" in (tmp_path / orders.PAGE).read_text()
+
+
 def test_own_theory_takes_the_place_of_the_general_one(family, results, tmp_path):
     path = tmp_path / "cases" / "powers" / "orders.yaml"
     path.write_text(LADDERS + "theory: {quadratic: {pressure_l2: [1.5, null]}}\n")
