@@ -23,6 +23,7 @@ from solver.mesh.catalogue import BY_NAME
 from solver.mixed import MeanStress
 from solver.supports import FreeMotion
 from solver.treatments import TREATMENTS, Treatment, scheme_of
+from solver.treatments.held import joined
 
 # An average initial gap below this many roundings of the coordinates is none.
 _GAP_ROUND_OFF = 8
@@ -54,6 +55,11 @@ class ZoneScene:
     def numbers(self) -> slice:
         """The zone's multipliers among all."""
         return slice(self.first, self.first + len(self.operator.initial))
+
+    def at_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Values (k,) of all multipliers at the nodes (n,) that the zone's ones belong to."""
+        mine, nodes = values[self.numbers], self.operator.at_nodes
+        return mine if nodes is None else nodes @ mine
 
     def by_macro_element(self, values: np.ndarray) -> np.ndarray:
         """Values (k,) of all multipliers averaged over each macro-element of the zone (m,)."""
@@ -112,7 +118,7 @@ def build_scene(
         cut_mesh, sub_faces = _cut(local, zones, surfaces)
     points = cut_mesh.points
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
-    scenes, first = [], 0
+    scenes = []
     with clock.stage("pairing"):
         for zone, (slave, master), faces in zip(zones, surfaces, sub_faces, strict=True):
             count = sum(len(block.nodes) for block in slave)
@@ -120,13 +126,13 @@ def build_scene(
             noise = _GAP_ROUND_OFF * rounding * cures.gap_threshold
             initial = _initial_gaps(zone, operator, points, faces, origin, noise)
             operator = replace(operator, initial=initial)
-            scenes.append(ZoneScene(zone, first, count, slave, master, faces, operator))
-            first += len(operator.initial)
+            scenes.append(ZoneScene(zone, 0, count, slave, master, faces, operator))
     groups = Attributes(case, local, cut_mesh, scenes, origin)
     with clock.stage("assembly"):
         blocks, mean = groups.elasticity(cures.mixed)
         free = groups.supports()
         force = groups.forces()
+        scenes = _without_held(scenes, free)
     body = body_numbers(len(points), cut_mesh.cells)
     return Scene(
         case=case,
@@ -145,6 +151,18 @@ def build_scene(
         rounding=rounding,
         cures=cures,
     )
+
+
+def _without_held(zones: list[ZoneScene], free: FreeMotion) -> list[ZoneScene]:
+    """The zones, multipliers of held nodes joined to others where the treatment does so."""
+    found, first = [], 0
+    for zone in zones:
+        operator = zone.operator
+        if zone.treatment.joins:
+            operator = joined(operator, free.basis)
+        found.append(replace(zone, first=first, operator=operator))
+        first += len(operator.initial)
+    return found
 
 
 def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndarray:

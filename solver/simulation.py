@@ -176,10 +176,11 @@ def _zone_result(
 
 
 def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
-    nodes, mine = zone.operator.nodes, zone.numbers
+    nodes = zone.operator.nodes
     if nodes is None:
         return None
-    return NodalContact(nodes, state.pressure[mine], state.gap[mine], state.status.closed[mine])
+    closed = zone.at_nodes(state.status.closed.astype(float)) >= _HALF
+    return NodalContact(nodes, zone.at_nodes(state.pressure), zone.at_nodes(state.gap), closed)
 
 
 def _closed(zone: ZoneScene, state: Equilibrium) -> np.ndarray:

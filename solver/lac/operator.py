@@ -44,7 +44,8 @@ class GapOperator:
     `area`, `covered` (k,): ∫ φ over the whole and the intersected surface; `mean` (m, k): values
     by multiplier averaged over the macro-elements of `surface`; `nodes` (k,): the nodes that
     multipliers belong to, None for macro-elements; `segments`: how many there are; `closed_faces`:
-    on how many faces the closure of integrals was used.
+    on how many faces the closure of integrals was used. `at_nodes` (n, k): the values at `nodes`,
+    then (n,), by multiplier, where some nodes have no multiplier of their own.
     """
 
     matrix: sparse.csr_matrix
@@ -56,6 +57,7 @@ class GapOperator:
     surface: Surface
     segments: int
     closed_faces: int
+    at_nodes: sparse.csr_matrix | None = None
 
 
 def meet_in_segments(

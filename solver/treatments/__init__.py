@@ -25,7 +25,8 @@ class Treatment:
 
     `cut`: whether slave faces are cut, so that each macro-element owns an unknown; `scheme` the
     integration, given the number of points; `faces` the slave faces that it exists for, and `why`
-    not for others; `what` it is, in words.
+    not for others; `what` it is, in words. `joins`: whether multipliers of held nodes join those of
+    their neighbours.
     """
 
     what: str
@@ -33,6 +34,7 @@ class Treatment:
     scheme: Callable[[int], Scheme]
     faces: tuple[str, ...] = _ALL
     why: str = ""
+    joins: bool = False
 
 
 def _quadrature(points: int) -> Scheme:
@@ -56,7 +58,10 @@ TREATMENTS: dict[str, Treatment] = {
         "forces of a uniform pressure are zero at vertices of TRIA6, negative at those of QUAD8",
     ),
     "nodal": Treatment(
-        "mortar: pressure linear between slave vertices, exact segments", False, lambda _: _NODAL
+        "mortar: pressure linear between slave vertices, exact segments",
+        False,
+        lambda _: _NODAL,
+        joins=True,
     ),
     "nodal_dual": Treatment(
         "mortar: dual multipliers at slave nodes, exact segments",
@@ -64,6 +69,7 @@ TREATMENTS: dict[str, Treatment] = {
         lambda _: replace(_NODAL, space=dual),
         _LINEAR,
         "it is built of linear shape functions; quadratic ones ask for a change of their basis",
+        joins=True,
     ),
 }
 
