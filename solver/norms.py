@@ -11,9 +11,9 @@ in cells in mixed form):
                                                              weighted by each element's coverage
     pressure_max          largest |p_h − p| / largest p      where p is smooth
     pressure_means        |p_h − p̄| / |p̄|                    p̄: mean of p over each macro-element
-    pressure_oscillation  largest |e₋ − 2 e + e₊| / largest p   e = p_h − p̄ of neighbours along
-                                                             the surface, where p is smooth (2D);
-                                                             of nodal multipliers p_h − p at nodes
+    pressure_oscillation  largest |e₋ − 2 e + e₊| / largest p   e = p_h − p̄ of neighbours where p is
+                                                             smooth; of nodal multipliers p_h − p
+                                                             at nodes (see solver.oscillation)
     half_width, peak      of the half ellipse fitted to p_h (Hertz), relative
 
 In the first two of the pressure p_h is the field that the treatment of the interface solves for:
@@ -36,7 +36,8 @@ from solver.elements.gauss import gauss_rule
 from solver.exact import ExactValues, computed_pressure, deformable
 from solver.faces import surface_points
 from solver.mesh.catalogue import cell_type
-from solver.solution import NodalContact, Solution, ZoneResult
+from solver.oscillation import oscillation
+from solver.solution import Solution, ZoneResult
 from solver.solutions import ElasticSolution, ExactSolution
 from solver.solutions.base import lame_of
 from solver.solutions.hertz import Hertz
@@ -141,8 +142,7 @@ def _integral(weight: np.ndarray, values: np.ndarray) -> float:
 
 def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, float]:
     squares, means = np.zeros(2), np.zeros(2)
-    largest, highest = 0.0, 0.0
-    second: list[float] = []
+    largest, highest, second = 0.0, 0.0, 0.0
     for zone in solution.zones:
         at = surface_points(solution.mesh.points, zone.faces)
         pressure = exact.contact_pressure(at.place)
@@ -155,15 +155,13 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
         means += _integral(weight, zone.multiplier - mean), _integral(weight, mean)
         largest = max(largest, np.abs(error[covered]).max(initial=0.0))
         highest = max(highest, pressure.max())
-        if exact.dim == 2:
-            second.append(_oscillation(solution, zone, exact, mean))
+        second = max(second, oscillation(solution.mesh.points, zone, exact, mean))
     found = {
         "pressure_l2": _root(*squares),
         "pressure_max": _over(largest, highest),
         "pressure_means": _root(*means),
+        "pressure_oscillation": _over(second, highest),
     }
-    if second:
-        found["pressure_oscillation"] = _over(max(second), highest)
     if isinstance(exact, Hertz):
         found |= _ellipse_errors(solution.zones, exact)
     return found
@@ -179,56 +177,6 @@ def _ellipse_errors(zones: list[ZoneResult], exact: Hertz) -> dict[str, float]:
         "half_width": abs(half_width / exact.half_width - 1),
         "peak": abs(peak / exact.peak - 1),
     }
-
-
-def _oscillation(
-    solution: Solution, zone: ZoneResult, exact: ExactSolution, mean: np.ndarray
-) -> float:
-    """Largest second difference of the error, by macro-element or, of nodal multipliers, by node.
-
-    The average of two nodes would hide a pressure that alternates from node to node.
-    """
-    if zone.nodal is None:
-        smooth = exact.regular(zone.centre)
-        return _second_difference(_neighbours(zone), zone.multiplier - mean, smooth)
-    place = solution.mesh.points[zone.nodal.nodes]
-    error = zone.nodal.multiplier - exact.contact_pressure(place)
-    return _second_difference(_nodal_neighbours(zone, zone.nodal), error, exact.regular(place))
-
-
-def _second_difference(
-    pairs: tuple[np.ndarray, np.ndarray], error: np.ndarray, smooth: np.ndarray
-) -> float:
-    """Largest |e₋ − 2 e + e₊| over places between two neighbours, all of them smooth."""
-    before, after = pairs
-    total, count = np.zeros(len(error)), np.zeros(len(error))
-    for one, other in ((before, after), (after, before)):
-        np.add.at(total, one, error[other] - error[one])
-        np.add.at(count, one, smooth[other])
-    between = (count == 2) & smooth
-    return float(np.abs(total[between]).max(initial=0.0))
-
-
-def _neighbours(zone: ZoneResult) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of macro-elements that share an end point."""
-    ends = np.concatenate([nodes[:, :2].ravel() for _, nodes, _ in zone.faces])
-    owner = np.concatenate([np.repeat(macro, 2) for _, _, macro in zone.faces])
-    order = np.argsort(ends, kind="stable")
-    ends, owner = ends[order], owner[order]
-    meet = (ends[1:] == ends[:-1]) & (owner[1:] != owner[:-1])
-    return owner[:-1][meet], owner[1:][meet]
-
-
-def _nodal_neighbours(zone: ZoneResult, nodal: NodalContact) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of multipliers that follow each other along the faces of a line."""
-    paths = [nodes[:, cell_type(name).boundary] for name, nodes, _ in zone.faces]
-    before, after = [], []
-    for path in paths:
-        own = path[:, np.isin(path[0], nodal.nodes)]
-        number = np.searchsorted(nodal.nodes, own)
-        before.append(number[:, :-1].ravel())
-        after.append(number[:, 1:].ravel())
-    return np.concatenate(before), np.concatenate(after)
 
 
 def _root(error: float, whole: float) -> float:

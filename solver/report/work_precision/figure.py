@@ -109,7 +109,7 @@ def draw_figure(panel: Panel, looks: Looks) -> Markup:
 
 def _legend(panel: Panel, width: float) -> list[tuple[str, float, int]]:
     """The treatments' places under the plots, behind the problem's name: title, x, row."""
-    at, row, places = LEFT + 20 + _LETTER * len(panel.problem.title), 0, []
+    at, row, places = LEFT + 24 + 1.2 * _LETTER * len(panel.problem.title), 0, []
     for title in panel.titles:
         length = 60 + _LETTER * len(title)
         if at + length > width:
