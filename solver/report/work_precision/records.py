@@ -1,6 +1,7 @@
 """The study's points as the page shows them: their records, lines of levels, the cheapest way."""
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +26,7 @@ ERRORS = {
     "stress_l2": "stress, L2",
     "stress_max": "stress, maximum",
 }
+_NUMBER = re.compile(r"\b\d[\d.e+-]*")
 TARGETS = {1e-2: "1 %", 1e-3: "0.1 %", 1e-4: "0.01 %", 1e-6: "10⁻⁶"}
 
 
@@ -87,6 +89,15 @@ class Line:
         """The levels that are solved and have this error."""
         return [m for m in self.levels if m.solved and m.error(error) is not None]
 
+    def reaching(self, error: str, target: float) -> list[Measured]:
+        """The levels from which on no error is above the target: one by accident does not count."""
+        found: list[Measured] = []
+        for m in reversed(self.having(error)):
+            if not (m.error(error) or 0) <= target:
+                break
+            found.append(m)
+        return found
+
     def order(self, error: str) -> Slope | None:
         """The observed order over the finest levels."""
         found = self.having(error)
@@ -134,13 +145,8 @@ class Panel:
         return [line for line in self.lines if line.title == title]
 
     def cheapest(self, title: str, target: float) -> Measured | None:
-        """The quickest solve of a treatment whose error is at most the target; None: never."""
-        good = [
-            m
-            for line in self.of(title)
-            for m in line.having(self.error)
-            if (m.error(self.error) or 0) <= target
-        ]
+        """The quickest solve of a treatment that reaches the target; None: never."""
+        good = [m for line in self.of(title) for m in line.reaching(self.error, target)]
         return min(good, key=lambda m: m.time.median, default=None)
 
     def ranked(self, target: float) -> list[tuple[str, Measured]]:
@@ -149,10 +155,10 @@ class Panel:
         reached = [(title, m) for title, m in found if m is not None]
         return sorted(reached, key=lambda pair: pair[1].time.median)
 
-    def smallest(self, title: str) -> float | None:
-        """The smallest error of a treatment on any pair and level."""
-        found = [m.error(self.error) for line in self.of(title) for m in line.having(self.error)]
-        return min((e for e in found if e is not None), default=None)
+    def finest(self, title: str) -> float | None:
+        """The smallest error of a treatment on the finest mesh of a pair; None without a solve."""
+        found = [x.having(self.error)[-1] for x in self.of(title) if x.having(self.error)]
+        return min((m.error(self.error) or 0.0 for m in found), default=None)
 
 
 def shown(error: float) -> float:
@@ -204,12 +210,17 @@ def panels(problem: Problem, found: Sequence[Line]) -> list[Panel]:
 
 
 def failures(points: Sequence[Measured]) -> list[tuple[str, str, str]]:
-    """Points without a solve: (outcome and reason, treatment, where) for each reason."""
+    """Points without a solve: (outcome and reason, treatment, where) for each reason.
+
+    Reasons that differ in numbers alone are told once.
+    """
     found: dict[tuple[str, str, str], list[str]] = {}
+    told: dict[str, str] = {}
     for m in points:
         if not m.solved:
             p = m.point
             why = f"{m.record['outcome']}: {m.record['reason']}"
+            why = told.setdefault(_NUMBER.sub("#", why), why)
             solver = "" if p.linear_solver == AUTO else f", {BACKENDS[p.linear_solver].name}"
             what = f"{p.treatment.title}{solver}"
             place = f"{p.problem.title}, {p.pair}"

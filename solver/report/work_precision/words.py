@@ -9,12 +9,11 @@ from solver.report.work_precision.records import ERRORS, TARGETS, Measured, Pane
 
 
 def paragraph(panel: Panel) -> str:
-    """What a panel shows: who reaches 0.1 % soonest, who never, what is exact, and the rest."""
-    solved = [title for title in panel.titles if panel.smallest(title) is not None]
+    """What a panel shows: who reaches 0.1 % soonest, who does not, what is exact, and the rest."""
+    solved = [title for title in panel.titles if panel.finest(title) is not None]
     parts = [_soonest(panel, solved), _never(panel, solved), _exact(panel, solved)]
     parts += [_finest(panel), _reference(panel), _lost(panel)]
-    text = " ".join(part for part in parts if part)
-    return text[:1].upper() + text[1:]
+    return " ".join(part[:1].upper() + part[1:] for part in parts if part)
 
 
 def seconds(value: float) -> str:
@@ -41,9 +40,9 @@ def _soonest(panel: Panel, solved: Sequence[str]) -> str:
     limit = TARGETS[LIMIT]
     ranked = panel.ranked(LIMIT)
     if not ranked:
-        best = min(solved, key=lambda title: panel.smallest(title) or 0.0)
-        smallest = percent(panel.smallest(best) or 0.0)
-        return f"No solve reaches {limit}; {best} comes nearest with {smallest}."
+        best = min(solved, key=lambda title: panel.finest(title) or 0.0)
+        nearest = percent(panel.finest(best) or 0.0)
+        return f"None reaches {limit}; {best} comes nearest with {nearest} on its finest mesh."
     (title, first), *others = ranked
     text = f"{title} reaches {limit} soonest, in {seconds(first.time.median)} ({first.label})"
     if not others:
@@ -62,13 +61,14 @@ def _soonest(panel: Panel, solved: Sequence[str]) -> str:
 
 
 def _never(panel: Panel, solved: Sequence[str]) -> str:
-    """Who does not reach 0.1 % on any mesh, with the smallest error seen."""
+    """Who does not reach 0.1 %, with its smallest error on the finest mesh of a pair."""
     reached = {title for title, _ in panel.ranked(LIMIT)}
     never = [title for title in solved if title not in reached]
     if not reached or not never:
         return ""
-    told = [f"{title} (smallest error {percent(panel.smallest(title) or 0.0)})" for title in never]
-    return f"On these meshes {listed(told)} never {'does' if len(never) == 1 else 'do'}."
+    told = [f"{title} ({percent(panel.finest(title) or 0.0)})" for title in never]
+    verb = "does" if len(never) == 1 else "do"
+    return f"{listed(told)} {verb} not (in brackets: the error on the finest meshes)."
 
 
 def _exact(panel: Panel, solved: Sequence[str]) -> str:
