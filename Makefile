@@ -16,7 +16,8 @@ INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report orders study stability test accept format lint lock clean clean-all
+.PHONY: help all-cases family case report orders study stability infsup test accept format lint lock
+.PHONY: clean clean-all
 .PHONY: environment test-environment lint-environment
 
 help: ## list the targets
@@ -50,6 +51,9 @@ study: environment ## error against run time, all treatments; a part in minutes:
 stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 stability: environment ## push one quantity after another until it breaks: LEVEL=quick for a few
 	@$(SNAKEMAKE) stability
+
+infsup: environment ## the inf-sup test of every cell type, and the half-loaded block
+	@$(SNAKEMAKE) infsup
 
 test: test-environment ## run the tests
 	@.venv/bin/python -m pytest -n auto $(ARGS)

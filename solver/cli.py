@@ -116,6 +116,16 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--quick", action="store_true", help="say that values are left out")
 
+    command = _add(commands, "infsup", _infsup, "run the inf-sup test and the half-loaded block")
+    command.add_argument("ladders", type=Path, metavar="INFSUP.yaml")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
+    command.add_argument("--quick", action="store_true", help="fewer levels")
+    command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
+
+    command = _add(commands, "infsup-page", _infsup_page, "write the page of the inf-sup test")
+    command.add_argument("record", type=Path, metavar="RECORD.json")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+
     command = _add(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
     command.add_argument("--mesh", action="store_true", help="mesh them too and check the groups")
@@ -239,6 +249,25 @@ def _stability(options: argparse.Namespace) -> int:
     from solver.report.stability import read_records, write_stability
 
     write_stability(read_records(options.records), options.output, options.quick)
+    return PASSED
+
+
+def _infsup(options: argparse.Namespace) -> int:
+    from solver.half_loaded import FACES, profiles
+    from solver.infsup_ladders import read_ladders, run
+    from solver.report.infsup import write_record
+
+    log = partial(print, flush=True)
+    ladders = [run(ladder, log) for ladder in read_ladders(options.ladders, options.quick)]
+    faces = FACES // 2 if options.quick else FACES
+    write_record(options.output, ladders, profiles(faces, log))
+    return PASSED
+
+
+def _infsup_page(options: argparse.Namespace) -> int:
+    from solver.report.infsup import read_record, write_page
+
+    write_page(read_record(options.record), options.output)
     return PASSED
 
 

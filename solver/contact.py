@@ -169,8 +169,13 @@ class ContactProblem:
         """The name of what solved the last system."""
         return self._system[1].factor.name if self._system else "none"
 
-    def solve(self, factor: float, start: np.ndarray | None = None) -> Equilibrium:
-        """Equilibrium at a load factor, the status search starting from `start` (a guess)."""
+    def solve(
+        self, factor: float, start: np.ndarray | None = None, bilateral: bool = False
+    ) -> Equilibrium:
+        """Equilibrium at a load factor, the status search starting from `start` (a guess).
+
+        `bilateral`: no status is sought, all macro-elements stay closed, in tension too.
+        """
         scene = self.scene
         start = self._first_guess(factor) if start is None else start
         force = factor * scene.force
@@ -183,7 +188,11 @@ class ContactProblem:
 
         load = float(np.abs(force).sum()) or 1.0
         pressure_scale = load / (float(self.area.sum()) or 1.0)
-        status = find_status(attempt, start, self.eligible, pressure_scale, scene.length)
+        if bilateral:
+            attempt(self.eligible)
+            status = StatusResult(self.eligible, 1, [])
+        else:
+            status = find_status(attempt, start, self.eligible, pressure_scale, scene.length)
         solved, shape = latest[0], scene.points.shape
         found = solved.iterate.displacement
         return Equilibrium(

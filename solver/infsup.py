@@ -31,7 +31,8 @@ def inf_sup_constant(scene: Scene) -> float:
     scaled = (sparse.diags(weight) @ gaps).tocsr()
     with factorise(scene.free.reduced(energy.tocsr())) as factor:
         response = factor.solve(scaled.T.toarray())
-    return float(np.sqrt(np.linalg.eigvalsh(scaled @ response)[0]))
+    # Round-off may put an eigenvalue of zero below it.
+    return float(np.sqrt(max(np.linalg.eigvalsh(scaled @ response)[0], 0.0)))
 
 
 def mass(points: np.ndarray, blocks: list[Block]) -> sparse.csr_matrix:

@@ -13,6 +13,7 @@ from typing import Any
 from solver.errors import InputError
 
 CASE_SCHEMA = Path(__file__).with_name("case.schema.json")
+INFSUP_SCHEMA = Path(__file__).with_name("infsup.schema.json")
 LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")
 FAMILY_SCHEMA = Path(__file__).with_name("family.schema.json")
 STUDY_SCHEMA = Path(__file__).with_name("study.schema.json")

@@ -1,0 +1,41 @@
+# Stability in the sense of theory: the inf-sup test and the half-loaded block, in one process.
+rule infsup_record:
+    input:
+        ladders="cases/stability/infsup/infsup.yaml",
+        sources=SOLVER_SOURCES,
+    output:
+        "results/stability/infsup.json",
+    log:
+        "results/stability/infsup.log",
+    benchmark:
+        "results/stability/infsup.benchmark"
+    message:
+        "inf-sup test"
+    shell:
+        "{PYTHON} -m solver infsup {input.ladders:q} -o {output:q} --threads 1 > {log:q} 2>&1"
+
+
+rule infsup_page:
+    input:
+        record="results/stability/infsup.json",
+        sources=REPORT_SOURCES,
+    output:
+        "results/report/infsup.html",
+        "results/report/infsup.csv",
+        "results/report/infsup-failures.txt",
+    log:
+        "results/report/infsup.log",
+    message:
+        "page of the inf-sup test"
+    shell:
+        "{PYTHON} -m solver infsup-page {input.record:q} -o results/report 2>&1 | tee {log:q}"
+
+
+# The gate: fails when the cut's constant does not level off; the page is there by then.
+rule infsup:
+    input:
+        "results/report/infsup-failures.txt",
+    message:
+        "inf-sup constants level off?"
+    shell:
+        "! test -s {input:q}"
