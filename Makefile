@@ -52,6 +52,7 @@ stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 stability: environment ## push one quantity after another until it breaks: LEVEL=quick for a few
 	@$(SNAKEMAKE) stability
 
+infsup: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 infsup: environment ## the inf-sup test of every cell type, and the half-loaded block
 	@$(SNAKEMAKE) infsup
 

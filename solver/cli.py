@@ -115,6 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("records", type=Path, nargs="+", metavar="RECORD.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--quick", action="store_true", help="say that values are left out")
+    command.add_argument("--infsup", type=Path, metavar="RECORD.json", help="show its record too")
 
     command = _add(commands, "infsup", _infsup, "run the inf-sup test and the half-loaded block")
     command.add_argument("ladders", type=Path, metavar="INFSUP.yaml")
@@ -246,9 +247,12 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _stability(options: argparse.Namespace) -> int:
+    from solver.report.infsup import read_record
     from solver.report.stability import read_records, write_stability
 
-    write_stability(read_records(options.records), options.output, options.quick)
+    theory = read_record(options.infsup) if options.infsup else None
+    records = read_records(options.records)
+    write_stability(records, options.output, options.quick, theory=theory)
     return PASSED
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from solver.errors import InputError
 from solver.files import replacing
-from solver.report import formats
+from solver.report import formats, infsup
 from solver.report.html import environment
 from solver.report.stability_map import anchor, draw_key, draw_map
 from solver.report.tables import as_csv
@@ -41,16 +41,22 @@ def read_records(paths: Sequence[Path]) -> list[Record]:
 
 
 def write_stability(
-    records: Sequence[Record], folder: Path, quick: bool, log: Callable[[str], Any] = print
+    records: Sequence[Record],
+    folder: Path,
+    quick: bool,
+    log: Callable[[str], Any] = print,
+    theory: infsup.Record | None = None,
 ) -> None:
     """Write the page, the table and the failures of the sweeps into `folder`.
 
-    They are called stability…, or stability-quick… for the quick version.
+    They are called stability…, or stability-quick… for the quick version. `theory` adds the inf-sup
+    test and the half-loaded block.
     """
     stem = "stability-quick" if quick else "stability"
     lines = [line for record in records for line in complaints(record)]
+    lines += infsup.failures(theory) if theory else []
     contents = {
-        PAGE: _to_html(records, quick, lines),
+        PAGE: _to_html(records, quick, lines, theory),
         TABLE: as_csv([row for record in records for row in _rows(record)]),
         FAILURES: "".join(f"{line}\n" for line in lines),
     }
@@ -82,7 +88,9 @@ def outcome(records: Sequence[Record]) -> str:
     return f"{held} of {len(points)} points hold, in {len(records)} sweeps."
 
 
-def _to_html(records: Sequence[Record], quick: bool, lines: Sequence[str]) -> str:
+def _to_html(
+    records: Sequence[Record], quick: bool, lines: Sequence[str], theory: infsup.Record | None
+) -> str:
     return (
         environment()
         .get_template("stability.html.jinja")
@@ -91,6 +99,7 @@ def _to_html(records: Sequence[Record], quick: bool, lines: Sequence[str]) -> st
             quick=quick,
             outcome=outcome(records),
             complaints=lines,
+            theory=infsup.sections(theory) if theory else "",
             table=f"stability{'-quick' * quick}{TABLE}",
             map=draw_map(records),
             key=draw_key(),

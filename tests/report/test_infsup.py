@@ -93,7 +93,7 @@ def test_a_small_run_from_file_to_page(tmp_path):
 def test_solid_cells_run_too(tmp_path):
     path = tmp_path / "infsup.yaml"
     path.write_text(SMALL)
-    cut, uncut = (run(each, lambda _: None) for each in read_ladders(path, quick=True)[-4:-2])
+    cut, uncut = (run(each, lambda _: None) for each in read_ladders(path, quick=True)[-2:])
     assert (cut.way, uncut.way) == ("hexahedra", "uncut")
     assert cut.constants[-1] > 0.4 > 0.3 > uncut.constants[-1] > 0
 

@@ -1,23 +1,29 @@
 # Stability in the sense of theory: the inf-sup test and the half-loaded block, in one process.
+INFSUP_RECORD = f"results/stability/infsup-{config['stability']}.json"
+
+
 rule infsup_record:
     input:
         ladders="cases/stability/infsup/infsup.yaml",
         sources=SOLVER_SOURCES,
     output:
-        "results/stability/infsup.json",
+        INFSUP_RECORD,
     log:
-        "results/stability/infsup.log",
+        INFSUP_RECORD + ".log",
     benchmark:
-        "results/stability/infsup.benchmark"
+        INFSUP_RECORD + ".benchmark"
+    params:
+        quick=" --quick" * (config["stability"] == "quick"),
     message:
         "inf-sup test"
     shell:
-        "{PYTHON} -m solver infsup {input.ladders:q} -o {output:q} --threads 1 > {log:q} 2>&1"
+        "{PYTHON} -m solver infsup {input.ladders:q} -o {output:q}{params.quick} --threads 1"
+        " > {log:q} 2>&1"
 
 
 rule infsup_page:
     input:
-        record="results/stability/infsup.json",
+        record=INFSUP_RECORD,
         sources=REPORT_SOURCES,
     output:
         "results/report/infsup.html",

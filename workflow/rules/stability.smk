@@ -32,6 +32,7 @@ rule stability_page:
             level=config["stability"],
             sweep=sorted(SWEEP_FILES),
         ),
+        infsup=INFSUP_RECORD,
         sources=REPORT_SOURCES,
     output:
         STABILITY + ".html",
@@ -44,8 +45,8 @@ rule stability_page:
     message:
         "numerical stability"
     shell:
-        "{PYTHON} -m solver stability {input.records:q} -o results/report{params.quick}"
-        " 2>&1 | tee {log:q}"
+        "{PYTHON} -m solver stability {input.records:q} --infsup {input.infsup:q}"
+        " -o results/report{params.quick} 2>&1 | tee {log:q}"
 
 
 # The gate: fails when a point does not hold; the page is there by then.
