@@ -1,6 +1,7 @@
 """Direct solvers: solutions known beforehand, refusals, and the same answer from every backend."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,12 @@ from hypothesis import strategies as st
 from scipy.sparse import block_array, csc_matrix, csr_matrix, diags, eye, kron, tril, triu
 
 from solver.errors import SolveError
-from solver.linear.direct import BACKENDS, factorise, factorise_indefinite
+from solver.linear.direct import (
+    BACKENDS,
+    factorise,
+    factorise_indefinite,
+    standing_for_auto,
+)
 
 INSTALLED = [name for name, backend in BACKENDS.items() if backend.available()]
 SINGLE = [name for name in INSTALLED if BACKENDS[name].single]
@@ -212,3 +218,22 @@ def test_singular_saddle_point_is_refused(kind):
         factorise_indefinite(floating, kind)
     with pytest.raises(SolveError, match="row 1 is zero"):
         factorise_indefinite(csr_matrix([[1.0, 0.0], [0.0, 0.0]]), kind)
+
+
+def test_a_chosen_solver_stands_for_auto_within_its_block(kind):
+    before = factorise(laplacian(3)).name
+    with standing_for_auto(kind):
+        assert factorise(laplacian(3)).name == BACKENDS[kind].name
+        assert factorise(laplacian(3), "superlu").name == "SuperLU"
+    assert factorise(laplacian(3)).name == before
+
+
+def test_what_a_chosen_solver_cannot_do_is_no_other_s_work(monkeypatch):
+    with (
+        standing_for_auto("cholmod"),
+        pytest.raises(SolveError, match="CHOLMOD factors positive definite matrices only"),
+    ):
+        factorise_indefinite(saddle(4))
+    monkeypatch.setitem(BACKENDS, "rslab", replace(BACKENDS["rslab"], available=lambda: False))
+    with standing_for_auto("rslab"), pytest.raises(SolveError, match="rslab is not installed"):
+        factorise(laplacian(3))
