@@ -3,7 +3,6 @@
 import numpy as np
 
 from solver.contact import Equilibrium
-from solver.elasticity import internal_force
 from solver.scene import Scene
 
 
@@ -24,9 +23,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     result: dict[str, float] = {}
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length)
-    internal = internal_force(points, scene.blocks, state.straining, state.extended)
-    internal += scene.mean.force(state.mean_stress)
-    unbalanced = (internal - state.force - contact).astype(float).ravel()
+    unbalanced = (state.internal - state.force - contact).astype(float).ravel()
     basis = scene.free.basis
     # What is left on held unknowns are the reactions; on free ones nothing may be left.
     free_part = (basis @ (basis.T @ unbalanced)).reshape(points.shape)

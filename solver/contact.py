@@ -42,6 +42,7 @@ _TWICE = 1e-6
 class Equilibrium:
     """A solved load factor: displacement (n, dim), pressure and gap (m,), status, residual.
 
+    `force` and `internal` (n, dim): the loads, and the internal forces that meet them.
     `straining` (2, n, dim): both parts of the displacement less a rigid motion of each body, from
     which strains are taken (see `Displacement`). `mean_stress` (k,) is that of cells in mixed form.
     """
@@ -54,6 +55,7 @@ class Equilibrium:
     status: StatusResult
     residual: float
     force: np.ndarray
+    internal: np.ndarray
     accuracy: Accuracy
     extended: bool
 
@@ -79,15 +81,20 @@ class _Iterate:
         """By how much the mean stress differs from λ div u; see `solver.mixed`."""
         return self.problem.scene.mean.defect(self.straining, self.mean_stress)
 
-    def residual(self) -> np.ndarray:
+    @cached_property
+    def internal(self) -> np.ndarray:
+        """Internal forces (n, dim)."""
         scene = self.problem.scene
         if scene.cures.differences:
             internal = internal_force(scene.points, scene.blocks, self.straining, self.extended)
         else:
             product = self.problem.stiffness @ self.displacement.total
             internal = product.reshape(self.force.shape)
-        internal += scene.mean.force(self.mean_stress)
-        return scene.free.basis.T @ (self.force - internal).astype(float).ravel()
+        return internal + scene.mean.force(self.mean_stress)
+
+    def residual(self) -> np.ndarray:
+        basis = self.problem.scene.free.basis
+        return basis.T @ (self.force - self.internal).astype(float).ravel()
 
     def condensed(self, force: np.ndarray) -> np.ndarray:
         scene = self.problem.scene
@@ -204,6 +211,7 @@ class ContactProblem:
             status,
             solved.residual,
             force,
+            solved.iterate.internal,
             solved.accuracy,
             solved.iterate.extended,
         )

@@ -130,6 +130,8 @@ def internal_force(
     n, dim = points.shape
     points, displacement = _in_precision(points, displacement, extended)
     force = np.zeros(n * dim, dtype=points.dtype)
+    if not displacement.any():
+        return force.reshape(n, dim)
     for block in blocks:
         reference, weights = block.rule
         for part in _chunks(block, dim):
