@@ -4,6 +4,7 @@ import meshio
 import numpy as np
 import pytest
 
+from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation import simulate
 from tests.scenes import block_case, block_mesh, errors, moved, straightened, with_points
@@ -51,6 +52,18 @@ def test_solid_pairs(bottom, top, hexahedra):
     """Each pair stands twice in the table, once with either block below: the slave."""
     mesh = block_mesh(bottom, top)
     assert_exact(simulate(block_case(3), mesh, hexahedra=hexahedra))
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize(
+    ("cells", "contact"),
+    [("PENTA6", "QUAD4"), ("PENTA15", "TRIA6"), ("PYRA5", "TRIA3"), ("PYRA13", "QUAD8")],
+)
+def test_blocks_of_many_boxes_of_prisms_and_pyramids(cells, contact, swapped):
+    top = {"cells": cells, "contact": contact, "divisions": [2, 3, 2]}
+    bottom = {"cells": "HEXA8", "divisions": [3, 2, 1]}
+    mesh = generate({"recipe": "blocks", "size": 1.0, "bottom": bottom, "top": top}, "case.yaml")
+    assert_exact(simulate(block_case(3), mesh, swapped))
 
 
 @pytest.mark.parametrize("hexahedra", ["pyramids", "hexahedra"])

@@ -3,10 +3,12 @@
 import json
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from solver.case import load_case
 from solver.cli import main
 from solver.report import formats, write_report
 from solver.report.families import FILE_NAME, page_name, paragraphs, read_family
@@ -87,6 +89,21 @@ def test_a_file_that_is_refused_is_told_and_the_report_is_written(
     assert message in logged
     assert str(file) in text_of(tmp_path / "blocks.html")
     assert str(file) in text_of(tmp_path / "summary.html")
+
+
+OURS = sorted(Path("cases").glob("*/family.yaml"))
+
+
+@pytest.mark.parametrize("file", OURS, ids=lambda file: file.parent.name)
+def test_every_family_of_ours_tells_problem_and_reference_and_draws_solves_it_has(file):
+    family = read_family(file)
+    assert family.complaint == ""
+    assert all(text.strip() for text in (family.description, family.problem, family.reference))
+    jobs = set()
+    for path in set(file.parent.glob("*.yaml")) - {file, file.with_name("orders.yaml")}:
+        case = load_case(path)
+        jobs |= {case.name} | ({f"{case.name}-swapped"} if case.directions == "both" else set())
+    assert {figure.job for figure in family.figures} <= jobs
 
 
 def test_pages_of_the_report_are_no_family_s():
