@@ -16,7 +16,7 @@ from solver.report.profile import draw_profile
 from solver.results import write_result
 from tests import handmade
 from tests.report.test_pictures import SVG, polygons
-from tests.report.test_report import verdict
+from tests.report.test_report import CHECK, verdict
 
 FAMILY = """\
 title: Blocks & <b>more</b>
@@ -210,6 +210,19 @@ def test_the_page_goes_from_problem_to_figure_to_verdict(file, tmp_path):
     for name in ("result.vtkhdf", "verdict.json", "log"):
         assert f'href="results/blocks/two-blocks/{name}"' in html
     assert 'href="blocks.html"' in (tmp_path / "summary.html").read_text()
+
+
+def test_a_solve_that_is_held_against_norms_alone_shows_the_largest(tmp_path):
+    checks = [
+        CHECK | {"name": name, "error": error, "tolerance": 0.5, "passed": True}
+        for name, error in (("peak", 0.25), ("pressure_means", 0.125), ("balance", 0.4))
+    ]
+    errors = {"pressure_means": 0.125, "peak": 0.25, "pressure_l2": 0.3}
+    report(tmp_path, [verdict("a", "passed", checks=checks, errors=errors)])
+    rows = parsed(tmp_path / "fam.html").rows
+    assert any("2.5e-01peak, of 5.0e-01" in cell for row in rows for cell in row)
+    assert ["a", "3.0e-01", "1.2e-01"] in [row[:3] for row in rows]  # in L2, and at means
+    assert "Not drawn" not in text_of(tmp_path / "fam.html")
 
 
 def test_the_cost_of_each_family_is_told(tmp_path):
