@@ -11,6 +11,7 @@
     ladders:
       - {case: tria3.yaml, reference_code: {displacement_l2: 1.998, pressure_l2: 1.041}}
       - {case: press-fit.yaml, problem: press fit}    # has plots of its own
+      - {case: lying.yaml, label: PENTA6 on its side}  # else the slave's cells, and their cut
       - {case: hexa20.yaml, hexahedra: hexahedra, levels: [1, 2, 3, 4]}
       - {case: sphere.yaml, finest: {peak: 0.01}}     # largest error allowed at the finest level
 
@@ -34,13 +35,15 @@ FILE_NAME = "orders.yaml"
 class Ladder:
     """One case file, and what the divisions of its recipe are multiplied by, level by level.
 
-    Ladders of the same `problem` share their plots. `observed` holds the reference code's own
+    Ladders of the same `problem` share their plots; `label` tells those of the same cells apart.
+    `observed` holds the reference code's own
     slopes by error, `finest` the largest errors allowed at the finest level.
     """
 
     case: Path
     levels: tuple[int, ...]
     problem: str = ""
+    label: str = ""
     hexahedra: str | None = None
     observed: Mapping[str, float] = field(default_factory=dict)
     finest: Mapping[str, float] = field(default_factory=dict)
@@ -108,6 +111,7 @@ def _ladder(path: Path, content: Mapping[str, Any], index: int) -> Ladder:
         case=case,
         levels=tuple(item.get("levels", content["levels"])),
         problem=item.get("problem", ""),
+        label=item.get("label", ""),
         hexahedra=item.get("hexahedra"),
         observed=item.get("reference_code", {}),
         finest=item.get("finest", {}),

@@ -61,7 +61,9 @@ class Curve:
 
     @cached_property
     def label(self) -> str:
-        """The slave's cells, and how they are cut where that is chosen."""
+        """The ladder's own label, or the slave's cells, and how they are cut where it is chosen."""
+        if self.ladder.label:
+            return self.ladder.label
         names = " + ".join(dict.fromkeys(cell.name for cell in self.slave_cells))
         cut = f" cut into {self.ladder.hexahedra}" if self.ladder.hexahedra else ""
         return (names or self.name) + cut

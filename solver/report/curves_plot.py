@@ -62,9 +62,9 @@ def _look(curve: Curve) -> tuple[str, str]:
 
 
 def _line(curve: Curve) -> dict[str, Style]:
-    """Linear cells dashed, quadratic ones solid; a way to cut that was chosen is dotted."""
+    """Linear cells dashed, quadratic ones solid; a variant (cut, label of its own) is dotted."""
     style: dict[str, Style] = {"stroke": _look(curve)[0], "stroke_width": 1.6}
-    if curve.ladder.hexahedra:
+    if curve.ladder.hexahedra or curve.ladder.label:
         return style | {"stroke_dasharray": (1.5, 3)}
     return style | ({"stroke_dasharray": (6, 3)} if curve.degree == "linear" else {})
 

@@ -222,6 +222,13 @@ def test_slopes_below_theory_are_told_with_the_reason_where_it_is_known(family, 
     assert "<p>Few &lt;levels&gt;.</p>" in (tmp_path / orders.PAGE).read_text()
 
 
+def test_a_label_tells_ladders_of_the_same_cells_apart(family, results):
+    path = family.folder / "orders.yaml"
+    path.write_text(LADDERS.replace("quad8.yaml", "quad8.yaml, label: QUAD8 <bent>"))
+    labels = {c.name: c.label for c in read_curves(read_ladders(path), results)}
+    assert (labels["tria3"], labels["quad8"]) == ("TRIA3", "QUAD8 <bent>")
+
+
 def test_own_theory_takes_the_place_of_the_general_one(family, results, tmp_path):
     path = tmp_path / "cases" / "powers" / "orders.yaml"
     path.write_text(LADDERS + "theory: {quadratic: {pressure_l2: [1.5, null]}}\n")
