@@ -8,7 +8,8 @@ from collections.abc import Iterable
 import meshio
 import numpy as np
 
-from solver.case import Case, Zone, check_dimension
+from solver.case import Case, Zone
+from solver.dimension import check_dimension
 from solver.errors import InputError
 from solver.mesh.catalogue import BY_MESHIO
 from solver.schemas import hint

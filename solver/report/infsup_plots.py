@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from solver.half_loaded import Profile
+from solver.half_loaded import CELLS, Profile
 from solver.infsup_ladders import Ladder
 from solver.mesh.catalogue import BY_NAME
 from solver.report.axes import Scale, draw_axes
@@ -81,7 +81,8 @@ def draw_profiles(profiles: Sequence[Profile]) -> Markup:
                 color = INK if profile.cut else ORANGE
                 width = 1.6 if profile.cut else 1.0
                 drawing.polygons(at[None], closed=False, stroke=color, stroke_width=width)
-    for k, (word, color) in enumerate((("with the cut", INK), ("without", ORANGE))):
+    method = "with the cut" if CELLS[profiles[0].cells] else "needs no cut"
+    for k, (word, color) in enumerate(((method, INK), ("without", ORANGE))):
         if any(profile.cut is (k == 0) for profile in profiles):
             drawing.text(WIDTH - 30, 50 + 16 * k, word, "end", color=color)
     drawing.line(WIDTH - 4, 34, WIDTH - 4, 214, stroke=MUTED, stroke_width=0.4)

@@ -39,6 +39,7 @@ def sources(*patterns):
 REPORT_SOURCES = sources("report/**/*.py", "report/templates/*")
 READING = (
     "case.py",
+    "dimension.py",
     "errors.py",
     "expressions.py",
     "files.py",
