@@ -7,6 +7,7 @@ import pytest
 from solver.case import parse_case
 from solver.clock import Clock
 from solver.infsup import inf_sup_constant
+from solver.infsup_ladders import Ladder, run
 from solver.scene import build_scene
 from tests.scenes import block_case, block_mesh
 
@@ -80,3 +81,28 @@ def test_the_other_stable_treatments_level_off_too(treatment, coarser):
     found = constants("QUAD4", (8, 16, 32), coarser, treatment=treatment)
     assert found[-1] > 0.3
     assert found[-1] > 0.97 * found[-2]
+
+
+@pytest.mark.parametrize(
+    ("cells", "contact", "levels"),
+    [
+        ("TETRA4", "", [4, 6]),
+        ("TETRA10", "", [4, 6]),
+        ("PENTA6", "TRIA3", [2, 4]),
+        ("PENTA6", "QUAD4", [4, 6]),
+        ("PENTA15", "TRIA6", [2, 4]),
+        ("PENTA15", "QUAD8", [4, 6]),
+        ("PYRA5", "TRIA3", [2, 4]),
+        ("PYRA5", "QUAD4", [4, 6]),
+        ("PYRA13", "TRIA6", [2, 4]),
+    ],
+)
+def test_simplices_prisms_and_pyramids_level_off_with_the_cut_alone(cells, contact, levels):
+    cut, uncut = (
+        run(Ladder(cells, cut, True, 2, contact, levels=levels), lambda _: None)
+        for cut in (True, False)
+    )
+    assert cut.levels_off
+    assert cut.constants[-1] > 0.18
+    assert not uncut.levels_off
+    assert uncut.constants[-1] < 0.65 * cut.constants[-1]
