@@ -102,7 +102,8 @@ def _draw_point(
         mark = "?" if name == "cured" and source["word"] == "unreliable" else ""
         stress = digits(of_stress) or 0
         less = f" / {stress}" if stress < found - 1 else ""
-        _square(drawing, *place, f"{found}{less}{mark}", shade(found))
+        size = 8.5 if less else 10
+        _square(drawing, *place, f"{found}{less}{mark}", shade(found), size=size)
     if name == "cured" and not point["holds"]:
         x, y = place
         drawing.rectangle(
