@@ -33,8 +33,13 @@ class Constrained(Protocol):
     def factor(self) -> Factor:
         """The factor of the system that is solved."""
 
-    def correction(self, force: np.ndarray, violation: np.ndarray) -> np.ndarray:
-        """The change of x (n,) that removes f − K x = `force` and b − G x = `violation`."""
+    def correction(
+        self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
+    ) -> np.ndarray:
+        """The change of x (n,) that removes f − K x = `force` and b − G x = `violation`.
+
+        `roughly`: as far as is quick, where another correction follows.
+        """
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """The multipliers p (m,) that balance f − K x = `force`."""
@@ -57,12 +62,14 @@ class Condensed:
     factor: Factor
     matrix: sparse.csr_matrix
 
-    def correction(self, force: np.ndarray, violation: np.ndarray) -> np.ndarray:
+    def correction(
+        self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
+    ) -> np.ndarray:
         """The pivots alone meet the constraints; the others then restore equilibrium."""
         change = np.zeros(self.expansion.shape[0])
         change[self.pivot] = violation / self.coefficient
         moved = force - self.matrix @ change if change.any() else force
-        return change + self.expansion @ self.factor.solve(self.expansion.T @ moved)
+        return change + self.expansion @ self.factor.solve(self.expansion.T @ moved, roughly)
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """From the equilibrium of the pivots, which one multiplier each acts on."""
@@ -87,11 +94,13 @@ class Saddle:
     weight: float
     factor: Factor
 
-    def correction(self, force: np.ndarray, violation: np.ndarray) -> np.ndarray:
+    def correction(
+        self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
+    ) -> np.ndarray:
         """Solved for x and p together."""
         wanted = violation / self.size
         pulled = force + self.weight * (self.scaled.T @ wanted)
-        return self.factor.solve(np.concatenate([pulled, -wanted]))[: len(force)]
+        return self.factor.solve(np.concatenate([pulled, -wanted]), roughly)[: len(force)]
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """The multipliers of the same system with nothing violated."""
@@ -215,7 +224,7 @@ def solve(
     """
     force, last = iterate.residual(), np.inf
     for _ in range(_MAX_REFINEMENTS if refine else 1):
-        correction = system.correction(iterate.condensed(force), iterate.violation())
+        correction = system.correction(iterate.condensed(force), iterate.violation(), refine)
         following = iterate.advanced(correction)
         following_force = following.residual()
         size = system.imbalance(following_force) / scale

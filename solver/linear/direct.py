@@ -33,6 +33,8 @@ SINGULAR_INDEFINITE = 1e-12
 TRUSTED_SINGLE = 1e-6
 """The same for a factor in single precision; below it the factor is made in double precision."""
 MAX_ITERATIONS = 50
+ROUGH = 1e-9
+"""Residual, over the right-hand side, of a solution that is going to be refined."""
 _auto: ContextVar[str] = ContextVar("auto", default="auto")
 
 
@@ -52,21 +54,24 @@ def standing_for_auto(kind: str) -> Iterator[None]:
 class Factor:
     """A factored matrix; `name` says by what. The memory goes when it is closed or dropped."""
 
-    def __init__(self, name: str, solve: Solve, scale: np.ndarray):
+    def __init__(self, name: str, solve: Solve, scale: np.ndarray, roughly: Solve | None = None):
         self.name = name
         self._scale = scale
         self._solve: Solve | None = solve
+        self._roughly = roughly or solve
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
+    def solve(self, right: np.ndarray, roughly: bool = False) -> np.ndarray:
         """Solve A x = `right`, of shape (n,) or (n, k); the result has the same shape.
 
+        `roughly`: to `ROUGH` of the right-hand side where that is quicker, for who refines.
         Raises SolveError where the solution is not finite or the iterations do not converge.
         """
         if self._solve is None:
             raise ValueError("the factor is closed")
         right = np.asarray(right, dtype=float)
         columns = right if right.ndim == 2 else right[:, None]
-        solution = self._scale[:, None] * self._solve(self._scale[:, None] * columns)
+        solve = self._roughly if roughly else self._solve
+        solution = self._scale[:, None] * solve(self._scale[:, None] * columns)
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         return solution.reshape(right.shape)
@@ -179,20 +184,23 @@ def _factorise_single(backend: Backend, upper: csr_matrix, scale: np.ndarray) ->
     if not _smallest_eigenvalue(precondition, upper.shape[0]) > TRUSTED_SINGLE:
         return None
 
-    def solve(right: np.ndarray) -> np.ndarray:
-        return conjugate_gradients(lambda x: _multiply(upper, x), precondition, right)
+    def solve(right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
+        return conjugate_gradients(lambda x: _multiply(upper, x), precondition, right, accuracy)
 
-    return Factor(f"{backend.name}, single precision in conjugate gradients", solve, scale)
+    name = f"{backend.name}, single precision in conjugate gradients"
+    return Factor(name, solve, scale, lambda right: solve(right, ROUGH))
 
 
-def conjugate_gradients(multiply: Solve, precondition: Solve, right: np.ndarray) -> np.ndarray:
-    """Solve for all columns at once; the residual falls to round-off of the right-hand side.
+def conjugate_gradients(
+    multiply: Solve, precondition: Solve, right: np.ndarray, accuracy: float = EPSILON
+) -> np.ndarray:
+    """Solve for all columns at once; the residual falls to `accuracy` of the right-hand side.
 
     The flexible form (Golub and Ye, SIAM J. Sci. Comput. 21 (1999) 1305): the preconditioner is
     rounded, so it is linear only to single precision.
     """
     solution, residual = np.zeros_like(right), right.copy()
-    target = EPSILON * np.linalg.norm(right, axis=0)
+    target = accuracy * np.linalg.norm(right, axis=0)
     improved = precondition(residual)
     direction = improved
     energy = np.sum(residual * improved, axis=0)

@@ -75,6 +75,17 @@ def test_single_precision_factor_gives_double_precision_solution(kind):
 
 
 @pytest.mark.parametrize("kind", SINGLE)
+def test_a_rough_solution_stops_where_refinement_takes_over(kind):
+    matrix = laplacian(12)
+    right = np.random.default_rng(1).standard_normal(matrix.shape[0])
+    with factorise(matrix, kind, precision="single") as factor:
+        rough, exact = factor.solve(right, roughly=True), factor.solve(right)
+    left = [np.linalg.norm(matrix @ x - right) / np.linalg.norm(right) for x in (rough, exact)]
+    assert 1e-15 < left[0] < 1e-8
+    assert left[1] < left[0]
+
+
+@pytest.mark.parametrize("kind", SINGLE)
 def test_single_precision_gives_way_where_it_cannot_be_trusted(kind):
     matrix = springs(4000)  # smallest eigenvalue of the scaled matrix 1 - cos(pi / 4001) = 3e-7
     exact = np.ones(4000)
