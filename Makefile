@@ -17,7 +17,7 @@ SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
 .PHONY: help all-cases family case report orders study stability infsup test accept format lint lock
-.PHONY: clean clean-all
+.PHONY: faults mutants bill clean clean-all
 .PHONY: environment test-environment lint-environment
 
 help: ## list the targets
@@ -58,6 +58,9 @@ infsup: environment ## the inf-sup test of every cell type, and the half-loaded 
 
 test: test-environment ## run the tests
 	@.venv/bin/python -m pytest -n auto $(ARGS)
+
+faults: test-environment ## read damaged files, 1,000 of them or COUNT=…: none may get through
+	@.venv/bin/python -m tests.faults $(or $(COUNT),1000)
 
 RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
 accept: environment ## take results as the accepted values, showing the difference: all or CASE=…

@@ -12,6 +12,8 @@ the checks need again, so that a file can be judged without solving:
                    of nodes where the treatment has its multipliers there
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
     /provenance    versions, revision, hashes, machine
+
+Its last line is the hash of all before it: a file that was damaged is refused before HDF5 sees it.
 """
 
 from __future__ import annotations
@@ -29,8 +31,9 @@ import numpy as np
 
 from solver.case import Case, parse_case
 from solver.checks import CheckResult
+from solver.consistency import inconsistency
 from solver.errors import InputError
-from solver.files import replacing
+from solver.files import is_sealed, replacing, seal
 from solver.mesh.catalogue import cell_type
 from solver.mesh.vtkhdf import read_grid, write_grid
 from solver.solution import BodyInfo, NodalContact, Solution, StepResult, ZoneResult
@@ -81,40 +84,60 @@ def write_result(
     provenance: Mapping[str, Any],
 ) -> None:
     """Write a solution, its checks and its provenance to a `.vtkhdf` file."""
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
-        _write_grid(file.create_group(GRID), solution)
-        _write_case(file.create_group("case"), solution)
-        file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
-        file.create_group("accuracy").attrs.update(solution.accuracy)
-        file.create_group("errors").attrs.update(solution.errors)
-        mean_stress = file.create_group("mean_stress")
-        for kind, values in solution.mean_stress.items():
-            mean_stress[kind] = values
-        contact = file.create_group("contact")
-        for number, zone in enumerate(solution.zones):
-            _write_zone(contact.create_group(zone.name), zone, number)
-        _write_bodies(file.create_group("bodies"), solution.bodies)
-        _write_steps(file, solution.steps)
-        _write_table(
-            file.create_group("balance"), _pairs("name", "value", solution.balance.items())
-        )
-        _write_table(
-            file.create_group("timings"), _pairs("stage", "seconds", solution.seconds.items())
-        )
-        _write_table(file.create_group("plan"), _pairs("what", "why", solution.plan))
-        _write_table(file.create_group("checks"), [_flat(check) for check in checks])
-        file.create_group("provenance").attrs.update(provenance)
+    with replacing(path) as temporary:
+        with h5py.File(temporary, "w") as file:
+            _write(file, solution, checks, provenance)
+        seal(temporary)
+
+
+def _write(
+    file: h5py.File,
+    solution: Solution,
+    checks: Iterable[CheckResult],
+    provenance: Mapping[str, Any],
+) -> None:
+    _write_grid(file.create_group(GRID), solution)
+    _write_case(file.create_group("case"), solution)
+    file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
+    file.create_group("accuracy").attrs.update(solution.accuracy)
+    file.create_group("errors").attrs.update(solution.errors)
+    mean_stress = file.create_group("mean_stress")
+    for kind, values in solution.mean_stress.items():
+        mean_stress[kind] = values
+    contact = file.create_group("contact")
+    for number, zone in enumerate(solution.zones):
+        _write_zone(contact.create_group(zone.name), zone, number)
+    _write_bodies(file.create_group("bodies"), solution.bodies)
+    _write_steps(file, solution.steps)
+    _write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
+    _write_table(file.create_group("timings"), _pairs("stage", "seconds", solution.seconds.items()))
+    _write_table(file.create_group("plan"), _pairs("what", "why", solution.plan))
+    _write_table(file.create_group("checks"), [_flat(check) for check in checks])
+    file.create_group("provenance").attrs.update(provenance)
 
 
 def read_result(path: str | Path) -> Result:
-    """Read a result file back; `InputError` for a file that is none."""
+    """Read a result file back; `InputError` for a file that is none, or not as it was written."""
+    if not is_sealed(path):
+        raise _no_result(path, "damaged, of another version, or none at all")
     try:
         with h5py.File(path) as file:
-            return Result(_read_solution(file), _plain(file["provenance"].attrs))
-    except (OSError, KeyError) as error:
-        reason = "cannot be opened as HDF5" if isinstance(error, OSError) else str(error.args[0])
-        allowed = f"must be a result written by `solve` ({reason})"
-        raise InputError(path, "file", None, allowed) from None
+            result = Result(_read_solution(file), _plain(file["provenance"].attrs))
+        fault = inconsistency(result.solution)
+    except InputError:
+        raise
+    except Exception as error:
+        # Whatever the reader trips over lies in the file, as where another version wrote it.
+        fault = " ".join(f"{type(error).__name__}: {error}".split())
+        raise _no_result(path, fault) from error
+    if fault:
+        raise _no_result(path, fault)
+    return result
+
+
+def _no_result(path: str | Path, fault: str) -> InputError:
+    allowed = f"must be a result written by `solve` ({fault}): solve again"
+    return InputError(path, "file", None, allowed)
 
 
 def _read_solution(file: h5py.File) -> Solution:

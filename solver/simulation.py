@@ -11,9 +11,11 @@ import numpy as np
 from solver.balance import imbalances
 from solver.case import Case
 from solver.clock import Clock
+from solver.consistency import inconsistency
 from solver.contact import ContactProblem, Equilibrium
 from solver.cures import ALL, Cures
 from solver.elasticity import nodal_stress
+from solver.errors import SolveError
 from solver.faces import nodal_normals
 from solver.mesh.catalogue import BY_NAME
 from solver.naming import body_infos
@@ -69,6 +71,8 @@ def solve_problem(
     with clock.stage("recovery"):
         solution = _recover(problem.scene, problem, states, swapped, hexahedra)
     solution.seconds = clock.seconds
+    if fault := inconsistency(solution):
+        raise SolveError(f"the solve came to no sound end: {fault}")
     return solution
 
 

@@ -8,8 +8,10 @@ import meshio
 import numpy as np
 import pytest
 
+from solver.case import parse_case
 from solver.checks import run_checks
 from solver.errors import InputError
+from solver.files import seal
 from solver.provenance import gather
 from solver.results import read_result, write_result
 from tests.handmade import plane, solid
@@ -37,6 +39,12 @@ def in_order(solution):
     return solution
 
 
+def retold(solution, old, new):
+    """The solution of another case: its source with one part changed."""
+    assert old in solution.case.source
+    solution.case = parse_case(solution.case.source.replace(old, new), solution.case.path)
+
+
 @pytest.fixture(params=[plane, solid])
 def solution(request, tmp_path):
     return request.param(tmp_path)
@@ -59,18 +67,22 @@ def test_everything_comes_back(solution, written):
 def test_zones_that_share_a_cell_type_come_back_apart(tmp_path):
     solution = solid(tmp_path)
     second = deepcopy(solution.zones[0])
-    second.name, second.faces = "a second", [("TRIA3", np.array([[8, 9, 10]]), np.array([1]))]
+    second.name, second.faces = "second", [("TRIA3", np.array([[8, 9, 10]]), np.array([1]))]
     solution.zones.append(second)
+    add = "contact: [{name: second, slave: a, master: b}, "
+    retold(solution, "contact: [", add)
     path = tmp_path / "result.vtkhdf"
     write_result(path, solution, [], {})
     again = read_result(path).solution
-    assert [zone.name for zone in again.zones] == ["interface", "a second"]
+    assert [zone.name for zone in again.zones] == ["interface", "second"]
     assert same(in_order(solution).zones, in_order(again).zones)
 
 
 def test_a_solve_without_contact_comes_back(tmp_path):
     solution = plane(tmp_path)
     solution.zones = []
+    retold(solution, "observe: [{zone: interface, nearest: [0, 0]}]\n", "")
+    retold(solution, "contact: [{name: interface, slave: lower, master: upper}]\n", "")
     for step in solution.steps:
         step.observations = []
     path = tmp_path / "result.vtkhdf"
@@ -102,7 +114,8 @@ def test_checks_of_the_file_are_those_of_the_solve(solution, written):
 def test_checks_are_made_from_the_stored_fields(written):
     with h5py.File(written, "r+") as file:
         file["contact/interface/multiplier"][0] = -25.0
-        file["VTKHDF/PointData/displacement"][3] = np.nan
+        file["VTKHDF/PointData/displacement"][3] = 1.0
+    seal(written)
     failed = {c.name for c in run_checks(read_result(written).solution) if not c.passed}
     assert {"multiplier", "element_pressure", "displacement"} <= failed
 
@@ -176,11 +189,67 @@ def test_nothing_half_written_takes_the_files_place(solution, written):
     assert {path.name for path in written.parent.iterdir()} == {"case.yaml", "result.vtkhdf"}
 
 
+@pytest.mark.parametrize("place", [0.05, 0.3, 0.6, 0.9])
+def test_a_damaged_result_is_refused_bit_by_bit(written, place):
+    content = bytearray(written.read_bytes())
+    content[int(place * len(content))] ^= 1
+    written.write_bytes(content)
+    with pytest.raises(InputError, match=r"must be a result written by `solve` \(damaged"):
+        read_result(written)
+
+
+def lose_group(file):
+    del file["balance"]
+
+
+def lose_zone(file):
+    del file["contact/interface"]
+
+
+def lose_step(file):
+    for data in file["steps"].values():
+        data[0] = 2.5
+
+
+def not_a_number(file):
+    file["contact/interface/gap"][0] = np.nan
+
+
+def node_beyond_the_end(file):
+    file["contact/interface/slave_nodes"][0] = 10**6
+
+
+def other_attributes(file):
+    file["solve"].attrs["length"] = "long"
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (lose_group, "balance"),
+        (lose_zone, "the contact zones are not those of the case"),
+        (lose_step, "the load steps are not those of the case"),
+        (not_a_number, "zone interface: gap holds values that are not finite numbers"),
+        (node_beyond_the_end, "zone interface: slave_nodes holds numbers outside 0"),
+        (other_attributes, "the solve's own numbers holds"),
+    ],
+)
+def test_a_result_of_another_layout_is_refused_in_one_line(written, change, fault):
+    with h5py.File(written, "r+") as file:
+        change(file)
+    seal(written)
+    with pytest.raises(InputError) as refusal:
+        read_result(written)
+    assert fault in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert str(refusal.value).endswith("solve again")
+
+
 def test_a_file_that_is_no_result_is_refused_by_name(tmp_path):
     text, other = tmp_path / "text.vtkhdf", tmp_path / "other.vtkhdf"
     text.write_text("no HDF5")
     h5py.File(other, "w").close()
-    for path in (text, other, tmp_path / "missing.vtkhdf"):
+    for path in (text, other, tmp_path / "missing.vtkhdf", tmp_path):
         with pytest.raises(InputError, match=rf"{path.name}.*must be a result"):
             read_result(path)
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import meshio
 
 from solver.errors import InputError
+from solver.mesh.apart import read_apart
 from solver.mesh.tidy import tidy
 
 # Modules with a function `read(path)` that gives the mesh as it stands in the file.
@@ -36,15 +37,7 @@ def read(path: Path) -> meshio.Mesh:
     if not path.is_file():
         raise InputError(path, "mesh", None, "no such file")
     reader = import_module(_READERS[suffix])
-    try:
-        raw = reader.read(path)
-    except InputError:
-        raise
-    except Exception as error:
-        # Whatever the reader trips over lies in the file.
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(path, "mesh", None, f"cannot be read ({reason})") from error
-    mesh = tidy(raw, path)
+    mesh = read_apart(lambda file: tidy(reader.read(file), file), path)
     if not mesh.cell_sets:
         raise InputError(path, "groups", None, "the mesh must have named groups of cells or faces")
     return mesh

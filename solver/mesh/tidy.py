@@ -68,6 +68,9 @@ class _Table:
 
     def __init__(self, raw: meshio.Mesh, where: object):
         self.blocks: list[_Block] = []
+        for name in (*raw.cell_sets, *raw.point_sets):
+            if not name or not name.isprintable():
+                raise InputError(where, "group", name, "must have a name of printable characters")
         self.node_groups = {n: np.asarray(ids, dtype=np.int64) for n, ids in raw.point_sets.items()}
         numbers = raw.cell_data.get("number")
         for i, block in enumerate(raw.cells):
@@ -79,6 +82,9 @@ class _Table:
                 continue
             if block.type not in BY_MESHIO:
                 raise InputError(where, "cell type", block.type, f"allowed: {', '.join(BY_NAME)}")
+            if block.data.dtype.kind not in "iu" and block.data.size:
+                allowed = f"nodes must be told by whole numbers, not {block.data.dtype}"
+                raise InputError(where, f"cells {block.type}", None, allowed)
             nodes = np.asarray(block.data, dtype=np.int64)
             number = np.arange(1, len(nodes) + 1) if numbers is None else numbers[i]
             masks = {name: np.isin(np.arange(len(nodes)), ids) for name, ids in groups.items()}
@@ -126,7 +132,11 @@ def _order(cell: CellType, dim: int) -> tuple[int, int]:
 
 
 def _flattened(points: np.ndarray, dim: int, where: object) -> np.ndarray:
-    points = np.asarray(points, dtype=float)
+    points = np.asarray(points)
+    if points.dtype.kind not in "fiu" or points.ndim != 2 or not dim <= points.shape[1] <= 3:
+        found = f"{points.dtype} {points.shape}"
+        raise InputError(where, "node coordinates", found, "must be two or three numbers a node")
+    points = points.astype(float)
     if not np.isfinite(points).all():
         raise InputError(where, "node coordinates", None, "must be finite numbers")
     if dim == 2 and points.shape[1] == 3:

@@ -13,6 +13,7 @@ import meshio
 import numpy as np
 
 from solver.errors import InputError
+from solver.files import is_sealed, seal
 from solver.mesh.catalogue import BY_NAME, cell_type
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
@@ -88,6 +89,7 @@ def write(mesh: meshio.Mesh, path: Path) -> None:
     """Write the mesh alone into a new file."""
     with h5py.File(path, "w") as file:
         write_grid(file.create_group("VTKHDF"), mesh, {}, {})
+    seal(path)
 
 
 def read(path: Path) -> meshio.Mesh:
@@ -98,6 +100,8 @@ def read(path: Path) -> meshio.Mesh:
     if not h5py.is_hdf5(path):
         lines = path.read_text(errors="replace")[:2000].splitlines()
         raise InputError(path, "mesh", None, lines[0] if lines else "the file is empty")
+    if not is_sealed(path):
+        raise InputError(path, "mesh", None, "damaged, or no mesh that this program wrote")
     with h5py.File(path, "r") as file:
         if "VTKHDF" not in file or _GROUPS not in file:
             raise InputError(path, "mesh", None, "no mesh that this program wrote")

@@ -1,5 +1,7 @@
 """Reading mesh files: node orders, groups, refusals."""
 
+import os
+import signal
 from pathlib import Path
 
 import gmsh
@@ -11,6 +13,7 @@ import vtk
 
 from solver.errors import InputError
 from solver.mesh import read_mesh
+from solver.mesh.apart import read_apart
 from solver.mesh.catalogue import BY_NAME
 from solver.mesh.gmsh_session import session
 from solver.mesh.orient import vertex_jacobians
@@ -252,3 +255,23 @@ def test_several_meshes_in_one_med_file(tmp_path):
         (name,) = file["ENS_MAA"]
         file.copy(f"ENS_MAA/{name}", "ENS_MAA/again")
     assert refusal(path).startswith("meshes = 2: the file must hold one mesh: again, ")
+
+
+def dies(_):
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def never_ends(_):
+    while True:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("reader", "message"), [(dies, "the reader died of it"), (never_ends, "takes too long to read")]
+)
+def test_what_kills_a_reader_is_a_refusal(reader, message, tmp_path, monkeypatch):
+    monkeypatch.setattr("solver.mesh.apart._SECONDS", 0.3)
+    path = tmp_path / "m.msh"
+    path.write_text("$MeshFormat")
+    with pytest.raises(InputError, match=rf"m\.msh: mesh: cannot be read \({message}"):
+        read_apart(reader, path)

@@ -86,6 +86,10 @@ def test_a_plane_mesh_has_two_columns():
     [
         ([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [("triangle", [[0, 1, 2]])], {}, "must have z = 0"),
         ([[0, 0, 0], [1, 0, 0], [0, 1, 1e-6]], [("triangle", [[0, 1, 2]])], {}, "must have z = 0"),
+        (SQUARE, [("triangle", [[0, 1.5, 2]])], {}, "cells triangle: nodes must be told by whole"),
+        (SQUARE, [("triangle", [[0, 1, 2]])], {"": [[0]]}, "group = '': must have a name of prin"),
+        (SQUARE, [("triangle", [[0, 1, 2]])], {"a\n": [[0]]}, r"group = 'a\\n': must have a name"),
+        ([[0], [1], [2]], [("triangle", [[0, 1, 2]])], {}, "must be two or three numbers a node"),
         (SQUARE, [("triangle", [[0, 1, 4]])], {}, "TRIA3 1: made of nodes that the file does not"),
         (SQUARE, [("triangle", [[0, 1, 2], [0, 2, -1]])], {}, "TRIA3 2: made of nodes"),
         ([[0, 0], [1, np.nan], [0, 1]], [("triangle", [[0, 1, 2]])], {}, "finite numbers"),
