@@ -20,6 +20,8 @@ _COLORS = (
 )
 NO_RESULT = "#e3e7eb"
 MOST_DIGITS = 16
+# Columns that a panel's title needs.
+_FEWEST = 5
 _WIDTH, _HEIGHT, _GAP, _LABEL = 37.0, 19.0, 34.0, 250.0
 _PANELS = {"floor": "floor of double precision", "cured": "solved", "uncured": "without cures"}
 
@@ -53,7 +55,7 @@ def draw_key() -> Markup:
 def draw_map(records: Sequence[Record]) -> Markup:
     """Sweeps down, values across; each point links to its row in the table."""
     columns = max((len(record["values"]) for record in records), default=0)
-    panel = columns * _WIDTH + _GAP
+    panel = max(columns, _FEWEST) * _WIDTH + _GAP
     rows = sum(2 + len(_series(record)) for record in records)
     drawing = Drawing(_LABEL + 3 * panel, 30 + rows * _HEIGHT, "Digits of the pressure")
     for k, title in enumerate(_PANELS.values()):
