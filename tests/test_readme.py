@@ -66,10 +66,14 @@ def write_study(folder: Path) -> None:
 
 
 def write_sweep(folder: Path) -> None:
-    """One of the project's sweeps, with its base cases."""
+    """One of the project's sweeps, with its base cases, and one ladder of the inf-sup test."""
     shutil.copytree(ROOT / "cases" / "stability" / "base", folder / "base")
     (folder / "sweeps").mkdir()
     shutil.copy(ROOT / "cases" / "stability" / "sweeps" / "stiffness.yaml", folder / "sweeps")
+    ladders = yaml.safe_load((ROOT / "cases/stability/infsup/infsup.yaml").read_text())
+    ladders["cells"] = ladders["cells"][:1]
+    (folder / "infsup").mkdir()
+    (folder / "infsup" / "infsup.yaml").write_text(yaml.safe_dump(ladders))
 
 
 @pytest.fixture
