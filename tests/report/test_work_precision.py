@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from solver.report.svg import Drawing
 from solver.report.work_precision import words
 from solver.report.work_precision.figure import LIMIT, Looks, draw_figure
-from solver.report.work_precision.page import outcome, write_study
+from solver.report.work_precision.page import disturbed, outcome, write_study
 from solver.report.work_precision.records import (
     TARGETS,
     Measured,
@@ -300,6 +300,17 @@ def test_the_page_its_table_and_its_figures(study, results, tmp_path):
     assert [r["reason"] for r in rows if r["outcome"] != "solved"] == [
         "no such treatment of QUAD4 & others"
     ]
+
+
+def test_points_begun_on_a_busy_machine_are_counted_and_warned_of(study, results, tmp_path):
+    write_study(study, results, tmp_path / "quiet", lambda line: None)
+    path = results / "patch/tria3-quad4/lac/1.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"load": 3.5}))
+    write_study(study, results, tmp_path / "busy", lambda line: None)
+    quiet, busy = ((tmp_path / name / "study.html").read_text() for name in ("quiet", "busy"))
+    assert "1 points began while other work kept the machine busy" in busy
+    assert "points began while" not in quiet
+    assert disturbed(read_points(study, results)) == 1
 
 
 def test_a_study_without_any_record_still_has_a_page(study, tmp_path):

@@ -22,6 +22,7 @@ from solver.report.work_precision.records import (
 )
 from solver.study import FULL
 from solver.study.description import AUTO, Problem, Study
+from solver.study.point import SOLVED
 from solver.study.timing import TOTAL, spread
 
 # The errors that the table at the top shows.
@@ -180,6 +181,8 @@ def _to_html(
             outcome=outcome(points),
             failures=failures(points),
             facts=_facts(points),
+            disturbed=disturbed(points),
+            good=all(m.record["outcome"] in (SOLVED, "refused") for m in points),
             repetitions=study.repetitions,
             targets=TARGETS,
             limit=LIMIT,
@@ -192,6 +195,12 @@ def _to_html(
     )
 
 
+def disturbed(points: Sequence[Measured]) -> int:
+    """How many solved points began while other work kept the machine busy."""
+    records = [m.record for m in points if m.solved]
+    return sum(record["load"] > record["threads"] + _BUSY for record in records)
+
+
 def _facts(points: Sequence[Measured]) -> list[tuple[str, str]]:
     """On what, and how undisturbed, the points were measured."""
     records = [m.record for m in points if m.solved]
@@ -202,7 +211,6 @@ def _facts(points: Sequence[Measured]) -> list[tuple[str, str]]:
         return ", ".join(sorted({str(r["machine"].get(key, "")) for r in records}))
 
     times = sorted(r["machine"]["time_utc"][:16].replace("T", " ") for r in records)
-    busy = sum(r["load"] > r["threads"] + _BUSY for r in records)
     packages = ("python", "numpy", "scipy")
     return [
         ("Measured", " … ".join(dict.fromkeys([times[0], times[-1]])) + " UTC"),
@@ -210,5 +218,5 @@ def _facts(points: Sequence[Measured]) -> list[tuple[str, str]]:
         ("Threads", ", ".join(sorted({str(r["threads"]) for r in records}))),
         ("Revision", all_of("revision")),
         ("Versions", ", ".join(f"{p} {all_of(p)}" for p in packages)),
-        ("Points begun while the machine was busy with other work", f"{busy} of {len(records)}"),
+        ("Begun while the machine was busy", f"{disturbed(points)} of {len(records)}"),
     ]
