@@ -62,6 +62,9 @@ test: test-environment ## run the tests
 faults: test-environment ## read damaged files, 1,000 of them or COUNT=…: none may get through
 	@.venv/bin/python -m tests.faults $(or $(COUNT),1000)
 
+mutants: test-environment ## plant faults in the core, one at a time: which check notices each
+	@.venv/bin/python -m tests.faults.mutants
+
 RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
 accept: environment ## take results as the accepted values, showing the difference: all or CASE=…
 	@test -n "$(RESULTS)" || { echo "make accept: there is no such result; solve first"; exit 2; }

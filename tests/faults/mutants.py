@@ -1,0 +1,306 @@
+"""Faults planted in the core: a row each, with the cases of the batch that must turn red for it.
+
+A patch replaces one function by another made from it. `python -m tests.faults.mutants` plants all
+of them, one at a time, and says which check noticed.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from solver.case import load_case
+from solver.checks import run_checks
+from solver.errors import InputError, SolveError
+from solver.norms import errors
+from solver.regression import accepted_values
+from solver.run import mesh_of
+from solver.simulation import simulate
+from solver.verdict import of_solution
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
+PLANE, SOLID = "ssnp170/c", "opening/overlap-tetra10-hexa8"
+CLOSING, OVERLAP, OPEN = (
+    "opening/closing-quad4",
+    "opening/overlap-quad4-tria3",
+    "opening/staying-open",
+)
+TILTED, PUNCH, BENT = (
+    "hydrostatic/tilted-tria3-quad8",
+    "opening/wide-punch-stiff",
+    "hydrostatic/coincident-quad8",
+)
+PARTLY, VARYING, LAYERS, TILTED_SOLID = (
+    "hertz/cylinder-tria3",
+    "manufactured/quad4",
+    "lame/cylinders-two-materials",
+    "hydrostatic/tilted-hexa20-tetra10",
+)
+
+# A segment below this share of the largest is round-off of the intersection.
+_SLIVER = 1e-6
+
+Wrapped = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A planted fault: `place` is module:name, `patch` makes the faulty function of the true one.
+
+    `case` is the case of the batch that has to notice.
+    """
+
+    name: str
+    what: str
+    case: str
+    place: str
+    patch: Callable[[Wrapped], Any]
+
+
+def verdict(case: str) -> dict[str, Any]:
+    """The verdict of a case of the batch, with its checks and accepted values."""
+    loaded, mesh = _case(case)
+    try:
+        solution = simulate(loaded, mesh)
+        solution.errors = errors(solution)
+        return of_solution(solution, run_checks(solution, accepted_values(solution)))
+    except (InputError, SolveError) as error:
+        return {"passed": False, "reason": str(error)}
+    except Exception as error:  # noqa: BLE001 -- the batch's verdict is then `crashed`
+        return {"passed": False, "reason": f"crashed: {type(error).__name__}: {error}"}
+
+
+@cache
+def _case(case: str) -> tuple[Any, Any]:
+    loaded = load_case(CASES / f"{case}.yaml")
+    return loaded, mesh_of(loaded)
+
+
+@contextmanager
+def planted(mutant: Mutant) -> Iterator[None]:
+    """The fault is in the program while the block runs."""
+    module, name = mutant.place.split(":")
+    owner: Any = import_module(module)
+    *path, last = name.split(".")
+    for part in path:
+        owner = getattr(owner, part)
+    faulty = mutant.patch(getattr(owner, last))
+    with patch.object(owner, last, faulty):
+        yield
+
+
+# What the patches are made of
+
+
+def changed(change: Callable[[Any], Any]) -> Callable[[Wrapped], Wrapped]:
+    """A function whose result is changed."""
+    return lambda true: lambda *given, **named: change(true(*given, **named))
+
+
+def given(change: Callable[..., tuple]) -> Callable[[Wrapped], Wrapped]:
+    """A function that gets other arguments."""
+    return lambda true: lambda *arguments: true(*change(*arguments))
+
+
+def _first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
+    values = np.array(values)
+    values[0] *= factor
+    return values
+
+
+def _one_dropped(parts: list) -> list:
+    """Without the smallest segment that is more than round-off."""
+    sizes = [part.weight.sum(axis=1) for part in parts]
+    if not parts:
+        return parts
+    least = _SLIVER * max(size.max() for size in sizes)
+    real = [np.where(size > least, size, np.inf) for size in sizes]
+    block = int(np.argmin([size.min() for size in real]))
+    keep = np.arange(len(real[block])) != real[block].argmin()
+    kept = type(parts[block])(**{k: v[keep] for k, v in vars(parts[block]).items()})
+    return [kept if i == block else part for i, part in enumerate(parts)]
+
+
+def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    kept = pairs[1] != 3
+    return pairs[0][kept], pairs[1][kept]
+
+
+def _never_closing(true: Wrapped) -> Wrapped:
+    def eligible(problem: Any, scene: Any) -> None:
+        true(problem, scene)
+        problem.eligible[len(problem.eligible) // 2] = False
+
+    return eligible
+
+
+def _first_system_kept(true: Wrapped) -> Wrapped:
+    kept: dict[int, Any] = {}
+
+    def constrained(problem: Any, closed: np.ndarray) -> Any:
+        if id(problem) not in kept:
+            kept[id(problem)] = true(problem, closed)
+        return kept[id(problem)]
+
+    return constrained
+
+
+def _factor_of_half(true: Wrapped) -> Wrapped:
+    """As of another stiffness, and no refinement that would make up for it."""
+    return lambda matrix, *rest: true(matrix * 0.5, *rest)
+
+
+def _never_closes(true: Wrapped) -> Wrapped:
+    return lambda solve, start, eligible, *scales: true(solve, start, eligible & False, *scales)
+
+
+def _stays_closed(true: Wrapped) -> Wrapped:
+    """Tension is borne."""
+
+    def status(solve: Any, start: Any, eligible: Any, *scales: float) -> Any:
+        def no_tension_seen(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            pressure, gap = solve(closed)
+            return np.abs(pressure), gap
+
+        return true(no_tension_seen, eligible, eligible, *scales)
+
+    return status
+
+
+def _rolled_sub_faces(result: Any) -> Any:
+    faces = [replace(f, macro=np.roll(f.macro, 1)) for f in result.sub_faces]
+    return replace(result, sub_faces=faces)
+
+
+def _template_off_by_one(result: Any) -> Any:
+    (kind, nodes), *others = result.sub_faces[0]
+    wrong = [(kind, [*nodes[1:], nodes[1]]), *others]
+    return replace(result, sub_faces=[wrong, *result.sub_faces[1:]])
+
+
+def _template_piece_lost(result: Any) -> Any:
+    return replace(result, pieces=result.pieces[1:])
+
+
+class _Alike:
+    """Shape functions with the same value for all nodes."""
+
+    def __init__(self, true: Any):
+        self.true = true
+
+    def both(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values, slopes = self.true.both(points)
+        return np.full(values.shape, 1 / values.shape[1]), slopes
+
+
+MUTANTS = (
+    Mutant("gap-sign", "the initial gap counts with the wrong sign", CLOSING,
+           "solver.lac.operator:_integrals", changed(lambda p: replace(p, gap=-p.gap))),
+    Mutant("operator-sign", "the gap operator has the wrong sign: surfaces attract", PLANE,
+           "solver.scene:gap_operator", changed(lambda o: replace(o, matrix=-o.matrix))),
+    Mutant("normal-side", "slave and master faces are turned inward", PLANE,
+           "solver.scene:facets", given(lambda x, kind, nodes, n: (x, kind, nodes[:, ::-1], n))),
+    Mutant("master-order", "master shape functions are given to the next node", TILTED,
+           "solver.lac.operator:_integrals",
+           changed(lambda p: replace(p, master=np.roll(p.master, 1, axis=2)))),
+    Mutant("slave-side-lost", "slave nodes are missing in the gap's derivative", PLANE,
+           "solver.lac.operator:_integrals", changed(lambda p: replace(p, slave=0 * p.slave))),
+    Mutant("sliver-lost", "the smallest segment is dropped", PLANE,
+           "solver.lac.operator:intersect", changed(_one_dropped)),
+    Mutant("sliver-lost-3d", "the smallest segment is dropped, in space", TILTED_SOLID,
+           "solver.lac.operator:intersect", changed(_one_dropped)),
+    Mutant("pair-lost", "one master face is overlooked when faces are paired", PLANE,
+           "solver.lac.segments:candidate_pairs", changed(_master_overlooked)),
+    Mutant("macro-element-dropped", "one macro-element may never close", PLANE,
+           "solver.contact:ContactProblem.__init__", _never_closing),
+    Mutant("macro-element-numbers", "sub-faces go to the next macro-element", VARYING,
+           "solver.scene:cut", changed(_rolled_sub_faces)),
+    Mutant("template-off-by-one", "the cut's first sub-face takes its nodes one further on", PLANE,
+           "solver.lac.cut:_template", changed(_template_off_by_one)),
+    Mutant("template-piece-lost", "the cut loses a piece of the cell", SOLID,
+           "solver.lac.cut:_template", changed(_template_piece_lost)),
+    Mutant("jacobian", "the Jacobian of one cell is one per cent too large", PLANE,
+           "solver.elasticity:physical_gradients",
+           changed(lambda found: (found[0], _first_scaled(found[1], 1.01)))),
+    Mutant("node-order", "the first two nodes of every cell are exchanged", PLANE,
+           "solver.elasticity:degrees_of_freedom",
+           given(lambda cells, dim: (cells[:, [1, 0, *range(2, cells.shape[1])]], dim))),
+    Mutant("quadrature-weight", "one weight of the cells' quadrature is ten per cent off", BENT,
+           "solver.elasticity:volume_rule",
+           changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
+    Mutant("segment-weight", "one weight of the segments' quadrature is ten per cent off", TILTED,
+           "solver.lac.segments:simplex_rule",
+           changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
+    Mutant("load-weight", "one weight of the loads' quadrature is ten per cent off", PLANE,
+           "solver.loads:face_rule", changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
+    Mutant("poisson-term", "Lamé's λ is that of plane stress", PLANE,
+           "solver.attributes:lame_parameters",
+           changed(lambda lm: (2 * lm[0] * lm[1] / (lm[0] + 2 * lm[1]), lm[1]))),
+    Mutant("shear-modulus", "E / (2 + ν) in place of E / (2 (1 + ν))", PLANE,
+           "solver.attributes:lame_parameters", changed(lambda lm: (lm[0], lm[1] * 2.6 / 2.3))),
+    Mutant("pressure-sign", "a pressure pulls", PLANE,
+           "solver.attributes:face_forces", changed(lambda force: -force)),
+    Mutant("load-side", "a load acts on the faces as seen from the other side", TILTED,
+           "solver.loads:area_vectors", changed(lambda vectors: -vectors)),
+    Mutant("load-mean", "a load is shared among a face's nodes alike", BENT,
+           "solver.loads:shape_functions",
+           lambda true: lambda name: _Alike(true(name))),
+    Mutant("coverage-lost", "the part that is covered is taken for the whole face", PARTLY,
+           "solver.scene:gap_operator",
+           changed(lambda o: replace(o, covered=o.area,
+                                     surface=replace(o.surface, covered=o.surface.area)))),
+    Mutant("stress-mean", "stress at nodes is the plain mean over the cell's quadrature", LAYERS,
+           "solver.elasticity:_extrapolation",
+           changed(lambda fit: np.full(fit.shape, 1 / fit.shape[1]))),
+    Mutant("stale-system", "the factored system is that of the first status", CLOSING,
+           "solver.contact:ContactProblem._constrained", _first_system_kept),
+    Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,
+           "solver.linear.condensation:factorise", _factor_of_half),
+    Mutant("multiplier-sign", "the multiplier balances the wrong way", PLANE,
+           "solver.linear.condensation:Condensed.multiplier", changed(lambda p: -p)),
+    Mutant("never-closes", "the contact status finds nothing to close", CLOSING,
+           "solver.contact:find_status", _never_closes),
+    Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
+           "solver.contact:find_status", _stays_closed),
+    Mutant("support-lost", "a support loses its last node", PLANE,
+           "solver.attributes:Attributes.nodes", changed(lambda nodes: nodes[:-1])),
+    Mutant("material-mixed-up", "the two bodies have each other's material", LAYERS,
+           "solver.attributes:Attributes._by_material",
+           changed(lambda values: {k: v[::-1] for k, v in values.items()})),
+    Mutant("origin-forgotten", "expressions see coordinates counted from the middle", VARYING,
+           "solver.attributes:Attributes.__init__",
+           lambda true: lambda self, case, mesh, cut, zones, origin: true(
+               self, case, mesh, cut, zones, 0 * origin)),
+)  # fmt: skip
+
+
+def reason(mutant: Mutant) -> str:
+    """Why the mutant's case turns red with the fault in the program; empty where it does not."""
+    with planted(mutant), np.errstate(all="ignore"):
+        found = verdict(mutant.case)
+    return "" if found["passed"] else found["reason"]
+
+
+def main() -> int:
+    """Plant every fault and print what noticed it."""
+    caught = 0
+    for mutant in MUTANTS:
+        why = reason(mutant)
+        caught += bool(why)
+        shown = f"caught by {mutant.case}: {why[:110]}" if why else f"NOT CAUGHT by {mutant.case}"
+        print(f"{mutant.name}: {mutant.what}\n    {shown}", flush=True)
+    print(f"{caught} of {len(MUTANTS)} planted faults caught")
+    return int(caught < len(MUTANTS))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
