@@ -90,6 +90,9 @@ test-environment:
 lint-environment:
 	@$(INSTALL) run test lint
 
+bill: environment ## write the bill of materials: every locked package, licence and hash
+	@.venv/bin/python workflow/bill.py results/bill-of-materials.json
+
 LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --no-annotate --custom-compile-command 'make lock'
 
