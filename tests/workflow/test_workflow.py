@@ -139,6 +139,13 @@ def test_one_case_again_is_one_case(project):
     assert jobs(project, *forced) == {"solve tiny-b"} | REPORT
 
 
+def test_another_family_joins_what_was_solved(project):
+    write_case(project / "cases" / "other", "other-a")
+    expected = {"mesh other-a", "solve other-a"} | REPORT
+    assert jobs(project, "--config", "family=other") == expected
+    assert jobs(project) == expected
+
+
 def test_both_cuts_of_hexahedra(project):
     case = (project / "cases" / "tiny" / "tiny-b.yaml").read_text().replace("QUAD4", "HEXA8")
     (project / "cases" / "tiny" / "tiny-b.yaml").write_text(case)
