@@ -17,6 +17,7 @@ from solver.cures import ALL, Cures
 from solver.elasticity import nodal_stress
 from solver.errors import SolveError
 from solver.faces import nodal_normals
+from solver.geometry import check_geometry
 from solver.mesh.catalogue import BY_NAME
 from solver.naming import body_infos
 from solver.plan import made_plan
@@ -49,6 +50,7 @@ def simulate(
     started = time.process_time()
     clock = Clock() if clock is None else clock
     scene = build_scene(case, mesh, swapped, hexahedra, clock, cures)
+    check_geometry(scene)
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
     with clock.stage("assembly"):
         problem = ContactProblem(scene)

@@ -1,7 +1,8 @@
 """The bill of materials: every locked package with version, licence and hashes, as CycloneDX.
 
-`python workflow/bill.py BILL.json` needs the standard library alone: what is locked stands in requirements*.txt, licences in the
-metadata of what is installed. The same locks and packages give the same file.
+`python workflow/bill.py BILL.json` needs the standard library alone: what is locked stands in
+requirements*.txt, licences in the metadata of what is installed. The same locks and packages give
+the same file.
 """
 
 import json
