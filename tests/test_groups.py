@@ -89,7 +89,7 @@ MISFITS = [
     (
         "  upper: {young: 2.0, poisson: 0.3}\n",
         "",
-        "materials = ['lower']: 1 of 2 volume cells have",
+        "materials = ['lower']: 1 of 2 volume cells have no material; name their group, or `all`",
     ),
     # contact surfaces
     ("slave: bottom_contact", "slave: empty", "contact[0].slave = 'empty': is empty; a group of "),
@@ -141,7 +141,10 @@ def tetrahedron():
     ("line", "message"),
     [
         ("plane: strain", "plane = 'strain': only for plane meshes; this one has three dimensions"),
-        ("loads: [{group: base, traction: [0, 1]}]", "loads[0].traction = [0.0, 1.0]: must have 3"),
+        (
+            "loads: [{group: base, traction: [0, 1]}]",
+            "[0.0, 1.0]: must have 3 components, as the mesh has",
+        ),
     ],
 )
 def test_a_solid_is_not_plane(line, message):

@@ -115,3 +115,18 @@ def test_the_project_s_own_study_is_what_its_page_promises():
     assert {len(problem.levels) for problem in quick.problems} == {3}
     assert sum(len(problem.pairs) for problem in quick.problems) == 4
     assert (len(quick.problems), quick.repetitions) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("{problem: plane, pair: [QUAD4", "{problem: plan, pair: [QUAD4", "no such problem; did"),
+        ("treatment: lac, solvers", "treatment: lax, solvers", "there is no such treatment; did"),
+        ("pairs: {space: ", "pairs: {spice: ", "there is no such problem; did you mean space"),
+    ],
+)
+def test_names_that_nothing_has(file, old, new, message):
+    assert old in STUDY
+    file.write_text(STUDY.replace(old, new))
+    with pytest.raises(InputError, match=message):
+        read_study(file, "quick")
