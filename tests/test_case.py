@@ -14,6 +14,7 @@ from solver.errors import InputError
 from solver.expressions import Expression
 from solver.schemas import CASE_SCHEMA
 from solver.solutions.uniform import Hydrostatic
+from solver.strict_yaml import parse_mapping
 
 PATH = Path("family/c.yaml")
 FULL = """\
@@ -430,3 +431,40 @@ def _refusal_of(text):
     except InputError as refusal:
         return str(refusal)
     return None
+
+
+WRONG = [None, True, -1, 0, 0.5, 1e300, 10**300, "", "x y", "../../etc", "<b>&", "$(x)", "9**9**9",
+         "a" * 2000, "(" * 60 + "1" + ")" * 60, [], [[]], [None], {}, {"a": 1}]  # fmt: skip
+
+
+def places(content, path=()):
+    """The paths of everything in a mapping, whatever it holds."""
+    pairs = content.items() if isinstance(content, dict) else enumerate(content)
+    for key, value in pairs:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from places(value, (*path, key))
+
+
+def put(content, path, value):
+    """A copy of plain content with one thing replaced."""
+    copy = json.loads(json.dumps(content))
+    inner = copy
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = value
+    return copy
+
+
+WHOLE = parse_mapping(FULL, PATH)
+# Keys of which nearly everything that is text, or a number, is a value.
+FREE = {"title", "description", "remark", "seed"}
+
+
+@pytest.mark.parametrize("path", list(places(WHOLE)), ids=lambda p: ".".join(map(str, p)))
+def test_every_key_with_a_wrong_value_is_refused_in_one_line(path):
+    told = [_refusal_of(json.dumps(put(WHOLE, path, value))) for value in WRONG]
+    refused = [line for line in told if line is not None]
+    assert all("\n" not in line and len(line) < 1500 for line in refused)
+    # At least what is neither text, number, list nor mapping, or is text of no meaning.
+    assert len(refused) >= (5 if path[-1] in FREE else 9)

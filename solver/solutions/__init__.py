@@ -77,7 +77,7 @@ def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
     key = "reference.solution"
     values = {"name": given} if isinstance(given, str) else dict(given)
     name = values.pop("name", None)
-    if name not in SOLUTIONS:
+    if not isinstance(name, str) or name not in SOLUTIONS:
         place = key if isinstance(given, str) else f"{key}.name"
         allowed = "this key is needed" if name is None else "no such solution"
         raise InputError(known.where, place, name, f"{allowed}; {hint(str(name), SOLUTIONS)}")
