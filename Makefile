@@ -17,7 +17,7 @@ SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
 .PHONY: help all-cases family case report orders study stability infsup test accept format lint lock
-.PHONY: faults mutants bill clean clean-all
+.PHONY: faults mutants kills bill clean clean-all
 .PHONY: environment test-environment lint-environment
 
 help: ## list the targets
@@ -64,6 +64,9 @@ faults: test-environment ## read damaged files, 1,000 of them or COUNT=…: none
 
 mutants: test-environment ## plant faults in the core, one at a time: which check notices each
 	@.venv/bin/python -m tests.faults.mutants
+
+kills: test-environment ## kill runs at 100 random moments, and see that the next one recovers
+	@.venv/bin/python -m tests.workflow.kills $(ARGS)
 
 RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
 accept: environment ## take results as the accepted values, showing the difference: all or CASE=…

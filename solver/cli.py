@@ -10,11 +10,12 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.errors import InputError, SolveError
+from solver.errors import InputError, SolveError, of_machine
 from solver.study.commands import add_commands
 
 if TYPE_CHECKING:
@@ -51,10 +52,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _unexpected(error: Exception) -> int:
-    """One line for a file that cannot be read or written, a traceback for a bug."""
-    if isinstance(error, OSError) and error.filename:
-        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
-        return REFUSED
+    """One line for what the machine lacks, a traceback for a bug."""
+    if reason := of_machine(error):
+        print(reason, file=sys.stderr)
+        return REFUSED if isinstance(error, OSError) else NO_RESULT
     traceback.print_exception(error)
     return BUG
 
@@ -76,11 +77,15 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--verdict", type=Path, metavar="VERDICT.json", help="written in any case")
     command.add_argument("--quiet", action="store_true", help="print nothing but errors")
     command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
+    command.add_argument(
+        "--no-memory-check", action="store_true", help="start even where memory cannot suffice"
+    )
 
     command = _add(commands, "crashed", _crashed, "write the verdict of a solve that died")
     _add_job(command)
     command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
-    command.add_argument("--log", type=Path, help="its last line is the reason")
+    command.add_argument("--log", type=Path, help="its last line tells the reason")
+    command.add_argument("--status", type=int, metavar="N", help="its exit status")
 
     command = _add(commands, "check", _check, "run the checks of stored results again")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
@@ -177,7 +182,8 @@ def _solve(options: argparse.Namespace) -> int:
     from solver.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
-    verdict = solve(_job(options), options.output, options.verdict, log)
+    job = replace(_job(options), memory_check=not options.no_memory_check)
+    verdict = solve(job, options.output, options.verdict, log)
     return PASSED if verdict["passed"] else FAILED
 
 
@@ -186,9 +192,9 @@ def _silent(line: str) -> None:
 
 
 def _crashed(options: argparse.Namespace) -> int:
-    from solver.run import record_crash
+    from solver.run import record_crash, summary
 
-    record_crash(_job(options), options.verdict, options.log)
+    print(summary(record_crash(_job(options), options.verdict, options.log, options.status)))
     return PASSED
 
 

@@ -1,4 +1,4 @@
-"""The two ways in which a command ends early: its input is refused, or the solve fails."""
+"""The ways in which a command ends early: its input is refused, or the solve fails."""
 
 
 class InputError(Exception):
@@ -18,8 +18,27 @@ class InputError(Exception):
         super().__init__(f"{self.where}: {self.told}")
 
 
+class MachineError(InputError):
+    """Refused not for what the input says, but for what the machine has now: another run may do."""
+
+
 class SolveError(Exception):
     """The solve failed (singular system, no convergence): one line with the reason, status 3."""
+
+
+def of_machine(error: Exception) -> str:
+    """In one line what the machine lacks, memory or a file that can be used; else nothing."""
+    said = " ".join(str(error).split())
+    if isinstance(error, MemoryError) or _is_unmapped(error):
+        return f"out of memory: {said or 'no more is to be had'}"
+    if isinstance(error, OSError) and error.errno:
+        return f"{error.filename or 'output'}: {error.strerror}"
+    return ""
+
+
+def _is_unmapped(error: Exception) -> bool:
+    """Whether a library could not be loaded for want of memory."""
+    return isinstance(error, ImportError) and "failed to map segment" in str(error)
 
 
 def _shorten(value: object, length: int = 80) -> str:

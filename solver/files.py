@@ -2,8 +2,10 @@
 
 import hashlib
 import os
+import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 
 # The last bytes of a sealed file; HDF5 leaves alone what follows its own end.
@@ -11,21 +13,30 @@ _SEAL = b"\nsha256 %s\n"
 _SEAL_SIZE = len(_SEAL % (b"0" * 64))
 _CHUNK = 1 << 20
 
+# Folders are shared among machines; a process is known on its own alone.
+_HOST = platform.node()
+
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """A temporary path in the same folder; it takes the place of `path` when the block ends well.
 
     The folder is made where it is missing. When the block raises, the temporary file goes and
-    `path` stays as it was.
+    `path` stays as it was; an OSError, as of a full disk, names `path`.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
+    _remove_abandoned(path)
     # The suffix is kept: writers choose the format by it.
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{_HOST}.{os.getpid()}{path.suffix}")
     try:
         yield temporary
+        _to_disk(temporary)
         temporary.replace(path)
+    except OSError as error:
+        if error.errno and error.filename in (None, str(temporary)):
+            error.filename = str(path)
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -61,3 +72,27 @@ def _digest(path: Path, size: int) -> bytes:
             digest.update(part)
             size -= len(part)
     return digest.hexdigest().encode()
+
+
+def _to_disk(path: Path) -> None:
+    """Wait until the content is on the disk: a file renamed before may be empty after a crash."""
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+
+
+def _remove_abandoned(path: Path) -> None:
+    """Remove what processes of this machine that were killed have left of the same file."""
+    for left in path.parent.glob(f".{escape(path.stem)}.{escape(_HOST)}.*{escape(path.suffix)}"):
+        process = left.name.removesuffix(path.suffix).rpartition(".")[2]
+        if process.isdigit() and not _lives(int(process)):
+            left.unlink(missing_ok=True)
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # of another user
+        return True
+    return True

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import shlex
 import subprocess
+import sys
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -22,6 +24,7 @@ def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
     return {
         "python": platform.python_version(),
         **{package: _version(package) for package in PACKAGES},
+        "command": shlex.join(["python", *sys.orig_argv[1:]]),
         "revision": _revision(),
         "case_sha256": _sha256(case),
         "mesh_sha256": _sha256(mesh),

@@ -34,6 +34,7 @@ from solver.checks import CheckResult
 from solver.consistency import inconsistency
 from solver.errors import InputError
 from solver.files import is_sealed, replacing, seal
+from solver.hdf5 import new_file
 from solver.mesh.catalogue import cell_type
 from solver.mesh.vtkhdf import read_grid, write_grid
 from solver.solution import BodyInfo, NodalContact, Solution, StepResult, ZoneResult
@@ -85,7 +86,7 @@ def write_result(
 ) -> None:
     """Write a solution, its checks and its provenance to a `.vtkhdf` file."""
     with replacing(path) as temporary:
-        with h5py.File(temporary, "w") as file:
+        with new_file(temporary) as file:
             _write(file, solution, checks, provenance)
         seal(temporary)
 

@@ -1,6 +1,7 @@
 """One job from case file to verdict: mesh, solve, checks, result file, verdict."""
 
 import os
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,7 +13,8 @@ import meshio
 from solver.case import Case, check_mesh_file, load_case
 from solver.checks import run_checks
 from solver.clock import Clock
-from solver.errors import InputError, SolveError
+from solver.errors import InputError, MachineError, SolveError, of_machine
+from solver.memory import check_memory
 from solver.mesh import generate, read_mesh, transform
 from solver.norms import errors
 from solver.provenance import gather
@@ -29,7 +31,8 @@ class Job:
     """One solve of a case: which mesh, which direction, which way to cut hexahedra.
 
     `mesh` is a mesh file taken as it is; None means the case's own, its transform applied.
-    `refine` multiplies the divisions of the case's recipe.
+    `refine` multiplies the divisions of the case's recipe. `memory_check`: refused where its memory
+    exceeds the machine's.
     """
 
     case: Path
@@ -37,6 +40,7 @@ class Job:
     swapped: bool = False
     hexahedra: str | None = None
     refine: int = 1
+    memory_check: bool = True
 
 
 def refined(case: Case, factor: int) -> Case:
@@ -71,11 +75,11 @@ def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> dict[s
         verdict = _solve(job, case, output, verdict_file or output, log)
     except Exception as error:
         if verdict_file:
-            word, reason = _ending(error)
-            subject = case or job.case
-            write_verdict(
-                verdict_file, without_result(word, reason, subject, job.swapped, job.hexahedra)
+            word, reason, transient = _ending(error)
+            ended = without_result(
+                word, reason, case or job.case, job.swapped, job.hexahedra, transient
             )
+            write_verdict(verdict_file, ended)
         raise
     if verdict_file:
         write_verdict(verdict_file, verdict)
@@ -91,14 +95,35 @@ def check(result_file: Path) -> dict[str, Any]:
     return of_solution(result.solution, checks, result_file.name, result.provenance)
 
 
-def record_crash(job: Job, verdict_file: Path, log_file: Path | None) -> None:
-    """Write the verdict of a solve whose process died; the log's last line is the reason."""
+def record_crash(
+    job: Job, verdict_file: Path, log_file: Path | None, status: int | None = None
+) -> dict[str, Any]:
+    """Write the verdict of a solve whose process died, and return it.
+
+    The reason is its exit status, as far as known, and the last line of the log.
+    """
     try:
         case: Case | Path = load_case(job.case)
     except InputError:
         case = job.case
-    reason = (_last_line(log_file) if log_file else "") or "the process died without a word"
-    write_verdict(verdict_file, without_result(CRASHED, reason, case, job.swapped, job.hexahedra))
+    said = _last_line(log_file) if log_file else ""
+    if status:
+        reason = _death(status) + (f"; last words: {said}" if said else "")
+    else:
+        reason = said or "the process died without a word"
+    verdict = without_result(CRASHED, reason, case, job.swapped, job.hexahedra, transient=True)
+    write_verdict(verdict_file, verdict)
+    return verdict
+
+
+def _death(status: int) -> str:
+    """What an exit status says of how a process ended; shells add 128 to a signal's number."""
+    told = f"died with exit status {status}"
+    names = {128 + number: number.name for number in signal.Signals}
+    if status not in names:
+        return told
+    hint = ", as a system does that runs out of memory" * (names[status] == "SIGKILL")
+    return f"{told}, ended by {names[status]}{hint}"
 
 
 def summary(verdict: dict[str, Any]) -> str:
@@ -117,6 +142,8 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[s
     output.parent.mkdir(parents=True, exist_ok=True)  # better refused now than after the solve
     with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
+    if job.memory_check:
+        check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
     solution = simulate(case, mesh, job.swapped, job.hexahedra, log)
     solution.seconds = {**clock.seconds, **solution.seconds}
     with clock.stage("checks"):
@@ -133,13 +160,15 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[s
     return of_solution(solution, checks, os.path.relpath(output, beside.parent), provenance)
 
 
-def _ending(error: Exception) -> tuple[str, str]:
-    """The verdict's word and reason for a solve that an exception ended."""
+def _ending(error: Exception) -> tuple[str, str, bool]:
+    """The verdict's word and reason for a solve that an exception ended; whether it may pass."""
     if isinstance(error, InputError):
-        return REFUSED, str(error)
+        return REFUSED, str(error), isinstance(error, MachineError)
     if isinstance(error, SolveError):
-        return FAILED, str(error)
-    return CRASHED, f"{type(error).__name__}: {' '.join(str(error).split())}"
+        return FAILED, str(error), False
+    if reason := of_machine(error):
+        return REFUSED if isinstance(error, OSError) else CRASHED, reason, True
+    return CRASHED, f"{type(error).__name__}: {' '.join(str(error).split())}", False
 
 
 def _last_line(path: Path) -> str:

@@ -46,6 +46,7 @@ _UNKNOWN: dict[str, Any] = {
     "attainable": None,
     "errors": {},
     "provenance": {},
+    "transient": False,
 }
 
 
@@ -94,6 +95,7 @@ def of_solution(
         "attainable": accuracy.estimate,
         "errors": dict(solution.errors),
         "provenance": dict(provenance or {}),
+        "transient": False,
     }
 
 
@@ -103,13 +105,15 @@ def without_result(
     case: Case | Path,
     swapped: bool = False,
     hexahedra: str | None = None,
+    transient: bool = False,
 ) -> dict[str, Any]:
     """The verdict of a solve that was refused, failed or crashed, for the reason given.
 
-    `case` is the path of the case file where the file itself could not be read.
+    `case` is the path of the case file where the file itself could not be read. `transient`: the
+    reason lies in the machine (memory, disk, a kill), so that the same solve may do another time.
     """
     ended = {"verdict": verdict, "passed": False, "reason": reason}
-    return _identity(case, swapped, hexahedra) | ended | _UNKNOWN
+    return _identity(case, swapped, hexahedra) | _UNKNOWN | ended | {"transient": transient}
 
 
 def write_verdict(path: str | Path, verdict: Mapping[str, Any]) -> None:

@@ -47,6 +47,8 @@ def _pardiso(upper: csr_matrix, definite: bool) -> Solve:
     except pardiso.PardisoError as error:
         if error.code in (pardiso.ZERO_PIVOT, pardiso.SINGULAR_DIAGONAL):
             raise BreakdownError from error
+        if error.code == pardiso.NO_MEMORY:
+            raise MemoryError("no room for the factor of the stiffness matrix") from error
         raise
 
 

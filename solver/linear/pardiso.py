@@ -14,11 +14,11 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 POSITIVE_DEFINITE, INDEFINITE = 2, -2
-ZERO_PIVOT, SINGULAR_DIAGONAL = -4, -7
+NO_MEMORY, ZERO_PIVOT, SINGULAR_DIAGONAL = -2, -4, -7
 _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
 _REASONS = {
     -1: "inconsistent input",
-    -2: "not enough memory",
+    NO_MEMORY: "not enough memory",
     -3: "reordering failed",
     ZERO_PIVOT: "zero or negative pivot",
     SINGULAR_DIAGONAL: "singular diagonal matrix",

@@ -14,6 +14,7 @@ import numpy as np
 
 from solver.errors import InputError
 from solver.files import is_sealed, seal
+from solver.hdf5 import new_file
 from solver.mesh.catalogue import BY_NAME, cell_type
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
@@ -87,7 +88,7 @@ def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
 
 def write(mesh: meshio.Mesh, path: Path) -> None:
     """Write the mesh alone into a new file."""
-    with h5py.File(path, "w") as file:
+    with new_file(path) as file:
         write_grid(file.create_group("VTKHDF"), mesh, {}, {})
     seal(path)
 

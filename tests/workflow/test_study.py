@@ -5,7 +5,7 @@ import json
 import shutil
 from pathlib import Path
 
-from tests.workflow.test_workflow import jobs, new_project, snakemake
+from tests.workflow.projects import jobs, new_project, snakemake
 
 ROOT = Path(__file__).parents[2]
 STUDY = """

@@ -8,59 +8,10 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-CASE = """\
-name: {name}
-mesh: {{recipe: blocks, size: 10, bottom: {{cells: QUAD4, divisions: [2, 2]}},
-       top: {{cells: QUAD4, divisions: [3, 2]}}}}
-plane: strain
-materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
-supports: [{{group: symx, fix: [x]}}, {{group: base, fix: [y]}}]
-loads: [{{group: press, pressure: 25.0}}]
-contact: [{{name: interface, slave: bottom_contact, master: top_contact}}]
-directions: {directions}
-reference: {{kind: analytical, contact_pressure: {pressure}, gap: 0.0}}
-"""
-
-
-def write_case(folder, name, directions="first", pressure=25.0):
-    folder.mkdir(parents=True, exist_ok=True)
-    text = CASE.format(name=name, directions=directions, pressure=pressure)
-    (folder / f"{name}.yaml").write_text(text)
-
-
-def snakemake(project, *arguments):
-    """The finished process of a run, its output and errors as one text."""
-    return subprocess.run(
-        [sys.executable, "-m", "snakemake", *map(str, arguments)],
-        cwd=project,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=300,
-    )
-
-
-def jobs(project, *arguments):
-    """What a run would do, by the jobs' messages."""
-    planned = snakemake(project, "--dry-run", *arguments)
-    assert planned.returncode == 0, planned.stdout
-    return set(re.findall(r"^Job \d+: (.*)$", planned.stdout, re.MULTILINE))
-
-
-def new_project(folder):
-    folder.mkdir(exist_ok=True)
-    shutil.copy(ROOT / "Snakefile", folder)
-    for name in ("workflow", "profiles", "solver"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-    write_case(folder / "cases" / "tiny", "tiny-a", "both")
-    write_case(folder / "cases" / "tiny", "tiny-b")
-    (folder / "cases" / "tiny" / "family.yaml").write_text("title: Tiny cases\n")
-    return folder
+from tests.workflow.projects import ROOT, jobs, new_project, snakemake, summary, write_case
 
 
 @pytest.fixture(scope="module")
@@ -81,11 +32,6 @@ def project(solved, tmp_path):
 
 def append(file, text):
     file.write_text(file.read_text() + text)
-
-
-def summary(project):
-    content = json.loads((project / "results" / "report" / "summary.json").read_text())
-    return {verdict["job"]: verdict for verdict in content}
 
 
 def test_results_lie_where_they_should(solved):
@@ -214,7 +160,7 @@ def test_two_cases_of_one_name_are_refused(project):
     assert "name = tiny-b: already taken by cases/tiny/other.yaml" in refused.stdout
 
 
-def test_after_a_killed_run_the_next_one_works(tmp_path):
+def test_a_second_run_is_refused_while_one_lives_and_after_its_kill_it_works(tmp_path):
     project = new_project(tmp_path / "killed")
     command = [sys.executable, "-m", "snakemake"]
     with (tmp_path / "output").open("w") as output:
@@ -224,6 +170,9 @@ def test_after_a_killed_run_the_next_one_works(tmp_path):
         while not list(project.glob("results/tiny/*/log")):
             assert run.poll() is None
             time.sleep(0.02)
+        second = snakemake(project)
+        assert second.returncode != 0
+        assert f"another run is at work in this folder (process {run.pid} on " in second.stdout
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
     done = snakemake(project)

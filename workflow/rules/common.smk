@@ -1,5 +1,6 @@
 """What is run: the case files found, the jobs they stand for, and the sources jobs depend on."""
 
+import hashlib
 import os
 import re
 import shlex
@@ -22,6 +23,7 @@ logger.addFilter(
 VARIANTS = config["variants"] in (True, "true")
 # Jobs share their bytecode: to compile the sources anew in each costs a third of a small solve.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+MEMORY_CHECK = " --no-memory-check" * (config["memory_check"] in (False, "false"))
 PYTHON = shlex.quote(sys.executable)
 
 # One solve. `mesh`: the user's mesh file, or None where a recipe generates it; `hexahedra`: how
@@ -34,6 +36,32 @@ def sources(*patterns):
     return sorted(
         str(f) for p in patterns for f in Path("solver").glob(p) if f.is_file()
     )
+
+
+@cache
+def content_of(file):
+    """The hash of a file's content; nothing where it cannot be read."""
+    try:
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def contents(*files):
+    """What a job is made from, as a parameter: it runs again on a change whatever the clock says.
+
+    Snakemake's parameters count for this only where they are made from nothing but wildcards.
+    """
+    told = "".join(f"{file} {content_of(file)}\n" for file in files)
+    return hashlib.sha256(told.encode()).hexdigest()
+
+
+def stamp_of(file):
+    """What tells one state of a file from another without reading it."""
+    if not file.is_file():
+        return ""
+    about = file.stat()
+    return f"{about.st_size} {about.st_mtime_ns} {os.access(file, os.R_OK)}"
 
 
 REPORT_SOURCES = sources("report/**/*.py", "report/templates/*")
@@ -75,7 +103,7 @@ def peek(file):
         content = yaml.load(
             file.read_text(), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)
         )
-    except (yaml.YAMLError, UnicodeDecodeError):
+    except (OSError, yaml.YAMLError, UnicodeDecodeError):
         content = None
     return content if isinstance(content, dict) else {}
 
@@ -129,6 +157,7 @@ def verdict_of(job):
 
 
 BATCH = find_jobs()
+MESHES = {str(job.mesh) for job in BATCH.values() if job.mesh}
 RUN = {k: j for k, j in BATCH.items() if config["case"] in ("", j.name)}
 if not RUN:
     raise WorkflowError(

@@ -13,8 +13,11 @@ rule mesh:
         "results/{family}/{case}/mesh.log",
     benchmark:
         "results/{family}/{case}/mesh.benchmark"
+    params:
+        content=lambda w: contents(RECIPES[w.family, w.case], *MESH_SOURCES),
     message:
         "mesh {wildcards.case}"
     shell:
-        "{PYTHON} -m solver mesh {input.case:q} -o {output.mesh:q} > {log:q} 2>&1"
-        " || tail -n 1 {log:q} > {output.mesh:q}"
+        "{PYTHON} -m solver mesh {input.case:q} -o {output.mesh:q} > {log:q} 2>&1 || {{ died=$?;"
+        ' test -s {log:q} || echo "meshing died with exit status $died" > {log:q};'
+        " tail -n 1 {log:q} > {output.mesh:q}.reason; mv {output.mesh:q}.reason {output.mesh:q}; }}"

@@ -45,6 +45,7 @@ use rule solve as solve_level with:
         "results/orders/{family}/{job}/{level}/benchmark"
     params:
         result="results/orders/{family}/{job}/{level}/result.vtkhdf",
+        content=lambda w: contents(ladders()[w.family, w.job][0].file, *SOLVER_SOURCES),
         options=level_options,
     message:
         "solve {wildcards.job} refined {wildcards.level} times"

@@ -33,6 +33,7 @@ rule report:
     benchmark:
         "results/report/benchmark"
     params:
+        content=lambda w: contents(*FAMILY_FILES, *REPORT_SOURCES),
         shown=[verdict for verdict in SHOWN if Path(verdict).is_file()],
     message:
         "report of all cases"

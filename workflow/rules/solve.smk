@@ -11,6 +11,12 @@ def accepted_of(job):
     return [str(file)] if file.is_file() else []
 
 
+def content_of_solve(job):
+    """What a solve is made from; a mesh file of the user's, which may be large, by its date."""
+    files = contents(job.file, *accepted_of(job), *SOLVER_SOURCES)
+    return files + (stamp_of(job.mesh) if job.mesh else "")
+
+
 def options_of(job):
     """How the command line is told which job of a case this is."""
     options = "--mesh " + shlex.quote(mesh_of(job)[0]) if job.mesh is None else ""
@@ -36,15 +42,15 @@ rule solve:
         "results/{family}/{job}/benchmark"
     params:
         result="results/{family}/{job}/result.vtkhdf",
+        content=lambda w: content_of_solve(BATCH[w.family, w.job]),
         options=lambda w: options_of(BATCH[w.family, w.job]),
     message:
         "solve {wildcards.job}"
     shell:
-        "rm -f {params.result:q};"
-        " {PYTHON} -m solver solve {input.case:q} {params.options}"
-        " -o {params.result:q} --verdict {output.verdict:q} > {log:q} 2>&1"
-        " || died=$? && test -s {output.verdict:q}"
-        ' || {{ echo "died with exit status $died" >> {log:q};'
-        " {PYTHON} -m solver crashed {input.case:q} {params.options}"
-        " --log {log:q} --verdict {output.verdict:q}; }};"
+        "rm -f {params.result:q}; died=0;"
+        " {PYTHON} -m solver solve {input.case:q} {params.options}{MEMORY_CHECK}"
+        " -o {params.result:q} --verdict {output.verdict:q} > {log:q} 2>&1 || died=$?;"
+        " test -s {output.verdict:q}"
+        " || {PYTHON} -m solver crashed {input.case:q} {params.options} --status $died"
+        " --log {log:q} --verdict {output.verdict:q} >> {log:q};"
         " tail -n 1 {log:q}"

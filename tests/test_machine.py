@@ -1,0 +1,201 @@
+"""A machine that fails: one clear line, the status as documented, nothing under a final name."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+
+import pytest
+
+from solver.cli import main
+from solver.errors import MachineError
+from solver.files import replacing
+from solver.memory import available, check_memory, needed
+from tests.machine import obeying_permissions, small_disk
+from tests.workflow.projects import CASE, ROOT, without_times
+
+GIGABYTE = 1e9
+
+
+@pytest.fixture
+def case(tmp_path):
+    """A small case in a folder of its own."""
+    path = tmp_path / "small.yaml"
+    path.write_text(CASE.format(name="small", directions="first", pressure=25.0))
+    return path
+
+
+def solve(case, folder, *options):
+    """The command line of a solve with its verdict, into `folder`."""
+    outputs = ["-o", folder / "r.vtkhdf", "--verdict", folder / "v.json"]
+    return ["solve", *map(str, [case, *outputs, *options])]
+
+
+def run(arguments, **settings):
+    """A finished process of the solver that obeys permissions."""
+    command = obeying_permissions([sys.executable, "-m", "solver", *arguments])
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, **settings)
+
+
+def test_a_full_disk_is_2_with_one_line_and_leaves_nothing(case, tmp_path, capsys):
+    out = tmp_path / "out"
+    with small_disk(out, 12):
+        assert main(solve(case, out)) == 2
+        verdict = json.loads((out / "v.json").read_text())
+        assert (verdict["verdict"], verdict["transient"]) == ("refused", True)
+        line = f"{out / 'r.vtkhdf'}: No space left on device"
+        assert verdict["reason"] == line
+        assert capsys.readouterr().err == line + "\n"
+        assert [file.name for file in out.iterdir()] == ["v.json"]
+        (out / "fill").write_bytes(bytes(4 << 10))
+        assert main(["mesh", str(case), "-o", str(out / "m.vtkhdf")]) == 2
+        assert capsys.readouterr().err == f"{out / 'm.vtkhdf'}: No space left on device\n"
+        assert not (out / "m.vtkhdf").exists()
+    assert main(solve(case, out)) == 0
+
+
+def test_a_folder_or_mesh_without_permission_is_2_with_one_line(case, tmp_path):
+    mesh, out = tmp_path / "m.vtkhdf", tmp_path / "out"
+    assert main(["mesh", str(case), "-o", str(mesh)]) == 0
+    out.mkdir(mode=0o555)
+    refused = run(solve(case, out))
+    assert refused.returncode == 2
+    assert refused.stderr == f"{out / 'v.json'}: Permission denied\n"
+    assert list(out.iterdir()) == []
+    out.chmod(0o755)
+    mesh.chmod(0)
+    refused = run(solve(case, out, "--mesh", mesh))
+    assert refused.returncode == 2
+    assert "Permission denied" in refused.stderr
+    assert len(refused.stderr.splitlines()) == 1
+    assert [file.name for file in out.iterdir()] == ["v.json"]
+    mesh.chmod(0o644)
+    assert main(solve(case, out, "--mesh", mesh)) == 0
+
+
+def test_a_mesh_that_vanished_is_2_and_back_again_is_solved(case, tmp_path, capsys):
+    mesh = tmp_path / "m.vtkhdf"
+    assert main(solve(case, tmp_path, "--mesh", mesh)) == 2
+    assert capsys.readouterr().err == f"{mesh}: mesh: no such file\n"
+    assert main(["mesh", str(case), "-o", str(mesh)]) == 0
+    assert main(solve(case, tmp_path, "--mesh", mesh)) == 0
+
+
+def test_left_over_temporaries_of_dead_processes_go(tmp_path):
+    with replacing(tmp_path / "a.json") as first:
+        first.write_text("{}")
+    ended = subprocess.Popen(["true"])
+    ended.wait()
+    dead = tmp_path / first.name.replace(str(os.getpid()), str(ended.pid))
+    alive = tmp_path / first.name.replace(str(os.getpid()), str(os.getppid()))
+    for left in (dead, alive):
+        left.write_text("{")
+    with replacing(tmp_path / "a.json") as temporary:
+        temporary.write_text("[]")
+    assert {file.name for file in tmp_path.iterdir()} == {"a.json", alive.name}
+
+
+def test_memory_needed_is_below_what_was_measured():
+    for unknowns, measured in ((109_500, 1.2 * GIGABYTE), (530_000, 5.4 * GIGABYTE)):
+        need = needed(unknowns // 3, 3)
+        assert need.least < measured
+        assert need.usual == pytest.approx(measured, rel=0.1)
+
+
+def test_what_cannot_fit_is_refused_and_what_may_not_is_warned_of():
+    told = []
+    with pytest.raises(MachineError) as refused:
+        check_memory(1_000_000, 3, "big.yaml", told.append, free=8 * GIGABYTE)
+    line = str(refused.value)
+    assert line.startswith("big.yaml: memory = '3000000 unknowns': needs at least 13 GB, 8 GB are")
+    assert "coarser mesh" in line
+    assert "--no-memory-check" in line
+    assert told == []
+    check_memory(500_000, 3, "big.yaml", told.append, free=8 * GIGABYTE)
+    assert told == ["memory may run out: about 15 GB of 8 GB free"]
+    check_memory(1_000_000, 2, "big.yaml", told.append, free=8 * GIGABYTE)
+    assert len(told) == 1
+
+
+def test_the_memory_there_is_heeds_the_limit_of_the_process():
+    assert 0 < available() < 1e15
+    asked = "from solver.memory import available; print(available())"
+    limited = subprocess.run(
+        [sys.executable, "-c", asked],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (10**9, 10**9)),
+    )
+    assert 0 < float(limited.stdout) < 10**9
+
+
+LIMITED = """
+import resource, sys
+from pathlib import Path
+from solver.cli import main
+
+main(["solve", sys.argv[1], "-o", sys.argv[1] + ".vtkhdf", "--quiet"])
+used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (used + 60_000_000,) * 2)
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+def test_a_solve_without_enough_memory_is_refused_or_ends_with_its_reason(case, tmp_path):
+    case.write_text(case.read_text().replace("divisions: [2, 2]", "divisions: [200, 200]"))
+    small = tmp_path / "warm.yaml"
+    small.write_text(CASE.format(name="warm", directions="first", pressure=25.0))
+
+    def limited(*options):
+        # The limit comes when the libraries are loaded, whatever these take on this machine.
+        command = [sys.executable, "-c", LIMITED, str(small), *solve(case, tmp_path, *options)]
+        done = subprocess.run(
+            command,
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        )
+        assert not (tmp_path / "r.vtkhdf").exists()
+        return done.returncode, done.stderr, json.loads((tmp_path / "v.json").read_text())
+
+    status, line, verdict = limited()
+    assert (status, verdict["verdict"], verdict["transient"]) == (2, "refused", True)
+    assert "unknowns': needs at least 0.26 GB" in line
+    status, line, verdict = limited("--no-memory-check")
+    assert (status, verdict["verdict"], verdict["transient"]) == (3, "crashed", True)
+    assert line.startswith("out of memory: ")
+    assert len(line.splitlines()) == 1
+
+
+def test_the_numbers_are_the_same_on_every_run(tmp_path):
+    """Bit for bit with one thread, to 1e-13 with two."""
+    space = CASE.replace("QUAD4", "HEXA8").replace("plane: strain\n", "")
+    space = space.replace("[2, 2]", "[9, 9, 9]").replace("[3, 2]", "[8, 8, 8]")
+    space = space.replace("{{group: base", "{{group: symy, fix: [y]}}, {{group: base")
+    for name, text in (("plane", CASE), ("space", space.replace("fix: [y]}}]", "fix: [z]}}]"))):
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(text.format(name=name, directions="first", pressure=25.0))
+        first, again = (numbers_of(path, tmp_path / f"{name}{i}", 1) for i in range(2))
+        assert first == again
+        several = numbers_of(path, tmp_path / f"{name}-2", 2)
+        assert several == pytest.approx(first, rel=1e-13, abs=1e-13 * 25)
+
+
+def numbers_of(case, folder, threads):
+    """All numbers of a solve's fields, in a new process with so many threads."""
+    import h5py
+
+    environment = os.environ | {"OMP_NUM_THREADS": str(threads), "MKL_NUM_THREADS": str(threads)}
+    done = run(solve(case, folder), env=environment)
+    assert done.returncode == 0, done.stderr
+    told = without_times(json.loads((folder / "v.json").read_text()))
+    assert told["provenance"]["threads"] == str(threads)
+    assert told["provenance"]["command"].startswith(f"python -m solver solve {case} -o {folder}")
+    with h5py.File(folder / "r.vtkhdf") as file:
+        fields = [file["VTKHDF/PointData"][key][()] for key in ("displacement", "stress")]
+        fields += [file["contact/interface"][key][()] for key in ("multiplier", "gap")]
+    return [number for field in fields for number in field.ravel().tolist()]

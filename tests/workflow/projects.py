@@ -1,0 +1,76 @@
+"""Copies of the project with tiny cases, and real Snakemake in them."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+CASE = """\
+name: {name}
+mesh: {{recipe: blocks, size: 10, bottom: {{cells: QUAD4, divisions: [2, 2]}},
+       top: {{cells: QUAD4, divisions: [3, 2]}}}}
+plane: strain
+materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
+supports: [{{group: symx, fix: [x]}}, {{group: base, fix: [y]}}]
+loads: [{{group: press, pressure: 25.0}}]
+contact: [{{name: interface, slave: bottom_contact, master: top_contact}}]
+directions: {directions}
+reference: {{kind: analytical, contact_pressure: {pressure}, gap: 0.0}}
+"""
+
+
+def write_case(folder, name, directions="first", pressure=25.0):
+    folder.mkdir(parents=True, exist_ok=True)
+    text = CASE.format(name=name, directions=directions, pressure=pressure)
+    (folder / f"{name}.yaml").write_text(text)
+
+
+def snakemake(project, *arguments):
+    """The finished process of a run, its output and errors as one text."""
+    return subprocess.run(
+        [sys.executable, "-m", "snakemake", *map(str, arguments)],
+        cwd=project,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=300,
+    )
+
+
+def jobs(project, *arguments):
+    """What a run would do, by the jobs' messages."""
+    planned = snakemake(project, "--dry-run", *arguments)
+    assert planned.returncode == 0, planned.stdout
+    return set(re.findall(r"^Job \d+: (.*)$", planned.stdout, re.MULTILINE))
+
+
+def new_project(folder):
+    folder.mkdir(exist_ok=True)
+    shutil.copy(ROOT / "Snakefile", folder)
+    for name in ("workflow", "profiles", "solver"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    write_case(folder / "cases" / "tiny", "tiny-a", "both")
+    write_case(folder / "cases" / "tiny", "tiny-b")
+    (folder / "cases" / "tiny" / "family.yaml").write_text("title: Tiny cases\n")
+    return folder
+
+
+def summary(project):
+    content = json.loads((project / "results" / "report" / "summary.json").read_text())
+    return {verdict["job"]: verdict for verdict in content}
+
+
+# What differs from one run of the same solve to the next.
+TIMES = {"seconds", "cpu_seconds", "peak_memory_mb", "time_utc"}
+
+
+def without_times(content):
+    """Parsed JSON without what measures time and memory."""
+    if isinstance(content, dict):
+        return {key: without_times(value) for key, value in content.items() if key not in TIMES}
+    if isinstance(content, list):
+        return [without_times(value) for value in content]
+    return content

@@ -1,0 +1,87 @@
+"""Batches on a machine that fails: the report says why, and the next run does what is missing."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+
+from tests.machine import obeying_permissions
+from tests.workflow.projects import jobs, new_project, snakemake, summary, write_case
+
+# In each process of the solver, as long as there is a file `fault`.
+FAULTS = """\
+import pathlib, resource, sys
+fault = pathlib.Path("fault").exists() and "solve" in sys.argv
+if fault and "hungry" in str(sys.argv):
+    import solver.run
+    used = int(pathlib.Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used, used))
+"""
+
+
+def test_what_the_machine_kept_from_is_done_by_the_next_run(tmp_path):
+    project = new_project(tmp_path / "project")
+    cases = project / "cases" / "tiny"
+    for case in cases.glob("tiny-*.yaml"):
+        case.unlink()
+    for name in ("good", "hungry", "meshless", "own"):
+        write_case(cases, name)
+    recipe = re.search(r"mesh: \{.*?\}\}\n", (cases / "own.yaml").read_text(), re.DOTALL)[0]
+    (cases / "own.yaml").write_text(
+        (cases / "own.yaml").read_text().replace(recipe, "mesh: {file: own.vtkhdf}\n")
+    )
+    main = project / "solver" / "__main__.py"
+    main.write_text(FAULTS + main.read_text())
+    (project / "fault").touch()
+
+    run = snakemake(project)
+
+    assert run.returncode != 0
+    told = {name: (v["verdict"], v["reason"]) for name, v in summary(project).items()}
+    assert {name: verdict for name, (verdict, _) in told.items()} == {
+        "good": "passed",
+        "hungry": "crashed",
+        "meshless": "passed",
+        "own": "refused",
+    }
+    assert told["hungry"][1].startswith("out of memory: ")
+    assert "no such file" in told["own"][1]
+
+    (project / "fault").unlink()
+    unmade = project / "results" / "tiny" / "meshless" / "mesh.vtkhdf"
+    unmade.write_text("meshing died with exit status 137\n")
+    shutil.copy(project / "results" / "tiny" / "good" / "mesh.vtkhdf", cases / "own.vtkhdf")
+    again = snakemake(project)
+    assert again.returncode == 0, again.stdout
+    assert all(verdict["passed"] for verdict in summary(project).values())
+    done = set(re.findall(r"^Job \d+: solve (.*)$", again.stdout, re.MULTILINE))
+    assert done == {"hungry", "meshless", "own"}
+
+
+def test_a_clock_that_went_back_hides_no_change(tmp_path):
+    project = new_project(tmp_path / "project")
+    (project / "cases" / "tiny" / "tiny-a.yaml").unlink()
+    assert snakemake(project).returncode == 0
+    tomorrow = time.time() + 86400
+    for file in (project / "results").rglob("*"):
+        os.utime(file, (tomorrow, tomorrow))
+    case = project / "cases" / "tiny" / "tiny-b.yaml"
+    case.write_text(case.read_text().replace("contact_pressure: 25.0", "contact_pressure: 26.0"))
+    assert "solve tiny-b" in jobs(project)
+    os.utime(case, (tomorrow, tomorrow))
+    run = snakemake(project)
+    assert "tiny-b: failed: multiplier interface: 25" in run.stdout
+    assert summary(project)["tiny-b"]["verdict"] == "failed"
+
+
+def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path):
+    project = new_project(tmp_path / "project")
+    (project / "results").mkdir(mode=0o555)
+    command = obeying_permissions([sys.executable, "-m", "snakemake"])
+    refused = subprocess.run(command, cwd=project, capture_output=True, text=True)
+    assert refused.returncode != 0
+    assert "results: nothing can be written into this folder" in refused.stderr
+    assert "Traceback" not in refused.stderr
+    assert list((project / "results").iterdir()) == []

@@ -1,0 +1,110 @@
+"""Before a run: the folder is this run's alone, and what an earlier one was kept from is due again."""
+
+import fcntl
+import time
+from glob import glob
+from threading import Thread
+
+from snakemake.scheduling.job_scheduler import JobScheduler
+
+
+def take_lock():
+    """Keep other runs out of this folder while this one lives; the system frees it with a kill.
+
+    Snakemake's own locks stay behind when a run is killed, so they are off.
+    """
+    place = Path(".snakemake") / "run.lock"
+    place.parent.mkdir(exist_ok=True)
+    lock = place.open("a+")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        lock.seek(0)
+        raise WorkflowError(
+            f"{Path.cwd()}: another run is at work in this folder ({lock.read().strip()}); "
+            "wait until it ends, or end it"
+        ) from None
+    except OSError:
+        return lock  # a file system without locks
+    lock.truncate(0)
+    lock.write(f"process {os.getpid()} on {os.uname().nodename}\n")
+    lock.flush()
+    return lock
+
+
+def survive_termination():
+    """Let Snakemake end on SIGTERM: its handler takes a lock that the code it interrupts may hold.
+
+    In a thread of its own the handler gets that lock as soon as it is free.
+    """
+    ending = JobScheduler.exit_gracefully
+    JobScheduler.exit_gracefully = lambda *of: Thread(target=ending, args=of).start()
+
+
+def check_writable():
+    """Say in one line what Snakemake would meet in the midst of its work."""
+    folders = [Path(verdict_of(job)).parent for job in RUN.values()]
+    for folder in (
+        Path(".snakemake"),
+        Path("results"),
+        Path("results/report"),
+        *folders,
+    ):
+        if folder.exists() and not os.access(folder, os.W_OK | os.X_OK):
+            raise WorkflowError(
+                f"{folder}: nothing can be written into this folder: "
+                "give yourself the permission, or work in a copy of the project"
+            )
+
+
+def mesh_made_for(job):
+    return Path(f"results/{job.family}/{job.case}/mesh.vtkhdf")
+
+
+def forget_transient():
+    """Remove what the machine was to blame for (memory, disk, a kill), so that it is done again.
+
+    A mesh that was not made goes with the verdicts that say so. With them goes what the gates
+    look at: Snakemake misses only files that something to be made is made from.
+    """
+    unmade = {mesh for mesh in map(mesh_made_for, RUN.values()) if is_reason(mesh)}
+    of_batch = {
+        Path(verdict_of(job))
+        for job in RUN.values()
+        if mesh_made_for(job) in unmade or is_transient(Path(verdict_of(job)))
+    }
+    levels = set(
+        filter(is_transient, map(Path, glob("results/orders/*/*/*/verdict.json")))
+    )
+    reports = Path("results/report")
+    gates = {reports / "passed", reports / "failures.txt"} if of_batch else set()
+    gates |= {reports / "orders-failures.txt"} if levels else set()
+    for file in unmade | of_batch | levels | gates:
+        file.unlink(missing_ok=True)
+
+
+def is_transient(verdict):
+    return verdict.is_file() and '"transient": true' in verdict.read_text("utf-8")
+
+
+def is_reason(mesh):
+    """Whether a mesh is none, but the line that says why."""
+    return mesh.is_file() and mesh.open("rb").read(8) != b"\x89HDF\r\n\x1a\n"
+
+
+def date_now():
+    """Date files of the future now, after the clock went back: Snakemake goes by their order."""
+    now = time.time()
+    files = {*SOLVER_SOURCES, *REPORT_SOURCES, *glob("results/**", recursive=True)}
+    files |= {job.file for job in BATCH.values()} | MESHES
+    for file in filter(os.path.exists, files):
+        if os.stat(file).st_mtime > now and os.access(file, os.W_OK):
+            os.utime(file)
+
+
+if workflow.is_main_process and not workflow.dryrun:
+    check_writable()
+    LOCK = take_lock()
+    survive_termination()
+    forget_transient()
+    date_now()
