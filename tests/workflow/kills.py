@@ -68,10 +68,13 @@ class Harness:
     def __init__(self, folder, targets):
         self.project = new_project(folder)
         (self.project / "cases" / "tiny" / "tiny-b.yaml").unlink()  # a small batch, often
-        self.run(TARGETS["batch"])
+        batch = self.run(TARGETS["batch"])
         self.expected = self.state()
         self.targets = {name: TARGETS[name] for name in targets}
-        self.duration = {name: self.run(target) for name, target in self.targets.items()}
+        self.duration = {
+            name: batch if target.command is SNAKEMAKE else self.run(target)
+            for name, target in self.targets.items()
+        }
 
     def run(self, target):
         """Run a target undisturbed, from nothing; the seconds it takes."""
