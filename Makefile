@@ -18,7 +18,7 @@ SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTIN
 
 .PHONY: help all-cases family case report orders study stability infsup test accept format lint lock
 .PHONY: faults mutants kills bill clean clean-all
-.PHONY: environment test-environment lint-environment
+.PHONY: environment study-environment test-environment lint-environment
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -45,7 +45,7 @@ orders: environment ## refine step by step and fit orders of convergence: all or
 	@$(SNAKEMAKE) orders
 
 study: override CONFIG += $(if $(LEVEL),study=$(LEVEL))
-study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
+study: study-environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
 	@$(SNAKEMAKE) study
 
 stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
@@ -87,6 +87,9 @@ lint: lint-environment ## check format, style and types of the sources
 environment:
 	@$(INSTALL) run
 
+study-environment:
+	@$(INSTALL) run pictures
+
 test-environment:
 	@$(INSTALL) run test
 
@@ -102,7 +105,7 @@ LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
-	@for group in build mkl slurm test lint lock; do \
+	@for group in build mkl slurm pictures test lint lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 

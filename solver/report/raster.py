@@ -1,4 +1,4 @@
-"""Drawings as PNG, for those who cannot use SVG: where matplotlib is installed, as for the tests.
+"""Drawings as PNG, for those who cannot use SVG: where matplotlib is installed.
 
 Reads what `svg.Drawing` writes and no other SVG: paths of whole numbers, text, links.
 """
