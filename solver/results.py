@@ -123,6 +123,7 @@ def read_result(path: str | Path) -> Result:
         raise _no_result(path, "damaged, of another version, or none at all")
     try:
         with h5py.File(path) as file:
+            file.visititems(_refuse_complex)
             result = Result(_read_solution(file), _plain(file["provenance"].attrs))
         fault = inconsistency(result.solution)
     except InputError:
@@ -134,6 +135,12 @@ def read_result(path: str | Path) -> Result:
     if fault:
         raise _no_result(path, fault)
     return result
+
+
+def _refuse_complex(name: str, item: h5py.HLObject) -> None:
+    """Numpy makes real numbers of complex ones with a warning only."""
+    if isinstance(item, h5py.Dataset) and item.dtype.kind == "c":
+        raise TypeError(f"{name} holds complex numbers")
 
 
 def _no_result(path: str | Path, fault: str) -> InputError:

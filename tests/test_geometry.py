@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from solver.case import parse_case
-from solver.errors import InputError
+from solver.errors import InputError, SolveError
+from solver.lac.facets import facets
+from solver.mesh.catalogue import BY_NAME
 from solver.mesh.tidy import tidy
 from solver.simulation import simulate
 from tests.scenes import PRESSURE, block_case, block_mesh, with_points
@@ -153,6 +155,12 @@ def test_refused_by_name(change, message, mesh):
     with pytest.raises(InputError, match=re.escape(message)) as refusal:
         solved(changed, *changes)
     assert "\n" not in str(refusal.value)
+
+
+def test_faces_of_no_size():
+    """As beside a node so far away that coordinates do not tell the others apart."""
+    with pytest.raises(SolveError, match=r"^1 SEG2 faces have no size left in the precision of"):
+        facets(np.zeros((2, 2)), BY_NAME["SEG2"], np.array([[0, 1]]), np.arange(1))
 
 
 def mirrored(mesh):

@@ -219,6 +219,12 @@ def node_beyond_the_end(file):
     file["contact/interface/slave_nodes"][0] = 10**6
 
 
+def complex_numbers(file):
+    values = file["observation/gap"][()] + 0j
+    del file["observation/gap"]
+    file["observation/gap"] = values
+
+
 def other_attributes(file):
     file["solve"].attrs["length"] = "long"
 
@@ -231,6 +237,7 @@ def other_attributes(file):
         (lose_step, "the load steps are not those of the case"),
         (not_a_number, "zone interface: gap holds values that are not finite numbers"),
         (node_beyond_the_end, "zone interface: slave_nodes holds numbers outside 0"),
+        (complex_numbers, "observation/gap holds complex numbers"),
         (other_attributes, "the solve's own numbers holds"),
     ],
 )

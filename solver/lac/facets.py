@@ -59,14 +59,21 @@ def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]
 
 
 def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.ndarray) -> Facets:
-    """Faces of one type from points (n_points, dim) and node numbers (n, n_nodes)."""
+    """Faces of one type from points (n_points, dim) and node numbers (n, n_nodes).
+
+    Raises SolveError for faces of no size, as beside a node that lies beyond all measure.
+    """
     corner = points[nodes]
     centre = corner[:, : kind.n_vertices].mean(axis=1)
     radius = np.linalg.norm(corner - centre[:, None], axis=2).max(axis=1)
     middle = kind.nodes[: kind.n_vertices].mean(axis=0)
     slope = shape_functions(kind.name).gradients(middle[None])
     normal = area_vectors(points, nodes, slope)[:, 0]
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    size = np.linalg.norm(normal, axis=1)
+    if not (size > 0).all():
+        lost = int((~(size > 0)).sum())
+        raise SolveError(f"{lost} {kind.name} faces have no size left in the precision of the mesh")
+    normal /= size[:, None]
     shape = _shape(kind, corner - centre[:, None], radius, normal)
     return Facets(
         kind,
