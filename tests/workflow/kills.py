@@ -93,6 +93,8 @@ class Harness:
             return subprocess.Popen(
                 target.command,
                 cwd=self.project,
+                # As Snakemake has it for its jobs: with one thread results agree to the bit.
+                env={**os.environ, "OMP_NUM_THREADS": "1"},
                 stdout=output,
                 stderr=output,
                 start_new_session=True,

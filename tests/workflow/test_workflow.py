@@ -170,6 +170,8 @@ def test_a_second_run_is_refused_while_one_lives_and_after_its_kill_it_works(tmp
         while not list(project.glob("results/tiny/*/log")):
             assert run.poll() is None
             time.sleep(0.02)
+        # Stopped, so that it does not end while the second one starts.
+        os.killpg(run.pid, signal.SIGSTOP)
         second = snakemake(project)
         assert second.returncode != 0
         assert f"another run is at work in this folder (process {run.pid} on " in second.stdout
