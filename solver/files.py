@@ -41,6 +41,12 @@ def replacing(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file in UTF-8: whole or not at all."""
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 def seal(path: Path) -> None:
     """Append the hash of all that a file holds, for `is_sealed`."""
     mark = _SEAL % _digest(path, path.stat().st_size)

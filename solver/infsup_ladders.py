@@ -33,8 +33,8 @@ from solver.infsup import inf_sup_constant
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME
 from solver.scene import build_scene
-from solver.schemas import INFSUP_SCHEMA, validate
-from solver.strict_yaml import parse_mapping, read_text
+from solver.schemas import INFSUP_SCHEMA
+from solver.strict_yaml import read_mapping
 
 LEVEL = 0.4
 """β_h falls with the size of the faces to this power at most, where it is said to level off."""
@@ -118,8 +118,7 @@ class Ladder:
 
 def read_ladders(path: Path, quick: bool = False) -> list[Ladder]:
     """The ladders that a file asks for, none of them run; InputError says what is refused."""
-    content = parse_mapping(read_text(path), path)
-    validate(content, INFSUP_SCHEMA, path)
+    content = read_mapping(path, INFSUP_SCHEMA)
     return list(_ladders(content, quick))
 
 

@@ -24,9 +24,9 @@ from pathlib import Path
 from typing import Any
 
 from solver.errors import InputError
-from solver.schemas import LADDERS_SCHEMA, validate
+from solver.schemas import LADDERS_SCHEMA
 from solver.solution import job_name
-from solver.strict_yaml import parse_mapping, read_text
+from solver.strict_yaml import read_mapping
 
 FILE_NAME = "orders.yaml"
 
@@ -88,8 +88,7 @@ class Family:
 
 def read_ladders(path: Path) -> Family:
     """The ladders in a file; `InputError` says what is refused, and what is allowed."""
-    content = parse_mapping(read_text(path), path)
-    validate(content, LADDERS_SCHEMA, path)
+    content = read_mapping(path, LADDERS_SCHEMA)
     return Family(
         folder=path.resolve().parent,
         title=content.get("title", ""),

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from solver.checks import Accepted, CheckResult
 from solver.errors import InputError
-from solver.files import replacing
+from solver.files import write_text
 from solver.solution import Solution
 
 _KEYS = {"minimum", "maximum"}
@@ -96,5 +96,4 @@ def _write(path: Path, values: Mapping[str, Accepted]) -> None:
         f'  {json.dumps(title)}: {{"minimum": {value.minimum!r}, "maximum": {value.maximum!r}}}'
         for title, value in sorted(values.items())
     ]
-    with replacing(path) as temporary:
-        temporary.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+    write_text(path, "{\n" + ",\n".join(lines) + "\n}\n")

@@ -275,8 +275,10 @@ def _initial_gaps(
     noise: float,
 ) -> np.ndarray:
     """∫ φ gap (k,) at the start: as meshed, without those below `noise`, or as the case says."""
-    initial = np.where(np.abs(operator.initial) <= noise * operator.covered, 0.0, operator.initial)
-    if zone.clearance is not None:
+    if zone.clearance is None:
+        meshed = operator.initial
+        initial = np.where(np.abs(meshed) <= noise * operator.covered, 0.0, meshed)
+    else:
         at = surface_points(points, [(f.type.name, f.nodes, f.macro) for f in sub_faces])
         means = at.means(evaluate(zone.clearance, at.place + origin))
         whole = operator.mean.T @ (operator.surface.area * means)

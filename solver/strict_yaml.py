@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from solver.errors import InputError
-from solver.schemas import key_path
+from solver.schemas import key_path, validate
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 20
@@ -55,6 +55,14 @@ def parse_mapping(text: str, where: Path) -> dict[str, Any]:
         raise InputError(where, *_place(error)) from None
     if not isinstance(content, dict):
         raise InputError(where, "file", content, "must be a mapping of keys to values")
+    return content
+
+
+def read_mapping(path: Path, schema: Path | None = None) -> dict[str, Any]:
+    """The mapping in a file; `InputError` says what is refused, also by the schema where given."""
+    content = parse_mapping(read_text(path), path)
+    if schema:
+        validate(content, schema, path)
     return content
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from solver.case import parse_case
 from solver.errors import InputError
-from solver.files import replacing
+from solver.files import write_text
 
 TEMPLATE = """\
 # A case file: change it to your problem, then
@@ -84,5 +84,4 @@ def write_template(name: str, path: Path) -> None:
     parse_case(text, path)
     if path.exists():
         raise InputError(path, "file", None, "is there already; choose another with -o")
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)

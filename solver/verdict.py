@@ -14,7 +14,7 @@ import numpy as np
 from solver.accuracy import Accuracy
 from solver.case import Case
 from solver.checks import CheckResult
-from solver.files import replacing
+from solver.files import write_text
 from solver.solution import Solution, job_name
 
 PASSED, FAILED, UNRELIABLE = "passed", "failed", "unreliable"
@@ -118,8 +118,7 @@ def without_result(
 
 def write_verdict(path: str | Path, verdict: Mapping[str, Any]) -> None:
     """Write a verdict as strict JSON: whole or not at all."""
-    with replacing(path) as temporary:
-        temporary.write_text(to_json(verdict) + "\n", encoding="utf-8")
+    write_text(path, to_json(verdict) + "\n")
 
 
 def to_json(content: Any) -> str:

@@ -55,6 +55,14 @@ class CellType:
         """Number of vertices; they come first in the node order."""
         return len(_SHAPES[_shape_of(self.name)].vertices)
 
+    def put_between(self, values: np.ndarray, nodes: np.ndarray) -> None:
+        """Give the nodes of cells (n, n_nodes) that are no vertices the mean of their vertices'.
+
+        `values` (n_points, …) by node, changed in place.
+        """
+        for i in range(self.n_vertices, self.n_nodes):
+            values[nodes[:, i]] = values[nodes[:, self.owners[i]]].mean(axis=1)
+
     @cached_property
     def boundary(self) -> tuple[int, ...]:
         """The nodes of a 2D cell, or the two ends of a line, as a closed polygon (mid-nodes in)."""

@@ -208,9 +208,7 @@ def _straightened(points: np.ndarray, cells: list[meshio.CellBlock]) -> np.ndarr
     """The points with all nodes that are no vertices in the middle of their vertices."""
     points = points.copy()
     for block in cells:
-        kind = cell_type(block.type)
-        for node in range(kind.n_vertices, kind.n_nodes):
-            points[block.data[:, node]] = points[block.data[:, kind.owners[node]]].mean(axis=1)
+        cell_type(block.type).put_between(points, block.data)
     return points
 
 

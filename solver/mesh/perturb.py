@@ -39,8 +39,7 @@ def stepped(mesh: meshio.Mesh, step: np.ndarray) -> np.ndarray | None:
     """
     volumes, step = _volumes(mesh), step.copy()
     for cell, nodes in volumes:
-        for i in range(cell.n_vertices, cell.n_nodes):
-            step[nodes[:, i]] = step[nodes[:, cell.owners[i]]].mean(axis=1)
+        cell.put_between(step, nodes)
     moved = mesh.points + step
     return None if any(_folded(moved, nodes, cell) for cell, nodes in volumes) else moved
 

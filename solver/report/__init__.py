@@ -20,7 +20,7 @@ def write_report(
     `family.yaml`, each in the folder of its family. Logs one line for each solve that did not pass,
     the outcome, and the processor time by family.
     """
-    from solver.files import replacing
+    from solver.files import write_text
     from solver.report import tables
     from solver.report.page import family_page, main_page
     from solver.report.rows import read_rows
@@ -40,8 +40,7 @@ def write_report(
         **{part.page: family_page(part, folder) for part in parts},
     }
     for name, content in contents.items():
-        with replacing(folder / name) as temporary:
-            temporary.write_text(content, encoding="utf-8")
+        write_text(folder / name, content)
     complaints = "".join(f"{c}\n" for part in parts if (c := part.family.complaint))
     said = f"{tables.outcome(rows)} Report: {folder / PAGE}\n{_costs(parts)}"
     log(f"{complaints}{contents['failures.txt']}{said}")

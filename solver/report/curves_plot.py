@@ -9,21 +9,12 @@ from solver.orders import ERRORS
 from solver.report import formats
 from solver.report.axes import EPSILON, Scale, draw_axes
 from solver.report.curves import Curve
-from solver.report.marks import draw_marks
-from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, Drawing, Style
+from solver.report.marks import LOOKS, draw_marks, look_of
+from solver.report.svg import INK, MUTED, Drawing, Style
 
 WIDTH, HEIGHT = 400, 330
-# Shapes of cells by colour and mark, so that either tells them apart; QUAD9 and HEXA27 have theirs.
-_LOOKS = {
-    "QUAD9": (INK, "cross"),
-    "HEXA27": (INK, "cross"),
-    "TRIA": (BLUE, "circle"),
-    "TETRA": (BLUE, "circle"),
-    "QUAD": (ORANGE, "square"),
-    "HEXA": (ORANGE, "square"),
-    "PENTA": (GREEN, "triangle"),
-    "PYRA": (PURPLE, "diamond"),
-}
+# QUAD9 and HEXA27 have a look of their own here, where they stand beside QUAD8 and HEXA20.
+_LOOKS = {"QUAD9": (INK, "cross"), "HEXA27": (INK, "cross"), **LOOKS}
 
 
 def draw_panel(error: str, curves: Sequence[Curve]) -> Markup:
@@ -57,8 +48,7 @@ def _range(values: Sequence[np.ndarray], factor: float) -> tuple[float, float]:
 
 
 def _look(curve: Curve) -> tuple[str, str]:
-    name = curve.slave_cells[0].name
-    return next(look for shape, look in _LOOKS.items() if name.startswith(shape))
+    return look_of(curve.slave_cells[0].name, _LOOKS)
 
 
 def _line(curve: Curve) -> dict[str, Style]:

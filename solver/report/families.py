@@ -23,8 +23,8 @@ from typing import Any
 
 from solver.errors import InputError
 from solver.expressions import Expression
-from solver.schemas import FAMILY_SCHEMA, validate
-from solver.strict_yaml import parse_mapping, read_text
+from solver.schemas import FAMILY_SCHEMA
+from solver.strict_yaml import read_mapping
 
 FILE_NAME = "family.yaml"
 # Pages of the report that are no family's: a family of that name has its page under another.
@@ -63,8 +63,7 @@ def read_family(file: Path) -> Family:
     if not file.is_file():
         return Family(name, name)
     try:
-        content = parse_mapping(read_text(file), file)
-        validate(content, FAMILY_SCHEMA, file)
+        content = read_mapping(file, FAMILY_SCHEMA)
         content["figures"] = tuple(
             _figure(file, i, item) for i, item in enumerate(content.get("figures", []))
         )

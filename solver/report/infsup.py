@@ -11,7 +11,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from solver.files import replacing
+from solver.files import write_text
 from solver.half_loaded import COARSER, Profile
 from solver.infsup_ladders import LEVEL, Ladder
 from solver.report.html import environment
@@ -31,8 +31,7 @@ def write_record(path: Path, ladders: Sequence[Ladder], profiles: Sequence[Profi
         "ladders": [asdict(ladder) for ladder in ladders],
         "profiles": [asdict(profile) for profile in profiles],
     }
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(content), encoding="utf-8")
+    write_text(path, json.dumps(content))
 
 
 def read_record(path: Path) -> Record:
@@ -87,8 +86,7 @@ def write_page(record: Record, folder: Path, log: Callable[[str], Any] = print) 
         FAILURES: "".join(f"{line}\n" for line in complaints),
     }
     for name, content in contents.items():
-        with replacing(folder / name) as temporary:
-            temporary.write_text(content, encoding="utf-8")
+        write_text(folder / name, content)
     log("\n".join([*complaints, f"Report: {folder / PAGE}"]))
 
 

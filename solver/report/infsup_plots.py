@@ -9,19 +9,10 @@ from solver.half_loaded import CELLS, Profile
 from solver.infsup_ladders import Ladder
 from solver.mesh.catalogue import BY_NAME
 from solver.report.axes import Scale, draw_axes
-from solver.report.marks import draw_marks
-from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, Drawing, Style
+from solver.report.marks import draw_marks, look_of
+from solver.report.svg import INK, MUTED, ORANGE, Drawing, Style
 
 WIDTH, HEIGHT = 400, 320
-# By shape of cells, so that colour and mark tell the same; QUAD and HEXA by how they are cut.
-_LOOKS = {
-    "TRIA": (BLUE, "circle"),
-    "TETRA": (BLUE, "circle"),
-    "QUAD": (ORANGE, "square"),
-    "HEXA": (ORANGE, "square"),
-    "PENTA": (GREEN, "triangle"),
-    "PYRA": (PURPLE, "diamond"),
-}
 # β_h below is drawn at the foot of the plot.
 _LEAST, _MOST = 0.02, 2.0
 
@@ -52,7 +43,7 @@ def draw_key(kind: tuple[str, bool]) -> Markup:
 def _draw_line(drawing: Drawing, kind: tuple[str, bool], at: np.ndarray) -> None:
     """Marks are hollow on linear cells; lines dashed, and faint, without the cut."""
     cells, cut = kind
-    color, mark = next(look for shape, look in _LOOKS.items() if cells.startswith(shape))
+    color, mark = look_of(cells)
     style: dict[str, Style] = {"stroke": color, "stroke_width": 1.6 if cut else 1.0}
     if not cut:
         style["stroke_dasharray"] = (5, 3)

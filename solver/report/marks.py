@@ -1,8 +1,10 @@
 """Marks of a plot that differ in shape as well as in colour, for print and for the colour-blind."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from solver.report.svg import PAPER, Drawing
+from solver.report.svg import BLUE, GREEN, ORANGE, PAPER, PURPLE, Drawing
 
 _CORNERS = {
     "square": [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)],
@@ -11,7 +13,21 @@ _CORNERS = {
     "diamond": [(-1.35, 0.0), (0.0, -1.35), (1.35, 0.0), (0.0, 1.35)],
     "pentagon": [(0.0, -1.25), (1.19, -0.39), (0.73, 1.01), (-0.73, 1.01), (-1.19, -0.39)],
 }
+# Colour and mark by the shape of cells, so that either tells them apart.
+LOOKS = {
+    "TRIA": (BLUE, "circle"),
+    "TETRA": (BLUE, "circle"),
+    "QUAD": (ORANGE, "square"),
+    "HEXA": (ORANGE, "square"),
+    "PENTA": (GREEN, "triangle"),
+    "PYRA": (PURPLE, "diamond"),
+}
 MARKS = ("circle", *_CORNERS, "cross")
+
+
+def look_of(cells: str, looks: Mapping[str, tuple[str, str]] = LOOKS) -> tuple[str, str]:
+    """Colour and mark of a cell type: the first of `looks` whose key its name begins with."""
+    return next(look for shape, look in looks.items() if cells.startswith(shape))
 
 
 def draw_marks(

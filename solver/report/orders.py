@@ -31,7 +31,7 @@ def write_orders(
     `results` holds a folder a family, a ladder, a level, each with its verdict. Logs one line for
     each level without a result and each slope that is not reached.
     """
-    from solver.files import replacing
+    from solver.files import write_text
 
     curves = {family.name: read_curves(family, results) for family in families}
     every = [curve for members in curves.values() for curve in members]
@@ -43,8 +43,7 @@ def write_orders(
         FAILURES: complaints,
     }
     for name, content in contents.items():
-        with replacing(folder / name) as temporary:
-            temporary.write_text(content, encoding="utf-8")
+        write_text(folder / name, content)
     log(f"{complaints}{outcome(every)} Report: {folder / PAGE}")
 
 

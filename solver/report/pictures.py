@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from solver.errors import InputError
 from solver.expressions import Expression
-from solver.files import replacing
+from solver.files import write_text
 from solver.report.plane import draw_plane
 from solver.report.profile import draw_profile
 from solver.report.rows import Row
@@ -48,8 +48,7 @@ def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], Markup]) ->
         except (InputError, OSError, LookupError, ValueError, ArithmeticError) as error:
             reason = f"{type(error).__name__}: {error}"
             return Markup("<p class=none>No picture: {}</p>").format(reason)
-        with replacing(kept) as temporary:
-            temporary.write_text(drawing, encoding="utf-8")
+        write_text(kept, drawing)
     return Markup(kept.read_text(encoding="utf-8"))
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from solver.errors import InputError
-from solver.files import replacing
+from solver.files import write_text
 from solver.report import formats, infsup
 from solver.report.html import environment
 from solver.report.stability_map import anchor, draw_key, draw_map
@@ -61,8 +61,7 @@ def write_stability(
         FAILURES: "".join(f"{line}\n" for line in lines),
     }
     for name, content in contents.items():
-        with replacing(folder / f"{stem}{name}") as temporary:
-            temporary.write_text(content, encoding="utf-8")
+        write_text(folder / f"{stem}{name}", content)
     log("".join(f"{line}\n" for line in lines) + f"{outcome(records)} Page: {folder / stem}{PAGE}")
 
 

@@ -23,7 +23,7 @@ from solver.clock import Clock
 from solver.contact import ContactProblem
 from solver.cures import ALL, Cures
 from solver.errors import InputError, SolveError
-from solver.files import replacing
+from solver.files import write_text
 from solver.linear.condensation import Condensed
 from solver.mesh import generate, transform
 from solver.scene import build_scene
@@ -74,8 +74,7 @@ def run_sweep(sweep: Sweep, output: Path, log: Log) -> dict[str, Any]:
         "points": points,
         "cpu_seconds": time.process_time() - started,
     }
-    with replacing(output) as temporary:
-        temporary.write_text(to_json(record) + "\n", encoding="utf-8")
+    write_text(output, to_json(record) + "\n")
     held = sum(point["holds"] for point in points)
     log(f"{sweep.name}: {held} of {len(points)} points hold, {record['cpu_seconds']:.1f} s")
     return record

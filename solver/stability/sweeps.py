@@ -28,8 +28,8 @@ import numpy as np
 from solver.case import Case, parse_case
 from solver.errors import InputError
 from solver.expressions import Expression
-from solver.schemas import SWEEP_SCHEMA, validate
-from solver.strict_yaml import parse_mapping, read_text
+from solver.schemas import SWEEP_SCHEMA
+from solver.strict_yaml import read_mapping
 
 COMPRESSION, HYDROSTATIC = "compression", "hydrostatic"
 Value = float | list[float]
@@ -77,8 +77,7 @@ def read_sweep(path: Path, quick: bool = False) -> Sweep:
 
     `InputError` says what is refused, and what is allowed.
     """
-    content = parse_mapping(read_text(path), path)
-    validate(content, SWEEP_SCHEMA, path)
+    content = read_mapping(path, SWEEP_SCHEMA)
     values, labels = content["values"], content.get("labels")
     if labels is not None and len(labels) != len(values):
         raise InputError(path, "labels", len(labels), f"must be as many as values: {len(values)}")
@@ -113,7 +112,7 @@ def _base(path: Path, name: str, item: Mapping[str, Any]) -> dict[str, Any]:
     file = path.parent / item["case"]
     if not file.is_file():
         raise InputError(path, f"meshes.{name}.case", item["case"], "no such file")
-    return parse_mapping(read_text(file), file)
+    return read_mapping(file)
 
 
 def _shown(value: Value) -> str:

@@ -38,8 +38,8 @@ import yaml
 from solver.case import Case, parse_case
 from solver.errors import InputError
 from solver.mesh.catalogue import BY_NAME
-from solver.schemas import STUDY_SCHEMA, hint, validate
-from solver.strict_yaml import parse_mapping, read_text
+from solver.schemas import STUDY_SCHEMA, hint
+from solver.strict_yaml import read_mapping
 from solver.study import FULL, QUICK
 
 FILE_NAME = "study.yaml"
@@ -88,7 +88,7 @@ class Problem:
     @cached_property
     def template(self) -> dict[str, Any]:
         """What the case file says."""
-        return parse_mapping(read_text(self.case), self.case)
+        return read_mapping(self.case)
 
     @property
     def sides(self) -> tuple[str, str]:
@@ -190,8 +190,7 @@ class Study:
 
 def read_study(path: Path, size: str = FULL) -> Study:
     """The study in a file, or its quick part; InputError says what is refused, what allowed."""
-    content = parse_mapping(read_text(path), path)
-    validate(content, STUDY_SCHEMA, path)
+    content = read_mapping(path, STUDY_SCHEMA)
     treatments = tuple(
         Treatment(t["name"], t["title"], t["zone"], tuple(t.get("slaves", ())))
         for t in content["treatments"]

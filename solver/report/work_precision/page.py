@@ -43,7 +43,7 @@ def write_study(
 
     Logs one line: what was measured, and where the page is.
     """
-    from solver.files import replacing
+    from solver.files import replacing, write_text
 
     points = read_points(study, results)
     name = page_name(study)
@@ -57,8 +57,7 @@ def write_study(
         for part in section["panels"]
     }
     for file, content in (contents | figures).items():
-        with replacing(folder / file) as temporary:
-            temporary.write_text(content, encoding="utf-8")
+        write_text(folder / file, content)
     for file, figure in figures.items() if raster.available() else ():
         with replacing((folder / file).with_suffix(".png")) as temporary:
             temporary.write_bytes(raster.to_png(figure))
