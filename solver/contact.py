@@ -176,6 +176,11 @@ class ContactProblem:
         """The name of what solved the last system."""
         return self._system[1].factor.name if self._system else "none"
 
+    @property
+    def linear_iterations(self) -> int:
+        """The most iterations that one solution of the last system took; 0 by a factor alone."""
+        return self._system[1].factor.iterations if self._system else 0
+
     def solve(
         self, factor: float, start: np.ndarray | None = None, bilateral: bool = False
     ) -> Equilibrium:

@@ -47,6 +47,8 @@ _SCALARS = (
     "macro_elements",
     "iterations",
     "linear_solver",
+    "linear_iterations",
+    "matrix_entries",
     "cpu_seconds",
     "peak_memory_mb",
 )
@@ -111,7 +113,7 @@ def _write(
     _write_bodies(file.create_group("bodies"), solution.bodies)
     _write_steps(file, solution.steps)
     _write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
-    _write_table(file.create_group("timings"), _pairs("stage", "seconds", solution.seconds.items()))
+    _write_table(file.create_group("timings"), _timings(solution))
     _write_table(file.create_group("plan"), _pairs("what", "why", solution.plan))
     _write_table(file.create_group("checks"), [_flat(check) for check in checks])
     file.create_group("provenance").attrs.update(provenance)
@@ -178,6 +180,7 @@ def _read_solution(file: h5py.File) -> Solution:
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
         seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
+        stage_cpu_seconds=dict(_read_pairs(file["timings"], "stage", "cpu_seconds")),
         **{key: _plain(file["solve"].attrs)[key] for key in _SCALARS},
     )
 
@@ -359,6 +362,14 @@ def _flat(check: CheckResult) -> dict[str, Any]:
     row = asdict(check)
     accepted = row.pop("regression") or {}
     return row | {f"accepted_{key}": accepted.get(key) for key in ("minimum", "maximum")}
+
+
+def _timings(solution: Solution) -> list[dict[str, Any]]:
+    cpu = solution.stage_cpu_seconds
+    return [
+        {"stage": stage, "seconds": seconds, "cpu_seconds": cpu.get(stage)}
+        for stage, seconds in solution.seconds.items()
+    ]
 
 
 def _pairs(key: str, value: str, pairs: Iterable[tuple[str, Any]]) -> list[dict[str, Any]]:

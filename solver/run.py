@@ -144,19 +144,16 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[s
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
-    solution = simulate(case, mesh, job.swapped, job.hexahedra, log)
-    solution.seconds = {**clock.seconds, **solution.seconds}
+    solution = simulate(case, mesh, job.swapped, job.hexahedra, log, clock=clock)
     with clock.stage("checks"):
         solution.errors = errors(solution)
         # What was accepted is a result on the case's own mesh.
         accepted = accepted_values(solution) if job.refine == 1 else {}
         checks = run_checks(solution, accepted)
-    solution.seconds["checks"] = clock.seconds["checks"]
     solution.cpu_seconds = time.process_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
     with clock.stage("write"):
         write_result(output, solution, checks, provenance)
-    solution.seconds["write"] = clock.seconds["write"]
     return of_solution(solution, checks, os.path.relpath(output, beside.parent), provenance)
 
 

@@ -72,7 +72,7 @@ def solve_problem(
         states = _walk(problem, problem.scene.case.steps, log)
     with clock.stage("recovery"):
         solution = _recover(problem.scene, problem, states, swapped, hexahedra)
-    solution.seconds = clock.seconds
+    solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
     return solution
@@ -123,6 +123,8 @@ def _recover(
         macro_elements=sum(zone.count for zone in scene.zones),
         iterations=sum(state.status.iterations for state in states),
         linear_solver=problem.linear_solver,
+        linear_iterations=problem.linear_iterations,
+        matrix_entries=problem.matrix.nnz,
         plan=made_plan(scene, states, problem.idle),
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),

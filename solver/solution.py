@@ -111,8 +111,10 @@ class Solution:
     `accuracy` are the relative errors that rounding alone may cause, by cause (`solver.accuracy`).
     `mean_stress` holds, by cell type, the stress s of cells in mixed form at their nodes (n_cells,
     n_nodes), NaN in other cells (see `solver.mixed`). `errors` are the norms of `solver.norms`
-    where the case names an exact solution. `seconds` is wall time by stage, `peak_memory_mb` the
-    process's largest resident size.
+    where the case names an exact solution. `matrix_entries`: those of the stiffness on the
+    free unknowns, both halves; `linear_iterations` the most that one solution of the linear system
+    took, 0 by a factor alone. `seconds` and `stage_cpu_seconds` are wall and processor time by
+    stage, `peak_memory_mb` the process's largest resident size.
     """
 
     case: Case
@@ -134,10 +136,13 @@ class Solution:
     iterations: int
     linear_solver: str
     plan: list[tuple[str, str]]
+    matrix_entries: int = 0
+    linear_iterations: int = 0
     accuracy: dict[str, float] = field(default_factory=dict)
     mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")
 

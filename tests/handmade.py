@@ -108,7 +108,10 @@ def plane(folder: Path, text: str = PLANE) -> Solution:
         iterations=1,
         linear_solver="by hand",
         plan=[("refinement", "none: by hand"), ("refinement", "said twice")],
+        matrix_entries=352,
+        linear_iterations=3,
         seconds={"mesh": 0.25, "solve": 0.5},
+        stage_cpu_seconds={"mesh": 0.25, "solve": 0.75},
         cpu_seconds=0.75,
         peak_memory_mb=1.0,
     )

@@ -61,6 +61,8 @@ def test_passed_is_0(small, capsys):
     assert (status, verdict["verdict"], verdict["passed"]) == (0, "passed", True)
     assert (verdict["case"], verdict["result"]) == ("small", "r.vtkhdf")
     assert {"mesh", "solve", "checks", "write", "total"} <= verdict["seconds"].keys()
+    assert verdict["stage_cpu_seconds"].keys() == verdict["seconds"].keys() - {"total"}
+    assert verdict["matrix_entries"] > verdict["dofs"]
     assert verdict["macro_elements"] == 3
     assert (small / "out/r.vtkhdf").is_file()
     assert capsys.readouterr().out.splitlines()[-1].startswith("small: passed, worst error ")

@@ -56,6 +56,7 @@ class Factor:
 
     def __init__(self, name: str, solve: Solve, scale: np.ndarray, roughly: Solve | None = None):
         self.name = name
+        self.iterations = 0
         self._scale = scale
         self._solve: Solve | None = solve
         self._roughly = roughly or solve

@@ -64,7 +64,7 @@ def summary(project):
 
 
 # What differs from one run of the same solve to the next.
-TIMES = {"seconds", "cpu_seconds", "peak_memory_mb", "time_utc"}
+TIMES = {"seconds", "cpu_seconds", "stage_cpu_seconds", "peak_memory_mb", "time_utc"}
 
 
 def without_times(content):
