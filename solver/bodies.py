@@ -40,6 +40,12 @@ def rigid_motions(points: np.ndarray, body: np.ndarray) -> sparse.csc_matrix:
     return sparse.csc_matrix((values, (rows, columns)), shape=(n * dim, len(count) * per_body))
 
 
+def whole_motions(motions: sparse.csc_matrix, n_bodies: int) -> np.ndarray:
+    """Rigid motions (n_dofs, 3 or 6) of all bodies at once, each about its own centre."""
+    each = motions.shape[1] // n_bodies
+    return np.asarray(motions @ np.tile(np.eye(each), (n_bodies, 1)))
+
+
 def unsupported(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> sparse.csr_matrix:
     """The rigid motions (n_dofs, k) of each body that the supports leave free.
 

@@ -13,7 +13,7 @@ from solver.accuracy import (
     pressure_of_forces,
     pressure_of_gaps,
 )
-from solver.bodies import rigid_motions, unheld_motion, unsupported
+from solver.bodies import rigid_motions, unheld_motion, unsupported, whole_motions
 from solver.displacement import Displacement
 from solver.elasticity import cancellation, internal_force, stiffness
 from solver.errors import InputError, SolveError
@@ -25,6 +25,7 @@ from solver.linear.condensation import (
     saddle_point,
     solve,
 )
+from solver.linear.multigrid import Unknowns
 from solver.naming import body_names
 from solver.scene import Scene
 
@@ -177,6 +178,11 @@ class ContactProblem:
         return self._system[1].factor.name if self._system else "none"
 
     @property
+    def why_solver(self) -> str:
+        """Why that was chosen."""
+        return self._system[1].why if self._system else ""
+
+    @property
     def linear_iterations(self) -> int:
         """The most iterations that one solution of the last system took; 0 by a factor alone."""
         return self._system[1].factor.iterations if self._system else 0
@@ -303,7 +309,8 @@ class ContactProblem:
             constraints = (self.gaps[closed] @ self.scene.free.basis).tocsr()
             system: Constrained
             if self.has_own_unknowns:
-                system = condense(self.matrix, constraints, self._own_unknowns())
+                own, unknowns = self._own_unknowns(), self._unknowns()
+                system = condense(self.matrix, constraints, own, unknowns)
             else:
                 system = self._saddle_point(constraints)
             self._system = key, system
@@ -318,6 +325,13 @@ class ContactProblem:
                 f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
                 "another, as where they outnumber the slave nodes or supports hold these"
             ) from None
+
+    def _unknowns(self) -> Unknowns:
+        """What the free unknowns stand for."""
+        basis, dim = self.scene.free.basis.tocsc(), self.scene.points.shape[1]
+        node = basis.indices[basis.indptr[:-1]] // dim
+        motions = basis.T @ whole_motions(self.motions, int(self.scene.body.max()) + 1)
+        return Unknowns(dim, node, motions, self.scene.body[node])
 
     def _own_unknowns(self) -> np.ndarray:
         """Free unknowns (n_free,) that belong to slave nodes."""

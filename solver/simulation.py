@@ -125,10 +125,15 @@ def _recover(
         linear_solver=problem.linear_solver,
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
-        plan=made_plan(scene, states, problem.idle),
+        plan=[*made_plan(scene, states, problem.idle), _linear_solver(problem)],
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),
     )
+
+
+def _linear_solver(problem: ContactProblem) -> tuple[str, str]:
+    """A line of the plan: what solved the last system, and why that."""
+    return f"linear solver: {problem.linear_solver}", problem.why_solver
 
 
 def _output_mesh(scene: Scene) -> meshio.Mesh:

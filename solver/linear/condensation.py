@@ -12,7 +12,9 @@ import numpy as np
 from scipy import sparse
 
 from solver.errors import SolveError
-from solver.linear.direct import Factor, factorise, factorise_indefinite
+from solver.linear.choice import Chosen, prepare
+from solver.linear.direct import Factor, factorise_indefinite
+from solver.linear.multigrid import Unknowns
 
 # Each refinement must at least halve the residual, or it has reached round-off.
 _MIN_GAIN = 0.5
@@ -30,8 +32,12 @@ class Constrained(Protocol):
     """A factored system K x = f + Gᵀ p under constraints G x = b."""
 
     @property
-    def factor(self) -> Factor:
-        """The factor of the system that is solved."""
+    def factor(self) -> Chosen | Factor:
+        """What solves the system."""
+
+    @property
+    def why(self) -> str:
+        """Why that was chosen."""
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
@@ -59,8 +65,13 @@ class Condensed:
     expansion: sparse.csr_matrix
     pivot: np.ndarray
     coefficient: np.ndarray
-    factor: Factor
+    factor: Chosen
     matrix: sparse.csr_matrix
+
+    @property
+    def why(self) -> str:
+        """Why that was chosen."""
+        return self.factor.why
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
@@ -93,6 +104,7 @@ class Saddle:
     size: np.ndarray
     weight: float
     factor: Factor
+    why: str = "constraints without an unknown of their own leave a saddle point"
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
@@ -150,9 +162,14 @@ def choose_pivots(
 
 
 def condense(
-    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, own: np.ndarray
+    matrix: sparse.csr_matrix,
+    constraints: sparse.csr_matrix,
+    own: np.ndarray,
+    unknowns: Unknowns,
 ) -> Condensed:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
+
+    `own` (n,) marks what may be eliminated, `unknowns` tells what each is.
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
@@ -174,7 +191,8 @@ def condense(
         among = among + coupling + coupling.T + follow.T @ (matrix[pivot][:, pivot] @ follow)
     else:
         among = matrix
-    return Condensed(expansion, pivot, coefficient, factorise(among.tocsr()), matrix)
+    factor = prepare(among.tocsr(), unknowns.of(kept_columns))
+    return Condensed(expansion, pivot, coefficient, factor, matrix)
 
 
 def _expansion(

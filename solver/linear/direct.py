@@ -13,6 +13,7 @@ iterative refinement in the same way).
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -20,6 +21,7 @@ from scipy.sparse import csr_matrix, sparray, spmatrix
 
 from solver.errors import SolveError
 from solver.linear.backends import BACKENDS, Backend, BreakdownError, Solve
+from solver.linear.krylov import ROUGH, conjugate_gradients, in_single
 
 LIGHT = 150_000
 """Stored entries up to which CHOLMOD is quickest in 3D (in 2D it always is, in processor time)."""
@@ -33,14 +35,12 @@ SINGULAR_INDEFINITE = 1e-12
 TRUSTED_SINGLE = 1e-6
 """The same for a factor in single precision; below it the factor is made in double precision."""
 MAX_ITERATIONS = 50
-ROUGH = 1e-9
-"""Residual, over the right-hand side, of a solution that is going to be refined."""
 _auto: ContextVar[str] = ContextVar("auto", default="auto")
 
 
 @contextmanager
 def standing_for_auto(kind: str) -> Iterator[None]:
-    """Within the block `auto` stands for `kind`, the name of a solver.
+    """Within the block `auto` stands for `kind`, the name of a solver, or `multigrid`.
 
     Raises SolveError there for a solver that is not installed, or not for that kind of matrix.
     """
@@ -49,6 +49,11 @@ def standing_for_auto(kind: str) -> Iterator[None]:
         yield
     finally:
         _auto.reset(token)
+
+
+def wanted() -> str:
+    """What `auto` stands for at present: `auto`, or the name of a solver."""
+    return _auto.get()
 
 
 class Factor:
@@ -142,12 +147,13 @@ def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Fact
 def _choose(kind: str, order: tuple[str, ...]) -> Backend:
     if kind != "auto":
         return BACKENDS[kind]
-    if (wanted := _auto.get()) != "auto":
-        if wanted not in (*order, "superlu"):
-            raise SolveError(f"{BACKENDS[wanted].name} factors positive definite matrices only")
-        if not BACKENDS[wanted].available():
-            raise SolveError(f"{BACKENDS[wanted].name} is not installed")
-        return BACKENDS[wanted]
+    # Multigrid makes no factor: where one is needed all the same, the best will do.
+    if (asked := wanted()) in BACKENDS:
+        if asked not in (*order, "superlu"):
+            raise SolveError(f"{BACKENDS[asked].name} factors positive definite matrices only")
+        if not BACKENDS[asked].available():
+            raise SolveError(f"{BACKENDS[asked].name} is not installed")
+        return BACKENDS[asked]
     return next(BACKENDS[name] for name in (*order, "superlu") if BACKENDS[name].available())
 
 
@@ -176,55 +182,16 @@ def _factorise_single(backend: Backend, upper: csr_matrix, scale: np.ndarray) ->
     except BreakdownError:
         return None
 
-    def precondition(right: np.ndarray) -> np.ndarray:
-        # Lifted to order one: single precision has few exponents.
-        size = np.abs(right).max(axis=0)
-        size[size == 0] = 1.0
-        return rough((right / size).astype(np.float32)) * size
-
+    precondition = in_single(rough)
     if not _smallest_eigenvalue(precondition, upper.shape[0]) > TRUSTED_SINGLE:
         return None
 
     def solve(right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
-        return conjugate_gradients(lambda x: _multiply(upper, x), precondition, right, accuracy)
+        multiply = partial(_multiply, upper)
+        return conjugate_gradients(multiply, precondition, right, accuracy, MAX_ITERATIONS)[0]
 
     name = f"{backend.name}, single precision in conjugate gradients"
     return Factor(name, solve, scale, lambda right: solve(right, ROUGH))
-
-
-def conjugate_gradients(
-    multiply: Solve, precondition: Solve, right: np.ndarray, accuracy: float = EPSILON
-) -> np.ndarray:
-    """Solve for all columns at once; the residual falls to `accuracy` of the right-hand side.
-
-    The flexible form (Golub and Ye, SIAM J. Sci. Comput. 21 (1999) 1305): the preconditioner is
-    rounded, so it is linear only to single precision.
-    """
-    solution, residual = np.zeros_like(right), right.copy()
-    target = accuracy * np.linalg.norm(right, axis=0)
-    improved = precondition(residual)
-    direction = improved
-    energy = np.sum(residual * improved, axis=0)
-    for _ in range(MAX_ITERATIONS):
-        image = multiply(direction)
-        step = _ratio(energy, np.sum(direction * image, axis=0))
-        solution += step * direction
-        residual = residual - step * image
-        if (np.linalg.norm(residual, axis=0) <= target).all():
-            return solution
-        previous, improved = improved, precondition(residual)
-        change = np.sum(residual * (improved - previous), axis=0)
-        direction = improved + _ratio(change, energy) * direction
-        energy = np.sum(residual * improved, axis=0)
-    raise SolveError(
-        f"conjugate gradients with a factor in single precision do not reach round-off in "
-        f"{MAX_ITERATIONS} iterations"
-    )
-
-
-def _ratio(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
-    # A column that is solved exactly has nothing left to divide by.
-    return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > 0)
 
 
 def _smallest_eigenvalue(solve: Solve, size: int) -> float:

@@ -1,0 +1,81 @@
+"""The linear solver that a positive definite system gets, by its size and dimension."""
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from solver.errors import SolveError
+from solver.linear.direct import Factor, factorise, wanted
+from solver.linear.multigrid import Multigrid, Unknowns
+
+MULTIGRID = "multigrid"
+MULTIGRID_FROM = 80_000
+"""Unknowns in 3D from which multigrid takes less time, and less memory, than a factor."""
+
+
+class Chosen:
+    """What solves one system, as often as wanted: `name`, and `why` it was chosen.
+
+    Multigrid gives way to a factor once it does not converge: thin cells, nearly incompressible
+    material.
+    """
+
+    def __init__(self, matrix: csr_matrix, dim: int, solver: Factor | Multigrid, why: str):
+        self._matrix, self._dim, self._solver, self.why = matrix, dim, solver, why
+
+    @property
+    def name(self) -> str:
+        """By what."""
+        return self._solver.name
+
+    @property
+    def iterations(self) -> int:
+        """The most that one solution took so far; 0 by a factor alone."""
+        return self._solver.iterations
+
+    def solve(self, right: np.ndarray, roughly: bool = False) -> np.ndarray:
+        """Solve for `right` (n,) or (n, k); `roughly` as far as is quick, for who refines.
+
+        Raises SolveError where the solution is not finite or the iterations do not converge.
+        """
+        try:
+            return self._solver.solve(right, roughly)
+        except SolveError as error:
+            if not isinstance(self._solver, Multigrid):
+                raise
+            self.why = _instead(error)
+        self._solver.close()
+        self._solver = factorise(self._matrix, dim=self._dim)
+        return self._solver.solve(right, roughly)
+
+
+def prepare(matrix: csr_matrix, unknowns: Unknowns) -> Chosen:
+    """Make ready to solve with a symmetric positive definite `matrix` (n, n), both halves stored.
+
+    Raises SolveError where the matrix is not positive definite or singular to working precision;
+    a singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
+    """
+    dim, kind = unknowns.dim, wanted()
+    why = _against_multigrid(matrix.shape[0], dim) if kind == "auto" else "as asked for"
+    if kind == MULTIGRID or not why:
+        why = (
+            why or f"{MULTIGRID_FROM} unknowns or more in space: quicker and smaller than a factor"
+        )
+        try:
+            return Chosen(matrix, dim, Multigrid(matrix, unknowns), why)
+        except SolveError as error:
+            # A factor decides whether the matrix is to blame.
+            why = _instead(error)
+    return Chosen(matrix, dim, factorise(matrix, dim=dim), why)
+
+
+def _against_multigrid(size: int, dim: int) -> str:
+    """Why a system of `size` unknowns is factored; empty where it is not."""
+    if dim == 2:
+        return "in the plane a factor is small"
+    if size < MULTIGRID_FROM:
+        return f"fewer than {MULTIGRID_FROM} unknowns: a factor is quicker than multigrid"
+    return ""
+
+
+def _instead(error: SolveError) -> str:
+    return f"multigrid does not serve here: {error}"

@@ -1,0 +1,257 @@
+"""Algebraic multigrid for large 3D elasticity: smoothed aggregation within conjugate gradients.
+
+Nodes are gathered into aggregates, the rigid motions of which are what is unknown on the next level
+(Vanek, Mandel, Brezina, Computing 56 (1996) 179). Every level is scaled to a diagonal of at most
+one and kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes,
+Numer. Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in
+double precision take the solution to round-off.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh_tridiagonal
+from scipy.sparse import bsr_matrix, csr_matrix
+
+from solver.errors import SolveError
+from solver.linear.krylov import ROUGH, conjugate_gradients, in_single
+
+COARSEST = 600
+"""Unknowns at which the hierarchy ends: that level is inverted as a dense matrix."""
+LARGEST_DENSE = 4_000
+"""More unknowns than this where the aggregates no longer grow: multigrid is of no use."""
+MAX_ITERATIONS = 150
+ROUND_OFF = 1e-15
+# Lottes' optimised weights of the polynomial of degree two.
+_FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
+# The iteration approaches the largest eigenvalue from below.
+_SAFETY = 1.05
+_SMOOTHED = 4 / 3
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """What the unknowns of a system stand for, in a space of `dim` dimensions.
+
+    `node` (n,): the node that each belongs to, at most `dim` to a node; `motions` (n, 3 or 6): the
+    rigid motions, in these unknowns; `body` (n,): the number of the body. Bodies that slide on each
+    other share no aggregate.
+    """
+
+    dim: int
+    node: np.ndarray
+    motions: np.ndarray
+    body: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> "Unknowns":
+        """What some of them stand for."""
+        return Unknowns(self.dim, self.node[chosen], self.motions[chosen], self.body[chosen])
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level: scaled matrix, bound of its eigenvalues, and the ways to and from the next."""
+
+    matrix: bsr_matrix
+    bound: np.float32
+    prolongation: bsr_matrix
+    restriction: bsr_matrix
+
+    def smooth(self, residual: np.ndarray) -> np.ndarray:
+        """The correction that the polynomial in the matrix makes of a residual (n, k)."""
+        step = residual * (np.float32(4 / 3) / self.bound)
+        residual = residual - self.matrix @ step
+        change = _FIRST * step
+        step *= np.float32(1 / 5)
+        step += residual * (np.float32(12 / 5) / self.bound)
+        return change + _SECOND * step
+
+
+class Multigrid:
+    """A hierarchy for one matrix. `iterations`: the most that a solve has taken so far."""
+
+    def __init__(self, matrix: csr_matrix, unknowns: Unknowns):
+        """Set up for a symmetric positive definite `matrix` (n, n), both halves stored.
+
+        Raises SolveError where the diagonal is not positive or nothing coarsens.
+        """
+        diagonal = matrix.diagonal()
+        if not (diagonal > 0).all():
+            raise SolveError("the matrix is not positive definite: its diagonal is not positive")
+        self.iterations = 0
+        self._matrix = matrix
+        self._scale = 1 / np.sqrt(diagonal)[:, None]
+        self._place, body = _places(unknowns)
+        motions = np.zeros((3 * len(body), unknowns.motions.shape[1]))
+        motions[self._place] = unknowns.motions / self._scale
+        blocks = _in_blocks(matrix, self._scale[:, 0], self._place, 3 * len(body))
+        blocks, motions, scale = _scaled(blocks, motions)
+        self._scale *= scale[self._place, None]
+        self._levels, self._coarsest = _hierarchy(blocks, motions, body)
+        self._padded = 3 * len(body)
+        self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
+
+    def solve(self, right: np.ndarray, roughly: bool = False) -> np.ndarray:
+        """Solve for `right` (n,) or (n, k), to round-off or `roughly` to `ROUGH` of it.
+
+        In 2-norms of the system scaled to a diagonal of at most one. Raises SolveError where
+        `MAX_ITERATIONS` do not lead there, or will not, and where the solution is not finite.
+        """
+        columns = np.asarray(right, dtype=float)
+        columns = columns if columns.ndim == 2 else columns[:, None]
+        solution, iterations = conjugate_gradients(
+            lambda x: self._scale * (self._matrix @ (self._scale * x)),
+            in_single(self._cycle),
+            self._scale * columns,
+            ROUGH if roughly else ROUND_OFF,
+            MAX_ITERATIONS,
+        )
+        if not np.isfinite(solution).all():
+            raise SolveError(f"the solution by {self.name} is not finite")
+        self.iterations = max(self.iterations, iterations)
+        return (self._scale * solution).reshape(np.shape(right))
+
+    def close(self) -> None:
+        """Release the hierarchy; it solves no more."""
+        self._levels = []
+
+    def _cycle(self, residual: np.ndarray) -> np.ndarray:
+        padded = np.zeros((self._padded, residual.shape[1]), dtype=np.float32)
+        padded[self._place] = residual
+        return self._descend(0, padded)[self._place]
+
+    def _descend(self, depth: int, residual: np.ndarray) -> np.ndarray:
+        """One V-cycle from a level down."""
+        if depth == len(self._levels):
+            return self._coarsest @ residual
+        level = self._levels[depth]
+        change = level.smooth(residual)
+        coarse = level.restriction @ (residual - level.matrix @ change)
+        change += level.prolongation @ self._descend(depth + 1, coarse)
+        change += level.smooth(residual - level.matrix @ change)
+        return change
+
+
+def _places(unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
+    """Row (n,) of each unknown when every node has three, and the body of each such node."""
+    _, first, number, count = np.unique(
+        unknowns.node, return_index=True, return_inverse=True, return_counts=True
+    )
+    order = np.argsort(number, kind="stable")
+    rank = np.empty(len(number), dtype=int)
+    rank[order] = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
+    return 3 * number + rank, unknowns.body[first]
+
+
+def _in_blocks(matrix: csr_matrix, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
+    """The scaled matrix in single precision and blocks of three; rows without unknown are zero."""
+    values = matrix.data * np.repeat(scale, np.diff(matrix.indptr))
+    values *= scale[matrix.indices]
+    order = np.argsort(place)
+    scaled = csr_matrix((values.astype(np.float32), matrix.indices, matrix.indptr), matrix.shape)
+    if (np.diff(order) != 1).any():
+        scaled = scaled[order]
+    starts = np.zeros(size + 1, dtype=scaled.indptr.dtype)
+    starts[place[order] + 1] = np.diff(scaled.indptr)
+    np.cumsum(starts, out=starts)
+    columns = place.astype(scaled.indices.dtype)[scaled.indices]
+    return csr_matrix((scaled.data, columns, starts), shape=(size, size)).tobsr((3, 3))
+
+
+def _hierarchy(
+    matrix: bsr_matrix, motions: np.ndarray, body: np.ndarray
+) -> tuple[list[Level], np.ndarray]:
+    """The levels below a scaled matrix, and the inverse of the last."""
+    levels: list[Level] = []
+    while matrix.shape[0] > COARSEST:
+        bound = np.float32(_SAFETY * _largest_eigenvalue(matrix))
+        tentative, coarse_motions, coarse_body = _aggregate(matrix, motions, body)
+        if tentative.nnz == 0 or 2 * tentative.shape[1] > matrix.shape[0]:
+            break
+        smoothed = (tentative - matrix @ tentative * np.float32(_SMOOTHED / bound)).tobsr(
+            tentative.blocksize
+        )
+        width = tentative.blocksize[1]
+        restriction = smoothed.T.tobsr((width, tentative.blocksize[0]))
+        coarse = (restriction @ (matrix @ smoothed)).tobsr((width, width))
+        coarse, motions, scale = _scaled(coarse, coarse_motions)
+        _scale_blocks(smoothed, np.ones(smoothed.shape[0]), scale)
+        _scale_blocks(restriction, scale, np.ones(smoothed.shape[0]))
+        levels.append(Level(matrix, bound, smoothed, restriction))
+        matrix, body = coarse, coarse_body
+    if matrix.shape[0] > LARGEST_DENSE:
+        raise SolveError(f"multigrid ends at {matrix.shape[0]} unknowns: nothing coarsens further")
+    dense = matrix.toarray().astype(float)
+    inverse = np.linalg.pinv((dense + dense.T) / 2, rcond=1e-7, hermitian=True)
+    return levels, inverse.astype(np.float32)
+
+
+def _aggregate(
+    matrix: bsr_matrix, motions: np.ndarray, body: np.ndarray
+) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
+    """Tentative prolongation, and the motions and body of the aggregates.
+
+    Its columns are the motions of each aggregate, orthonormalised.
+    """
+    from pyamg.aggregation import (
+        fit_candidates,
+        standard_aggregation,
+    )
+
+    count = len(body)
+    rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
+    within = body[rows] == body[matrix.indices]
+    starts = np.zeros(count + 1, dtype=np.int32)
+    np.cumsum(np.bincount(rows[within], minlength=count), out=starts[1:])
+    columns = matrix.indices[within].astype(np.int32)
+    graph = csr_matrix((np.ones(len(columns)), columns, starts), shape=(count, count))
+    aggregates, _ = standard_aggregation(graph)
+    tentative, coarse = fit_candidates(aggregates, motions)
+    members = aggregates.tocoo()
+    coarse_body = np.zeros(aggregates.shape[1], dtype=body.dtype)
+    coarse_body[members.col] = body[members.row]
+    return bsr_matrix(tentative, dtype=np.float32), coarse, coarse_body
+
+
+def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
+    """Matrix and motions scaled to a diagonal of at most one, and the scale (n,).
+
+    Rows whose entries add up to more than the typical sum are scaled down further: otherwise the
+    few at a contact surface would set the bound of the eigenvalues for all. Zero rows, unknowns
+    that are not there, stay zero.
+    """
+    size = matrix.blocksize[0]
+    diagonal = matrix.diagonal().astype(float)
+    there = diagonal > 0
+    scale = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
+    weights = scale.astype(np.float32).reshape(-1, size)[matrix.indices]
+    inner = np.matmul(np.abs(matrix.data), weights[:, :, None])[:, :, 0]
+    sums = scale * np.add.reduceat(inner, matrix.indptr[:-1], axis=0).ravel()
+    scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
+    _scale_blocks(matrix, scale, scale)
+    return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
+
+
+def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> None:
+    """Multiply rows and columns, in place."""
+    height, width = matrix.blocksize
+    rows = np.repeat(left.astype(np.float32).reshape(-1, height), np.diff(matrix.indptr), axis=0)
+    matrix.data *= rows[:, :, None]
+    matrix.data *= right.astype(np.float32).reshape(-1, width)[matrix.indices][:, None, :]
+
+
+def _largest_eigenvalue(matrix: bsr_matrix, steps: int = 10) -> float:
+    """Largest eigenvalue by Lanczos' iteration, from below."""
+    vector = np.random.default_rng(0).uniform(-1, 1, matrix.shape[0]).astype(np.float32)
+    vector /= np.linalg.norm(vector)
+    previous = np.zeros_like(vector)
+    diagonal, beside = [], [np.float32(0)]
+    for _ in range(steps):
+        image = matrix @ vector - beside[-1] * previous
+        diagonal.append(np.float32(vector @ image))
+        image -= diagonal[-1] * vector
+        beside.append(np.float32(np.linalg.norm(image)))
+        if beside[-1] < 1e-5:
+            break
+        previous, vector = vector, image / beside[-1]
+    return float(eigh_tridiagonal(diagonal, beside[1 : len(diagonal)], eigvals_only=True)[-1])

@@ -1,0 +1,198 @@
+"""Multigrid on blocks of HEXA8: solutions known beforehand, iterations, and when it gives way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.sparse import block_diag, csr_matrix, eye
+
+from solver.elasticity import Block, lame_parameters, stiffness
+from solver.errors import SolveError
+from solver.linear import choice
+from solver.linear.direct import standing_for_auto
+from solver.linear.multigrid import Multigrid, Unknowns
+from solver.mesh.catalogue import BY_NAME
+
+
+def block(count: int, stretch: float = 1.0, poisson: float = 0.3) -> tuple[np.ndarray, csr_matrix]:
+    """Points (n, 3) and stiffness of a unit cube of count³ cells, stretched along z."""
+    ticks = np.arange(count + 1)
+    points = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    i, j, k = points[(points < count).all(axis=1)].T
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    corners += [(a, b, 1) for a, b, _ in corners]
+    side = count + 1
+    cells = np.stack([((i + a) * side + j + b) * side + k + c for a, b, c in corners], axis=1)
+    lame, shear = lame_parameters(np.full(len(cells), 2000.0), np.full(len(cells), poisson))
+    points = points / count * [1.0, 1.0, stretch]
+    return points, stiffness(points, [Block(BY_NAME["HEXA8"], cells, lame, shear)])
+
+
+def motions(points: np.ndarray) -> np.ndarray:
+    """Three translations and three rotations (3n, 6)."""
+    rotations = [np.cross(axis, points) for axis in np.eye(3)]
+    shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(3)]
+    return np.stack([m.ravel() for m in shifts + rotations], axis=1)
+
+
+def held(points: np.ndarray, matrix: csr_matrix, free: np.ndarray, body: np.ndarray):
+    """The system of the free unknowns, and what they stand for."""
+    kept = np.flatnonzero(free.ravel())
+    unknowns = Unknowns(3, kept // 3, motions(points)[kept], body[kept // 3])
+    return csr_matrix(matrix[kept][:, kept]), unknowns
+
+
+def clamped(count: int, **options: float):
+    points, matrix = block(count, **options)
+    free = np.repeat(points[:, 2:] > 0, 3, axis=1)
+    return held(points, matrix, free, np.zeros(len(points), dtype=int))
+
+
+def on_rollers(count: int):
+    """Three symmetry planes: nodes on them have one, two or no unknowns."""
+    points, matrix = block(count)
+    return held(points, matrix, points > 0, np.zeros(len(points), dtype=int))
+
+
+def two_blocks(count: int):
+    """One block sliding on another: their facing nodes share the vertical displacement."""
+    points, matrix = block(count)
+    n = len(points)
+    both, top = block_diag([matrix, matrix]).tocsr(), np.flatnonzero(points[:, 2] == 1)
+    bottom = n + np.flatnonzero(points[:, 2] == 0)
+    follow = eye(6 * n, format="lil")
+    follow[3 * bottom + 2, 3 * bottom + 2] = 0
+    follow[3 * bottom + 2, 3 * top + 2] = 1
+    follow = follow.tocsr()
+    free = np.concatenate([points > 0, points > [0, 0, -1]])
+    free[bottom, 2] = False
+    body = np.repeat([0, 1], n)
+    stacked = np.concatenate([points, points + np.array([0, 0, 1])])
+    return held(stacked, follow.T @ both @ follow, free, body)
+
+
+@pytest.mark.parametrize("system", [clamped, on_rollers, two_blocks])
+def test_manufactured_solution_in_few_iterations(system):
+    matrix, unknowns = system(8)
+    exact = np.random.default_rng(0).standard_normal((matrix.shape[0], 2))
+    solver = Multigrid(matrix, unknowns)
+    solution = solver.solve(matrix @ exact)
+    np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-11)
+    assert solver.iterations <= 40
+    single = solver.solve(matrix @ exact[:, 1])
+    np.testing.assert_allclose(single, exact[:, 1], rtol=0, atol=1e-11)
+
+
+def test_iterations_hardly_grow_with_the_mesh():
+    iterations = []
+    for count in (8, 16):
+        matrix, unknowns = clamped(count)
+        solver = Multigrid(matrix, unknowns)
+        solver.solve(np.ones(matrix.shape[0]))
+        iterations.append(solver.iterations)
+    assert iterations[1] <= iterations[0] + 8
+
+
+def test_bodies_that_slide_share_no_aggregate():
+    """Aggregates across the contact surface cannot slide: many more iterations."""
+    matrix, unknowns = two_blocks(8)
+    glued = Unknowns(3, unknowns.node, unknowns.motions, np.zeros_like(unknowns.body))
+    apart, across = Multigrid(matrix, unknowns), Multigrid(matrix, glued)
+    right = np.ones(matrix.shape[0])
+    np.testing.assert_allclose(apart.solve(right), across.solve(right), rtol=1e-10)
+    assert apart.iterations < across.iterations
+
+
+def test_order_and_units_of_the_unknowns_do_not_matter():
+    matrix, unknowns = on_rollers(8)
+    exact = np.random.default_rng(1).standard_normal(matrix.shape[0])
+    order = np.random.default_rng(2).permutation(matrix.shape[0])
+    shuffled = Unknowns(3, unknowns.node[order], unknowns.motions[order], unknowns.body[order])
+    solver = Multigrid(1e-12 * matrix[order][:, order], shuffled)
+    solution = solver.solve(1e-12 * (matrix @ exact)[order])
+    np.testing.assert_allclose(solution, exact[order], rtol=0, atol=1e-11)
+
+
+def test_zero_right_hand_side():
+    matrix, unknowns = clamped(6)
+    solver = Multigrid(matrix, unknowns)
+    np.testing.assert_array_equal(solver.solve(np.zeros(matrix.shape[0])), 0.0)
+
+
+def test_diagonal_that_is_not_positive_is_refused():
+    matrix, unknowns = clamped(6)
+    matrix[0, 0] = 0.0
+    with pytest.raises(SolveError, match="not positive definite"):
+        Multigrid(matrix, unknowns)
+
+
+def test_rough_solution_is_as_rough_as_promised():
+    matrix, unknowns = clamped(8)
+    right = np.random.default_rng(3).standard_normal(matrix.shape[0])
+    solver = Multigrid(matrix, unknowns)
+    rough, exact = solver.solve(right, roughly=True), solver.solve(right)
+    assert np.linalg.norm(rough - exact) < 1e-6 * np.linalg.norm(exact)
+    assert (rough != exact).any()
+
+
+def test_nodes_without_neighbours_do_not_coarsen():
+    count = 4500
+    node = np.arange(count) // 3
+    unknowns = Unknowns(3, node, np.ones((count, 6)), np.zeros(count, dtype=int))
+    with pytest.raises(SolveError, match="multigrid ends at 4500 unknowns: nothing coarsens"):
+        Multigrid(csr_matrix(eye(count)), unknowns)
+
+
+def test_right_hand_side_that_is_no_number():
+    matrix, unknowns = clamped(6)
+    with pytest.raises(SolveError, match=r"the solution by conjugate gradients .* is not finite"):
+        Multigrid(matrix, unknowns).solve(np.full(matrix.shape[0], np.nan))
+
+
+def test_choice_by_size_and_dimension(monkeypatch):
+    matrix, unknowns = clamped(6)
+    monkeypatch.setattr(choice, "MULTIGRID_FROM", matrix.shape[0])
+    large = choice.prepare(matrix, unknowns)
+    assert "multigrid" in large.name
+    assert "unknowns or more in space" in large.why
+    plane = choice.prepare(matrix, replace(unknowns, dim=2))
+    assert "multigrid" not in plane.name
+    assert "plane" in plane.why
+    monkeypatch.setattr(choice, "MULTIGRID_FROM", matrix.shape[0] + 1)
+    small = choice.prepare(matrix, unknowns)
+    assert "multigrid" not in small.name
+    assert "fewer than" in small.why
+
+
+def test_choice_as_asked_for():
+    matrix, unknowns = clamped(6)
+    for kind, name in (("multigrid", "multigrid"), ("superlu", "SuperLU")):
+        with standing_for_auto(kind):
+            chosen = choice.prepare(matrix, unknowns)
+        assert name in chosen.name
+        assert chosen.why == "as asked for"
+
+
+@pytest.mark.parametrize("options", [{"poisson": 0.49999}, {"stretch": 100.0}])
+def test_a_factor_takes_over_where_multigrid_does_not_converge(options):
+    matrix, unknowns = clamped(8, **options)
+    with pytest.raises(SolveError, match="conjugate gradients leave a residual"):
+        Multigrid(matrix, unknowns).solve(np.ones(matrix.shape[0]))
+    exact = np.ones(matrix.shape[0])
+    with standing_for_auto("multigrid"):
+        chosen = choice.prepare(matrix, unknowns)
+        assert "multigrid" in chosen.name
+        np.testing.assert_allclose(chosen.solve(matrix @ exact), exact, rtol=1e-6)
+    assert "multigrid" not in chosen.name
+    assert "conjugate gradients leave a residual" in chosen.why
+
+
+def test_free_body_is_refused():
+    points, matrix = block(6)
+    everything = np.ones_like(points, dtype=bool)
+    matrix, unknowns = held(points, matrix, everything, np.zeros(len(points), dtype=int))
+    with (
+        standing_for_auto("multigrid"),
+        pytest.raises(SolveError, match=r"singular|not positive definite"),
+    ):
+        choice.prepare(matrix, unknowns).solve(np.ones(matrix.shape[0]))
