@@ -97,7 +97,7 @@ def test_refused_input_is_2_with_one_line(small, capsys, old, new, message):
 
 
 def _raising(error):
-    def simulate(*_):
+    def simulate(*_, **__):
         raise error
 
     return simulate
