@@ -16,8 +16,8 @@ INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report orders study stability infsup test accept format lint lock
-.PHONY: faults mutants kills bill clean clean-all
+.PHONY: help all-cases family case report summary orders study stability infsup test accept
+.PHONY: format lint lock faults mutants kills bill clean clean-all
 .PHONY: environment study-environment test-environment lint-environment
 
 help: ## list the targets
@@ -39,6 +39,10 @@ case: environment ## solve one case again, then report: make case CASE=ssnp170-e
 
 report: environment ## write the report again from the results there are
 	@$(SNAKEMAKE) report
+
+summary: ## print the last report's table, as Markdown
+	@cat results/report/summary.md 2>/dev/null \
+	  || { echo "make summary: there is no report yet; make all-cases writes it" >&2; exit 2; }
 
 orders: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
 orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…

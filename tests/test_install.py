@@ -179,6 +179,19 @@ def test_gmsh_loads_here():
     assert libraries.failure(Path(sys.prefix)) == ""
 
 
+@pytest.mark.parametrize("missing", [[], ["libGLU.so.1"]])
+def test_an_environment_out_of_a_cache_is_completed_on_this_system(monkeypatch, missing):
+    done = []
+    monkeypatch.setattr(sys, "argv", ["install", "run"])
+    monkeypatch.setattr(environment, "current", lambda groups: True)
+    monkeypatch.setattr(environment, "complete", lambda: True)
+    monkeypatch.setattr(environment, "stamp", lambda groups, complete: done.append("stamp"))
+    monkeypatch.setattr(libraries, "missing", lambda venv: missing)
+    monkeypatch.setattr(libraries, "provide", lambda venv: done.append("provide"))
+    runpy.run_path(str(ROOT / "workflow" / "install"), run_name="__main__")
+    assert done == (["provide", "stamp"] if missing else [])
+
+
 @pytest.fixture
 def library(tmp_path) -> Path:
     """A small shared library, to be changed at will."""

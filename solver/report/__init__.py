@@ -22,6 +22,7 @@ def write_report(
     """
     from solver.files import write_text
     from solver.report import tables
+    from solver.report.junit import to_junit
     from solver.report.page import family_page, main_page
     from solver.report.rows import read_rows
     from solver.report.sections import sections
@@ -35,7 +36,7 @@ def write_report(
         "summary.json": tables.to_json(rows),
         "summary.csv": tables.to_csv(rows),
         "summary.md": tables.to_markdown(rows),
-        "junit.xml": tables.to_junit(rows),
+        "junit.xml": to_junit(rows),
         "failures.txt": tables.to_failures(rows),
         **{part.page: family_page(part, folder) for part in parts},
     }

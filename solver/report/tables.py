@@ -1,10 +1,9 @@
-"""The report for machines and terminals: JSON, CSV, Markdown, JUnit XML, the list of failures."""
+"""The report for machines and terminals: JSON, CSV, Markdown, the list of failures."""
 
 import csv
 import io
 import json
 import re
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -137,53 +136,6 @@ def _md(text: str) -> str:
     """Text that Markdown, and the HTML made of it, shows as it is."""
     text = " ".join(str(text).split()).replace("&", "&amp;").replace("<", "&lt;")
     return re.sub(r"([\\|`*_\[\]])", r"\\\1", text.replace(">", "&gt;"))
-
-
-def to_junit(rows: Sequence[Row]) -> str:
-    """JUnit XML: a suite for each family; refused and crashed solves are errors, not failures."""
-    suites = ET.Element("testsuites", _junit_counts(rows))
-    for family, members in families(rows).items():
-        suite = ET.SubElement(suites, "testsuite", {"name": _xml(family)} | _junit_counts(members))
-        for row in members:
-            case = ET.SubElement(
-                suite,
-                "testcase",
-                {
-                    "classname": _xml(family),
-                    "name": _xml(row.name),
-                    "time": f"{row.total or 0:.3f}",
-                },
-            )
-            if row.word != "passed":
-                tag = "failure" if row.word in ("failed", "unreliable") else "error"
-                ending = ET.SubElement(case, tag, {"type": row.word, "message": _xml(row.why)})
-                ending.text = _xml(_failed_checks(row))
-    ET.indent(suites)
-    return ET.tostring(suites, encoding="unicode", xml_declaration=True) + "\n"
-
-
-def _junit_counts(rows: Sequence[Row]) -> dict[str, str]:
-    words = [row.word for row in rows]
-    return {
-        "tests": str(len(words)),
-        "failures": str(sum(word in ("failed", "unreliable") for word in words)),
-        "errors": str(sum(word in ("refused", "crashed") for word in words)),
-        "time": f"{sum(row.total or 0 for row in rows):.3f}",
-    }
-
-
-def _failed_checks(row: Row) -> str:
-    failed = [check for check in row.checks or () if not check["passed"]]
-    return "\n".join(
-        f"{check['name']}{' ' + check['zone'] if check['zone'] else ''}: error "
-        f"{formats.error(check['error'])}, tolerance {formats.error(check['tolerance'])}"
-        for check in failed
-    )
-
-
-def _xml(text: str) -> str:
-    """Text without the characters that XML does not allow at all."""
-    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "�", text)
 
 
 def to_failures(rows: Sequence[Row]) -> str:

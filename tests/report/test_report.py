@@ -200,9 +200,10 @@ def test_failures_come_first_then_names_in_their_natural_order(report):
 def test_junit_tells_failures_from_errors(report):
     folder, _ = report
     suites = ET.parse(folder / "junit.xml").getroot()
-    assert suites.get("tests") == "8"
-    assert suites.get("failures") == "2"
-    assert suites.get("errors") == "4"
+    [suite] = suites
+    assert suite.get("tests") == "8"
+    assert suite.get("failures") == "2"
+    assert suite.get("errors") == "4"
     ending = {case.get("name"): [e.tag for e in case] for case in suites.iter("testcase")}
     assert ending["fam-a2"] == []
     assert ending["fam-bad"] == ending["fam-odd"] == ["failure"]

@@ -37,7 +37,8 @@ def main() -> None:
         if not environment.current(groups):
             environment.install(groups)
             environment.stamp(groups)
-        if not environment.complete():
+        # An environment out of a cache may have been completed on another system.
+        if not environment.complete() or libraries.missing(environment.VENV):
             libraries.provide(environment.VENV)
             environment.stamp(groups, complete=True)
     except InstallError as error:

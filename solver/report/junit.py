@@ -1,0 +1,93 @@
+"""The report as JUnit XML, which CI servers read.
+
+There is no standard of it, but two schemas that most readers and checkers go by: that of Ant's
+task (strict: every attribute is asked for, and no other is allowed) and that of Jenkins. What is
+written here holds under both.
+"""
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from solver.report import formats
+from solver.report.rows import Row, counted, families
+
+_FAILURES = ("failed", "unreliable")
+# Of the provenance of a suite's solves, what tells one run from another.
+_PROPERTIES = ("revision", "cpu", "cores", "platform", "python", "numpy", "scipy", "scikit-fem")
+
+
+def to_junit(rows: Sequence[Row]) -> str:
+    """A suite for each family; refused and crashed solves are errors, the others failures."""
+    suites = ET.Element("testsuites")
+    for number, (family, members) in enumerate(families(rows).items()):
+        suites.append(_suite(number, family, members))
+    ET.indent(suites)
+    return ET.tostring(suites, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _suite(number: int, family: str, rows: Sequence[Row]) -> ET.Element:
+    counts = counted(rows)
+    attributes = {
+        "id": str(number),
+        "package": _xml(family),
+        "name": _xml(family),
+        "timestamp": _started(rows),
+        "hostname": "localhost",  # a result does not tell
+        "tests": str(len(rows)),
+        "failures": str(sum(counts.get(word, 0) for word in _FAILURES)),
+        "errors": str(sum(n for word, n in counts.items() if word not in (*_FAILURES, "passed"))),
+        "time": f"{sum(row.total or 0 for row in rows):.3f}",
+    }
+    suite = ET.Element("testsuite", attributes)
+    properties = ET.SubElement(suite, "properties")
+    for name, value in _properties(rows).items():
+        ET.SubElement(properties, "property", {"name": name, "value": _xml(value)})
+    suite.extend(_case(row) for row in rows)
+    ET.SubElement(suite, "system-out")
+    ET.SubElement(suite, "system-err")
+    return suite
+
+
+def _case(row: Row) -> ET.Element:
+    attributes = {"classname": _xml(row.group), "name": _xml(row.name)}
+    case = ET.Element("testcase", attributes | {"time": f"{row.total or 0:.3f}"})
+    if row.word != "passed":
+        tag = "failure" if row.word in _FAILURES else "error"
+        ending = ET.SubElement(case, tag, {"type": row.word, "message": _xml(row.why)})
+        ending.text = _xml(_failed_checks(row))
+    return case
+
+
+def _started(rows: Sequence[Row]) -> str:
+    """When the first of the solves ended, in UTC as the schema wants it; now where none tells."""
+    times = [
+        str(row.provenance["time_utc"]) for row in rows if (row.provenance or {}).get("time_utc")
+    ]
+    return min(times, default=datetime.now(UTC).isoformat())[:19]
+
+
+def _properties(rows: Sequence[Row]) -> dict[str, str]:
+    """What the solves were made with; Jenkins' schema wants one property at least."""
+    verdicts = ", ".join(f"{n} {word}" for word, n in counted(rows).items())
+    found = {"verdicts": verdicts}
+    for key in _PROPERTIES:
+        values = sorted({str(v) for row in rows if (v := (row.provenance or {}).get(key))})
+        if values:
+            found[key] = ", ".join(values)
+    return found
+
+
+def _failed_checks(row: Row) -> str:
+    failed = [check for check in row.checks or () if not check["passed"]]
+    return "\n".join(
+        f"{check['name']}{' ' + check['zone'] if check['zone'] else ''}: error "
+        f"{formats.error(check['error'])}, tolerance {formats.error(check['tolerance'])}"
+        for check in failed
+    )
+
+
+def _xml(text: str) -> str:
+    """Text without the characters that XML does not allow at all."""
+    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "�", text)
