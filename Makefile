@@ -16,7 +16,7 @@ INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report summary orders study stability infsup test accept
+.PHONY: help all-cases family case report summary compare orders study stability infsup test accept
 .PHONY: format lint lock faults mutants kills bill clean clean-all
 .PHONY: environment study-environment test-environment lint-environment
 
@@ -43,6 +43,10 @@ report: environment ## write the report again from the results there are
 summary: ## print the last report's table, as Markdown
 	@cat results/report/summary.md 2>/dev/null \
 	  || { echo "make summary: there is no report yet; make all-cases writes it" >&2; exit 2; }
+
+compare: environment ## what is new since another batch: make compare BASE=folder [THIS=folder]
+	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
+	@.venv/bin/python -m solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
 
 orders: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
 orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…

@@ -103,6 +103,11 @@ def _parser() -> argparse.ArgumentParser:
         help="what families are about; default: those in cases/",
     )
 
+    command = _add(commands, "compare", _compare, "say what is new since another batch")
+    command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
+    command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
+    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
+
     command = _add(commands, "orders", _orders, "write the page of orders of convergence")
     command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
     command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the levels")
@@ -234,6 +239,12 @@ def _report(options: argparse.Namespace) -> int:
     if families is None:
         families = sorted(Path("cases").glob("*/family.yaml"))
     return write_report(verdicts, options.output, families=families)
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from solver.report.compare import compare
+
+    return FAILED if compare(options.base, options.this, options.output).worse else PASSED
 
 
 def _orders(options: argparse.Namespace) -> int:

@@ -28,7 +28,17 @@ from solver.strict_yaml import read_mapping
 
 FILE_NAME = "family.yaml"
 # Pages of the report that are no family's: a family of that name has its page under another.
-_TAKEN = ("index", "summary", "orders", "workflow", "study", "stability", "scaling", "benchmark")
+_TAKEN = (
+    "index",
+    "summary",
+    "compare",
+    "orders",
+    "workflow",
+    "study",
+    "stability",
+    "scaling",
+    "benchmark",
+)
 
 
 @dataclass(frozen=True)

@@ -96,12 +96,12 @@ def to_markdown(rows: Sequence[Row]) -> str:
     bad = [row for row in rows if row.word != "passed"]
     if bad:
         parts.append("\n## Not passed\n")
-        parts += [f"- **{_md(row.name)}** {row.word}: {_md(row.why)}" for row in bad]
+        parts += [f"- **{md(row.name)}** {row.word}: {md(row.why)}" for row in bad]
     for family, members in families(rows).items():
-        parts.append(f"\n## {_md(family)}\n\n{outcome(members)}\n")
+        parts.append(f"\n## {md(family)}\n\n{outcome(members)}\n")
         parts.append("| " + " | ".join(_HEAD) + " |")
         parts.append("|" + " --- |" * len(_HEAD))
-        parts += ["| " + " | ".join(map(_md, _cells(row))) + " |" for row in members]
+        parts += ["| " + " | ".join(map(md, _cells(row))) + " |" for row in members]
     return "\n".join(parts) + "\n"
 
 
@@ -132,7 +132,7 @@ def _cells(row: Row) -> list[str]:
     ]
 
 
-def _md(text: str) -> str:
+def md(text: str) -> str:
     """Text that Markdown, and the HTML made of it, shows as it is."""
     text = " ".join(str(text).split()).replace("&", "&amp;").replace("<", "&lt;")
     return re.sub(r"([\\|`*_\[\]])", r"\\\1", text.replace(">", "&gt;"))

@@ -17,6 +17,7 @@ INFSUP_SCHEMA = Path(__file__).with_name("infsup.schema.json")
 LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")
 FAMILY_SCHEMA = Path(__file__).with_name("family.schema.json")
 STUDY_SCHEMA = Path(__file__).with_name("study.schema.json")
+SUMMARY_SCHEMA = Path(__file__).with_name("summary.schema.json")
 SWEEP_SCHEMA = Path(__file__).with_name("sweep.schema.json")
 
 

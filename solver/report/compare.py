@@ -1,0 +1,95 @@
+"""Two batches side by side: Markdown for the terminal, and a page in the style of the report's."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from solver.files import write_text
+from solver.report.differences import Comparison, Pair, read_batch
+from solver.report.html import environment
+from solver.report.tables import md
+
+PAGE = "compare.html"
+CHANGES = ("solve", "quantity", "before", "now", "change")
+TIMES = ("before", "now", "ratio")
+# Rows of a table in Markdown; the page has them all.
+_MOST = 40
+
+
+def compare(
+    base: Path, this: Path, page: Path | None = None, log: Callable[[str], Any] = print
+) -> Comparison:
+    """Compare two batches: log Markdown, write the page, by default into the report of `this`.
+
+    Raises `InputError` for what is no batch.
+    """
+    found = Comparison(read_batch(base), read_batch(this))
+    page = page or found.this.file.with_name(PAGE)
+    write_text(page, to_html(found))
+    log(f"{to_markdown(found)}\nReport: {page}")
+    return found
+
+
+def verdict(found: Comparison) -> str:
+    """The comparison in one line."""
+    parts = {
+        "got worse": found.worse,
+        "got better": found.better,
+        "did not pass before either": found.still,
+        "new": found.new,
+        "vanished": found.vanished,
+    }
+    words = ", ".join(f"{len(pairs)} {word}" for word, pairs in parts.items() if pairs)
+    solves = len({change.solve for change in found.changes})
+    numbers = f"numbers changed in {solves} of them" if solves else "no number changed"
+    return f"{len(found.pairs)} solves: {words or 'no verdict changed'}; {numbers}."
+
+
+def sections(found: Comparison) -> dict[str, list[Pair]]:
+    """The solves whose verdicts are told, under their headings, new failures first."""
+    named = {
+        "Worse than before": found.worse,
+        "Not passed, as before": found.still,
+        "Better than before": found.better,
+        "New, and passed": found.new,
+        "No longer there": found.vanished,
+    }
+    return {heading: pairs for heading, pairs in named.items() if pairs}
+
+
+def to_markdown(found: Comparison) -> str:
+    """Verdicts, numbers and times as Markdown."""
+    parts = [f"# Two batches\n\n{verdict(found)}\n"]
+    for name, batch in (("Before", found.base), ("Now", found.this)):
+        parts.append(f"- {name}: `{batch.file}`, {md(batch.outcome)} {md(batch.origin)}")
+    for heading, pairs in sections(found).items():
+        told = [(pair.name, pair.words, pair.row.why) for pair in pairs]
+        parts += [f"\n## {heading}\n", *_table(("solve", "verdict", "reason"), told)]
+    if found.changes:
+        rows = [change.cells for change in found.changes]
+        parts += ["\n## Numbers\n", *_table(CHANGES, rows)]
+    parts += ["\n## Times\n", *_table(("stage", *TIMES), [t.cells for t in found.stages])]
+    if found.solves:
+        parts += ["", *_table(("solve", *TIMES), [t.cells for t in found.solves])]
+    return "\n".join(parts) + "\n"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
+    lines += ["| " + " | ".join(map(md, row)) + " |" for row in rows[:_MOST]]
+    return lines + [f"\n… and {len(rows) - _MOST} more."] * (len(rows) > _MOST)
+
+
+def to_html(found: Comparison) -> str:
+    """The page."""
+    return (
+        environment()
+        .get_template("compare.html.jinja")
+        .render(
+            found=found,
+            outcome=verdict(found),
+            sections=sections(found),
+            changes=CHANGES,
+            times=TIMES,
+        )
+    )

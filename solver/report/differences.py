@@ -1,0 +1,265 @@
+"""What changed between two batches: verdicts, numbers, times.
+
+A number has changed when it moved by more than accepted values may: 1e-9 of the check's scale. What
+round-off does is no change. Times are shown and never judged.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from solver.checks import ROUND_OFF
+from solver.errors import InputError
+from solver.report import formats, stages
+from solver.report.rows import WORDS, Row, natural
+from solver.report.tables import outcome
+from solver.schemas import SUMMARY_SCHEMA, validate
+
+SUMMARY = "summary.json"
+# A solve whose time changed is worth a line from this ratio on, and from these seconds.
+_RATIO, _SECONDS, _MOST = 1.5, 0.2, 10
+_SUMS = ("total", "processor time")
+_COUNTS = {
+    "dofs": "unknowns",
+    "macro_elements": "macro-elements",
+    "iterations": "iterations",
+    "linear_solver": "linear solver",
+}
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A batch: its summary.json, and its rows by family and name."""
+
+    file: Path
+    rows: Mapping[tuple[str, str], Row]
+
+    @property
+    def outcome(self) -> str:
+        """How many solves passed."""
+        return outcome(list(self.rows.values()))
+
+    @property
+    def origin(self) -> str:
+        """Revision and machine, as far as the solves tell."""
+        found = [row.provenance or {} for row in self.rows.values()]
+        values = [sorted({str(o[k]) for o in found if o.get(k)}) for k in ("revision", "cpu")]
+        return "; ".join(", ".join(each) for each in values if each)
+
+
+@dataclass(frozen=True)
+class Change:
+    """A quantity of a solve that is not what it was; `size` is relative, None for what is none."""
+
+    solve: str
+    quantity: str
+    base: str
+    this: str
+    size: float | None
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of a table."""
+        return self.solve, self.quantity, self.base, self.this, formats.error(self.size)
+
+
+@dataclass(frozen=True)
+class Time:
+    """Seconds of both batches, of a stage or a solve."""
+
+    name: str
+    base: float
+    this: float
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of a table: name, before, now, ratio."""
+        ratio = f"{self.this / self.base:.2f}" if self.base else formats.NOTHING
+        return self.name, formats.seconds(self.base), formats.seconds(self.this), ratio
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A solve in both batches, or in one of them."""
+
+    base: Row | None
+    this: Row | None
+
+    @property
+    def row(self) -> Row:
+        """The solve as it is now, or as it was where it vanished."""
+        row = self.this or self.base
+        assert row is not None
+        return row
+
+    @property
+    def name(self) -> str:
+        """Family and name."""
+        return self.row.anchor
+
+    @property
+    def step(self) -> int:
+        """How much worse the verdict is than before: negative where better.
+
+        A solve that was not there counts as one that had passed; one that vanished has no verdict.
+        """
+        if self.this is None:
+            return 0
+        before = self.base.word if self.base else "passed"
+        return WORDS.index(before) - WORDS.index(self.this.word)
+
+    @property
+    def words(self) -> str:
+        """The verdicts, before and now."""
+        told = [row.word if row else "not there" for row in (self.base, self.this)]
+        return " → ".join(dict.fromkeys(told))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two batches side by side."""
+
+    base: Batch
+    this: Batch
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """All solves of either batch, in the order of their names."""
+        names = sorted({*self.base.rows, *self.this.rows}, key=lambda n: (n[0], natural(n[1])))
+        return [Pair(self.base.rows.get(name), self.this.rows.get(name)) for name in names]
+
+    @property
+    def worse(self) -> list[Pair]:
+        """Verdicts that got worse, worst first; new solves that did not pass are among them."""
+        return sorted((p for p in self.pairs if p.step > 0), key=lambda pair: -pair.step)
+
+    @property
+    def better(self) -> list[Pair]:
+        """Verdicts that got better."""
+        return [pair for pair in self.pairs if pair.step < 0]
+
+    @property
+    def still(self) -> list[Pair]:
+        """Solves that did not pass before, and do no better and no worse."""
+        return [p for p in self.pairs if p.this and p.step == 0 and p.row.word != "passed"]
+
+    @property
+    def new(self) -> list[Pair]:
+        """Solves that were not there, and passed."""
+        return [pair for pair in self.pairs if pair.base is None and pair.step == 0]
+
+    @property
+    def vanished(self) -> list[Pair]:
+        """Solves that are no longer there."""
+        return [pair for pair in self.pairs if pair.this is None]
+
+    @cached_property
+    def changes(self) -> list[Change]:
+        """What changed in solves that both have; what is no number first, then by size."""
+        found = [change for base, this in self._solved for change in _changes(base, this)]
+        return sorted(found, key=lambda c: (c.size is not None, -(c.size or 0)))
+
+    @property
+    def stages(self) -> list[Time]:
+        """Wall time by stage, in all, and processor time, over the solves that both have."""
+        sides = [list(map(_times, rows)) for rows in zip(*self._solved, strict=True)] or [[], []]
+        every = dict.fromkeys(name for rows in sides for row in rows for name in row)
+        names = [*(name for name in stages.colors(every) if name not in _SUMS), *_SUMS]
+        base, this = ({n: sum(row.get(n) or 0.0 for row in rows) for n in names} for rows in sides)
+        return [Time(name, base[name], this[name]) for name in names]
+
+    @property
+    def solves(self) -> list[Time]:
+        """The solves whose wall time changed most, of those that are worth a line."""
+        times = [
+            Time(this.anchor, base.total or 0.0, this.total or 0.0) for base, this in self._solved
+        ]
+        worth = [
+            (abs(time.this - time.base), time)
+            for time in times
+            if max(time.this, time.base) > _RATIO * min(time.this, time.base)
+        ]
+        found = sorted(((by, time) for by, time in worth if by > _SECONDS), key=lambda w: -w[0])
+        return [time for _, time in found[:_MOST]]
+
+    @cached_property
+    def _solved(self) -> list[tuple[Row, Row]]:
+        """The rows of the solves that came to their end in both batches."""
+        both = [(pair.base, pair.this) for pair in self.pairs if pair.base and pair.this]
+        return [(base, this) for base, this in both if base.total and this.total]
+
+
+def read_batch(path: Path) -> Batch:
+    """A batch, by its folder of results, the folder of its report, or its summary.json.
+
+    Raises `InputError` where there is none, or the file is not what a report writes.
+    """
+    candidates = (path / "report" / SUMMARY, path / SUMMARY) if path.is_dir() else (path,)
+    file = next((each for each in candidates if each.is_file()), None)
+    if file is None:
+        allowed = f"must be a folder of results with a report, or its {SUMMARY}"
+        raise InputError(path, "batch", None, allowed)
+    try:
+        verdicts = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(file, "file", None, f"must be JSON ({error})") from None
+    validate(verdicts, SUMMARY_SCHEMA, file)
+    rows = [Row(verdict, file.parent.parent / verdict["family"]) for verdict in verdicts]
+    return Batch(file, {(row.group, row.name): row for row in rows})
+
+
+def _times(row: Row) -> dict[str, float | None]:
+    return {**row.stages, **dict(zip(_SUMS, (row.total, row.cpu_seconds), strict=True))}
+
+
+def _changes(base: Row, this: Row) -> Iterator[Change]:
+    solve = this.anchor
+    for key, name in _COUNTS.items():
+        before, now = base.verdict.get(key), this.verdict.get(key)
+        if before != now:
+            yield Change(solve, name, _text(before), _text(now), None)
+    yield from _checks(solve, _by_title(base), _by_title(this))
+    for name in {**base.norms, **this.norms}:
+        yield from _number(solve, f"error {name}", base.norms.get(name), this.norms.get(name))
+
+
+def _by_title(row: Row) -> dict[str, Mapping[str, Any]]:
+    checks = row.verdict.get("checks", ())
+    return {f"{c['name']} {c.get('zone') or ''}".strip(): c for c in checks}
+
+
+def _checks(
+    solve: str, base: Mapping[str, Mapping[str, Any]], this: Mapping[str, Mapping[str, Any]]
+) -> Iterator[Change]:
+    for title in {**base, **this}:
+        if title not in base or title not in this:
+            before, now = ("there" if title in side else "not there" for side in (base, this))
+            yield Change(solve, title, before, now, None)
+            continue
+        old, new = base[title], this[title]
+        scale = old.get("scale") or 1.0
+        for key in ("minimum", "maximum"):
+            yield from _number(solve, f"{title}: {key}", old.get(key), new.get(key), scale)
+        for key in ("error", "tolerance"):
+            yield from _number(solve, f"{title}: {key}", old.get(key), new.get(key))
+
+
+def _number(
+    solve: str, quantity: str, base: float | None, this: float | None, scale: float = 1.0
+) -> Iterator[Change]:
+    """The change of a number, if it is one."""
+    if base is None or this is None:
+        if base is not this:
+            yield Change(solve, quantity, _text(base), _text(this), None)
+    elif abs(this - base) > ROUND_OFF * abs(scale):
+        size = abs((this - base) / scale)
+        yield Change(solve, quantity, _text(base), _text(this), size)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return formats.digits(value)
+    return formats.NOTHING if value is None else str(value)
