@@ -23,6 +23,8 @@ _LINES = {
     "T2D2": "SEG2", "T3D2": "SEG2", "B21": "SEG2", "B31": "SEG2", "R2D2": "SEG2",
     "T2D3": "SEG3", "T3D3": "SEG3", "B22": "SEG3", "B32": "SEG3",
 }  # fmt: skip
+# Node orders are the catalogue's, but that lines have their middle node between their ends.
+_MIDDLE_SECOND = [0, 2, 1]
 _PLANE = re.compile(r"(?:CPE|CPS|CAX|M3D|SFM3D|R3D|DS|STRI|S)(\d)")
 # Corners of the faces S1, S2, … of each shape, counted from 1.
 _FACES = {
@@ -129,18 +131,20 @@ class _Deck:
         flat = [int(field) for line in lines for field in line if field]
         if len(flat) % (cell.n_nodes + 1):
             raise self._refuse("*ELEMENT", None, f"each {kind} must have {cell.n_nodes} nodes")
-        table = np.array(flat).reshape(-1, cell.n_nodes + 1).tolist()
-        for number, *nodes in table:
+        table = np.array(flat).reshape(-1, cell.n_nodes + 1)
+        if cell.name == "SEG3":
+            table[:, 1:] = table[:, 1:][:, _MIDDLE_SECOND]
+        for number, *nodes in table.tolist():
             missing = next((n for n in nodes if n not in self.nodes), None)
             if missing is not None:
                 raise self._refuse("node", missing, f"cell {number} has it, *NODE has not")
             self.cells[number] = (cell, nodes)
         if "ELSET" in options:
-            self.cell_sets[self._key(options["ELSET"])] += [row[0] for row in table]
+            self.cell_sets[self._key(options["ELSET"])] += table[:, 0].tolist()
 
     def _cell_type(self, name: str) -> CellType:
         plane = _PLANE.match(name)
-        found = _LINES.get(name)
+        found = _LINES.get(name.removesuffix("H"))
         if solid := re.match(r"C3D(\d+)", name):
             found = _SOLIDS.get(int(solid[1]))
         elif plane and not found:

@@ -10,9 +10,9 @@ import yaml
 
 from solver.errors import InputError
 from solver.mesh import generate, write_mesh
-from solver.mesh.catalogue import BY_NAME, cell_type
+from solver.mesh.catalogue import BY_NAME, CellType, cell_type
 from solver.mesh.orient import vertex_jacobians
-from tests.mesh.one_cell import KINDS, middles
+from tests.mesh.curved import KINDS
 
 CASES = sorted(Path("cases/ssnp170").glob("[a-z]*.yaml"))
 CASES = [path for path in CASES if path.stem != "family"]
@@ -127,6 +127,16 @@ def test_sides_and_volumes(name, contact):
             owned[group] = {int(i) for nodes in members(mesh, group) for i in nodes.ravel()}
         assert not owned["bottom"] & owned["top"]
         assert owned["bottom"] | owned["top"] == set(range(len(mesh.points)))
+
+
+def middles(cell: CellType, vertices: np.ndarray) -> np.ndarray:
+    """Where the nodes after the vertices belong: the middles of edges, faces and cell."""
+    parts = [list(edge) for edge in cell.edges]
+    if cell.name == "HEXA27":
+        parts += [list(face.nodes[:4]) for face in cell.faces]
+    if cell.name in ("QUAD9", "HEXA27"):
+        parts.append(list(range(cell.n_vertices)))
+    return np.array([vertices[part].mean(axis=0) for part in parts])
 
 
 @pytest.mark.parametrize("name", [n for n in KINDS if BY_NAME[n].order == 2])

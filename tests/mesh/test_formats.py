@@ -1,4 +1,4 @@
-"""Reading mesh files: node orders, groups, refusals."""
+"""Reading mesh files: groups, refusals."""
 
 import os
 import signal
@@ -14,121 +14,9 @@ import vtk
 from solver.errors import InputError
 from solver.mesh import read_mesh
 from solver.mesh.apart import read_apart
-from solver.mesh.catalogue import BY_NAME
 from solver.mesh.gmsh_session import session
-from solver.mesh.orient import vertex_jacobians
-from tests.mesh.one_cell import KINDS, distorted, middles, write_by_gmsh
-
-ABAQUS_KINDS = [name for name in KINDS if name not in ("HEXA27", "PYRA13")]
-
-
-def assert_well_read(mesh: meshio.Mesh, name: str) -> None:
-    """One cell, all its vertices there, right side out, every mid-node between its vertices."""
-    cell = BY_NAME[name]
-    (block,) = (b for b in mesh.cells if b.type == cell.meshio)
-    points = mesh.points[block.data[0]]
-    assert points.shape == (cell.n_nodes, cell.dim)
-    expected = distorted(cell)[:, : cell.dim]
-    assert sorted(map(tuple, points[: cell.n_vertices].round(9))) == sorted(
-        map(tuple, expected.round(9))
-    )
-    assert (vertex_jacobians(mesh.points, block.data, cell) > 0).all()
-    mids = points[cell.n_vertices :]
-    np.testing.assert_allclose(mids, middles(cell, points[: cell.n_vertices]), atol=1e-8)
-
-
-@pytest.mark.parametrize("name", KINDS)
-def test_med(name, tmp_path):
-    write_by_gmsh(name, tmp_path / "cell.med")
-    mesh = read_mesh(tmp_path / "cell.med")
-    assert_well_read(mesh, name)
-    assert [len(ids) for ids in mesh.cell_sets["body"]] == [1]
-
-
-@pytest.mark.parametrize("version", [2.2, 4.1])
-@pytest.mark.parametrize("binary", [0, 1])
-@pytest.mark.parametrize("name", KINDS)
-def test_msh(name, version, binary, tmp_path):
-    options = {"Mesh__MshFileVersion": version, "Mesh__Binary": binary}
-    write_by_gmsh(name, tmp_path / "cell.msh", **options)
-    mesh = read_mesh(tmp_path / "cell.msh")
-    assert_well_read(mesh, name)
-    assert [len(ids) for ids in mesh.cell_sets["body"]] == [1]
-
-
-@pytest.mark.parametrize("name", ABAQUS_KINDS)
-def test_inp(name, tmp_path):
-    write_by_gmsh(name, tmp_path / "cell.inp", Mesh__SaveGroupsOfElements=1)
-    mesh = read_mesh(tmp_path / "cell.inp")
-    assert_well_read(mesh, name)
-    assert [len(ids) for ids in mesh.cell_sets["body"]] == [1]
-
-
-@pytest.mark.parametrize("name", KINDS)
-def test_vtu(name, tmp_path):
-    write_by_vtk(name, tmp_path / "cell.vtu")
-    mesh = read_mesh(tmp_path / "cell.vtu")
-    assert_well_read(mesh, name)
-    assert [len(ids) for ids in mesh.cell_sets["body"]] == [1]
-    assert "material" not in mesh.cell_sets
-    assert len(mesh.point_sets["pinned"]) == 1
-
-
-def write_by_vtk(name: str, path: Path) -> None:
-    """The cell with its nodes where VTK's own cell of that type has them."""
-    cell = BY_NAME[name]
-    theirs = vtk.vtkGenericCell()
-    theirs.SetCellType(cell.vtk)
-    flat = theirs.GetParametricCoords()
-    parametric = np.array([flat[i] for i in range(3 * cell.n_nodes)]).reshape(-1, 3)
-    vertices = distorted(cell)
-    grid, points = vtk.vtkUnstructuredGrid(), vtk.vtkPoints()
-    points.SetDataTypeToDouble()
-    for place in _interpolated(cell, vertices, parametric[:, : cell.dim]):
-        points.InsertNextPoint(*place)
-    grid.SetPoints(points)
-    grid.InsertNextCell(cell.vtk, cell.n_nodes, list(range(cell.n_nodes)))
-    for target, values, label in (
-        (grid.GetCellData(), [1], "body"),
-        (grid.GetCellData(), [7], "material"),
-        (grid.GetPointData(), [1] + [0] * (cell.n_nodes - 1), "pinned"),
-    ):
-        array = vtk.vtkIntArray()
-        array.SetName(label)
-        for value in values:
-            array.InsertNextValue(value)
-        target.AddArray(array)
-    writer = vtk.vtkXMLUnstructuredGridWriter()
-    writer.SetFileName(str(path))
-    writer.SetInputData(grid)
-    writer.Write()
-
-
-def _interpolated(cell, vertices: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Images of VTK's parametric places (n, dim) under the map of the linear cell."""
-    corners = cell.nodes[: cell.n_vertices]
-    if cell.name.startswith("PYRA"):
-        # VTK stands its pyramid on [0, 1]².
-        base = at[:, :2] * 2 - 1
-        at = np.column_stack([base * (1 - at[:, 2:]), at[:, 2]])
-    weights = np.array([_weights(cell.name, place, corners) for place in at])
-    return weights @ vertices
-
-
-def _weights(name: str, place: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Linear shape functions, derived here by hand, at a place of the reference cell."""
-    if name.startswith(("TRIA", "TETRA")):
-        return np.array([1 - place.sum(), *place])
-    if name.startswith("PENTA"):
-        flat = np.array([1 - place[:2].sum(), *place[:2]])
-        return np.concatenate([flat * (1 - place[2]), flat * place[2]])
-    if name.startswith("PYRA"):
-        if place[2] == 1:
-            return np.eye(5)[4]
-        height = 1 - place[2]
-        base = np.prod(height + corners[:4, :2] * place[:2], axis=1) / (4 * height)
-        return np.array([*base, place[2]])
-    return np.prod(np.where(corners == 1, place, 1 - place), axis=1)
+from tests.mesh.curved import Curved
+from tests.mesh.one_cell import vtk_grid, write_by_gmsh
 
 
 def write_square(path: Path, version: float = 4.1) -> None:
@@ -183,9 +71,10 @@ def test_groups_of_nodes_in_med(tmp_path):
         names = b"".join(label.encode().ljust(80, b"\0") for label in ("pins", "Stütze"))
         family["GRO/NOM"] = np.frombuffer(names, dtype=np.int8).reshape(2, 80)
     mesh = read_mesh(tmp_path / "cell.med")
-    expected = distorted(BY_NAME["TETRA4"])[[1, 3]]
+    curved = Curved.of("TETRA4")
+    expected = curved.places(curved.cell.nodes)[[1, 3]]
     for label in ("pins", "Stütze"):
-        np.testing.assert_array_equal(mesh.points[mesh.point_sets[label]], expected)
+        np.testing.assert_allclose(mesh.points[mesh.point_sets[label]], expected, atol=1e-12)
 
 
 def refusal(path: Path) -> str:
@@ -246,6 +135,33 @@ def test_a_type_that_is_not_there(tmp_path):
         gmsh.model.mesh.generate(2)
         gmsh.write(str(path))
     assert refusal(path).startswith("cell type = 'Triangle 10': allowed: SEG2, SEG3,")
+
+
+def write_vtu(grid: vtk.vtkUnstructuredGrid, path: Path, compressor: str = "ZLib") -> None:
+    writer = vtk.vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(grid)
+    getattr(writer, f"SetCompressorTypeTo{compressor}")()
+    writer.Write()
+
+
+def test_vtu_with_cells_that_would_be_left_out(tmp_path):
+    """The reader behind it leaves out, with no more than a word, what it does not know."""
+    grid = vtk_grid("QUAD4")
+    for array in ("body", "side", "material"):
+        grid.GetCellData().GetArray(array).InsertNextValue(1)
+    grid.InsertNextCell(vtk.VTK_TRIANGLE_STRIP, 4, [0, 1, 3, 2])
+    write_vtu(grid, tmp_path / "strip.vtu")
+    message = refusal(tmp_path / "strip.vtu")
+    assert message.startswith("cell type: 1 of 3 cells are of other types; allowed: SEG2, ")
+
+
+def test_vtu_with_a_compression_that_is_not_read(tmp_path):
+    write_vtu(vtk_grid("QUAD4"), tmp_path / "cell.vtu", "LZ4")
+    assert refusal(tmp_path / "cell.vtu") == (
+        "compressor = 'vtkLZ4DataCompressor': allowed: none, vtkZLibDataCompressor, "
+        "vtkLZMADataCompressor"
+    )
 
 
 def test_several_meshes_in_one_med_file(tmp_path):

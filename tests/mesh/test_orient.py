@@ -10,7 +10,7 @@ from solver.errors import InputError
 from solver.mesh.catalogue import BY_NAME
 from solver.mesh.orient import right_side_out, vertex_jacobians
 from solver.mesh.tidy import tidy
-from tests.mesh.one_cell import KINDS
+from tests.mesh.curved import KINDS
 
 
 def reference_mesh(name: str, places: np.ndarray | None = None) -> meshio.Mesh:

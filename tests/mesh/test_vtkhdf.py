@@ -1,5 +1,7 @@
 """Meshes as VTKHDF: what is written comes back, is the same bit for bit, and opens in VTK."""
 
+from pathlib import Path
+
 import h5py
 import meshio
 import numpy as np
@@ -7,11 +9,13 @@ import pytest
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
+from solver.elements import shape_functions
 from solver.errors import InputError
 from solver.mesh import generate, read_mesh, write_mesh
 from solver.mesh.catalogue import BY_NAME
 from solver.mesh.vtkhdf import read_grid, write_grid
-from tests.mesh.one_cell import KINDS, write_by_gmsh
+from tests.mesh.curved import KINDS, Curved, inner_points
+from tests.mesh.one_cell import to_cube
 
 RECIPES = [
     {"bottom": {"cells": "TRIA6", "divisions": 2}, "top": {"cells": "QUAD4", "divisions": 3}},
@@ -73,31 +77,65 @@ def test_data_on_points_and_cells(tmp_path):
     np.testing.assert_array_equal(cells["pressure"], cell_data["pressure"])
 
 
-def test_vtk_sees_the_volume_of_every_type(tmp_path):
-    """Written as VTKHDF and read by VTK, each type is what it was and right side out."""
-    for name in KINDS:
-        write_by_gmsh(name, tmp_path / "cell.msh")
-        mesh = read_mesh(tmp_path / "cell.msh")
-        write_mesh(mesh, tmp_path / "cell.vtkhdf")
-        reader = vtk.vtkHDFReader()
-        reader.SetFileName(str(tmp_path / "cell.vtkhdf"))
-        sizes = vtk.vtkCellSizeFilter()
-        sizes.SetInputConnection(reader.GetOutputPort())
-        sizes.Update()
-        grid = sizes.GetOutput()
-        data = grid.GetCellData()
-        label = "Volume" if BY_NAME[name].dim == 3 else "Area"
-        assert vtk_to_numpy(data.GetArray(label))[0] > 0.1, name
-        assert grid.GetCell(0).GetCellType() == BY_NAME[name].vtk
+def opened(mesh: meshio.Mesh, folder: Path) -> vtk.vtkUnstructuredGrid:
+    """The mesh written as VTKHDF and read by VTK."""
+    write_mesh(mesh, folder / "mesh.vtkhdf")
+    reader = vtk.vtkHDFReader()
+    reader.SetFileName(str(folder / "mesh.vtkhdf"))
+    reader.Update()
+    return reader.GetOutput()
+
+
+def interpolated(cell: vtk.vtkCell, name: str, reference: np.ndarray) -> np.ndarray:
+    """Where VTK's own shape functions put points (n, dim) of our reference cell: (n, 3)."""
+    parametric = to_cube(reference) if name.startswith("PYRA") else reference
+    padded = np.pad(parametric, ((0, 0), (0, 3 - parametric.shape[1])))
+    found, weights = np.empty((len(reference), 3)), [0.0] * cell.GetNumberOfPoints()
+    for row, place in zip(found, padded.tolist(), strict=True):
+        cell.EvaluateLocation(vtk.reference(0), place, row, weights)
+    return found
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_vtk_interpolates_every_type_as_we_do(name, tmp_path):
+    """A wrong number of a type, or a wrong order of its nodes, puts other points elsewhere."""
+    kind = BY_NAME[name]
+    curved = Curved.of(name)
+    # Inside a pyramid of 13 nodes VTK has functions of its own; only between straight edges, and
+    # on bent ones, are they the same.
+    straight = Curved.of("PYRA5") if name == "PYRA13" else curved
+    edges = kind.nodes[np.array(kind.edges)]
+    on_edges = 0.3 * edges[:, 0] + 0.7 * edges[:, 1]
+    for body, at in ((straight, inner_points(kind)), (curved, on_edges)):
+        nodes = body.places(kind.nodes)[:, : kind.dim]
+        block = (kind.meshio, np.arange(kind.n_nodes)[None])
+        group = {"body": [np.array([0])]}
+        cell = opened(meshio.Mesh(nodes, [block], cell_sets=group), tmp_path).GetCell(0)
+        assert cell.GetCellType() == kind.vtk
+        ours = shape_functions(name).values(at) @ nodes
+        np.testing.assert_allclose(interpolated(cell, name, at)[:, : kind.dim], ours, atol=1e-14)
+        np.testing.assert_allclose(ours, body.places(at)[:, : kind.dim], atol=1e-14)
+
+
+@pytest.mark.parametrize("name", [n for n in KINDS if BY_NAME[n].dim == 3])
+def test_vtk_takes_the_faces_for_outward(name, tmp_path):
+    """Otherwise ParaView lights the surface from within."""
+    kind = BY_NAME[name]
+    block = (kind.meshio, np.arange(kind.n_nodes)[None])
+    mesh = meshio.Mesh(kind.nodes, [block], cell_sets={"body": [np.array([0])]})
+    cell = opened(mesh, tmp_path).GetCell(0)
+    middle = kind.nodes[: kind.n_vertices].mean(axis=0)
+    assert cell.GetNumberOfFaces() == len(kind.faces)
+    for number in range(cell.GetNumberOfFaces()):
+        face = cell.GetFace(number)
+        points = [face.GetPoints().GetPoint(i) for i in range(face.GetNumberOfEdges())]
+        area = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+        assert area @ (np.mean(points, axis=0) - middle) > 0
 
 
 def test_vtk_reads_2d_meshes_with_z_zero(tmp_path):
     mesh = generate({"recipe": "blocks", "size": 3.0} | RECIPES[0], "case.yaml")
-    write_mesh(mesh, tmp_path / "mesh.vtkhdf")
-    reader = vtk.vtkHDFReader()
-    reader.SetFileName(str(tmp_path / "mesh.vtkhdf"))
-    reader.Update()
-    points = vtk_to_numpy(reader.GetOutput().GetPoints().GetData())
+    points = vtk_to_numpy(opened(mesh, tmp_path).GetPoints().GetData())
     np.testing.assert_array_equal(points[:, :2], mesh.points)
     assert (points[:, 2] == 0).all()
 
