@@ -16,7 +16,8 @@ INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report summary compare orders study stability infsup test accept
+.PHONY: help all-cases family case report summary compare orders study stability infsup scaling
+.PHONY: benchmark test accept
 .PHONY: format lint lock faults mutants kills bill clean clean-all
 .PHONY: environment study-environment test-environment lint-environment
 
@@ -59,6 +60,10 @@ study: study-environment ## error against run time, all treatments; a part in mi
 stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 stability: environment ## push one quantity after another until it breaks: LEVEL=quick for a few
 	@$(SNAKEMAKE) stability
+
+scaling: override CONFIG += $(if $(LEVEL),scaling=$(LEVEL))
+scaling: environment ## growth with size, to a million unknowns; the small in a minute: LEVEL=quick
+	@$(SNAKEMAKE) scaling
 
 infsup: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 infsup: environment ## the inf-sup test of every cell type, and the half-loaded block

@@ -1,4 +1,4 @@
-"""Targets of the batch: `all_cases` (default), `report`, `orders`, `study`, `stability`, or a verdict by its path."""
+"""Targets of the batch: `all_cases` (default), `report`, `orders`, `study`, `stability`, `scaling`, or a verdict by its path."""
 
 from snakemake.utils import min_version
 
@@ -21,3 +21,4 @@ include: "workflow/rules/orders.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/infsup.smk"
 include: "workflow/rules/stability.smk"
+include: "workflow/rules/scaling.smk"

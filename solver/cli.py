@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from solver.errors import InputError, SolveError, of_machine
-from solver.study.commands import add_commands
+from solver.scaling import commands as scaling
+from solver.study import commands as study
 
 if TYPE_CHECKING:
     from solver.run import Job
@@ -114,7 +115,9 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
 
     command = commands.add_parser("study", help="error against run time: points and their page")
-    add_commands(command)
+    study.add_commands(command)
+    command = commands.add_parser("scaling", help="growth with size: points and their page")
+    scaling.add_commands(command)
     command = _add(commands, "sweep", _sweep, "push one quantity of a case through its values")
     command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")

@@ -8,6 +8,11 @@ from contextlib import contextmanager
 SOLVING = ("cut", "pairing", "assembly", "solve", "recovery")
 
 
+def now() -> float:
+    """Seconds on a clock that all processes of the machine share."""
+    return time.clock_gettime(time.CLOCK_MONOTONIC)
+
+
 class Clock:
     """Adds up wall time `seconds` and processor time `cpu_seconds` spent in each named stage."""
 

@@ -1,8 +1,8 @@
 """The README's commands, run from top to bottom as a newcomer would.
 
 They run as they stand, in a copy of the project where long ones are short: `cases/` holds only the
-case that the README names and a study of one point, and `tests/` a single test. The installation
-is left out: the copy borrows this environment.
+case that the README names, a study and a scaling family of one point each, and `tests/` a single
+test. The installation is left out: the copy borrows this environment.
 """
 
 import os
@@ -65,6 +65,16 @@ def write_study(folder: Path) -> None:
     (folder / "study.yaml").write_text(yaml.safe_dump(study))
 
 
+def write_scaling(folder: Path) -> None:
+    """The project's scaling family with a single small point in its quick part."""
+    shutil.copytree(ROOT / "cases" / "scaling", folder)
+    scaling = yaml.safe_load((folder / "scaling.yaml").read_text())
+    [plane] = [series for series in scaling["series"] if series["name"] == "quad4"]
+    scaling["series"], scaling["goals"] = [plane | {"sizes": [1000]}], []
+    scaling["quick"]["series"] = ["quad4"]
+    (folder / "scaling.yaml").write_text(yaml.safe_dump(scaling))
+
+
 def write_sweep(folder: Path) -> None:
     """One of the project's sweeps, with its base cases, and one ladder of the inf-sup test."""
     shutil.copytree(ROOT / "cases" / "stability" / "base", folder / "base")
@@ -88,6 +98,7 @@ def project(tmp_path: Path) -> Path:
     for name in ("e.yaml", "family.yaml"):
         shutil.copy(ROOT / "cases" / "ssnp170" / name, tmp_path / "cases" / "ssnp170")
     write_study(tmp_path / "cases" / "study")
+    write_scaling(tmp_path / "cases" / "scaling")
     write_sweep(tmp_path / "cases" / "stability")
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "test_start.py").write_text("def test_start():\n    import solver.cli\n")

@@ -1,15 +1,20 @@
-"""How long the points that are still to be measured will take, before any is begun."""
+"""How long the points that are still to be measured will take, before any is begun.
+
+For the study and whatever else is measured point by point, each with a record of its own that has
+its name under `point` and the seconds it took under `whole`.
+"""
 
 import json
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from solver.mesh.catalogue import BY_NAME
 from solver.study.description import Point, Study
 
-# Nodes a cell, in large meshes of divisions of equal size (those of TRIA and TETRA are smaller).
+# Nodes for each product of divisions, in large meshes of divisions of equal size. TRIA and TETRA
+# cells are smaller than such a product.
 _NODES = {
     "TRIA3": 1.1,
     "TRIA6": 4.5,
@@ -22,6 +27,21 @@ _NODES = {
     "HEXA20": 4.0,
     "HEXA27": 8.0,
 }
+
+
+class Announced(Protocol):
+    """What is measured: its title, threads, and the seconds that a point may take at most."""
+
+    @property
+    def title(self) -> str: ...  # noqa: D102
+
+    @property
+    def threads(self) -> int: ...  # noqa: D102
+
+    @property
+    def limit(self) -> float: ...  # noqa: D102
+
+
 _START = 1.5  # seconds: libraries loaded, mesh made, record written
 # Seconds a solve: factor and power of the unknowns, by dimension.
 _COST = {2: (2e-5, 1.0), 3: (4e-6, 1.3)}
@@ -44,22 +64,17 @@ def modelled(point: Point, repetitions: int) -> float:
     return _START + (1 + repetitions) * factor * unknowns(point) ** power
 
 
-def expected(study: Study, points: Sequence[Point], earlier: Mapping[str, float]) -> float:
-    """Seconds that `points` will take.
+def expected(
+    model: Mapping[str, float], pending: Iterable[str], earlier: Mapping[str, float], limit: float
+) -> float:
+    """Seconds that the points of these names will take, each at most `limit`.
 
-    `earlier` has the seconds that points took before, by name; what it does not know is modelled,
-    and the model scaled by how it fits what it does know.
+    `earlier` has the seconds that points took before; what it does not know is taken from the
+    model, which is scaled by how it fits what is known.
     """
-    ratios = [
-        earlier[point.name] / modelled(point, study.repetitions)
-        for point in study.points
-        if point.name in earlier
-    ]
+    ratios = [earlier[name] / seconds for name, seconds in model.items() if name in earlier]
     scale = statistics.median(ratios) if ratios else 1.0
-    return sum(
-        min(earlier.get(p.name) or scale * modelled(p, study.repetitions), study.limit)
-        for p in points
-    )
+    return sum(min(earlier.get(name) or scale * model[name], limit) for name in pending)
 
 
 def measured_before(files: Iterable[Path]) -> dict[str, float]:
@@ -74,15 +89,22 @@ def measured_before(files: Iterable[Path]) -> dict[str, float]:
     return found
 
 
-def announcement(study: Study, folder: Path, pending: Sequence[Point]) -> str:
+def model(study: Study) -> dict[str, float]:
+    """Seconds that each point of a study takes, by name."""
+    return {point.name: modelled(point, study.repetitions) for point in study.points}
+
+
+def announcement(
+    about: Announced, model: Mapping[str, float], folder: Path, pending: Collection[str]
+) -> str:
     """What is about to be measured and how long it will take; records lie in `folder`."""
     if not pending:
-        return f"{study.title}: all {len(study.points)} points are measured."
-    earlier = measured_before(folder / f"{point.name}.json" for point in study.points)
-    seconds = expected(study, pending, earlier)
+        return f"{about.title}: all {len(model)} points are measured."
+    earlier = measured_before(folder / f"{name}.json" for name in model)
+    seconds = expected(model, pending, earlier, about.limit)
     basis = "from earlier measurements" if earlier else "from a model, not from this machine"
     shown = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
     return (
-        f"{study.title}: {len(pending)} of {len(study.points)} points to measure, one at a time, "
-        f"on {study.threads} of this machine's cores: about {shown} ({basis})."
+        f"{about.title}: {len(pending)} of {len(model)} points to measure, one at a time, "
+        f"on {about.threads} of this machine's cores: about {shown} ({basis})."
     )

@@ -12,11 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from solver.clock import SOLVING, Clock
+from solver.clock import SOLVING, Clock, now
 from solver.errors import InputError, SolveError
 from solver.study.description import Point, Study, read_study
 from solver.study.point import SOLVED
-from solver.study.timing import now, repeated
+from solver.study.timing import repeated
 
 
 def main(job: Mapping[str, Any]) -> None:
@@ -38,7 +38,7 @@ def main(job: Mapping[str, Any]) -> None:
 def measure(study: Study, point: Point, reference: Path | None, started: float) -> dict[str, Any]:
     """The outcome of a point: a first solve as a warm-up, then the repetitions.
 
-    `started` is when the process was, by `timing.now`. Raises InputError and SolveError.
+    `started` is when the process was, by `clock.now`. Raises InputError and SolveError.
     """
     from solver.linear.direct import standing_for_auto
     from solver.norms import errors

@@ -15,19 +15,18 @@ The record is a JSON object:
 
 import json
 import os
-import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from solver.clock import now
 from solver.errors import InputError
 from solver.files import replacing
+from solver.process import cores_for, run_apart
 from solver.study.description import Point, Study
-from solver.study.timing import now
 
 SOLVED = "solved"
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _UNKNOWN: dict[str, Any] = {
     "dim": None,
     "dofs": None,
@@ -47,7 +46,7 @@ def measure_apart(study: Study, point: Point, output: Path, reference: Path | No
     `reference` is the result that stands for an exact solution, where the problem has none. Raises
     InputError where the machine has not the cores that the study asks for.
     """
-    cores = sorted(os.sched_getaffinity(0))[-study.threads :]
+    cores = cores_for(study.threads)
     if len(cores) < study.threads:
         allowed = f"more than the {len(cores)} cores that may be used here"
         raise InputError(study.path, "threads", study.threads, allowed)
@@ -87,26 +86,13 @@ def told(record: Mapping[str, Any]) -> str:
 
 def _in_process(job: Mapping[str, Any], limit: float, cores: list[int]) -> dict[str, Any]:
     """What the measuring process found, or why it found nothing."""
-    environment = os.environ | dict.fromkeys(THREADS, str(len(cores)))
     command = [sys.executable, "-m", "solver.study.measure", json.dumps(job)]
-    try:
-        done = subprocess.run(
-            command,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=limit,
-            preexec_fn=lambda: os.sched_setaffinity(0, cores),
-        )
-    except subprocess.TimeoutExpired:
+    done = run_apart(command, cores, limit)
+    if done.status is None:
         return _ended("failed", f"no end within {limit:g} s")
-    if done.returncode == 0:
+    if done.status == 0:
         return json.loads(Path(job["output"]).read_text(encoding="utf-8"))
-    lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-    last = lines[-1].strip() if lines else "no word"
-    return _ended("crashed", f"the process died with exit status {done.returncode}: {last}")
+    return _ended("crashed", done.reason)
 
 
 def _ended(outcome: str, reason: str) -> dict[str, Any]:

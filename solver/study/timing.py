@@ -2,7 +2,6 @@
 
 import gc
 import statistics
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -60,8 +59,3 @@ def _timed(run: Callable[[Clock], object]) -> Clock:
 def medians(times: Mapping[str, Mapping[str, Sequence[float]]], kind: str) -> dict[str, float]:
     """The median by stage, of `wall` or of `cpu` time."""
     return {stage: statistics.median(values[kind]) for stage, values in times.items()}
-
-
-def now() -> float:
-    """Seconds on a clock that all processes of the machine share."""
-    return time.clock_gettime(time.CLOCK_MONOTONIC)

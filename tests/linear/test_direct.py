@@ -70,7 +70,9 @@ def test_single_precision_factor_gives_double_precision_solution(kind):
     exact[:, 1] = 0.0  # a column that needs no iteration
     with factorise(matrix, kind, precision="single") as factor:
         assert "single" in factor.name
+        assert factor.iterations == 0
         solution = factor.solve(matrix @ exact)
+        assert 0 < factor.iterations < 10
     np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-13)
 
 

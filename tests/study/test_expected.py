@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from solver.study.description import read_study
-from solver.study.expected import announcement, expected, measured_before, modelled, unknowns
+from solver.study.expected import announcement, expected, measured_before, model, unknowns
 
 STUDY = read_study(Path(__file__).parents[2] / "cases/study/study.yaml", "quick")
+MODEL = model(STUDY)
 
 
 def test_unknowns_of_regular_grids_are_counted():
@@ -20,32 +21,32 @@ def test_unknowns_of_regular_grids_are_counted():
 
 
 def test_what_was_measured_before_is_taken_as_it_is():
-    earlier = {point.name: 2.0 for point in STUDY.points}
-    assert expected(STUDY, STUDY.points, earlier) == pytest.approx(2.0 * len(STUDY.points))
-    assert expected(STUDY, STUDY.points[:3], earlier) == pytest.approx(6.0)
+    earlier = dict.fromkeys(MODEL, 2.0)
+    assert expected(MODEL, MODEL, earlier, 100.0) == pytest.approx(2.0 * len(STUDY.points))
+    assert expected(MODEL, list(MODEL)[:3], earlier, 100.0) == pytest.approx(6.0)
 
 
 def test_the_model_is_scaled_by_what_is_known():
-    first, *others = STUDY.points
-    plain = [modelled(point, STUDY.repetitions) for point in others]
-    assert expected(STUDY, others, {}) == pytest.approx(sum(plain))
-    thrice = {first.name: 3 * modelled(first, STUDY.repetitions)}
-    assert expected(STUDY, others, thrice) == pytest.approx(3 * sum(plain))
+    first, *others = MODEL
+    plain = sum(MODEL[name] for name in others)
+    assert expected(MODEL, others, {}, 1e6) == pytest.approx(plain)
+    thrice = {first: 3 * MODEL[first]}
+    assert expected(MODEL, others, thrice, 1e6) == pytest.approx(3 * plain)
 
 
 def test_no_point_is_expected_to_take_more_than_its_limit():
-    point = STUDY.points[0]
-    assert expected(STUDY, [point], {point.name: 10 * STUDY.limit}) == STUDY.limit
+    name = next(iter(MODEL))
+    assert expected(MODEL, [name], {name: 1000.0}, 100.0) == 100.0
 
 
 def test_the_announcement_says_how_many_how_long_and_from_what(tmp_path):
-    one = STUDY.points[0]
-    assert "all" in announcement(STUDY, tmp_path, [])
-    assert "from a model" in announcement(STUDY, tmp_path, [one])
-    record = tmp_path / f"{one.name}.json"
+    one = STUDY.points[0].name
+    assert "all" in announcement(STUDY, MODEL, tmp_path, [])
+    assert "from a model" in announcement(STUDY, MODEL, tmp_path, [one])
+    record = tmp_path / f"{one}.json"
     record.parent.mkdir(parents=True)
-    record.write_text(json.dumps({"point": one.name, "whole": 40.0}))
-    text = announcement(STUDY, tmp_path, [one])
+    record.write_text(json.dumps({"point": one, "whole": 40.0}))
+    text = announcement(STUDY, MODEL, tmp_path, [one])
     assert f"1 of {len(STUDY.points)} points" in text
     assert "about 40 s (from earlier measurements)" in text
 

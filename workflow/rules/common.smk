@@ -93,7 +93,7 @@ def case_files():
                 f"cases = {folder}: no case file (*.yaml) in this folder"
             )
         files += found
-    others = ("family.yaml", "orders.yaml", "study.yaml")
+    others = ("family.yaml", "orders.yaml", "scaling.yaml", "study.yaml")
     return [f for f in files if f.name not in others]
 
 

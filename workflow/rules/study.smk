@@ -12,7 +12,7 @@ def study():
     """The study and its points by name; says how long those that are missing will take."""
     from solver.errors import InputError
     from solver.study.description import read_study
-    from solver.study.expected import announcement
+    from solver.study.expected import announcement, model
 
     try:
         content = read_study(Path(STUDY_FILE), SIZE)
@@ -20,9 +20,9 @@ def study():
         raise WorkflowError(str(error)) from None
     newest = max(Path(source).stat().st_mtime for source in MEASURING_SOURCES)
     pending = [
-        point for point in content.points if older(record_of(point.name), newest)
+        point.name for point in content.points if older(record_of(point.name), newest)
     ]
-    logger.info(announcement(content, Path(POINTS), pending))
+    logger.info(announcement(content, model(content), Path(POINTS), pending))
     return {point.name: point for point in content.points}
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver.report import raster, stages
+from solver.report import measured, raster, stages
 from solver.report.html import environment
 from solver.report.tables import as_csv
 from solver.report.work_precision import words
@@ -27,8 +27,6 @@ from solver.study.timing import TOTAL, spread
 
 # The errors that the table at the top shows.
 _OVERVIEW = ("pressure_l2", "pressure_means", "displacement_l2", "stress_l2")
-# A machine that was busier than this when a point began may have disturbed it.
-_BUSY = 1.0
 
 
 def page_name(study: Study) -> str:
@@ -169,6 +167,7 @@ def _to_html(
     sections: Sequence[dict[str, Any]],
     solvers: Sequence[dict[str, Any]],
 ) -> str:
+    solved = [m.record for m in points if m.solved]
     return (
         environment()
         .get_template("study.html.jinja")
@@ -179,8 +178,8 @@ def _to_html(
             solvers=solvers,
             outcome=outcome(points),
             failures=failures(points),
-            facts=_facts(points),
-            disturbed=disturbed(points),
+            facts=measured.facts(solved),
+            disturbed=measured.disturbed(solved),
             good=all(m.record["outcome"] in (SOLVED, "refused") for m in points),
             repetitions=study.repetitions,
             targets=TARGETS,
@@ -192,30 +191,3 @@ def _to_html(
             stages=stages.colors(s for m in points for s in m.record["times"] if s != TOTAL),
         )
     )
-
-
-def disturbed(points: Sequence[Measured]) -> int:
-    """How many solved points began while other work kept the machine busy."""
-    records = [m.record for m in points if m.solved]
-    return sum(record["load"] > record["threads"] + _BUSY for record in records)
-
-
-def _facts(points: Sequence[Measured]) -> list[tuple[str, str]]:
-    """On what, and how undisturbed, the points were measured."""
-    records = [m.record for m in points if m.solved]
-    if not records:
-        return []
-
-    def all_of(key: str) -> str:
-        return ", ".join(sorted({str(r["machine"].get(key, "")) for r in records}))
-
-    times = sorted(r["machine"]["time_utc"][:16].replace("T", " ") for r in records)
-    packages = ("python", "numpy", "scipy")
-    return [
-        ("Measured", " … ".join(dict.fromkeys([times[0], times[-1]])) + " UTC"),
-        ("Machine", all_of("cpu")),
-        ("Threads", ", ".join(sorted({str(r["threads"]) for r in records}))),
-        ("Revision", all_of("revision")),
-        ("Versions", ", ".join(f"{p} {all_of(p)}" for p in packages)),
-        ("Begun while the machine was busy", f"{disturbed(points)} of {len(records)}"),
-    ]

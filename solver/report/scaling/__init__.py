@@ -1,0 +1,1 @@
+"""The page of growth with size: figures, exponents, numbers beside the goals."""
