@@ -77,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", type=Path, required=True, metavar="RESULT.vtkhdf")
     command.add_argument("--verdict", type=Path, metavar="VERDICT.json", help="written in any case")
     command.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    command.add_argument("--verbose", action="store_true", help="tell each stage, with the time")
     command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
     command.add_argument(
         "--no-memory-check", action="store_true", help="start even where memory cannot suffice"
@@ -187,11 +188,13 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _solve(options: argparse.Namespace) -> int:
+    from solver.progress import telling
     from solver.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
     job = replace(_job(options), memory_check=not options.no_memory_check)
-    verdict = solve(job, options.output, options.verdict, log)
+    with telling(options.verbose, options.quiet):
+        verdict = solve(job, options.output, options.verdict, log)
     return PASSED if verdict["passed"] else FAILED
 
 

@@ -1,8 +1,11 @@
 """Time by stage: wall time, and processor time of all threads of the process."""
 
+import logging
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+_LOG = logging.getLogger(__name__)
 
 # The stages of `simulate`, in the order of the work; `pairing` holds the intersections too.
 SOLVING = ("cut", "pairing", "assembly", "solve", "recovery")
@@ -23,6 +26,8 @@ class Clock:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Count the time within the block to the stage `name`."""
+        if name not in self.seconds:
+            _LOG.info("%s", name)
         wall, cpu = time.perf_counter(), time.process_time()
         try:
             yield

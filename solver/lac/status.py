@@ -6,12 +6,15 @@ p − c ḡ > 0, with c a stiffness over a length so that no unit matters. Sourc
 A primal–dual active set strategy for non-linear multibody contact problems, CMAME 194 (2005).
 """
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from solver.errors import SolveError
+
+_LOG = logging.getLogger(__name__)
 
 # solve(closed) gives pressure (m,) (zero where open), average gap (m,), and the rest it found
 Solve = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -53,6 +56,8 @@ def find_status(
         offence = np.where(closed, -pressure / scale, -gap / length)
         noise = np.where(closed, PRESSURE_NOISE, GAP_NOISE)
         wrong = eligible & (offence > noise)
+        told = iteration, int(closed.sum()), len(closed), int(wrong.sum())
+        _LOG.info("contact status: iteration %d, %d of %d closed, %d wrong", *told)
         if not wrong.any():
             return StatusResult(closed, iteration, changes)
         seen.add(closed.tobytes())

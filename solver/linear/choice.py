@@ -1,11 +1,15 @@
 """The linear solver that a positive definite system gets, by its size and dimension."""
 
+import logging
+
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from solver.errors import SolveError
 from solver.linear.direct import Factor, factorise, wanted
 from solver.linear.multigrid import Multigrid, Unknowns
+
+_LOG = logging.getLogger(__name__)
 
 MULTIGRID = "multigrid"
 MULTIGRID_FROM = 80_000
@@ -43,6 +47,7 @@ class Chosen:
             if not isinstance(self._solver, Multigrid):
                 raise
             self.why = _instead(error)
+            _LOG.info("%s", self.why)
         self._solver.close()
         self._solver = factorise(self._matrix, dim=self._dim)
         return self._solver.solve(right, roughly)
@@ -56,7 +61,9 @@ def prepare(matrix: csr_matrix, unknowns: Unknowns) -> Chosen:
     """
     dim, kind = unknowns.dim, wanted()
     why = _against_multigrid(matrix.shape[0], dim) if kind == "auto" else "as asked for"
-    if kind == MULTIGRID or not why:
+    by = MULTIGRID if kind == MULTIGRID or not why else "a factor"
+    _LOG.info("linear system of %d unknowns, by %s", matrix.shape[0], by)
+    if by == MULTIGRID:
         why = (
             why or f"{MULTIGRID_FROM} unknowns or more in space: quicker and smaller than a factor"
         )

@@ -5,6 +5,7 @@ the others through the constraint, x = Z v + c, and the multiplier follows from 
 that degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
 """
 
+import logging
 from dataclasses import dataclass
 from typing import Protocol, Self, TypeVar
 
@@ -15,6 +16,8 @@ from solver.errors import SolveError
 from solver.linear.choice import Chosen, prepare
 from solver.linear.direct import Factor, factorise_indefinite
 from solver.linear.multigrid import Unknowns
+
+_LOG = logging.getLogger(__name__)
 
 # Each refinement must at least halve the residual, or it has reached round-off.
 _MIN_GAIN = 0.5
@@ -241,13 +244,14 @@ def solve(
     solution is not finite.
     """
     force, last = iterate.residual(), np.inf
-    for _ in range(_MAX_REFINEMENTS if refine else 1):
+    for step in range(_MAX_REFINEMENTS if refine else 1):
         correction = system.correction(iterate.condensed(force), iterate.violation(), refine)
         following = iterate.advanced(correction)
         following_force = following.residual()
         size = system.imbalance(following_force) / scale
         if not np.isfinite(size):
             raise SolveError("the solution is not finite")
+        _LOG.info("solution %d: residual %.1e", step + 1, size)
         if size < last:
             iterate, force = following, following_force
         enough = size <= round_off or size > _MIN_GAIN * last

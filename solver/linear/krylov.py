@@ -1,10 +1,14 @@
 """Conjugate gradients in double precision around a preconditioner in single precision."""
 
+import logging
 from collections.abc import Callable
 
 import numpy as np
 
 from solver.errors import SolveError
+
+_LOG = logging.getLogger(__name__)
+_TOLD = 10  # iterations from one line of the log to the next
 
 Operator = Callable[[np.ndarray], np.ndarray]
 
@@ -39,6 +43,8 @@ def conjugate_gradients(
         residual -= step * image
         iteration += 1
         reached = float(_ratio(np.linalg.norm(residual, axis=0), start).max())
+        if iteration % _TOLD == 0:
+            _LOG.info("conjugate gradients: iteration %d, residual %.1e", iteration, reached)
         if reached > accuracy:
             previous, improved = improved, precondition(residual)
             change = np.sum(residual * (improved - previous), axis=0)

@@ -94,7 +94,7 @@ def test_they_call_targets_of_make_and_nothing_else():
 
 def test_the_studies_are_those_of_the_project():
     studies = {line.removeprefix("make ") for line in LINES["gitlab", "studies"]}
-    assert studies == {"orders", "study", "stability"}
+    assert studies == {"orders", "study", "stability", "scaling"}
     assert studies <= {line.removeprefix("make ") for line in LINES["github", "studies"]}
     assert LINES["gitlab", "batch"] == ["make all-cases"]
 
