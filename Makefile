@@ -18,8 +18,8 @@ SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTIN
 
 .PHONY: help all-cases family case report summary compare orders study stability infsup scaling
 .PHONY: benchmark test accept
-.PHONY: format lint lock faults mutants kills bill clean clean-all
-.PHONY: environment study-environment test-environment lint-environment
+.PHONY: format lint lock faults mutants kills docs bill clean clean-all
+.PHONY: environment study-environment test-environment lint-environment docs-environment
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -109,6 +109,14 @@ test-environment:
 lint-environment:
 	@$(INSTALL) run test lint
 
+docs-environment:
+	@$(INSTALL) run docs
+
+docs: docs-environment ## write the documentation as a site into results/docs
+	@.venv/bin/python -m sphinx --quiet --fresh-env --fail-on-warning --keep-going \
+	  -c docs/site -d .sphinx . results/docs
+	@.venv/bin/python docs/site/links.py results/docs
+
 bill: environment ## write the bill of materials: every locked package, licence and hash
 	@.venv/bin/python workflow/bill.py results/bill-of-materials.json
 
@@ -118,13 +126,13 @@ LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
-	@for group in build mkl slurm pictures test lint lock; do \
+	@for group in build mkl slurm pictures test lint docs lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 
 clean: ## remove results and caches
 	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +
-	@rm -rf .snakemake .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	@rm -rf .snakemake .sphinx .pytest_cache .hypothesis .mypy_cache .ruff_cache
 	@find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
 clean-all: clean ## remove the environment too

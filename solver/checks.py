@@ -70,7 +70,7 @@ class CheckResult:
 
     @property
     def title(self) -> str:
-        """The check's name with its zone: the key of its accepted values."""
+        """The check's name with its zone, the key of its accepted values."""
         return f"{self.name} {self.zone}" if self.zone else self.name
 
     @property
@@ -120,21 +120,24 @@ class Check:
 
 
 def block_size(solution: Solution) -> float:
-    """The largest extent of the smallest body: what gaps are measured against."""
+    """The extent of the smallest body."""
     bodies = [solution.mesh.points[solution.body == b] for b in range(len(solution.bodies))]
     return min(float(np.ptp(points, axis=0).max()) for points in bodies if len(points))
 
 
 def _load(solution: Solution) -> float:
+    """The load."""
     return float(solution.load_scale)
 
 
 def _elongation(solution: Solution) -> float:
+    """Load / stiffness × size."""
     stiffness = min(m.young for m in solution.case.materials.values())
     return float(solution.load_scale / stiffness * block_size(solution))
 
 
 def _unit(_: Solution) -> float:
+    """One."""
     return 1.0
 
 

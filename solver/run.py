@@ -11,7 +11,7 @@ from typing import Any
 import meshio
 
 from solver.case import Case, check_mesh_file, load_case
-from solver.checks import run_checks
+from solver.checks import CheckResult, run_checks
 from solver.clock import Clock
 from solver.errors import InputError, MachineError, SolveError, of_machine
 from solver.memory import check_memory
@@ -21,6 +21,7 @@ from solver.provenance import gather
 from solver.regression import accepted_values
 from solver.results import read_result, write_result
 from solver.simulation import simulate
+from solver.solution import Solution
 from solver.verdict import CRASHED, FAILED, REFUSED, of_solution, without_result, write_verdict
 
 Log = Callable[[str], Any]
@@ -87,6 +88,27 @@ def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> dict[s
     return verdict
 
 
+def solve_checked(
+    case: Case,
+    mesh: meshio.Mesh,
+    swapped: bool = False,
+    hexahedra: str | None = None,
+    log: Log = lambda _: None,
+    accepted: bool = True,
+    clock: Clock | None = None,
+) -> tuple[Solution, list[CheckResult]]:
+    """Solve a case on its mesh and run its checks, those of `accepted` values too if asked.
+
+    The time of every stage is added to `clock`, where one is given.
+    """
+    clock = Clock() if clock is None else clock
+    solution = simulate(case, mesh, swapped, hexahedra, log, clock=clock)
+    with clock.stage("checks"):
+        solution.errors = errors(solution)
+        checks = run_checks(solution, accepted_values(solution) if accepted else {})
+    return solution, checks
+
+
 def check(result_file: Path) -> dict[str, Any]:
     """The verdict of a stored result, its checks run again on the stored fields."""
     result = read_result(result_file)
@@ -144,12 +166,9 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[s
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
-    solution = simulate(case, mesh, job.swapped, job.hexahedra, log, clock=clock)
-    with clock.stage("checks"):
-        solution.errors = errors(solution)
-        # What was accepted is a result on the case's own mesh.
-        accepted = accepted_values(solution) if job.refine == 1 else {}
-        checks = run_checks(solution, accepted)
+    # What was accepted is a result on the case's own mesh.
+    accepted = job.refine == 1
+    solution, checks = solve_checked(case, mesh, job.swapped, job.hexahedra, log, accepted, clock)
     solution.cpu_seconds = time.process_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
     with clock.stage("write"):

@@ -84,8 +84,8 @@ class ZoneResult:
 class StepResult:
     """One load step: load factor, cost of the status iteration, and what was observed.
 
-    `residual` is relative to the forces; `complementarity` is the largest |p ḡ| of a macro-element,
-    relative to the scale of stress times the model's length.
+    `residual` is relative to the forces; `complementarity` is the largest size of p ḡ on a
+    macro-element, relative to the scale of stress times the model's length.
 
     `observations` holds one mapping per observed macro-element, in the order of the case file:
     zone, macro_element (number), pressure, gap, status (0 or 1), coverage.

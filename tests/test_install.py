@@ -222,3 +222,15 @@ def test_unpacked_libraries_look_beside_themselves(tmp_path, library):
     command = [tmp_path / "bin" / "patchelf", "--print-rpath", tmp_path / "lib" / "libsample.so.1"]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     assert run.stdout.strip() == "$ORIGIN"
+
+
+def test_the_environment_knows_the_project_from_any_folder(tmp_path, monkeypatch):
+    packages = tmp_path / "lib" / "python3.11" / "site-packages"
+    packages.mkdir(parents=True)
+    monkeypatch.setattr(environment, "VENV", tmp_path)
+    environment.share()
+    environment.share()
+    code = f"import site; site.addsitedir({str(packages)!r}); import solver; print(solver.__file__)"
+    command = [sys.executable, "-I", "-S", "-c", code]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert run.stdout.strip() == str(ROOT / "solver" / "__init__.py"), run.stderr

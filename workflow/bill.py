@@ -20,11 +20,20 @@ _HASH = re.compile(r"^ +--hash=sha256:([0-9a-f]{64})")
 _NAME = 60
 # Of packages whose metadata does not say, or that are installed on some machines only.
 _TOLD = {
+    "accessible-pygments": "BSD-3-Clause",
+    "alabaster": "BSD-3-Clause",
+    "babel": "BSD-3-Clause",
+    "beautifulsoup4": "MIT",
     "colorama": "BSD-3-Clause",
     "conda-inject": "MIT",
     "cvxopt": "GPL-3.0-or-later",
+    "furo": "MIT",
+    "imagesize": "MIT",
+    "mdit-py-plugins": "MIT",
+    "myst-parser": "MIT",
     "pandas": "BSD-3-Clause",
     "pyreadline3": "BSD-3-Clause",
+    "roman-numerals": "0BSD OR CC0-1.0",
     "snakemake-executor-plugin-slurm": "MIT",
     "snakemake-executor-plugin-slurm-jobstep": "MIT",
     "snakemake-interface-common": "MIT",
@@ -32,6 +41,16 @@ _TOLD = {
     "snakemake-interface-report-plugins": "MIT",
     "snakemake-interface-scheduler-plugins": "MIT",
     "snakemake-interface-storage-plugins": "MIT",
+    "snowballstemmer": "BSD-3-Clause",
+    "soupsieve": "MIT",
+    "sphinx": "BSD-2-Clause",
+    "sphinx-basic-ng": "MIT",
+    "sphinxcontrib-applehelp": "BSD-2-Clause",
+    "sphinxcontrib-devhelp": "BSD-2-Clause",
+    "sphinxcontrib-htmlhelp": "BSD-2-Clause",
+    "sphinxcontrib-jsmath": "BSD-2-Clause",
+    "sphinxcontrib-qthelp": "BSD-2-Clause",
+    "sphinxcontrib-serializinghtml": "BSD-2-Clause",
     "uv": "MIT OR Apache-2.0",
 }
 UNKNOWN = "NOASSERTION"

@@ -1,17 +1,17 @@
 """What a case file's `transform:` does to a mesh: keys applied in the order in which they stand.
 
-scale: 1.0e-3                          # by one positive number
-stretch: [1, 1, 10]                    # by one along each axis
-rotate: 30                             # degrees, in the plane; in 3D {axis: [1, 1, 0], angle: 30}
+scale: 1.0e-3                       # by one positive number
+stretch: [1, 1, 10]                 # by one along each axis
+rotate: 30                          # degrees, in the plane; in 3D {axis: [1, 1, 0], angle: 30}
 translate: [100, 0, 0]
-perturb: {amplitude: 0.2, seed: 1}     # random moves, as a share of the shortest edge at each node;
-                                       # with `group`, of the nodes of that group alone
-renumber: 1                            # a seed: another order of the nodes and of the cells
-shift: {group: top, by: [0, 0.1]}      # the nodes of a group's cells
-turn: {group: top, angle: 1.0e-9}      # degrees, about the last axis; see `parts.turned`
+perturb: {amplitude: 0.2, seed: 1}  # random moves, as a share of the shortest edge at each
+                                    # node; with `group`, of the nodes of that group alone
+renumber: 1                         # a seed: another order of the nodes and of the cells
+shift: {group: top, by: [0, 0.1]}   # the nodes of a group's cells
+turn: {group: top, angle: 1.0e-9}   # degrees, about the last axis; see `parts.turned`
 pick: {from: bottom_contact, low: [0, -1], high: [0.5, 1], name: corner, rest: others}
-                                       # two groups of a group's cells, by the place of their nodes;
-                                       # or a list of such
+                                    # two groups of a group's cells, by the place of their
+                                    # nodes; or a list of such
 """
 
 from collections.abc import Callable, Mapping

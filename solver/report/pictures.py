@@ -21,21 +21,39 @@ MOST_CELLS = 100_000
 
 def picture(row: Row, folder: Path) -> Markup:
     """The picture of one solve, kept in `folder`; a line that says why there is none."""
-    return _kept(row, folder, "", _draw)
+    return _kept(row, folder, "", lambda row: draw(_solution(row), row.name))
 
 
 def profile(row: Row, folder: Path, along: Expression | None = None) -> Markup:
     """The pressure of one solve's first zone along the interface, kept in `folder` too."""
 
-    def draw(row: Row) -> Markup:
-        solution = _solution(row)
-        if not solution.zones:
-            raise ValueError("no contact, no pressure")
-        title = f"{row.name}: contact pressure along the interface"
-        return draw_profile(solution, solution.zones[0], title, along)
+    def draw_row(row: Row) -> Markup:
+        return draw_pressure(_solution(row), row.name, along)
 
     over = f"-{sha256(along.text.encode()).hexdigest()[:8]}" if along else ""
-    return _kept(row, folder, f"-profile{over}", draw)
+    return _kept(row, folder, f"-profile{over}", draw_row)
+
+
+def draw(solution: Solution, name: str) -> Markup:
+    """Meshes and contact pressure; raises ValueError where there are too many cells to draw."""
+    cells = sum(len(block.data) for block in solution.mesh.cells)
+    if cells > MOST_CELLS:
+        raise ValueError(f"{cells} cells are too many to draw")
+    drawn = draw_plane if solution.mesh.points.shape[1] == 2 else draw_space
+    return drawn(solution, f"{name}: meshes and contact pressure")
+
+
+def draw_pressure(
+    solution: Solution, name: str, along: Expression | None = None, zone: str | None = None
+) -> Markup:
+    """The pressure of a zone, the first or the one named, along the interface.
+
+    Raises ValueError where there is no such zone.
+    """
+    shown = next((z for z in solution.zones if zone in (None, z.name)), None)
+    if shown is None:
+        raise ValueError(f"there is no contact zone {zone}" if zone else "no contact, no pressure")
+    return draw_profile(solution, shown, f"{name}: contact pressure along the interface", along)
 
 
 def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], Markup]) -> Markup:
@@ -56,16 +74,6 @@ def _is_current(kept: Path, result: Path) -> bool:
     sources = Path(__file__).parent.glob("*.py")
     newest = max(path.stat().st_mtime for path in (result, *sources))
     return kept.is_file() and kept.stat().st_mtime > newest
-
-
-def _draw(row: Row) -> Markup:
-    solution = _solution(row)
-    cells = sum(len(block.data) for block in solution.mesh.cells)
-    if cells > MOST_CELLS:
-        raise ValueError(f"{cells} cells are too many to draw")
-    title = f"{row.name}: meshes and contact pressure"
-    draw = draw_plane if solution.mesh.points.shape[1] == 2 else draw_space
-    return draw(solution, title)
 
 
 def _solution(row: Row) -> Solution:

@@ -92,8 +92,9 @@ class _Elements:
 
     @property
     def shown(self) -> np.ndarray:
-        """Which macro-elements (m,) are drawn."""
-        return (self.last > self.low) & (self.first < self.high)
+        """Which macro-elements (m,) are drawn: partly within, or as marks centred within."""
+        first, last = (self.first, self.last) if self.steps else (self.centre, self.centre)
+        return (last >= self.low) & (first <= self.high)
 
     def draw(self, drawing: Drawing, x: Scale, y: Scale, values: np.ndarray) -> None:
         """One value (m,) of each macro-element."""

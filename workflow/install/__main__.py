@@ -37,6 +37,7 @@ def main() -> None:
         if not environment.current(groups):
             environment.install(groups)
             environment.stamp(groups)
+        environment.share()
         # An environment out of a cache may have been completed on another system.
         if not environment.complete() or libraries.missing(environment.VENV):
             libraries.provide(environment.VENV)

@@ -106,6 +106,14 @@ def make() -> None:
     venv.create(VENV, clear=True, with_pip=True, symlinks=True)
 
 
+def share() -> None:
+    """Let the environment's Python import the project from any folder: it runs in place."""
+    for packages in VENV.glob("lib/python*/site-packages"):
+        known = packages / "mortarcheck.pth"
+        if not known.is_file() or known.read_text() != f"{ROOT}\n":
+            known.write_text(f"{ROOT}\n")
+
+
 def compile_bytecode() -> None:
     """Compile every package on all cores: otherwise each start of Snakemake pays for it."""
     # Packages hold templates and samples that are no valid Python: the status says nothing.

@@ -1,0 +1,71 @@
+"""What the pages ask for when they become a site: tables, the menu, a first page.
+
+The menu is made from the lists of links on the front page, a section each. A page of docs/ that is
+in no list comes last, so that a new one is never forgotten.
+"""
+
+import re
+from pathlib import Path
+from posixpath import join, normpath
+from typing import Any
+
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from tables import TABLES
+
+_TABLE = re.compile(r"^<!-- table: (.*) -->$", re.MULTILINE)
+_SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
+_LINK = re.compile(r"^- \[(.+)\]\((.+)\.md\)", re.MULTILINE)
+_FIRST = (
+    '<!doctype html><meta charset="utf-8"><title>{0}</title>'
+    '<meta http-equiv="refresh" content="0; url={1}"><a href="{1}">{0}</a>'
+)
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Connect to Sphinx."""
+    app.connect("source-read", _tables)
+    app.connect("source-read", _menu)
+    app.connect("build-finished", _first_page)
+    return {"parallel_read_safe": True}
+
+
+def _tables(_: Sphinx, page: str, source: list[str]) -> None:
+    def made(match: re.Match[str]) -> str:
+        if match[1] not in TABLES:
+            raise ExtensionError(
+                f"{page}: there is no table {match[1]}; known: {', '.join(TABLES)}"
+            )
+        return TABLES[match[1]]()
+
+    source[0] = _TABLE.sub(made, source[0])
+
+
+def _menu(app: Sphinx, page: str, source: list[str]) -> None:
+    if page != app.config.root_doc:
+        return
+    folder = page.rpartition("/")[0]
+    before, *parts = _SECTION.split(source[0])
+    sections = dict(zip(parts[::2], parts[1::2], strict=True))
+    listed = {
+        normpath(join(folder, to)) for text in sections.values() for _, to in _LINK.findall(text)
+    }
+    rest = sorted(app.env.found_docs - listed - {page})
+    if rest:
+        links = [f"- [{Path(name).name}](/{name}.md)" for name in rest]
+        sections["More"] = "\n\n" + "\n".join(links) + "\n\n"
+    menus = [_toctree(title, _LINK.findall(text), folder) for title, text in sections.items()]
+    lists = [f"## {title}{text}" for title, text in sections.items()]
+    source[0] = before + "".join(lists) + "\n" + "\n".join(menus)
+
+
+def _toctree(caption: str, links: list[tuple[str, str]], folder: str) -> str:
+    entries = [f"{title} <{join('/', folder, to)}>" for title, to in links]
+    return "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *entries, "```", ""])
+
+
+def _first_page(app: Sphinx, failure: Exception | None) -> None:
+    """Where a reader begins who opens the folder: leads to the front page."""
+    if failure is None and app.builder.name == "html":
+        page = _FIRST.format(app.config.html_title, f"{app.config.root_doc}.html")
+        (Path(app.outdir) / "index.html").write_text(page, encoding="utf-8")

@@ -1,0 +1,174 @@
+"""The pages: links as a forge follows them, parts made from the sources, formulas."""
+
+import importlib
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from solver.checks import CHECKS
+from solver.mesh.recipes import _RECIPES
+from solver.report.html import NORMS
+from solver.schemas import CASE_SCHEMA
+from solver.solutions import SOLUTIONS
+
+ROOT = Path(__file__).resolve().parents[2]
+SITE = ROOT / "docs" / "site"
+PAGES = [
+    *(
+        ROOT / name
+        for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "results/README.md")
+    ),
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+ASKED = re.compile(r"^<!-- table: (.*) -->$", re.MULTILINE)
+CODE = re.compile(r"^(```+).*?^\1$|`[^`\n]+`", re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def site(monkeypatch):
+    monkeypatch.syspath_prepend(SITE)
+    return importlib.import_module
+
+
+def slugs(page: Path) -> set[str]:
+    """The anchors that a forge gives to headings."""
+    text = re.sub(
+        r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
+    heads = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_to_files_and_headings(page):
+    text = CODE.sub("", page.read_text(encoding="utf-8"))
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" in link:
+            continue
+        path, _, anchor = link.partition("#")
+        target = page.parent / path if path else page
+        assert target.exists(), link
+        assert not anchor or anchor in slugs(target), link
+
+
+def titled(schema: dict, path: str) -> Iterator[tuple[str, bool]]:
+    """Every key of the schema, found anew: its path, and whether it has a title."""
+    for name, key in schema.get("properties", {}).items():
+        yield f"{path}{name}", "title" in key
+        yield from titled(key, f"{path}{name}.")
+    for part, ending in (("items", "[]."), ("additionalProperties", "*.")):
+        if isinstance(schema.get(part), dict):
+            inside = path[:-1] + ending if ending == "[]." else path + ending
+            yield from titled(schema[part], inside)
+
+
+def test_every_key_of_a_case_file_is_in_the_table(site):
+    table = site("tables").case_keys()
+    keys = dict(titled(json.loads(CASE_SCHEMA.read_text()), ""))
+    untold = {key for key, has_title in keys.items() if not has_title}
+    # Named by what they are: checks, and components of the stress.
+    assert all(key.startswith(("tolerance.", "reference.stress.")) for key in untold)
+    assert len(keys) - len(untold) > 70
+    for key in keys.keys() - untold:
+        assert f"| `{key}` |" in table
+    assert "| `contact[].hexahedra` | into what slave hexahedra are cut | " in table
+    assert "pyramids or hexahedra | `pyramids` |" in table
+    assert "| a positive number | needed |" in table
+    assert "`directions` | solved once, or again with slave and master exchanged | " in table
+
+
+def test_every_check_solution_and_recipe_is_on_its_page(site):
+    tables = site("tables")
+    page = (ROOT / "docs" / "checks.md").read_text(encoding="utf-8")
+    table = tables.checks()
+    for check in CHECKS:
+        assert f"`{check.name}`" in (page if check.name in NORMS else table), check.name
+    assert all(f"### `{name}`" in tables.solutions() for name in SOLUTIONS)
+    assert all(f"recipe: {name}" in tables.recipes() for name in _RECIPES)
+    assert "perturb: {amplitude" in tables.transforms()
+
+
+def test_pages_ask_for_tables_that_there_are(site):
+    asked = {name for page in PAGES for name in ASKED.findall(page.read_text(encoding="utf-8"))}
+    assert asked == set(site("tables").TABLES)
+
+
+def formulas() -> Iterator[tuple[str, str]]:
+    for page in PAGES:
+        text = CODE.sub("", page.read_text(encoding="utf-8"))
+        for block, inline in re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+)\$", text, re.DOTALL):
+            yield page.name, block or inline
+
+
+def test_every_formula_can_be_drawn():
+    from docutils.utils.math.latex2mathml import tex2mathml
+
+    found = list(formulas())
+    assert len(found) > 60
+    for page, latex in found:
+        assert tex2mathml(latex).startswith("<math"), page
+        # An accent takes a subscript for a limit below it: \bar{g}{}_i is right, \bar g_i is not.
+        assert not re.search(r"\\(bar|hat|tilde)( \w|\{\w\})_", latex), (page, latex)
+
+
+LIBRARY = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
+
+
+PYTHON = re.findall(r"^```python\n(.*?)^```$", LIBRARY, re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("code", PYTHON)
+def test_code_on_the_page_of_the_library_runs(code):
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert "passed" in run.stdout
+
+
+def write(folder: Path, **pages: str) -> Path:
+    for name, body in pages.items():
+        (folder / f"{name}.html").write_text(f"<html><body>{body}</body></html>")
+    return folder
+
+
+def test_links_of_the_site_that_lead_somewhere(site, tmp_path):
+    write(
+        tmp_path,
+        a="<h1 id=top>A</h1><a href='b.html#x'>b</a><a href='#top'>up</a>"
+        "<a href='https://example.org/'>elsewhere</a><img src='data:image/png;base64,'>",
+        b="<p id=x>x</p><a href='a.html'>a</a><a href='a.html#'>a</a>",
+    )
+    assert site("links").broken(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("body", "fault"),
+    [
+        ("<a href='c.html'>c</a>", "a.html: c.html: there is no such file"),
+        ("<a href='b.html#y'>y</a>", "a.html: b.html#y: there is no such anchor"),
+        ("<a href='#y'>y</a>", "a.html: #y: there is no such anchor"),
+        ("<a href='../a.html'>out</a>", "a.html: ../a.html: there is no such file"),
+        ("<img src='no.png'>", "a.html: no.png: there is no such file"),
+        (
+            "<script src='https://example.org/x.js'></script>",
+            "a.html: loads https://example.org/x.js",
+        ),
+        (
+            "<link rel=stylesheet href='//example.org/x.css'>",
+            "a.html: loads //example.org/x.css",
+        ),
+    ],
+)
+def test_links_of_the_site_that_lead_nowhere(site, tmp_path, body, fault):
+    assert site("links").broken(write(tmp_path, a=body, b="<p id=x>")) == [fault]
+
+
+def test_a_site_without_pages_is_none(site, tmp_path):
+    run = subprocess.run(
+        [sys.executable, SITE / "links.py", tmp_path], capture_output=True, text=True
+    )
+    assert (run.returncode, run.stderr) == (1, f"{tmp_path}: there is no page\n")
