@@ -89,7 +89,7 @@ class _Iterate:
         if scene.cures.differences:
             internal = internal_force(scene.points, scene.blocks, self.straining, self.extended)
         else:
-            product = self.problem.stiffness @ self.displacement.total
+            product = self.problem.whole_stiffness @ self.displacement.total
             internal = product.reshape(self.force.shape)
         return internal + scene.mean.force(self.mean_stress)
 
@@ -152,9 +152,13 @@ class ContactProblem:
         self.at_rest = Displacement.zero(free, surface, scene.cures.remainder)
         self._refuse_unheld()
         self.has_own_unknowns = self._find_own_unknowns()
-        self.stiffness = stiffness(scene.points, scene.blocks)
-        self.matrix = scene.free.reduced(self.stiffness + scene.mean.stiffness())
+        self.matrix, self.diagonal = _stiffness(scene)
         self._system: tuple[bytes, Constrained] | None = None
+
+    @cached_property
+    def whole_stiffness(self) -> sparse.csr_matrix:
+        """That of all degrees of freedom, without mean stress: a plain residual asks for it."""
+        return stiffness(self.scene.points, self.scene.blocks)[0]
 
     def _acts(self) -> np.ndarray:
         """Which multipliers (k,) move anything: supports may hold the nodes of both surfaces.
@@ -288,7 +292,7 @@ class ContactProblem:
         smallest = float(self.area.min()) ** (1 / (dim - 1))
         causes = {
             "forces": pressure_of_forces(gaps, noise),
-            "gap": pressure_of_gaps(gaps, known, self.stiffness.diagonal()),
+            "gap": pressure_of_gaps(gaps, known, self.diagonal),
             "coordinates": scale * scene.rounding / smallest,
             "stress": max(unit * stress, EPSILON * mean_stress),
             "slender": unit * slender,
@@ -390,6 +394,17 @@ class ContactProblem:
                 )
                 raise InputError(self.scene.case.path, "supports", None, allowed)
         return not len(lost)
+
+
+def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """The stiffness of the free unknowns, and its diagonal (n_dofs,), that of held ones too."""
+    free, mean = scene.free, scene.mean
+    matrix, diagonal = stiffness(scene.points, scene.blocks, free.selection)
+    if free.selection is None:
+        matrix = free.reduced(matrix)
+    if mean.size:
+        matrix = matrix + free.reduced(mean.stiffness())
+    return matrix, diagonal
 
 
 def _row_sizes(matrix: sparse.csr_matrix) -> np.ndarray:

@@ -10,13 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from solver.assembly import CellSum, degrees_of_freedom
 from solver.batch import invert
 from solver.elements import shape_functions, volume_rule
 from solver.errors import SolveError
 from solver.mesh.catalogue import CellType
 
 # Bytes of gradients handled at once: small enough to stay in the processor's cache.
-_CHUNK_BYTES = 8 << 20
+_CHUNK_BYTES = 1 << 20
+_ALL = slice(None)
 
 
 @dataclass(frozen=True)
@@ -71,49 +73,37 @@ def _chunks(block: Block, dim: int) -> Iterator[slice]:
         yield slice(start, start + step)
 
 
-def element_matrices(points: np.ndarray, block: Block) -> np.ndarray:
-    """Stiffness matrices (n, dim · n_nodes, dim · n_nodes) of a block's cells."""
-    dim = points.shape[1]
-    nodes = block.type.n_nodes
+def element_matrices(points: np.ndarray, block: Block, part: slice = _ALL) -> np.ndarray:
+    """Stiffness matrices (n, dim · n_nodes, dim · n_nodes) of a part of a block's cells."""
+    dim, nodes = points.shape[1], block.type.n_nodes
     reference, weights = block.rule
-    matrices = np.empty((len(block.cells), nodes, dim, nodes, dim))
-    for part in _chunks(block, dim):
-        gradient, determinant = physical_gradients(points, block.cells[part], block.type, reference)
-        flat = gradient.reshape(*gradient.shape[:2], nodes * dim)
-        weighted = flat * (weights * determinant)[:, :, None]
-        products = np.matmul(np.swapaxes(weighted, 1, 2), flat)
-        products = products.reshape(-1, nodes, dim, nodes, dim)
-        shear = block.shear[part, None, None, None, None]
-        stiffness = matrices[part]
-        np.multiply(products, block.lame[part, None, None, None, None], out=stiffness)
-        stiffness += shear * np.swapaxes(products, 2, 4)
-        trace = block.shear[part, None, None] * np.einsum("caibi->cab", products)
-        for i in range(dim):
-            stiffness[:, :, i, :, i] += trace
-    return matrices.reshape(len(block.cells), nodes * dim, nodes * dim)
+    gradient, determinant = physical_gradients(points, block.cells[part], block.type, reference)
+    flat = gradient.reshape(*gradient.shape[:2], nodes * dim)
+    weighted = flat * (weights * determinant)[:, :, None]
+    products = np.matmul(np.swapaxes(weighted, 1, 2), flat)
+    products = products.reshape(-1, nodes, dim, nodes, dim)
+    shear = block.shear[part, None, None, None, None]
+    stiffness = products * block.lame[part, None, None, None, None]
+    stiffness += shear * np.swapaxes(products, 2, 4)
+    trace = block.shear[part, None, None] * np.einsum("caibi->cab", products)
+    for i in range(dim):
+        stiffness[:, :, i, :, i] += trace
+    return stiffness.reshape(-1, nodes * dim, nodes * dim)
 
 
-def degrees_of_freedom(cells: np.ndarray, dim: int) -> np.ndarray:
-    """Degrees of freedom (n, dim · n_nodes) of cells (n, n_nodes)."""
-    return (dim * cells[:, :, None] + np.arange(dim)).reshape(len(cells), -1)
+def stiffness(
+    points: np.ndarray, blocks: list[Block], kept: np.ndarray | None = None
+) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """The stiffness matrix (k, k), symmetric, both halves stored, and its whole diagonal (n_dofs,).
 
-
-def stiffness(points: np.ndarray, blocks: list[Block]) -> sparse.csr_matrix:
-    """The stiffness matrix (n_dofs, n_dofs), symmetric, both halves stored."""
+    Of all degrees of freedom, or of those `kept` (k,), in ascending order, alone.
+    """
     n, dim = points.shape
-    total = sparse.csr_matrix((n * dim, n * dim))
+    total = CellSum([block.cells for block in blocks], n, dim, kept)
     for block in blocks:
-        total = total + assembled(block.cells, element_matrices(points, block), total.shape[0], dim)
-    return total
-
-
-def assembled(cells: np.ndarray, matrices: np.ndarray, n_dofs: int, dim: int) -> sparse.csr_matrix:
-    """The sum (n_dofs, n_dofs) of cell matrices (n, dim · n_nodes, dim · n_nodes)."""
-    dofs = degrees_of_freedom(cells, dim).astype(np.int32)
-    rows = np.repeat(dofs, dofs.shape[1], axis=1)
-    columns = np.tile(dofs, dofs.shape[1])
-    entries = (matrices.ravel(), (rows.ravel(), columns.ravel()))
-    return sparse.coo_matrix(entries, shape=(n_dofs, n_dofs)).tocsr()
+        for part in _chunks(block, dim):
+            total.add(block.cells[part], element_matrices(points, block, part))
+    return total.matrix, total.diagonal
 
 
 def internal_force(

@@ -10,7 +10,8 @@ Comput. Struct. 79 (2001) 1473–1486.
 import numpy as np
 from scipy import sparse
 
-from solver.elasticity import Block, assembled, physical_gradients, stiffness
+from solver.assembly import CellSum
+from solver.elasticity import Block, physical_gradients, stiffness
 from solver.elements import shape_functions
 from solver.linear.direct import factorise
 from solver.scene import Scene
@@ -22,7 +23,7 @@ def inf_sup_constant(scene: Scene) -> float:
     Raises SolveError where the system is singular.
     """
     basis = scene.free.basis
-    energy = stiffness(scene.points, scene.blocks) + scene.mean.stiffness()
+    energy = stiffness(scene.points, scene.blocks)[0] + scene.mean.stiffness()
     energy = energy + mass(scene.points, scene.blocks) / scene.length**2
     gaps = sparse.vstack([zone.operator.matrix for zone in scene.zones]) @ basis
     area = np.concatenate([zone.operator.area for zone in scene.zones])
@@ -39,12 +40,13 @@ def inf_sup_constant(scene: Scene) -> float:
 def mass(points: np.ndarray, blocks: list[Block]) -> sparse.csr_matrix:
     """The consistent mass matrix (n_dofs, n_dofs) of unit density."""
     n, dim = points.shape
-    total = sparse.csr_matrix((n * dim, n * dim))
+    total = CellSum([block.cells for block in blocks], n, dim)
     for block in blocks:
         reference, weights = block.rule
         values = shape_functions(block.type.name).values(reference)
         _, determinant = physical_gradients(points, block.cells, block.type, reference)
         scalar = np.einsum("cq,q,qa,qb->cab", determinant, weights, values, values, optimize=True)
         local = np.einsum("cab,ij->caibj", scalar, np.eye(dim))
-        total = total + assembled(block.cells, local, n * dim, dim)
-    return total
+        size = dim * block.type.n_nodes
+        total.add(block.cells, local.reshape(-1, size, size))
+    return total.matrix

@@ -26,7 +26,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from solver.elasticity import Block, degrees_of_freedom, physical_gradients
+from solver.assembly import degrees_of_freedom
+from solver.elasticity import Block, physical_gradients
 from solver.elements import shape_functions
 
 AUTOMATIC_ABOVE = 0.499

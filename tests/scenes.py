@@ -41,6 +41,15 @@ def block_mesh(bottom: str, top: str, counts: tuple[int, int] = (3, 2), size: fl
     return generate({"recipe": "blocks", "size": size, **sections}, "test")
 
 
+def grid(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) and HEXA8 cells (count³, 8) of a unit cube."""
+    ticks = np.arange(count + 1)
+    points = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    first = points[(points < count).all(axis=1)] @ [(count + 1) ** 2, count + 1, 1]
+    corners = BY_NAME["HEXA8"].nodes @ [(count + 1) ** 2, count + 1, 1]
+    return points / count, first[:, None] + np.rint(corners).astype(int)
+
+
 def moved(mesh: meshio.Mesh, amount: float, seed: int = 0) -> meshio.Mesh:
     """Every node moved at random by up to `amount`, within the planes that bound the blocks.
 

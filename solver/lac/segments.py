@@ -24,6 +24,10 @@ _FACING = 0.2
 # Extra degrees where a face is not the affine image of its reference face: its functions are then
 # no polynomials in the plane.
 _BENT_DEGREES = 6
+# More than what rounding makes of a distance, as a share of it.
+_ROUNDING = 1e-9
+# Pairs cut at once: few enough for their polygons to stay in the processor's cache.
+_PAIRS_AT_ONCE = 4096
 # The straight edges around a bent face are moved outward by twice what its mid-nodes ask for, since
 # an edge may reach beyond its mid-node, and by this share of their distance from the centre.
 _MARGIN = 0.05
@@ -56,10 +60,15 @@ def intersect(slave: Facets, master: Facets, reach: float, more: int = 0) -> lis
     """
     i, j = facing_pairs(slave, master, reach)
     straight = slave.straight[i]
+    charts = (
+        (np.flatnonzero(straight & _above_each_other(slave, master, i, j)), _in_plane),
+        (np.flatnonzero(~straight), _in_reference),
+    )
     parts = []
-    for chosen, chart in ((straight, _in_plane), (~straight, _in_reference)):
-        if chosen.any():
-            parts.append(chart(slave, master, (i[chosen], j[chosen]), reach, more))
+    for pairs, chart in charts:
+        for start in range(0, len(pairs), _PAIRS_AT_ONCE):
+            some = pairs[start : start + _PAIRS_AT_ONCE]
+            parts.append(chart(slave, master, (i[some], j[some]), reach, more))
     return [part for part in parts if len(part.slave)]
 
 
@@ -68,6 +77,13 @@ def facing_pairs(slave: Facets, master: Facets, reach: float) -> tuple[np.ndarra
     i, j = candidate_pairs(slave.centre, slave.radius, master.centre, master.radius, reach)
     facing = np.einsum("pd,pd->p", slave.normal[i], master.normal[j]) < -_FACING
     return i[facing], j[facing]
+
+
+def _above_each_other(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """Which pairs (p,) may overlap, seen along the slave's normal: their balls do."""
+    between = master.centre[j] - slave.centre[i]
+    beside = np.einsum("pd,ptd->pt", between, slave.tangents[i])
+    return np.linalg.norm(beside, axis=1) <= (1 + _ROUNDING) * (slave.radius[i] + master.radius[j])
 
 
 def _in_plane(

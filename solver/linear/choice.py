@@ -7,6 +7,7 @@ from scipy.sparse import csr_matrix
 
 from solver.errors import SolveError
 from solver.linear.direct import Factor, factorise, wanted
+from solver.linear.krylov import EPSILON
 from solver.linear.multigrid import Multigrid, Unknowns
 
 _LOG = logging.getLogger(__name__)
@@ -36,13 +37,13 @@ class Chosen:
         """The most that one solution took so far; 0 by a factor alone."""
         return self._solver.iterations
 
-    def solve(self, right: np.ndarray, roughly: bool = False) -> np.ndarray:
-        """Solve for `right` (n,) or (n, k); `roughly` as far as is quick, for who refines.
+    def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
+        """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that, or better.
 
         Raises SolveError where the solution is not finite or the iterations do not converge.
         """
         try:
-            return self._solver.solve(right, roughly)
+            return self._solver.solve(right, accuracy)
         except SolveError as error:
             if not isinstance(self._solver, Multigrid):
                 raise
@@ -50,7 +51,7 @@ class Chosen:
             _LOG.info("%s", self.why)
         self._solver.close()
         self._solver = factorise(self._matrix, dim=self._dim)
-        return self._solver.solve(right, roughly)
+        return self._solver.solve(right, accuracy)
 
 
 def prepare(matrix: csr_matrix, unknowns: Unknowns) -> Chosen:

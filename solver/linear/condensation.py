@@ -15,6 +15,7 @@ from scipy import sparse
 from solver.errors import SolveError
 from solver.linear.choice import Chosen, prepare
 from solver.linear.direct import Factor, factorise_indefinite
+from solver.linear.krylov import EPSILON, ROUGH
 from solver.linear.multigrid import Unknowns
 
 _LOG = logging.getLogger(__name__)
@@ -24,6 +25,8 @@ _MIN_GAIN = 0.5
 _MAX_REFINEMENTS = 6
 # A residual below this multiple of the machine precision, relative to the forces, is round-off.
 _ROUND_OFF = 8 * np.finfo(float).eps
+# A refinement aims at this share of round-off, and at no smaller a gain.
+_WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
 # A macro-element's own coefficient must not be smaller than this share of its row's largest.
 _SMALLEST_PIVOT = 1e-6
 
@@ -43,11 +46,11 @@ class Constrained(Protocol):
         """Why that was chosen."""
 
     def correction(
-        self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
+        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
         """The change of x (n,) that removes f − K x = `force` and b − G x = `violation`.
 
-        `roughly`: as far as is quick, where another correction follows.
+        What is left of the forces may be `accuracy` of them, where another correction follows.
         """
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
@@ -62,14 +65,14 @@ class Condensed:
     """x = Z v + shift · b for constraints G x = b, and the factor of ZᵀKZ.
 
     `pivot` (m,) the eliminated unknowns, `kept` (n − m,) the others, `coefficient` (m,) of the
-    pivots in G.
+    pivots in G; `coupling` (m, n) the rows of K that belong to them.
     """
 
     expansion: sparse.csr_matrix
     pivot: np.ndarray
     coefficient: np.ndarray
     factor: Chosen
-    matrix: sparse.csr_matrix
+    coupling: sparse.csr_matrix
 
     @property
     def why(self) -> str:
@@ -77,13 +80,13 @@ class Condensed:
         return self.factor.why
 
     def correction(
-        self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
+        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
         """The pivots alone meet the constraints; the others then restore equilibrium."""
         change = np.zeros(self.expansion.shape[0])
         change[self.pivot] = violation / self.coefficient
-        moved = force - self.matrix @ change if change.any() else force
-        return change + self.expansion @ self.factor.solve(self.expansion.T @ moved, roughly)
+        moved = force - self.coupling.T @ change[self.pivot]
+        return change + self.expansion @ self.factor.solve(self.expansion.T @ moved, accuracy)
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """From the equilibrium of the pivots, which one multiplier each acts on."""
@@ -110,12 +113,12 @@ class Saddle:
     why: str = "constraints without an unknown of their own leave a saddle point"
 
     def correction(
-        self, force: np.ndarray, violation: np.ndarray, roughly: bool = False
+        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
         """Solved for x and p together."""
         wanted = violation / self.size
         pulled = force + self.weight * (self.scaled.T @ wanted)
-        return self.factor.solve(np.concatenate([pulled, -wanted]), roughly)[: len(force)]
+        return self.factor.solve(np.concatenate([pulled, -wanted]), accuracy)[: len(force)]
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """The multipliers of the same system with nothing violated."""
@@ -184,18 +187,16 @@ def condense(
         )
     kept = np.ones(n, dtype=bool)
     kept[pivot] = False
-    kept_columns = np.flatnonzero(kept)
+    kept_columns, coupling = np.flatnonzero(kept), matrix[pivot]
     rest = constraints[:, kept_columns]
-    follow = sparse.diags(-1 / coefficient) @ rest if len(pivot) else rest
-    expansion = _expansion(n, kept_columns, pivot, follow.tocsr())
+    follow = (sparse.diags(-1 / coefficient) @ rest).tocsr() if len(pivot) else rest
+    expansion = _expansion(n, kept_columns, pivot, follow)
     if len(pivot):
-        among = matrix[kept_columns][:, kept_columns]
-        coupling = (matrix[pivot][:, kept_columns].T @ follow).tocsr()
-        among = among + coupling + coupling.T + follow.T @ (matrix[pivot][:, pivot] @ follow)
-    else:
-        among = matrix
-    factor = prepare(among.tocsr(), unknowns.of(kept_columns))
-    return Condensed(expansion, pivot, coefficient, factor, matrix)
+        pulled = (coupling[:, kept_columns].T @ follow).tocsr()
+        added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
+        matrix = (matrix[kept_columns][:, kept_columns] + added).tocsr()
+    factor = prepare(matrix, unknowns.of(kept_columns))
+    return Condensed(expansion, pivot, coefficient, factor, coupling)
 
 
 def _expansion(
@@ -243,9 +244,9 @@ def solve(
     Algorithms, §12), or is less than `round_off` of the forces. Raises SolveError where the
     solution is not finite.
     """
-    force, last = iterate.residual(), np.inf
+    force, last, accuracy = iterate.residual(), np.inf, ROUGH if refine else EPSILON
     for step in range(_MAX_REFINEMENTS if refine else 1):
-        correction = system.correction(iterate.condensed(force), iterate.violation(), refine)
+        correction = system.correction(iterate.condensed(force), iterate.violation(), accuracy)
         following = iterate.advanced(correction)
         following_force = following.residual()
         size = system.imbalance(following_force) / scale
@@ -258,4 +259,6 @@ def solve(
         last = min(size, last)
         if enough:
             break
+        # No more than it takes from here to well below round-off.
+        accuracy = min(max(_WELL_BELOW * round_off / last, ROUGH), _LEAST_GAIN)
     return iterate, system.multiplier(force), last

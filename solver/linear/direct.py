@@ -10,7 +10,7 @@ round-off in about three iterations (Carson and Higham, SIAM J. Sci. Comput. 40 
 iterative refinement in the same way).
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import partial
@@ -21,13 +21,12 @@ from scipy.sparse import csr_matrix, sparray, spmatrix
 
 from solver.errors import SolveError
 from solver.linear.backends import BACKENDS, Backend, BreakdownError, Solve
-from solver.linear.krylov import ROUGH, conjugate_gradients, in_single
+from solver.linear.krylov import EPSILON, conjugate_gradients, in_single
 
 LIGHT = 150_000
 """Stored entries up to which CHOLMOD is quickest in 3D (in 2D it always is, in processor time)."""
 SINGLE_FROM = 20_000
 """Unknowns in 3D from which a factor in single precision pays for its iterations."""
-EPSILON = float(np.finfo(float).eps)
 SINGULAR = 4 * EPSILON
 """Smallest eigenvalue of the scaled matrix (largest entry 1) at which it counts as singular."""
 SINGULAR_INDEFINITE = 1e-12
@@ -35,6 +34,7 @@ SINGULAR_INDEFINITE = 1e-12
 TRUSTED_SINGLE = 1e-6
 """The same for a factor in single precision; below it the factor is made in double precision."""
 MAX_ITERATIONS = 50
+Iterative = Callable[[np.ndarray, float], tuple[np.ndarray, int]]
 _auto: ContextVar[str] = ContextVar("auto", default="auto")
 
 
@@ -62,25 +62,26 @@ class Factor:
     `iterations`: the most that a solution took so far, 0 where the factor alone is exact enough.
     """
 
-    def __init__(self, name: str, solve: Solve, scale: np.ndarray, roughly: Solve | None = None):
+    def __init__(self, name: str, solve: Iterative, scale: np.ndarray):
+        """`solve` takes columns (n, k) and an accuracy, and tells its iterations too."""
         self.name = name
         self.iterations = 0
         self._scale = scale
-        self._solve: Solve | None = solve
-        self._roughly = roughly or solve
+        self._solve: Iterative | None = solve
 
-    def solve(self, right: np.ndarray, roughly: bool = False) -> np.ndarray:
+    def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve A x = `right`, of shape (n,) or (n, k); the result has the same shape.
 
-        `roughly`: to `ROUGH` of the right-hand side where that is quicker, for who refines.
-        Raises SolveError where the solution is not finite or the iterations do not converge.
+        Where that is quicker, to a residual of `accuracy` times the right-hand side only. Raises
+        SolveError where the solution is not finite or the iterations do not converge.
         """
         if self._solve is None:
             raise ValueError("the factor is closed")
         right = np.asarray(right, dtype=float)
         columns = right if right.ndim == 2 else right[:, None]
-        solve = self._roughly if roughly else self._solve
-        solution = self._scale[:, None] * solve(self._scale[:, None] * columns)
+        solution, iterations = self._solve(self._scale[:, None] * columns, accuracy)
+        self.iterations = max(self.iterations, iterations)
+        solution = self._scale[:, None] * solution
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         return solution.reshape(right.shape)
@@ -110,7 +111,7 @@ def factorise(
     """
     upper = _upper_triangle(matrix)
     if upper.shape[0] == 0:
-        return Factor("nothing to solve", np.copy, np.ones(0))
+        return Factor("nothing to solve", lambda right, _: (right, 0), np.ones(0))
     diagonal = upper.diagonal()
     if not (diagonal > 0).all():
         worst = int(np.argmin(np.where(np.isnan(diagonal), -np.inf, diagonal)))
@@ -175,13 +176,14 @@ def _factorise_double(
             f"the matrix is singular to working precision: scaled to a largest entry of 1, its "
             f"smallest eigenvalue is about {smallest:.0e} (more than {limit:.0e} is needed)"
         )
-    return Factor(backend.name, solve, scale)
+    return Factor(backend.name, lambda right, _: (solve(right), 0), scale)
 
 
 def _factorise_single(backend: Backend, upper: csr_matrix, scale: np.ndarray) -> Factor | None:
     """The factor in single precision; None where it cannot be trusted."""
     try:
-        rough = backend.factor(upper.astype(np.float32), True)
+        arrays = upper.data.astype(np.float32), upper.indices, upper.indptr
+        rough = backend.factor(csr_matrix(arrays, shape=upper.shape), True)
     except BreakdownError:
         return None
 
@@ -189,17 +191,11 @@ def _factorise_single(backend: Backend, upper: csr_matrix, scale: np.ndarray) ->
     if not _smallest_eigenvalue(precondition, upper.shape[0]) > TRUSTED_SINGLE:
         return None
 
-    def solve(right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
+    def solve(right: np.ndarray, accuracy: float) -> tuple[np.ndarray, int]:
         multiply = partial(_multiply, upper)
-        solution, iterations = conjugate_gradients(
-            multiply, precondition, right, accuracy, MAX_ITERATIONS
-        )
-        factor.iterations = max(factor.iterations, iterations)
-        return solution
+        return conjugate_gradients(multiply, precondition, right, accuracy, MAX_ITERATIONS)
 
-    name = f"{backend.name}, single precision in conjugate gradients"
-    factor = Factor(name, solve, scale, lambda right: solve(right, ROUGH))
-    return factor
+    return Factor(f"{backend.name}, single precision in conjugate gradients", solve, scale)
 
 
 def _smallest_eigenvalue(solve: Solve, size: int) -> float:

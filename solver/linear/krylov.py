@@ -12,6 +12,7 @@ _TOLD = 10  # iterations from one line of the log to the next
 
 Operator = Callable[[np.ndarray], np.ndarray]
 
+EPSILON = float(np.finfo(float).eps)
 ROUGH = 1e-9
 """Residual, over the right-hand side, of a solution that is going to be refined."""
 

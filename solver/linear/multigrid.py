@@ -14,14 +14,13 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from solver.errors import SolveError
-from solver.linear.krylov import ROUGH, conjugate_gradients, in_single
+from solver.linear.krylov import EPSILON, conjugate_gradients, in_single
 
 COARSEST = 600
 """Unknowns at which the hierarchy ends: that level is inverted as a dense matrix."""
 LARGEST_DENSE = 4_000
 """More unknowns than this where the aggregates no longer grow: multigrid is of no use."""
 MAX_ITERATIONS = 150
-ROUND_OFF = 1e-15
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
 # The iteration approaches the largest eigenvalue from below.
@@ -91,8 +90,8 @@ class Multigrid:
         self._padded = 3 * len(body)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
 
-    def solve(self, right: np.ndarray, roughly: bool = False) -> np.ndarray:
-        """Solve for `right` (n,) or (n, k), to round-off or `roughly` to `ROUGH` of it.
+    def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
+        """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
 
         In 2-norms of the system scaled to a diagonal of at most one. Raises SolveError where
         `MAX_ITERATIONS` do not lead there, or will not, and where the solution is not finite.
@@ -103,7 +102,7 @@ class Multigrid:
             lambda x: self._scale * (self._matrix @ (self._scale * x)),
             in_single(self._cycle),
             self._scale * columns,
-            ROUGH if roughly else ROUND_OFF,
+            accuracy,
             MAX_ITERATIONS,
         )
         if not np.isfinite(solution).all():

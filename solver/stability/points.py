@@ -162,18 +162,18 @@ def _known(
     known: dict[str, Any] = {"floor_pressure": pressure, "floor_stress": stress}
     system = problem.system
     if isinstance(system, Condensed) and problem.scene.points.shape[1] == 2:
-        known |= _spectrum(system)
+        known |= _spectrum(system, problem.matrix)
     return known
 
 
-def _spectrum(system: Condensed) -> dict[str, Any]:
+def _spectrum(system: Condensed, stiffness: sparse.csr_matrix) -> dict[str, Any]:
     """Condition number and inertia of the condensed system, scaled to a diagonal of one.
 
     By all its eigenvalues where it is small, in full precision; else the inertia alone, which is
     known from the factor: Cholesky's succeeds only where all eigenvalues are positive.
     """
     expansion = system.expansion
-    matrix = (expansion.T @ system.matrix @ expansion).tocsr()
+    matrix = (expansion.T @ stiffness @ expansion).tocsr()
     size = matrix.shape[0]
     if size > SMALL:
         return {"condition": None, "inertia": [size, 0, 0], "inertia_by": "factor"}

@@ -16,6 +16,7 @@ from solver.linear.direct import (
     factorise_indefinite,
     standing_for_auto,
 )
+from solver.linear.krylov import ROUGH
 
 INSTALLED = [name for name, backend in BACKENDS.items() if backend.available()]
 SINGLE = [name for name in INSTALLED if BACKENDS[name].single]
@@ -81,7 +82,7 @@ def test_a_rough_solution_stops_where_refinement_takes_over(kind):
     matrix = laplacian(12)
     right = np.random.default_rng(1).standard_normal(matrix.shape[0])
     with factorise(matrix, kind, precision="single") as factor:
-        rough, exact = factor.solve(right, roughly=True), factor.solve(right)
+        rough, exact = factor.solve(right, ROUGH), factor.solve(right)
     left = [np.linalg.norm(matrix @ x - right) / np.linalg.norm(right) for x in (rough, exact)]
     assert 1e-15 < left[0] < 1e-8
     assert left[1] < left[0]
