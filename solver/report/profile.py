@@ -13,7 +13,7 @@ from solver.report.axes import Scale, draw_axes
 from solver.report.layout import extents, plan_axes, tangent
 from solver.report.svg import BLUE, INK, PAPER, Drawing, mixed
 from solver.samples import expected_pressure
-from solver.solution import Solution, ZoneResult
+from solver.solution import NodalContact, Solution, ZoneResult
 
 WIDTH, HEIGHT = 470, 372
 # Where less than this share of the interface is pressed, only that and what is next to it is drawn.
@@ -26,17 +26,20 @@ def draw_profile(
     """The pressure of each macro-element over its place, with the reference; below, the deviation.
 
     The place is the distance along the interface, or what `along` says. The deviation is taken over
-    the largest pressure of the reference.
+    the largest pressure of the reference. Multipliers at nodes are drawn there, over their means.
     """
     drawing = Drawing(WIDTH, HEIGHT, title)
     means = expected(solution, zone)
     elements = _elements(solution, zone, along, means)
-    pressures = np.concatenate([zone.multiplier, [0.0] if means is None else means])
+    nodal = np.empty(0) if zone.nodal is None else zone.nodal.multiplier
+    pressures = np.concatenate([zone.multiplier, nodal, [0.0] if means is None else means])
     x = Scale(elements.low, elements.high, 64, WIDTH - 14)
-    low = min(0.0, float(zone.multiplier.min()))
+    low = min(0.0, float(pressures.min()))
     y = Scale(low, 1.12 * max(float(pressures.max()), 1e-300), 290 if means is None else 196, 30)
     draw_axes(drawing, x, y, elements.name if means is None else "", "contact pressure")
     elements.draw(drawing, x, y, zone.multiplier)
+    if zone.nodal:
+        _draw_nodes(drawing, x, y, elements, elements.place(solution.mesh.points), zone.nodal)
     if means is not None:
         _draw_reference(drawing, x, y, elements, means, _curve(solution, zone))
         deviation = (zone.multiplier - means) / (np.abs(means).max() or 1.0)
@@ -44,7 +47,7 @@ def draw_profile(
         below = Scale(-most, most, 302, 242)
         draw_axes(drawing, x, below, elements.name, "deviation, over the largest reference")
         elements.draw(drawing, x, below, deviation)
-    _draw_legend(drawing, elements.steps, means is not None)
+    _draw_legend(drawing, elements.steps, zone.nodal is not None, means is not None)
     return drawing.svg()
 
 
@@ -148,6 +151,24 @@ def _range(first: np.ndarray, last: np.ndarray, pressed: np.ndarray) -> tuple[fl
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
+def _draw_nodes(
+    drawing: Drawing,
+    x: Scale,
+    y: Scale,
+    elements: _Elements,
+    position: np.ndarray,
+    nodal: NodalContact,
+) -> None:
+    """The multipliers at their nodes, in the plane joined by the lines between them."""
+    place = position[nodal.nodes]
+    order = np.argsort(place, kind="stable")
+    order = order[(place[order] >= elements.low) & (place[order] <= elements.high)]
+    at = np.column_stack([x(place[order]), y(nodal.multiplier[order])])
+    if elements.steps:
+        drawing.polygons(at[None], closed=False, stroke=BLUE, stroke_width=1)
+    drawing.circles(at, 1.8, fill=BLUE, stroke=BLUE, stroke_width=0.5)
+
+
 def _draw_reference(
     drawing: Drawing,
     x: Scale,
@@ -169,13 +190,14 @@ def _draw_reference(
     drawing.polygons(line[None], closed=False, stroke=INK, stroke_width=1.1)
 
 
-def _draw_legend(drawing: Drawing, steps: bool, reference: bool) -> None:
+def _draw_legend(drawing: Drawing, steps: bool, nodal: bool, reference: bool) -> None:
     left, base = 64.0, HEIGHT - 12.0
     if steps:
         drawing.line(left, base - 4, left + 16, base - 4, stroke=BLUE, stroke_width=2)
     else:
         drawing.circles(np.array([[left + 8, base - 4]]), 2.6, stroke=BLUE, stroke_width=1.2)
-    drawing.text(left + 22, base, "computed, one constant per macro-element")
+    computed = "computed at nodes (dots), means of faces" if nodal else ""
+    drawing.text(left + 22, base, computed or "computed, one constant per macro-element")
     if reference:
         at = left + 290
         if steps:

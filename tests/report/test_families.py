@@ -14,6 +14,7 @@ from solver.report import formats, write_report
 from solver.report.families import FILE_NAME, page_name, paragraphs, read_family
 from solver.report.profile import draw_profile
 from solver.results import write_result
+from solver.solution import NodalContact
 from tests import handmade
 from tests.report.test_pictures import SVG, polygons
 from tests.report.test_report import CHECK, verdict
@@ -256,6 +257,19 @@ def test_a_profile_in_space_has_a_mark_and_a_cross_for_each_macro_element(tmp_pa
     circles = [p.get("d").count("M") for p in drawn(svg, "path") if "a26 26" in p.get("d")]
     assert sorted(circles) == [1, 2, 2]  # pressure, deviation, and the legend's
     assert polygons(svg) == 0
+
+
+def test_a_profile_of_multipliers_at_nodes_has_a_dot_for_each(tmp_path):
+    solution = handmade.plane(tmp_path)
+    zone = solution.zones[0]
+    n = len(zone.slave_nodes)
+    zone.nodal = NodalContact(zone.slave_nodes, np.linspace(24.0, 29.0, n), *np.zeros((2, n)))
+    svg = draw_profile(solution, zone, "pressure")
+    dots = [p.get("d").count("M") for p in drawn(svg, "path") if "a18 18" in p.get("d")]
+    assert dots == [n]
+    words = {text.text for text in drawn(svg, "text")}
+    assert "computed at nodes (dots), means of faces" in words
+    assert "30" in words  # the scale holds 29
 
 
 def drawn(svg, tag):
