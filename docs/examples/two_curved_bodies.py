@@ -38,7 +38,8 @@ def write_mesh(path: Path, fine: float) -> None:
 
     field = gmsh.model.mesh.field
     ring = field.add("Ball")
-    for option, value in {"Radius": 1.3, "Thickness": 6, "VIn": fine, "VOut": 3.0}.items():
+    sizes = {"Radius": 1.3, "Thickness": 6, "VIn": fine, "VOut": 3.0}
+    for option, value in sizes.items():
         field.setNumber(ring, option, value)
     field.setAsBackgroundMesh(ring)
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
@@ -112,9 +113,10 @@ def main(folder: Path, fine: float = 0.15) -> None:
 
     seat = solved.zones["seat"]
     hertz = solved.solution.case.solution
-    lift = seat.multiplier @ (seat.area * seat.coverage * seat.normal[:, 2])
-    print(f"force {4 * lift:.1f} N of {FORCE:.1f} N, {seat.closed.sum()} macro-elements in contact")
-    print(f"largest pressure {solved.pressure.max():.1f} MPa, after Hertz {hertz.peak:.1f} MPa")
+    force = 4 * seat.multiplier @ (seat.area * seat.coverage * seat.normal[:, 2])
+    print(f"force {force:.1f} N of {FORCE:.1f} N")
+    print(f"{seat.closed.sum()} of {len(seat.closed)} macro-elements in contact")
+    print(f"largest pressure {solved.pressure.max():.1f} MPa, Hertz {hertz.peak:.1f} MPa")
 
     solved.save(folder / "ball.vtkhdf")
     (folder / "pressure.svg").write_text(solved.profile(along="r"), encoding="utf-8")

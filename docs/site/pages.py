@@ -15,7 +15,7 @@ from tables import TABLES
 
 _TABLE = re.compile(r"^<!-- table: (.*) -->$", re.MULTILINE)
 _SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
-_LINK = re.compile(r"^- \[(.+)\]\((.+)\.md\)", re.MULTILINE)
+_LINK = re.compile(r"^- \[(.*)\]\((.+)\.md\)", re.MULTILINE)
 _FIRST = (
     '<!doctype html><meta charset="utf-8"><title>{0}</title>'
     '<meta http-equiv="refresh" content="0; url={1}"><a href="{1}">{0}</a>'
@@ -52,7 +52,7 @@ def _menu(app: Sphinx, page: str, source: list[str]) -> None:
     }
     rest = sorted(app.env.found_docs - listed - {page})
     if rest:
-        links = [f"- [{Path(name).name}](/{name}.md)" for name in rest]
+        links = [f"- [](/{name}.md)" for name in rest]  # a link without words has the page's title
         sections["More"] = "\n\n" + "\n".join(links) + "\n\n"
     menus = [_toctree(title, _LINK.findall(text), folder) for title, text in sections.items()]
     lists = [f"## {title}{text}" for title, text in sections.items()]
@@ -60,7 +60,8 @@ def _menu(app: Sphinx, page: str, source: list[str]) -> None:
 
 
 def _toctree(caption: str, links: list[tuple[str, str]], folder: str) -> str:
-    entries = [f"{title} <{join('/', folder, to)}>" for title, to in links]
+    places = [(title, join("/", folder, to)) for title, to in links]
+    entries = [f"{title} <{place}>" if title else place for title, place in places]
     return "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *entries, "```", ""])
 
 
