@@ -65,6 +65,11 @@ scaling: override CONFIG += $(if $(LEVEL),scaling=$(LEVEL))
 scaling: environment ## growth with size, to a million unknowns; the small in a minute: LEVEL=quick
 	@$(SNAKEMAKE) scaling
 
+BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
+benchmark: environment ## ratios side by side: linear solvers, cut, cures, batch, CalculiX
+	@.venv/bin/python -m solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
+	  $(if $(filter quick,$(LEVEL)),--quick)
+
 infsup: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 infsup: environment ## the inf-sup test of every cell type, and the half-loaded block
 	@$(SNAKEMAKE) infsup

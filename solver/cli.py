@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from solver.errors import InputError, SolveError, of_machine
+from solver.scaling import FULL, QUICK
 from solver.scaling import commands as scaling
 from solver.study import commands as study
 
@@ -119,6 +120,11 @@ def _parser() -> argparse.ArgumentParser:
     study.add_commands(command)
     command = commands.add_parser("scaling", help="growth with size: points and their page")
     scaling.add_commands(command)
+    command = _add(commands, "benchmark", _benchmark, "measure ratios side by side")
+    command.add_argument("benchmark", type=Path, metavar="BENCHMARK.yaml")
+    command.add_argument("--quick", action="store_true", help="on tiny meshes, for a first look")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
+
     command = _add(commands, "sweep", _sweep, "push one quantity of a case through its values")
     command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
@@ -258,6 +264,20 @@ def _orders(options: argparse.Namespace) -> int:
     from solver.report.orders import write_orders
 
     write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
+    return PASSED
+
+
+def _benchmark(options: argparse.Namespace) -> int:
+    from solver.benchmark import words
+    from solver.benchmark.description import read_benchmark
+    from solver.benchmark.run import run_benchmark
+    from solver.files import write_text
+    from solver.verdict import to_json
+
+    benchmark = read_benchmark(options.benchmark, QUICK if options.quick else FULL)
+    record = run_benchmark(benchmark, partial(print, file=sys.stderr, flush=True))
+    write_text(options.output, to_json(record) + "\n")
+    print("\n".join(words.lines(record)))
     return PASSED
 
 

@@ -4,6 +4,7 @@ import os
 import resource
 import subprocess
 import tempfile
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from threading import Event, Timer
@@ -28,11 +29,25 @@ class Ended:
     peak_memory_mb: float
 
     @property
+    def used(self) -> dict[str, float]:
+        """What it took, as `used_since` tells it."""
+        return {"wall": self.wall, "cpu": self.cpu, "peak_memory_mb": self.peak_memory_mb}
+
+    @property
     def reason(self) -> str:
         """How it died and its last words; for a process that did."""
         lines = [line for line in self.output.splitlines() if line.strip()]
         last = lines[-1].strip() if lines else "no word"
         return f"the process died with exit status {self.status}: {last}"
+
+
+def used_since(started: float) -> dict[str, float]:
+    """What this process took: wall seconds since `started`, processor seconds, peak memory, MB."""
+    return {
+        "wall": now() - started,
+        "cpu": time.process_time(),
+        "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
 
 
 def cores_for(threads: int) -> list[int]:

@@ -66,13 +66,19 @@ def write_study(folder: Path) -> None:
 
 
 def write_scaling(folder: Path) -> None:
-    """The project's scaling family with a single small point in its quick part."""
+    """The project's scaling family with a single small point, its benchmark with one comparison."""
     shutil.copytree(ROOT / "cases" / "scaling", folder)
     scaling = yaml.safe_load((folder / "scaling.yaml").read_text())
     [plane] = [series for series in scaling["series"] if series["name"] == "quad4"]
     scaling["series"], scaling["goals"] = [plane | {"sizes": [1000]}], []
     scaling["quick"]["series"] = ["quad4"]
     (folder / "scaling.yaml").write_text(yaml.safe_dump(scaling))
+    benchmark = yaml.safe_load((folder / "benchmark.yaml").read_text())
+    comparison = benchmark["comparisons"][0] | {"series": "quad4"}
+    benchmark["comparisons"] = [comparison | {"ways": comparison["ways"][:1]}]
+    benchmark["growth"] = []
+    benchmark["batch"]["cases"] = ["../ssnp170/e.yaml"]
+    (folder / "benchmark.yaml").write_text(yaml.safe_dump(benchmark))
 
 
 def write_sweep(folder: Path) -> None:

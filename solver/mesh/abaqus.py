@@ -27,7 +27,7 @@ _LINES = {
 _MIDDLE_SECOND = [0, 2, 1]
 _PLANE = re.compile(r"(?:CPE|CPS|CAX|M3D|SFM3D|R3D|DS|STRI|S)(\d)")
 # Corners of the faces S1, S2, … of each shape, counted from 1.
-_FACES = {
+FACES = {
     "TRIA": ["12", "23", "31"],
     "QUAD": ["12", "23", "34", "41"],
     "TETRA": ["123", "142", "243", "341"],
@@ -213,7 +213,7 @@ class _Deck:
                 yield self._face(*self.cells[number], label[0].upper() if label else "")
 
     def _face(self, cell: CellType, nodes: list[int], label: str) -> tuple[CellType, list[int]]:
-        corners = _FACES[cell.name.rstrip("0123456789")]
+        corners = FACES[cell.name.rstrip("0123456789")]
         number = int(label[1:]) if re.fullmatch(r"S\d", label) else 0
         if not 0 < number <= len(corners):
             # Without a number, or as SPOS and SNEG: the shell itself is the face.

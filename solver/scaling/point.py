@@ -89,13 +89,13 @@ def _solve(
     case.write_text(point.source(), encoding="utf-8")
     solver = [sys.executable, "-m", "solver"]
     meshed = run_apart([*solver, "mesh", str(case), "-o", str(mesh)], cores, limit, memory)
-    found = {"meshing": _used(meshed), "process": {}} | dict.fromkeys(_FROM_VERDICT)
+    found = {"meshing": meshed.used, "process": {}} | dict.fromkeys(_FROM_VERDICT)
     found |= {"verdict": None, "faces": None, "machine": {}}
     if meshed.status != 0:
         return found | _ended("failed", f"no mesh: {_why(meshed, limit)}")
     command = [*solver, "solve", str(case), "--mesh", str(mesh), "-o", str(folder / "r.vtkhdf")]
     done = run_apart([*command, "--verdict", str(verdict)], cores, limit, memory)
-    found["process"] = _used(done)
+    found["process"] = done.used
     if not verdict.is_file():
         return found | _ended("failed" if done.status is None else "crashed", _why(done, limit))
     content = json.loads(verdict.read_text(encoding="utf-8"))
@@ -106,14 +106,6 @@ def _solve(
         return found | _ended(_OUTCOMES.get(content["verdict"], "failed"), reason)
     found["faces"] = sum(body["faces"] for body in content["bodies"])
     return found | _ended(SOLVED, content["reason"])
-
-
-def _used(process: Ended) -> dict[str, float]:
-    return {
-        "wall": process.wall,
-        "cpu": process.cpu,
-        "peak_memory_mb": process.peak_memory_mb,
-    }
 
 
 def _why(process: Ended, limit: float) -> str:

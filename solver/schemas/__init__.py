@@ -12,6 +12,7 @@ from typing import Any
 
 from solver.errors import InputError
 
+BENCHMARK_SCHEMA = Path(__file__).with_name("benchmark.schema.json")
 CASE_SCHEMA = Path(__file__).with_name("case.schema.json")
 INFSUP_SCHEMA = Path(__file__).with_name("infsup.schema.json")
 LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")

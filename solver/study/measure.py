@@ -5,15 +5,14 @@ process's own: hence a process for each point.
 """
 
 import json
-import resource
 import sys
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from solver.clock import SOLVING, Clock, now
+from solver.clock import SOLVING, Clock
 from solver.errors import InputError, SolveError
+from solver.process import used_since
 from solver.study.description import Point, Study, read_study
 from solver.study.point import SOLVED
 from solver.study.timing import repeated
@@ -55,7 +54,7 @@ def measure(study: Study, point: Point, reference: Path | None, started: float) 
 
     with standing_for_auto(point.linear_solver):
         solution = run(Clock())
-        process = _process(started)
+        process = used_since(started)
         times = repeated(run, study.repetitions)
     exact = read_reference(reference) if reference else None
     order = [stage for stage in SOLVING if stage in times]
@@ -72,14 +71,6 @@ def measure(study: Study, point: Point, reference: Path | None, started: float) 
         "times": {stage: times[stage] for stage in order},
         "process": process,
         "machine": gather(case.path, None),
-    }
-
-
-def _process(started: float) -> dict[str, float]:
-    return {
-        "wall": now() - started,
-        "cpu": time.process_time(),
-        "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
 
 

@@ -83,6 +83,11 @@ class Line:
         chosen = window([m.point.size for m in self.solved], *self.fit)
         return [self.solved[i] for i in chosen]
 
+    @property
+    def on_large(self) -> bool:
+        """Whether exponents are those of large sizes: small ones are mostly start-up."""
+        return bool(self.fitted) and min(m.point.size for m in self.fitted) >= self.fit[0]
+
     def growth(self, stage: str) -> Growth | None:
         """The exponent of a stage, or of the whole process; None where it cannot be told."""
         found = self.fitted
@@ -136,8 +141,7 @@ def _reached(goal: Goal, line: Line | None) -> Reached:
         return Reached(goal, None, "not in this part of the family")
     if goal.what.startswith(GROWTH):
         growth = line.growth(goal.what.removeprefix(GROWTH))
-        # An exponent of small sizes is one of start-up: no answer to the question.
-        if growth is None or min(m.point.size for m in line.fitted) < line.fit[0]:
+        if growth is None or not line.on_large:
             return Reached(goal, None, "too few of the large sizes are measured")
         return Reached(goal, growth.value, "")
     m = next((m for m in line.points if m.point.size == goal.size), None)

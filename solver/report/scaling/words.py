@@ -63,9 +63,10 @@ def _dominant(m: Measured) -> str:
 
 def growing(lines: Sequence[Line]) -> str:
     """Which series stay near-linear, and which do not."""
-    known = [(line, growth) for line in lines if (growth := line.growth(WHOLE))]
+    fitted = [line for line in lines if line.on_large]
+    known = [(line, growth) for line in fitted if (growth := line.growth(WHOLE))]
     if not known:
-        return "No exponent can be fitted yet."
+        return "Too few large sizes are measured to tell how cost grows; small ones are start-up."
     near = [line.series.title for line, growth in known if growth.value <= LINEAR]
     above = [
         f"{line.series.title} ({growth.value:.2f})"
