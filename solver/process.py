@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Event, Timer
 
 from solver.clock import now
@@ -64,10 +65,12 @@ def run_apart(
     limit: float,
     memory: float = float("inf"),
     environment: Mapping[str, str] | None = None,
+    folder: Path | None = None,
 ) -> Ended:
     """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
 
-    `memory` (bytes) is the most that it may ask for. It reads nothing; what it prints is kept.
+    `memory` (bytes) is the most that it may ask for, `folder` where it runs if not here. It reads
+    nothing; what it prints is kept.
     """
 
     def prepare() -> None:
@@ -80,6 +83,7 @@ def run_apart(
         started = now()
         process = subprocess.Popen(
             command,
+            cwd=folder,
             env={**os.environ, **threads, **(environment or {})},
             stdin=subprocess.DEVNULL,
             stdout=output,

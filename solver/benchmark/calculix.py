@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import meshio
 import numpy as np
@@ -20,7 +21,7 @@ from solver.errors import SolveError
 from solver.faces import boundary_faces, volume_cells
 from solver.mesh.abaqus import FACES
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME, CellType
-from solver.process import Ended, run_apart
+from solver.process import Ended, cores_for, run_apart
 
 PROGRAM = "ccx"
 # Cells whose nodes have the same order here and there.
@@ -43,7 +44,10 @@ def version() -> str:
     """The program's version; empty where it is not installed."""
     if shutil.which(PROGRAM) is None:
         return ""
-    found = re.search(r"Version (\S+)", run_apart([PROGRAM, "-v"], [0], 10.0).output)
+    # It leaves files wherever it runs.
+    with TemporaryDirectory() as folder:
+        told = run_apart([PROGRAM, "-v"], cores_for(1), 10.0, folder=Path(folder)).output
+    found = re.search(r"Version (\S+)", told)
     return found[1] if found else "unknown"
 
 
@@ -57,7 +61,7 @@ def solve(
     deck = folder / f"{_NAME}.inp"
     with deck.open("w", encoding="ascii") as file:
         file.writelines(f"{line}\n" for line in deck_lines(case, mesh))
-    process = run_apart([PROGRAM, "-i", str(deck.with_suffix(""))], cores, limit)
+    process = run_apart([PROGRAM, "-i", _NAME], cores, limit, folder=folder)
     if process.status is None:
         raise SolveError(f"CalculiX: no end within {limit:g} s")
     if process.status != 0:

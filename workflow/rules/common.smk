@@ -93,8 +93,8 @@ def case_files():
                 f"cases = {folder}: no case file (*.yaml) in this folder"
             )
         files += found
-    others = ("family.yaml", "orders.yaml", "scaling.yaml", "study.yaml")
-    return [f for f in files if f.name not in others]
+    others = ("benchmark", "family", "orders", "scaling", "study")
+    return [f for f in files if f.stem not in others]
 
 
 def peek(file):
