@@ -130,11 +130,7 @@ def internal_force(
             stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
             stress *= (weights * determinant)[:, :, None, None]
             nodal = np.einsum("cqaj,cqij->cai", gradient, stress, optimize=True)
-            dofs = degrees_of_freedom(cells, dim)
-            if extended:
-                np.add.at(force, dofs, nodal.reshape(dofs.shape))
-            else:
-                force += np.bincount(dofs.ravel(), nodal.ravel(), minlength=n * dim)
+            np.add.at(force, degrees_of_freedom(cells, dim).ravel(), nodal.ravel())
     return force.reshape(n, dim)
 
 
@@ -160,17 +156,20 @@ def cancellation(
     for block in blocks:
         reference, weights = block.rule
         middle = (weights @ reference / weights.sum())[None]
-        gradient, determinant = physical_gradients(points, block.cells, block.type, middle)
-        slope = np.linalg.norm(gradient[:, 0], axis=2)
-        nodal = displacement[block.cells]
-        apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
-        stress = (block.lame + 2 * block.shear) * np.einsum("ca,ca->c", slope, apart)
-        extent = np.linalg.norm(np.ptp(points[block.cells], axis=1), axis=1)
-        nodal_force = (determinant[:, 0] * weights.sum() * stress)[:, None] * slope
-        force += np.bincount(block.cells.ravel(), nodal_force.ravel(), minlength=len(points))
-        highest = max(highest, float(stress.max(initial=0.0)))
-        on_small_faces = stress * extent * slope.max(axis=1)
-        slender = max(slender, float(on_small_faces.max(initial=0.0)))
+        for part in _chunks(block, points.shape[1]):
+            cells = block.cells[part]
+            gradient, determinant = physical_gradients(points, cells, block.type, middle)
+            slope = np.linalg.norm(gradient[:, 0], axis=2)
+            nodal = displacement[cells]
+            apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
+            stiff = block.lame[part] + 2 * block.shear[part]
+            stress = stiff * np.einsum("ca,ca->c", slope, apart)
+            extent = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
+            nodal_force = (determinant[:, 0] * weights.sum() * stress)[:, None] * slope
+            np.add.at(force, cells.ravel(), nodal_force.ravel())
+            highest = max(highest, float(stress.max(initial=0.0)))
+            on_small_faces = stress * extent * slope.max(axis=1)
+            slender = max(slender, float(on_small_faces.max(initial=0.0)))
     return force, highest, slender
 
 
@@ -203,7 +202,7 @@ def nodal_stress(
     """
     n = len(points)
     points, displacement = _in_precision(points, displacement, extended)
-    total, count = np.zeros((n, 6)), np.zeros(n)
+    total, count = np.zeros(6 * n), np.zeros(n)
     for block in blocks:
         reference, _ = block.rule
         fit = _extrapolation(block.type, reference)
@@ -213,10 +212,10 @@ def nodal_stress(
             stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
             full = _voigt(stress, block.lame[part], block.shear[part])
             nodal = np.einsum("aq,cqs->cas", fit, full, optimize=True)
-            for s in range(6):
-                total[:, s] += np.bincount(cells.ravel(), nodal[:, :, s].ravel(), minlength=n)
-            count += np.bincount(cells.ravel(), minlength=n)
-    return total / np.maximum(count, 1)[:, None]
+            places = 6 * cells[:, :, None] + np.arange(6)
+            np.add.at(total, places.ravel(), nodal.ravel())
+        count += np.bincount(block.cells.ravel(), minlength=n)
+    return total.reshape(n, 6) / np.maximum(count, 1)[:, None]
 
 
 def _extrapolation(kind: CellType, reference: np.ndarray) -> np.ndarray:

@@ -21,6 +21,7 @@ COARSEST = 600
 LARGEST_DENSE = 4_000
 """More unknowns than this where the aggregates no longer grow: multigrid is of no use."""
 MAX_ITERATIONS = 150
+_ROWS_AT_ONCE = 30_000  # whole nodes
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
 # The iteration approaches the largest eigenvalue from below.
@@ -143,18 +144,27 @@ def _places(unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _in_blocks(matrix: csr_matrix, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
-    """The scaled matrix in single precision and blocks of three; rows without unknown are zero."""
-    values = matrix.data * np.repeat(scale, np.diff(matrix.indptr))
-    values *= scale[matrix.indices]
-    order = np.argsort(place)
-    scaled = csr_matrix((values.astype(np.float32), matrix.indices, matrix.indptr), matrix.shape)
-    if (np.diff(order) != 1).any():
-        scaled = scaled[order]
-    starts = np.zeros(size + 1, dtype=scaled.indptr.dtype)
-    starts[place[order] + 1] = np.diff(scaled.indptr)
-    np.cumsum(starts, out=starts)
-    columns = place.astype(scaled.indices.dtype)[scaled.indices]
-    return csr_matrix((scaled.data, columns, starts), shape=(size, size)).tobsr((3, 3))
+    """The scaled matrix in single precision and blocks of three; rows without unknown are zero.
+
+    Row and column i go to `place` (n,) i of `size`. Some rows at a time: no copy in double
+    precision is made of the whole.
+    """
+    order, place = np.argsort(place), place.astype(np.int32)
+    rows, parts = place[order], []
+    for first in range(0, size, _ROWS_AT_ONCE):
+        last = min(first + _ROWS_AT_ONCE, size)
+        low, high = np.searchsorted(rows, (first, last))
+        some, counts = matrix[order[low:high]], np.zeros(last - first, dtype=int)
+        counts[rows[low:high] - first] = np.diff(some.indptr)
+        values = some.data * np.repeat(scale[order[low:high]], np.diff(some.indptr))
+        values *= scale[some.indices]
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        arrays = values.astype(np.float32), place[some.indices], starts
+        parts.append(csr_matrix(arrays, shape=(last - first, size)).tobsr((3, 3)))
+    blocks = np.concatenate([part.data for part in parts])
+    columns = np.concatenate([part.indices for part in parts])
+    lengths = np.concatenate([[0], *(np.diff(part.indptr) for part in parts)])
+    return bsr_matrix((blocks, columns, np.cumsum(lengths)), shape=(size, size))
 
 
 def _hierarchy(
