@@ -177,6 +177,25 @@ def test_where_none_is_accurate_enough_the_nearest_is_told(study, results):
     assert "never" not in text
 
 
+def test_errors_that_do_not_differ_are_told_once(study, results):
+    points = [m for m in read_points(study, results) if m.solved]
+    for m in points:
+        m.record["errors"]["pressure_l2"] = 0.009 * (1 + 1e-6 * m.point.level)
+    text = words.paragraph(pressure(study, points))
+    assert text.startswith("None reaches 0.1 %; all come to 0.9 % on their finest mesh.")
+    assert "between" not in text
+
+
+def test_hardly_longer_is_no_number_of_times(study, results):
+    points = read_points(study, results)
+    for m in (m for m in points if m.solved):
+        slower = {"lac": 1.0, "uncut": 1.02}.get(m.point.treatment.name, 9.0)
+        m.record["times"]["total"]["wall"] = [0.1 * slower * m.point.level] * 3
+        m.record["errors"]["pressure_l2"] = 1e-4
+    text = words.paragraph(pressure(study, points))
+    assert "whole faces is next and takes little longer, 0.1 s (TRIA3–QUAD4, level 1)." in text
+
+
 # Chosen values make ties and values at the very limit likely.
 ERROR = st.one_of(st.floats(1e-17, 10), st.sampled_from([1e-12, LIMIT, 0.5]))
 SECONDS = st.one_of(st.floats(1e-4, 1e3), st.sampled_from([1.0, 2.0]))

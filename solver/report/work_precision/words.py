@@ -42,6 +42,8 @@ def _soonest(panel: Panel, solved: Sequence[str]) -> str:
     if not ranked:
         best = min(solved, key=lambda title: panel.finest(title) or 0.0)
         nearest = percent(panel.finest(best) or 0.0)
+        if len(solved) > 1 and {percent(panel.finest(t) or 0.0) for t in solved} == {nearest}:
+            return f"None reaches {limit}; all come to {nearest} on their finest mesh."
         return f"None reaches {limit}; {best} comes nearest with {nearest} on its finest mesh."
     (title, first), *others = ranked
     text = f"{title} reaches {limit} soonest, in {seconds(first.time.median)} ({first.label})"
@@ -53,9 +55,10 @@ def _soonest(panel: Panel, solved: Sequence[str]) -> str:
             f"{text}; {following} is next with {seconds(second.time.median)} ({second.label}), "
             "no later within the spread of the measurements."
         )
-    ratio = second.time.median / first.time.median
+    times = f"{second.time.median / first.time.median:.2g} times as long"
+    longer = "little longer" if times.startswith("1 ") else times
     return (
-        f"{text}; {following} is next and takes {ratio:.2g} times as long, "
+        f"{text}; {following} is next and takes {longer}, "
         f"{seconds(second.time.median)} ({second.label})."
     )
 
@@ -102,6 +105,8 @@ def _finest(panel: Panel) -> str:
     if len(finest) < 2:
         return ""
     low, high = min(finest, key=_error), max(finest, key=_error)
+    if percent(low[0]) == percent(high[0]):
+        return ""
     return (
         f"On the finest meshes the error of the {ERRORS[panel.error]}, lies between "
         f"{percent(low[0])} ({low[1]}, {low[2].point.pair}) and {percent(high[0])} "
