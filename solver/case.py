@@ -105,9 +105,10 @@ class Case:
     """A case: one file, ready to be solved once its mesh is there.
 
     `mesh` is the file's mapping, the key `file` replaced by `path`, relative to the case file.
-    `tolerance` holds the overrides by check name, under `all` where one number was given.
-    `source` is the file's text. `family` is the name of the file's folder. `reference_uncertainty`
-    is relative, `reference_code` has the keys name and version.
+    `tolerance` holds the overrides by check name, under `all` where one number was given. `units`
+    names those of length and stress, for labels alone. `source` is the file's text. `family` is the
+    name of the file's folder. `reference_uncertainty` is relative, `reference_code` has the keys
+    name and version.
     """
 
     name: str
@@ -134,6 +135,7 @@ class Case:
     solution: "ExactSolution | None" = None
     tolerance: dict[str, float] = field(default_factory=dict)
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
 
 
 def load_case(path: str | Path) -> Case:
@@ -177,7 +179,7 @@ class _Reader:
         # Left out where the file does not give them, for the defaults of `Case` to hold.
         given: dict[str, Any] = {
             key: content[key]
-            for key in ("transform", "plane", "directions", "counts")
+            for key in ("transform", "plane", "directions", "counts", "units")
             if key in content
         }
         if "steps" in content:

@@ -13,6 +13,7 @@ the checks need again, so that a file can be judged without solving:
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
     /provenance    versions, revision, hashes, machine
 
+Where the case names its units, fields have them as their attribute `unit`, and the grid lists them.
 Its last line is the hash of all before it: a file that was damaged is refused before HDF5 sees it.
 """
 
@@ -34,10 +35,11 @@ from solver.checks import CheckResult
 from solver.consistency import inconsistency
 from solver.errors import InputError
 from solver.files import is_sealed, replacing, seal
-from solver.hdf5 import new_file
+from solver.hdf5 import column, new_file, read_table, write_table
 from solver.mesh.catalogue import cell_type
 from solver.mesh.vtkhdf import read_grid, write_grid
 from solver.solution import BodyInfo, NodalContact, Solution, StepResult, ZoneResult
+from solver.units import label_fields
 
 GRID = "VTKHDF"
 _SCALARS = (
@@ -112,11 +114,12 @@ def _write(
         _write_zone(contact.create_group(zone.name), zone, number)
     _write_bodies(file.create_group("bodies"), solution.bodies)
     _write_steps(file, solution.steps)
-    _write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
-    _write_table(file.create_group("timings"), _timings(solution))
-    _write_table(file.create_group("plan"), _pairs("what", "why", solution.plan))
-    _write_table(file.create_group("checks"), [_flat(check) for check in checks])
+    write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
+    write_table(file.create_group("timings"), _timings(solution))
+    write_table(file.create_group("plan"), _pairs("what", "why", solution.plan))
+    write_table(file.create_group("checks"), [_flat(check) for check in checks])
     file.create_group("provenance").attrs.update(provenance)
+    label_fields(file[GRID], contact, solution.case.units)
 
 
 def read_result(path: str | Path) -> Result:
@@ -301,17 +304,17 @@ def _read_nodal(group: h5py.Group) -> NodalContact:
 
 
 def _write_bodies(group: h5py.Group, bodies: Sequence[BodyInfo]) -> None:
-    _write_table(group, [{"name": b.name, "role": b.role, "faces": b.faces} for b in bodies])
+    write_table(group, [{"name": b.name, "role": b.role, "faces": b.faces} for b in bodies])
     cells = [
         {"body": number, "type": kind, "count": count}
         for number, body in enumerate(bodies)
         for kind, count in body.cells.items()
     ]
-    _write_table(group.create_group("cells"), cells)
+    write_table(group.create_group("cells"), cells)
 
 
 def _read_bodies(group: h5py.Group) -> list[BodyInfo]:
-    cells = _read_table(group["cells"])
+    cells = read_table(group["cells"])
     return [
         BodyInfo(
             name=row["name"],
@@ -319,7 +322,7 @@ def _read_bodies(group: h5py.Group) -> list[BodyInfo]:
             faces=row["faces"],
             cells={cell["type"]: cell["count"] for cell in cells if cell["body"] == number},
         )
-        for number, row in enumerate(_read_table(group))
+        for number, row in enumerate(read_table(group))
     ]
 
 
@@ -327,11 +330,11 @@ def _write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
     """The cost of every step, and what was observed as arrays (steps, observed places)."""
     rows = [asdict(step) for step in steps]
     observed = [row.pop("observations") for row in rows]
-    _write_table(file.create_group("steps"), rows)
+    write_table(file.create_group("steps"), rows)
     group = file.create_group("observation")
     group["factor"] = [step.factor for step in steps]
     first = observed[0] if observed else []
-    group["zone"] = _column([o["zone"] for o in first])
+    group["zone"] = column([o["zone"] for o in first])
     group["macro_element"] = np.array([o["macro_element"] for o in first], dtype=int)
     for name in _OBSERVED:
         values = [[float(o[name]) for o in row] for row in observed]
@@ -351,7 +354,7 @@ def _read_steps(file: h5py.File) -> list[StepResult]:
                 for j, (zone, element) in enumerate(zip(zones, elements, strict=True))
             ],
         )
-        for i, row in enumerate(_read_table(file["steps"]))
+        for i, row in enumerate(read_table(file["steps"]))
     ]
 
 
@@ -377,30 +380,7 @@ def _pairs(key: str, value: str, pairs: Iterable[tuple[str, Any]]) -> list[dict[
 
 
 def _read_pairs(group: h5py.Group, key: str, value: str) -> list[tuple[str, Any]]:
-    return [(row[key], row[value]) for row in _read_table(group)]
-
-
-def _write_table(group: h5py.Group, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write the rows' columns; nothing at all where there are no rows."""
-    for key in rows[0] if rows else ():
-        group[key] = _column([row[key] for row in rows])
-
-
-def _column(values: list[Any]) -> np.ndarray:
-    """An array of numbers, None as NaN, or of texts, None as an empty one."""
-    if not values or any(isinstance(value, str) for value in values):
-        return np.array([value or "" for value in values], dtype=h5py.string_dtype())
-    return np.array([np.nan if value is None else value for value in values])
-
-
-def _read_table(group: h5py.Group) -> list[dict[str, Any]]:
-    columns = {
-        name: (data.asstr()[()] if h5py.check_string_dtype(data.dtype) else data[()]).tolist()
-        for name, data in group.items()
-        if isinstance(data, h5py.Dataset)
-    }
-    rows = zip(*columns.values(), strict=True)
-    return [dict(zip(columns, row, strict=True)) for row in rows]
+    return [(row[key], row[value]) for row in read_table(group)]
 
 
 def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:

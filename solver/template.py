@@ -15,6 +15,9 @@ TEMPLATE = """\
 name: {name}
 title: Two blocks pressed together
 
+# What your numbers are in; shown beside them, and nothing else.
+units: {{length: mm, stress: MPa}}
+
 # A mesh made by recipe ...
 mesh:
   recipe: blocks

@@ -9,6 +9,7 @@ from solver.report.layout import Frame, apart, edge_color, extents, fit, tangent
 from solver.report.profile import expected
 from solver.report.svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
 from solver.solution import Solution, ZoneResult
+from solver.units import with_unit
 
 WIDTH, HEIGHT = 760, 330
 
@@ -66,7 +67,8 @@ def _interface(drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Fr
     largest = max(float(pressures.max()), 1e-300)
     x = Scale(low, high, left, left + width)
     y = Scale(min(0.0, float(zone.multiplier.min())), 1.25 * largest, top + height - 78, top + 36)
-    draw_axes(drawing, x, y, "", f"pressure along {zone.name}")
+    label = with_unit(f"pressure along {zone.name}", solution.case.units.get("stress"))
+    draw_axes(drawing, x, y, "", label)
     steps = np.stack([np.stack([x(start), y(zone.multiplier)], -1)] * 2, axis=1)
     steps[:, 1, 0] = x(end)
     ground = np.stack([steps[:, 1], steps[:, 0]], axis=1)

@@ -14,6 +14,7 @@ from solver.report.layout import extents, plan_axes, tangent
 from solver.report.svg import BLUE, INK, PAPER, Drawing, mixed
 from solver.samples import expected_pressure
 from solver.solution import NodalContact, Solution, ZoneResult
+from solver.units import with_unit
 
 WIDTH, HEIGHT = 470, 372
 # Where less than this share of the interface is pressed, only that and what is next to it is drawn.
@@ -36,7 +37,8 @@ def draw_profile(
     x = Scale(elements.low, elements.high, 64, WIDTH - 14)
     low = min(0.0, float(pressures.min()))
     y = Scale(low, 1.12 * max(float(pressures.max()), 1e-300), 290 if means is None else 196, 30)
-    draw_axes(drawing, x, y, elements.name if means is None else "", "contact pressure")
+    pressure = with_unit("contact pressure", solution.case.units.get("stress"))
+    draw_axes(drawing, x, y, elements.name if means is None else "", pressure)
     elements.draw(drawing, x, y, zone.multiplier)
     if zone.nodal:
         _draw_nodes(drawing, x, y, elements, elements.place(solution.mesh.points), zone.nodal)
@@ -119,6 +121,8 @@ def _elements(
 ) -> _Elements:
     points = solution.mesh.points
     name, place = _position(zone, along)
+    if along is None:
+        name = with_unit(name, solution.case.units.get("length"))
     first, last = extents(zone, place(points))
     pressed = (zone.multiplier > 0) | (means is not None and np.asarray(means) > 0)
     low, high = _range(first, last, pressed)

@@ -17,6 +17,7 @@ from solver.report.layout import (
 )
 from solver.report.svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
 from solver.solution import Solution, ZoneResult
+from solver.units import with_unit
 
 WIDTH, HEIGHT = 760, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
@@ -31,7 +32,7 @@ def draw_space(solution: Solution, title: str) -> Markup:
     drawing = Drawing(WIDTH, HEIGHT, title)
     _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24))
     if solution.zones:
-        _plan(drawing, solution.zones[0], solution.mesh.points, (420, 40, 240, HEIGHT - 110))
+        _plan(drawing, solution, solution.zones[0], (420, 40, 240, HEIGHT - 110))
     return drawing.svg()
 
 
@@ -98,10 +99,11 @@ def _macro_outlines(
         drawing.polygons(place(points[edges]), closed=False, stroke=BLUE, stroke_width=1.3)
 
 
-def _plan(drawing: Drawing, zone: ZoneResult, points: np.ndarray, frame: Frame) -> None:
+def _plan(drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Frame) -> None:
     """Slave sub-faces coloured by pressure, macro-elements and master faces in outline."""
     axes, names = plan_axes(zone)
-    flat = points @ axes.T
+    units = solution.case.units
+    flat = solution.mesh.points @ axes.T
     used = np.concatenate([nodes.ravel() for _, nodes, _ in zone.faces])
     place = fit(flat[used], frame)
     largest = max(float(zone.multiplier.max()), 1e-300)
@@ -119,8 +121,9 @@ def _plan(drawing: Drawing, zone: ZoneResult, points: np.ndarray, frame: Frame) 
     for kind, nodes in zone.master_faces:
         drawing.polygons(place(outlines(flat, kind, nodes)), stroke=MASTER, stroke_width=1)
     low, high = place(flat[used]).min(axis=0), place(flat[used]).max(axis=0)
-    drawing.text(low[0], low[1] - 10, f"{zone.name} in plan: pressure on the slave")
-    _ends(drawing, low, high, flat[used], names)
+    label = f"{zone.name} in plan: pressure on the slave"
+    drawing.text(low[0], low[1] - 10, with_unit(label, units.get("stress")))
+    _ends(drawing, low, high, flat[used], (with_unit(names[0], units.get("length")), names[1]))
     _color_bar(drawing, largest, (high[0] + 16, low[1], 12, high[1] - low[1]))
     _legend(drawing, zone, (low[0], high[1] + 38))
 

@@ -1,0 +1,48 @@
+"""Units as labels: what a case says its numbers are in. Nothing is computed with them."""
+
+from collections.abc import Mapping
+
+import h5py
+import numpy as np
+
+# What kind of quantity each field of a result is.
+_KINDS = {
+    "Points": "length",
+    "centre": "length",
+    "displacement": "length",
+    "gap": "length",
+    "multiplier": "stress",
+    "normal_stress": "stress",
+    "pressure": "stress",
+    "stress": "stress",
+    "stress_master": "stress",
+    "stress_slave": "stress",
+}
+
+
+def label_fields(grid: h5py.Group, contact: h5py.Group, units: Mapping[str, str]) -> None:
+    """Give the fields in both groups of a result their `unit`.
+
+    `units` maps length and stress to what they are called. VTK shows no attributes, so that the
+    grid lists the units of its fields as the field data `units` as well.
+    """
+
+    def label(name: str, item: h5py.HLObject) -> None:
+        field = name.rpartition("/")[2]
+        if isinstance(item, h5py.Dataset) and _KINDS.get(field) in units:
+            item.attrs["unit"] = units[_KINDS[field]]
+            listed.add(f"{field}: {item.attrs['unit']}")
+
+    listed: set[str] = set()
+    contact.visititems(label)
+    listed.clear()
+    grid.visititems(label)
+    if listed:
+        # VTK reads texts that call themselves ASCII, and dies of others; their bytes may be UTF-8.
+        texts = np.array([text.encode() for text in sorted(listed)], dtype=object)
+        grid.create_dataset("FieldData/units", data=texts, dtype=h5py.string_dtype("ascii"))
+
+
+def with_unit(text: str, unit: str | None) -> str:
+    """The text of a label with its unit, if there is one."""
+    return f"{text} [{unit}]" if unit else text
