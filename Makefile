@@ -16,10 +16,10 @@ INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report summary compare orders study stability infsup scaling
-.PHONY: benchmark test accept
+.PHONY: help all-cases family case report summary compare gallery orders study stability infsup
+.PHONY: scaling benchmark test accept
 .PHONY: format lint lock faults mutants kills docs bill clean clean-all
-.PHONY: environment study-environment test-environment lint-environment docs-environment
+.PHONY: environment study-environment gallery-environment test-environment lint-environment docs-environment
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -48,6 +48,10 @@ summary: ## print the last report's table, as Markdown
 compare: environment ## what is new since another batch: make compare BASE=folder [THIS=folder]
 	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
 	@.venv/bin/python -m solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
+
+gallery: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
+gallery: gallery-environment ## draw each result with PyVista, off-screen: all or FAMILY=…
+	@$(SNAKEMAKE) gallery
 
 orders: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
 orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…
@@ -108,6 +112,9 @@ environment:
 study-environment:
 	@$(INSTALL) run pictures
 
+gallery-environment:
+	@$(INSTALL) run gallery
+
 test-environment:
 	@$(INSTALL) run test
 
@@ -131,7 +138,7 @@ LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
-	@for group in build mkl slurm pictures test lint docs lock; do \
+	@for group in build mkl slurm pictures gallery test lint docs lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 

@@ -1,4 +1,4 @@
-"""Targets of the batch: `all_cases` (default), `report`, `orders`, `study`, `stability`, `scaling`, or a verdict by its path."""
+"""Targets of the batch: `all_cases` (default), `report`, `gallery`, `orders`, `study`, `stability`, `scaling`, or a verdict by its path."""
 
 from snakemake.utils import min_version
 
@@ -17,6 +17,7 @@ rule all_cases:
 include: "workflow/rules/mesh.smk"
 include: "workflow/rules/solve.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/gallery.smk"
 include: "workflow/rules/orders.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/infsup.smk"

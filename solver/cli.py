@@ -106,6 +106,12 @@ def _parser() -> argparse.ArgumentParser:
         help="what families are about; default: those in cases/",
     )
 
+    command = _add(commands, "gallery", _gallery, "draw results with PyVista, on a page")
+    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
+    command.add_argument("--plain", action="store_true", help="without PyVista and OpenGL")
+
     command = _add(commands, "compare", _compare, "say what is new since another batch")
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
@@ -237,16 +243,30 @@ def _row(check: dict[str, Any]) -> str:
     return f"{'ok' if check['passed'] else 'FAILED':<7}{name:<40}{extremes:<36}{error}"
 
 
-def _report(options: argparse.Namespace) -> int:
-    from solver.report import write_report
-
+def _verdicts(options: argparse.Namespace) -> list[Path]:
+    """The verdicts named, and all in the folder of results, but those of ladders' levels."""
     verdicts = list(options.verdicts)
     if options.results:
         found = sorted(options.results.glob("**/verdict.json"))
         # The levels of ladders have a page of their own.
         verdicts += [p for p in found if "orders" not in p.relative_to(options.results).parts]
     if not verdicts:
-        raise InputError(options.results or "report", "VERDICT.json", None, "there is none")
+        where = options.results or options.run.__name__.strip("_")
+        raise InputError(where, "VERDICT.json", None, "there is none")
+    return verdicts
+
+
+def _gallery(options: argparse.Namespace) -> int:
+    from solver.report.gallery import write_gallery
+
+    write_gallery(_verdicts(options), options.output, options.plain, partial(print, flush=True))
+    return PASSED
+
+
+def _report(options: argparse.Namespace) -> int:
+    from solver.report import write_report
+
+    verdicts = _verdicts(options)
     families = options.families
     if families is None:
         families = sorted(Path("cases").glob("*/family.yaml"))

@@ -55,14 +55,20 @@ def _key(vertices: np.ndarray) -> np.ndarray:
 
 
 def macro_edges(faces: Iterable[tuple[str, np.ndarray, np.ndarray]]) -> np.ndarray:
-    """The edges (n, 2) around macro-elements, given their sub-faces (type, nodes, number)."""
+    """The edges around macro-elements, given their sub-faces (type, nodes, number).
+
+    Returns (n, 3): both ends, and the node between them, or an end again where there is none.
+    """
     edges = []
     for kind, nodes, owner in faces:
-        corners = nodes[:, : cell_type(kind).n_vertices]
+        n, order = cell_type(kind).n_vertices, cell_type(kind).order
+        corners = nodes[:, :n]
         pairs = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
-        edges.append(np.column_stack([np.sort(pairs), np.repeat(owner, corners.shape[1])]))
+        pairs.sort()
+        middle = nodes[:, n : 2 * n].ravel() if order == 2 else pairs[:, 0]
+        edges.append(np.column_stack([pairs, middle, np.repeat(owner, n)]))
     unique, counts = np.unique(np.concatenate(edges), axis=0, return_counts=True)
-    return np.unique(unique[counts == 1, :2], axis=0)
+    return np.unique(unique[counts == 1, :3], axis=0)
 
 
 def normals(polygons: np.ndarray) -> np.ndarray:

@@ -23,6 +23,7 @@ def main_page(sections: Sequence[Section], folder: Path) -> str:
             orders=(folder / "orders.html").is_file(),
             study=(folder / "study.html").is_file(),
             stability=(folder / "stability.html").is_file(),
+            gallery=(folder / "gallery.html").is_file(),
             bad=[row for row in rows if row.word != "passed"],
             outcome=outcome(rows),
             counts=counted(rows),

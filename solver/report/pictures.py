@@ -60,7 +60,7 @@ def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], Markup]) ->
     if row.result_file is None:
         return Markup("<p class=none>No result, no picture.</p>")
     kept = folder / f"{row.group}-{row.folder.name}{ending}.svg"
-    if not _is_current(kept, row.result_file):
+    if not is_current(kept, row.result_file):
         try:
             drawing = draw(row)
         except (InputError, OSError, LookupError, ValueError, ArithmeticError) as error:
@@ -70,8 +70,9 @@ def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], Markup]) ->
     return Markup(kept.read_text(encoding="utf-8"))
 
 
-def _is_current(kept: Path, result: Path) -> bool:
-    sources = Path(__file__).parent.glob("*.py")
+def is_current(kept: Path, result: Path, *drawing: Path) -> bool:
+    """Whether a picture is newer than its result, this folder's sources and those of `drawing`."""
+    sources = [s for folder in (Path(__file__).parent, *drawing) for s in folder.glob("*.py")]
     newest = max(path.stat().st_mtime for path in (result, *sources))
     return kept.is_file() and kept.stat().st_mtime > newest
 

@@ -14,10 +14,13 @@ from solver.units import with_unit
 WIDTH, HEIGHT = 760, 330
 
 
-def draw_plane(solution: Solution, title: str) -> Markup:
-    """Blocks on the left, the first zones' pressure on the right."""
+def draw_plane(solution: Solution, title: str, magnified: float = 0.0) -> Markup:
+    """Blocks on the left, the first zones' pressure on the right.
+
+    The blocks are moved by their displacement, `magnified` so many times.
+    """
     drawing = Drawing(WIDTH, HEIGHT, title)
-    _blocks(drawing, solution, (4, 10, 190, HEIGHT - 20))
+    _blocks(drawing, solution, (4, 10, 190, HEIGHT - 20), magnified)
     zones = solution.zones[:3]
     each = HEIGHT / max(1, len(zones))
     for i, zone in enumerate(zones):
@@ -25,9 +28,9 @@ def draw_plane(solution: Solution, title: str) -> Markup:
     return drawing.svg()
 
 
-def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
+def _blocks(drawing: Drawing, solution: Solution, frame: Frame, magnified: float) -> None:
     """The cells of every body, the bodies drawn a little apart, each with its name beside it."""
-    points = apart(solution, 0.03)
+    points = apart(solution, 0.03, magnified)
     place = fit(points, frame)
     for polygons, node in plane_cells(points, solution.mesh):
         for number, body in enumerate(solution.bodies):

@@ -27,10 +27,13 @@ LEVELS = 32
 MASTER = "#ffa45c"  # readable on every pressure
 
 
-def draw_space(solution: Solution, title: str) -> Markup:
-    """Axonometric view on the left, plan of the first zone on the right."""
+def draw_space(solution: Solution, title: str, magnified: float = 0.0) -> Markup:
+    """Axonometric view on the left, plan of the first zone on the right.
+
+    In the view points are moved by their displacement, `magnified` so many times.
+    """
     drawing = Drawing(WIDTH, HEIGHT, title)
-    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24))
+    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24), magnified)
     if solution.zones:
         _plan(drawing, solution, solution.zones[0], (420, 40, 240, HEIGHT - 110))
     return drawing.svg()
@@ -49,9 +52,9 @@ def _camera(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([right, np.cross(eye, right)]), eye
 
 
-def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
+def _blocks(drawing: Drawing, solution: Solution, frame: Frame, magnified: float) -> None:
     """The faces turned to the eye, from far to near, the bodies drawn apart."""
-    points = apart(solution, 0.3)
+    points = apart(solution, 0.3, magnified)
     screen, eye = _camera(solution)
     place = fit(points @ screen.T, frame)
     numbers = range(len(solution.bodies))
@@ -95,7 +98,7 @@ def _macro_outlines(
     drawing: Drawing, solution: Solution, points: np.ndarray, place: Placement
 ) -> None:
     for zone in solution.zones:
-        edges = macro_edges(zone.faces)
+        edges = macro_edges(zone.faces)[:, :2]
         drawing.polygons(place(points[edges]), closed=False, stroke=BLUE, stroke_width=1.3)
 
 
@@ -116,7 +119,7 @@ def _plan(drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Frame) 
             drawing.polygons(
                 polygons[level[owner] == value], fill=fill, stroke=PAPER, stroke_width=0.5
             )
-    edges = place(flat[macro_edges(zone.faces)])
+    edges = place(flat[macro_edges(zone.faces)[:, :2]])
     drawing.polygons(edges, closed=False, stroke=PAPER, stroke_width=1.8)
     for kind, nodes in zone.master_faces:
         drawing.polygons(place(outlines(flat, kind, nodes)), stroke=MASTER, stroke_width=1)

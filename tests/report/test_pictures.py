@@ -62,7 +62,7 @@ def test_boundary_of_two_cubes_on_each_other():
 def test_outline_of_a_macro_element_leaves_out_the_cut():
     # A triangle cut into three about node 3: the three inner edges are not its outline.
     faces = [("TRIA3", np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]]), np.zeros(3, dtype=int))]
-    assert macro_edges(faces).tolist() == [[0, 1], [0, 2], [1, 2]]
+    assert macro_edges(faces)[:, :2].tolist() == [[0, 1], [0, 2], [1, 2]]
 
 
 def test_mid_nodes_are_drawn_only_where_the_edge_bends():
