@@ -18,6 +18,8 @@ from solver.units import with_unit
 WIDTH, HEIGHT = 1560, 600
 # From little to much, light to dark, as far from the blues of pressure as can be.
 _DISPLACEMENT = ("#fdf6ee", "#fbd9b5", "#f5a662", "#d9691e", "#8c3304")
+# Seen on every pressure.
+GOLD = "#e8a200"
 # VTK halves the faces of quadratic cells so often each way: outlines have as many corners.
 _SUBDIVISION = 2
 # Edges meet where a surface bends by more than this angle (degrees).
@@ -98,7 +100,7 @@ def _pressure(plotter: Any, shape: Shape, grid: Any) -> tuple[str, np.ndarray]:
         scalar_bar_args={"title": "  ", **_BAR},
     )
     _lines(plotter, shape, polygons, mixed(MUTED, PAPER, 0.3), 1.0)
-    _macro_elements(plotter, shape, shown, np.zeros(3))
+    _macro_elements(plotter, shape, shown, np.zeros(3), GOLD if shape.dim == 3 else INK)
     where = "on the slave faces" if all_of_it else "where it presses"
     return f"{with_unit('contact pressure', shape.units.get('pressure'))} {where}", seen
 
@@ -139,14 +141,14 @@ def _features(plotter: Any, cells: Any, color: str) -> None:
         plotter.add_mesh(edges, color=color, line_width=1.2, lighting=False)
 
 
-def _macro_elements(plotter: Any, shape: Shape, shown: np.ndarray, away: np.ndarray) -> None:
+def _macro_elements(
+    plotter: Any, shape: Shape, shown: np.ndarray, away: np.ndarray, color: str = INK
+) -> None:
     """The edges of the macro-elements, in the plane their ends, moved by `away` (3,)."""
     places = shape.macro_outlines(shown) + away
     if shape.dim == 3:
-        # Dark in light: seen on every pressure.
-        width = 2.0 if len(places) < 400 else 1.2
-        for color, wide, front in ((PAPER, 2.5 * width, 1.5), (INK, width, 2.0)):
-            _lines(plotter, shape, [places], color, wide, False, front * _IN_FRONT)
+        width = 2.4 if len(places) < 400 else 1.4
+        _lines(plotter, shape, [places], color, width, False, 2 * _IN_FRONT)
     else:
         plotter.add_points(places, color=INK, point_size=6.0)
 
