@@ -85,7 +85,11 @@ def listed(value):
 
 def case_files():
     """All case files: ours, a folder a family, and those of the configured folders."""
-    files = sorted(Path("cases").glob("*/*.yaml"))
+    # Folders of ours that are measured, not checked, hold no cases beside what they are told by.
+    measured = {Path("cases/study"), Path("cases/scaling")}
+    files = sorted(
+        f for f in Path("cases").glob("*/*.yaml") if f.parent not in measured
+    )
     for folder in listed(config["cases"]):
         found = sorted(Path(folder).expanduser().glob("*.yaml"))
         if not found:
@@ -93,8 +97,7 @@ def case_files():
                 f"cases = {folder}: no case file (*.yaml) in this folder"
             )
         files += found
-    others = ("benchmark", "family", "orders", "scaling", "study")
-    return [f for f in files if f.stem not in others]
+    return [f for f in files if f.name not in ("family.yaml", "orders.yaml")]
 
 
 def peek(file):
