@@ -15,7 +15,7 @@ from solver.exact import node_parts
 from solver.expressions import evaluate
 from solver.faces import FaceBlock, boundary_faces, nodal_normals, volume_cells
 from solver.groups import ALL
-from solver.lac.cut import CutMesh, SubFaces, needs_cut
+from solver.lac.cut import CutMesh, SubFaces
 from solver.loads import Field, body_forces, face_forces, stress_forces
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME
 from solver.mixed import MeanStress, in_mixed_form, split
@@ -82,8 +82,6 @@ class Attributes:
     ) -> np.ndarray:
         """Mark the faces that are cut slave faces of the zone; append their sub-faces."""
         hit = np.zeros(len(block.nodes), dtype=bool)
-        if not needs_cut(block.type.name):
-            return hit
         for slave in zone.slave_faces:
             if slave.owner_type is block.owner_type and slave.type is block.type:
                 mine, theirs = (10 * b.owner + b.local for b in (block, slave))
@@ -139,11 +137,13 @@ class Attributes:
         for number in np.unique(part).tolist():
             yield number, nodes[part == number]
 
-    def elasticity(self, mixed_form: bool = True) -> tuple[list[Block], MeanStress]:
+    def elasticity(
+        self, mixed_form: bool = True, plain: bool = True
+    ) -> tuple[list[Block], MeanStress]:
         """Cells with their materials, and the mean stress of those in mixed form.
 
         Cells of rigid bodies, which need no material, get a unit one. Without `mixed_form` none is
-        in it, whatever the case says.
+        in it, whatever the case says; `plain`: cells with straight edges have plain quadrature.
         """
         young = self._by_material(lambda m: m.young, 1.0)
         poisson = self._by_material(lambda m: m.poisson, 0.0)
@@ -153,7 +153,7 @@ class Attributes:
                 BY_NAME[name],
                 cells,
                 *lame_parameters(young[name], poisson[name]),
-                bool(has_straight_edges(BY_NAME[name], self.points[cells]).all()),
+                plain and bool(has_straight_edges(BY_NAME[name], self.points[cells]).all()),
             )
             for name, cells in self.cut.cells.items()
         ]

@@ -60,6 +60,26 @@ def unsupported(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> sparse.
     return (motions @ sparse.csr_matrix(chosen)).tocsr()
 
 
+def body_of_unknowns(basis: sparse.csr_matrix, body: np.ndarray) -> np.ndarray:
+    """The body (n_free,) of each free unknown; `basis` (n_dofs, n_free), `body` (n_nodes,)."""
+    columns = basis.tocsc()
+    dim = basis.shape[0] // len(body)
+    return body[columns.indices[columns.indptr[:-1]] // dim]
+
+
+def joined_bodies(gaps: sparse.csr_matrix, bodies: np.ndarray, n_bodies: int) -> np.ndarray:
+    """The group (n_bodies,) of each body: those joined by rows of `gaps` (k, n_free) share one.
+
+    `bodies` (n_free,) of the unknowns. A body without free unknowns joins no others.
+    """
+    entries = gaps.tocoo()
+    # Bodies first, then multipliers, as nodes of one graph.
+    size = n_bodies + gaps.shape[0]
+    joins = (np.ones(entries.nnz), (bodies[entries.col], n_bodies + entries.row))
+    graph = sparse.coo_matrix(joins, shape=(size, size))
+    return connected_components(graph, directed=False)[1][:n_bodies]
+
+
 def unheld_motion(
     motions: sparse.csc_matrix,
     basis: sparse.csr_matrix,

@@ -81,6 +81,9 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--verbose", action="store_true", help="tell each stage, with the time")
     command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
     command.add_argument(
+        "--everything", action="store_true", help="do what the scene does not need as well"
+    )
+    command.add_argument(
         "--no-memory-check", action="store_true", help="start even where memory cannot suffice"
     )
 
@@ -153,6 +156,10 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("record", type=Path, metavar="RECORD.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
 
+    command = _add(commands, "savings", _savings, "measure what each line of a plan saves")
+    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="SAVINGS.json")
+
     command = _add(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
     command.add_argument("--mesh", action="store_true", help="mesh them too and check the groups")
@@ -204,7 +211,8 @@ def _solve(options: argparse.Namespace) -> int:
     from solver.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
-    job = replace(_job(options), memory_check=not options.no_memory_check)
+    checked, everything = not options.no_memory_check, options.everything
+    job = replace(_job(options), memory_check=checked, everything=everything)
     with telling(options.verbose, options.quiet):
         verdict = solve(job, options.output, options.verdict, log)
     return PASSED if verdict["passed"] else FAILED
@@ -335,6 +343,13 @@ def _infsup_page(options: argparse.Namespace) -> int:
     from solver.report.infsup import read_record, write_page
 
     write_page(read_record(options.record), options.output)
+    return PASSED
+
+
+def _savings(options: argparse.Namespace) -> int:
+    from solver.savings import write_savings
+
+    write_savings(options.output, options.cases, partial(print, flush=True))
     return PASSED
 
 

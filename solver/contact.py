@@ -13,21 +13,15 @@ from solver.accuracy import (
     pressure_of_forces,
     pressure_of_gaps,
 )
-from solver.bodies import rigid_motions, unheld_motion, unsupported, whole_motions
+from solver.bodies import rigid_motions, unheld_motion, unsupported
 from solver.displacement import Displacement
 from solver.elasticity import cancellation, internal_force, stiffness
 from solver.errors import InputError, SolveError
-from solver.lac.status import StatusResult, find_status, likely_closed
-from solver.linear.condensation import (
-    Constrained,
-    choose_pivots,
-    condense,
-    saddle_point,
-    solve,
-)
-from solver.linear.multigrid import Unknowns
+from solver.lac.status import GAP_NOISE, StatusResult, find_status, likely_closed
+from solver.linear.condensation import Constrained, choose_pivots, solve
 from solver.naming import body_names
 from solver.scene import Scene
+from solver.systems import Systems, parts_of, unknowns_of
 
 # A macro-element covered by less than this share of its area is out of contact.
 MIN_COVERAGE = 0.01
@@ -140,7 +134,7 @@ class ContactProblem:
         self.eligible = self.coverage > MIN_COVERAGE
         self._refuse_double_cover()
         self.idle = self.eligible & ~self._acts()
-        self.eligible &= ~self.idle
+        self.eligible &= ~(self.idle | scene.resting)
         self.own = np.zeros(n, dtype=bool)
         dim = scene.points.shape[1]
         for zone in scene.zones:
@@ -153,7 +147,11 @@ class ContactProblem:
         self._refuse_unheld()
         self.has_own_unknowns = self._find_own_unknowns()
         self.matrix, self.diagonal = _stiffness(scene)
-        self._system: tuple[bytes, Constrained] | None = None
+        constraints = (self.gaps @ scene.free.basis).tocsr()
+        own = self._own_unknowns() if self.has_own_unknowns else None
+        unknowns = unknowns_of(scene, self.motions)
+        self.parts = parts_of(scene, constraints, unknowns.body)
+        self._systems = Systems(self.matrix, constraints, own, unknowns, self.parts)
 
     @cached_property
     def whole_stiffness(self) -> sparse.csr_matrix:
@@ -174,22 +172,22 @@ class ContactProblem:
     @property
     def system(self) -> Constrained | None:
         """The last system solved."""
-        return self._system[1] if self._system else None
+        return self._systems.latest
 
     @property
     def linear_solver(self) -> str:
         """The name of what solved the last system."""
-        return self._system[1].factor.name if self._system else "none"
+        return self.system.factor.name if self.system else "none"
 
     @property
     def why_solver(self) -> str:
         """Why that was chosen."""
-        return self._system[1].why if self._system else ""
+        return self.system.why if self.system else ""
 
     @property
     def linear_iterations(self) -> int:
         """The most iterations that one solution of the last system took; 0 by a factor alone."""
-        return self._system[1].factor.iterations if self._system else 0
+        return self.system.factor.iterations if self.system else 0
 
     def solve(
         self, factor: float, start: np.ndarray | None = None, bilateral: bool = False
@@ -199,11 +197,15 @@ class ContactProblem:
         `bilateral`: no status is sought, all macro-elements stay closed, in tension too.
         """
         scene = self.scene
+        if not scene.skips.status:
+            start = self.eligible
         start = self._first_guess(factor) if start is None else start
         force = factor * scene.force
         latest: list[_Solved] = []
 
         def attempt(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            if not scene.skips.status:
+                self._systems.forget()
             found = self._solve_closed(closed, force, factor)
             latest[:] = [found]
             return found.pressure, self._average_gap(found.iterate.displacement)
@@ -214,16 +216,25 @@ class ContactProblem:
             attempt(self.eligible)
             status = StatusResult(self.eligible, 1, [])
         else:
-            status = find_status(attempt, start, self.eligible, pressure_scale, scene.length)
+            status = find_status(
+                attempt,
+                start,
+                self.eligible,
+                pressure_scale,
+                scene.length,
+                confirm=not scene.skips.status,
+            )
         solved, shape = latest[0], scene.points.shape
         found = solved.iterate.displacement
+        gap = self._average_gap(found)
+        touching = scene.resting & (gap <= GAP_NOISE * scene.length)
         return Equilibrium(
             found.total.reshape(shape),
             solved.iterate.straining,
             solved.iterate.mean_stress,
             solved.pressure,
-            self._average_gap(found),
-            status,
+            gap,
+            replace(status, closed=status.closed | touching),
             solved.residual,
             force,
             solved.iterate.internal,
@@ -249,7 +260,7 @@ class ContactProblem:
 
     def _average_gap(self, displacement: Displacement) -> np.ndarray:
         opening = self.initial + self.opening(displacement, self.gaps)
-        return opening / np.where(self.eligible, self.covered, np.inf)
+        return opening / np.where(self.eligible | self.scene.resting, self.covered, np.inf)
 
     def _solve_closed(self, closed: np.ndarray, force: np.ndarray, factor: float) -> _Solved:
         """Equilibrium with the given macro-elements closed."""
@@ -266,7 +277,8 @@ class ContactProblem:
     def _refined(self, system: Constrained, start: _Iterate, scale: float) -> _Solved:
         refine = self.scene.cures.refinement
         # In a stretched model a force of the size of round-off may be a large one elsewhere.
-        options = {"round_off": 0.0} if start.extended else {}
+        goes_on = start.extended or not self.scene.skips.refinement
+        options = {"round_off": 0.0} if goes_on else {}
         iterate, multiplier, residual = solve(system, start, scale, refine, **options)
         pressure = np.zeros(len(start.closed))
         pressure[start.closed] = multiplier
@@ -305,37 +317,10 @@ class ContactProblem:
         return float(max(np.abs(force).max(), np.abs(internal).max())) or 1.0
 
     def _constrained(self, closed: np.ndarray) -> Constrained:
-        key = closed.tobytes()
-        if self._system is None or self._system[0] != key:
-            held = self._unheld(closed)
-            if held:
-                raise SolveError(f"{held} once {int((~closed).sum())} macro-elements are open")
-            constraints = (self.gaps[closed] @ self.scene.free.basis).tocsr()
-            system: Constrained
-            if self.has_own_unknowns:
-                own, unknowns = self._own_unknowns(), self._unknowns()
-                system = condense(self.matrix, constraints, own, unknowns)
-            else:
-                system = self._saddle_point(constraints)
-            self._system = key, system
-            return system
-        return self._system[1]
-
-    def _saddle_point(self, constraints: sparse.csr_matrix) -> Constrained:
-        try:
-            return saddle_point(self.matrix, constraints)
-        except SolveError as error:
-            raise SolveError(
-                f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
-                "another, as where they outnumber the slave nodes or supports hold these"
-            ) from None
-
-    def _unknowns(self) -> Unknowns:
-        """What the free unknowns stand for."""
-        basis, dim = self.scene.free.basis.tocsc(), self.scene.points.shape[1]
-        node = basis.indices[basis.indptr[:-1]] // dim
-        motions = basis.T @ whole_motions(self.motions, int(self.scene.body.max()) + 1)
-        return Unknowns(dim, node, motions, self.scene.body[node])
+        held = self._unheld(closed)
+        if held:
+            raise SolveError(f"{held} once {int((~closed).sum())} macro-elements are open")
+        return self._systems.closed(closed)
 
     def _own_unknowns(self) -> np.ndarray:
         """Free unknowns (n_free,) that belong to slave nodes."""

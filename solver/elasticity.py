@@ -5,7 +5,7 @@ Source: Bathe, Finite Element Procedures, §5.3. Works on arrays alone.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -39,6 +39,11 @@ class Block:
     def rule(self) -> tuple[np.ndarray, np.ndarray]:
         """The quadrature points (q, dim) and weights (q,) of the block."""
         return volume_rule(self.type.name, self.straight)
+
+    def of(self, chosen: np.ndarray) -> "Block":
+        """The chosen (n,) of its cells."""
+        cells, lame, shear = self.cells[chosen], self.lame[chosen], self.shear[chosen]
+        return replace(self, cells=cells, lame=lame, shear=shear)
 
 
 def lame_parameters(young: np.ndarray, poisson: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

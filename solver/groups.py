@@ -35,6 +35,45 @@ def check_groups(case: Case, mesh: meshio.Mesh, swapped: bool = False) -> None:
         groups.check_zone(f"contact[{i}]", zone, swapped)
 
 
+def named_parts(case: Case, mesh: meshio.Mesh) -> tuple[meshio.Mesh, tuple[int, int]]:
+    """The mesh without what the case does not name: how many groups, how many faces and edges.
+
+    Groups of volume cells stay: bodies have their names. `check_groups` comes first.
+    """
+    dims = [BY_MESHIO[block.type].dim for block in mesh.cells]
+    volume = [dim == mesh.points.shape[1] for dim in dims]
+    named = _named(case)
+    sets = {
+        name: members
+        for name, members in mesh.cell_sets.items()
+        if name in named or any(len(m) for m, v in zip(members, volume, strict=True) if v)
+    }
+    points = {name: nodes for name, nodes in mesh.point_sets.items() if name in named}
+    left = len(mesh.cell_sets) - len(sets) + len(mesh.point_sets) - len(points)
+    members: dict[str, list[np.ndarray]] = {name: [] for name in sets}
+    cells, count = [], 0
+    for i, (block, whole) in enumerate(zip(mesh.cells, volume, strict=True)):
+        kept = np.full(len(block.data), whole)
+        for parts in sets.values():
+            kept[np.asarray(parts[i], dtype=int)] = True
+        place = np.cumsum(kept) - 1
+        for name, parts in sets.items():
+            members[name].append(place[np.asarray(parts[i], dtype=int)])
+        cells.append((block.type, block.data[kept]))
+        count += int((~kept).sum())
+    if not left and not count:
+        return mesh, (0, 0)
+    return meshio.Mesh(mesh.points, cells, cell_sets=members, point_sets=points), (left, count)
+
+
+def _named(case: Case) -> set[str]:
+    """All groups that a case names."""
+    sides = [side for zone in case.zones for side in (zone.slave, zone.master)]
+    held = [support.group for support in case.supports]
+    loaded = [load.group for load in case.loads]
+    return {*case.materials, *case.rigid, *case.counts, *sides, *held, *loaded}
+
+
 class _Groups:
     """The groups of one mesh, asked for by the keys of one case."""
 

@@ -181,15 +181,11 @@ def split(
             whole.append(block)
             continue
         if not chosen.all():
-            whole.append(_subset(block, ~chosen))
-        part = _subset(block, chosen)
+            whole.append(block.of(~chosen))
+        part = block.of(chosen)
         whole.append(replace(part, lame=np.zeros(len(part.cells))))
         parts.append((part, np.flatnonzero(chosen), number[chosen]))
     return whole, _mean_stress(points, parts)
-
-
-def _subset(block: Block, pick: np.ndarray) -> Block:
-    return replace(block, cells=block.cells[pick], lame=block.lame[pick], shear=block.shear[pick])
 
 
 def _mean_stress(

@@ -38,7 +38,7 @@ from solver.files import is_sealed, replacing, seal
 from solver.hdf5 import column, new_file, read_table, write_table
 from solver.mesh.catalogue import cell_type
 from solver.mesh.vtkhdf import read_grid, write_grid
-from solver.solution import BodyInfo, NodalContact, Solution, StepResult, ZoneResult
+from solver.solution import BodyInfo, Line, NodalContact, Solution, StepResult, ZoneResult
 from solver.units import label_fields
 
 GRID = "VTKHDF"
@@ -116,7 +116,7 @@ def _write(
     _write_steps(file, solution.steps)
     write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
     write_table(file.create_group("timings"), _timings(solution))
-    write_table(file.create_group("plan"), _pairs("what", "why", solution.plan))
+    write_table(file.create_group("plan"), [line._asdict() for line in solution.plan])
     write_table(file.create_group("checks"), [_flat(check) for check in checks])
     file.create_group("provenance").attrs.update(provenance)
     label_fields(file[GRID], contact, solution.case.units)
@@ -178,7 +178,7 @@ def _read_solution(file: h5py.File) -> Solution:
         nodal_normal_stress=point_data["normal_stress"],
         balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=_read_steps(file),
-        plan=_read_pairs(file["plan"], "what", "why"),
+        plan=[Line(**row) for row in read_table(file["plan"])],
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},

@@ -21,6 +21,7 @@ from solver.provenance import gather
 from solver.regression import accepted_values
 from solver.results import read_result, write_result
 from solver.simulation import simulate
+from solver.skips import EVERYTHING, NEEDED, Skips
 from solver.solution import Solution
 from solver.verdict import CRASHED, FAILED, REFUSED, of_solution, without_result, write_verdict
 
@@ -33,7 +34,7 @@ class Job:
 
     `mesh` is a mesh file taken as it is; None means the case's own, its transform applied.
     `refine` multiplies the divisions of the case's recipe. `memory_check`: refused where its memory
-    exceeds the machine's.
+    exceeds the machine's. `everything`: what the scene does not need is done all the same.
     """
 
     case: Path
@@ -42,6 +43,7 @@ class Job:
     hexahedra: str | None = None
     refine: int = 1
     memory_check: bool = True
+    everything: bool = False
 
 
 def refined(case: Case, factor: int) -> Case:
@@ -96,13 +98,14 @@ def solve_checked(
     log: Log = lambda _: None,
     accepted: bool = True,
     clock: Clock | None = None,
+    skips: Skips = NEEDED,
 ) -> tuple[Solution, list[CheckResult]]:
     """Solve a case on its mesh and run its checks, those of `accepted` values too if asked.
 
     The time of every stage is added to `clock`, where one is given.
     """
     clock = Clock() if clock is None else clock
-    solution = simulate(case, mesh, swapped, hexahedra, log, clock=clock)
+    solution = simulate(case, mesh, swapped, hexahedra, log, clock=clock, skips=skips)
     with clock.stage("checks"):
         solution.errors = errors(solution)
         checks = run_checks(solution, accepted_values(solution) if accepted else {})
@@ -168,7 +171,10 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[s
         check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
     # What was accepted is a result on the case's own mesh.
     accepted = job.refine == 1
-    solution, checks = solve_checked(case, mesh, job.swapped, job.hexahedra, log, accepted, clock)
+    skips = EVERYTHING if job.everything else NEEDED
+    solution, checks = solve_checked(
+        case, mesh, job.swapped, job.hexahedra, log, accepted, clock, skips
+    )
     solution.cpu_seconds = time.process_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
     with clock.stage("write"):

@@ -1,6 +1,7 @@
 """From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import meshio
@@ -15,14 +16,15 @@ from solver.elasticity import Block
 from solver.errors import InputError
 from solver.expressions import evaluate
 from solver.faces import FaceBlock, boundary_faces, surface_points, volume_cells
-from solver.groups import check_groups
+from solver.groups import check_groups, named_parts
 from solver.lac.cut import CutMesh, SubFaces, cut
 from solver.lac.facets import Facets, facets, with_nodal_normals
 from solver.lac.operator import GapOperator, gap_operator
 from solver.mesh.catalogue import BY_NAME
 from solver.mixed import MeanStress
+from solver.skips import NEEDED, Skips
 from solver.supports import FreeMotion
-from solver.treatments import TREATMENTS, Treatment, scheme_of
+from solver.treatments import SEGMENTED, TREATMENTS, Treatment, scheme_of
 from solver.treatments.held import joined
 
 # An average initial gap below this many roundings of the coordinates is none.
@@ -74,7 +76,10 @@ class Scene:
     origin of the coordinates, differences would lose digits. `force` (n, dim) and `free.offset` are
     for load factor 1. `blocks` of cells in mixed form have λ = 0; `mean` makes up for it. `meshed`:
     the volume cells before the cut, by type, and `volume_groups` which of them each named group
-    holds. `rounding`: how well the coordinates are known (a length).
+    holds. `rounding`: how well the coordinates are known (a length). `unnamed`: how many groups of
+    the mesh, and of its faces and edges, the case does not name. `asleep` (b,) bodies and `resting`
+    (k,) multipliers are left out since nothing moves them (see `solver.unloaded`): `blocks` and
+    `free` are without them.
     """
 
     case: Case
@@ -92,6 +97,10 @@ class Scene:
     volume_groups: dict[str, dict[str, np.ndarray]]
     rounding: float
     cures: Cures
+    skips: Skips
+    unnamed: tuple[int, int]
+    asleep: np.ndarray
+    resting: np.ndarray
 
     @property
     def n_dofs(self) -> int:
@@ -106,30 +115,32 @@ def build_scene(
     hexahedra: str | None,
     clock: Clock,
     cures: Cures = ALL,
+    skips: Skips = NEEDED,
 ) -> Scene:
     """The discrete problem of a case; raises InputError where case and mesh do not fit."""
     check_groups(case, mesh, swapped)
+    mesh, unnamed = named_parts(case, mesh)
     origin = mesh.points.mean(axis=0) * cures.local_coordinates
     local = replace_points(mesh, mesh.points - origin)
     length = float(np.ptp(local.points, axis=0).max())
     zones = [_as_solved(zone, swapped, hexahedra) for zone in case.zones]
     with clock.stage("cut"):
         surfaces = _surfaces(case, local, zones, swapped)
-        cut_mesh, sub_faces = _cut(local, zones, surfaces)
+        cut_mesh, sub_faces = _cut(local, zones, surfaces, skips)
     points = cut_mesh.points
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
     scenes = []
     with clock.stage("pairing"):
         for zone, (slave, master), faces in zip(zones, surfaces, sub_faces, strict=True):
             count = sum(len(block.nodes) for block in slave)
-            operator = _operator(points, zone, faces, master, count, cures)
+            operator = _operator(points, zone, faces, master, count, cures, skips)
             noise = _GAP_ROUND_OFF * rounding * cures.gap_threshold
             initial = _initial_gaps(zone, operator, points, faces, origin, noise)
             operator = replace(operator, initial=initial)
             scenes.append(ZoneScene(zone, 0, count, slave, master, faces, operator))
     groups = Attributes(case, local, cut_mesh, scenes, origin)
     with clock.stage("assembly"):
-        blocks, mean = groups.elasticity(cures.mixed)
+        blocks, mean = groups.elasticity(cures.mixed, plain=skips.quadrature)
         free = groups.supports()
         force = groups.forces()
         scenes = _without_held(scenes, free)
@@ -150,6 +161,10 @@ def build_scene(
         volume_groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
         rounding=rounding,
         cures=cures,
+        skips=skips,
+        unnamed=unnamed,
+        asleep=np.zeros(int(body.max()) + 1, dtype=bool),
+        resting=np.zeros(sum(len(zone.operator.initial) for zone in scenes), dtype=bool),
     )
 
 
@@ -168,9 +183,8 @@ def _without_held(zones: list[ZoneScene], free: FreeMotion) -> list[ZoneScene]:
 def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndarray:
     """Values (n, dim) at the nodes of the mesh, interpolated at those of the scene's cut mesh."""
     surfaces = [(zone.slave_faces, zone.master_faces) for zone in scene.zones]
-    return _cut(replace_points(mesh, values), [zone.zone for zone in scene.zones], surfaces)[
-        0
-    ].points
+    zones = [zone.zone for zone in scene.zones]
+    return _cut(replace_points(mesh, values), zones, surfaces, scene.skips)[0].points
 
 
 def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
@@ -226,6 +240,7 @@ def _cut(
     mesh: meshio.Mesh,
     zones: list[Zone],
     surfaces: list[tuple[list[FaceBlock], list[FaceBlock]]],
+    skips: Skips,
 ) -> tuple[CutMesh, list[list[SubFaces]]]:
     """The cut mesh, and each zone's sub-faces with macro-elements counted within the zone."""
     faces, macro, into_hexahedra, uncut, first = [], [], [], [], [0]
@@ -236,7 +251,8 @@ def _cut(
             into_hexahedra.append(zone.hexahedra == "hexahedra")
             uncut.append(not TREATMENTS[zone.treatment].cut)
         first.append(first[-1] + sum(len(block.nodes) for block in slave))
-    cut_mesh = cut(mesh.points, volume_cells(mesh), faces, macro, into_hexahedra, uncut)
+    cells = volume_cells(mesh)
+    cut_mesh = cut(mesh.points, cells, faces, macro, into_hexahedra, uncut, not skips.cut)
     sub_faces = []
     for low, high in pairwise(first):
         mine = [(f, (f.macro >= low) & (f.macro < high)) for f in cut_mesh.sub_faces]
@@ -253,6 +269,7 @@ def _operator(
     master_faces: list[FaceBlock],
     count: int,
     cures: Cures,
+    skips: Skips,
 ) -> GapOperator:
     slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
     if zone.normal == "nodal":
@@ -261,9 +278,18 @@ def _operator(
     corners = np.concatenate([f.centre for f in [*slaves, *masters]])
     search = float(np.linalg.norm(np.ptp(corners, axis=0)))
     search += max(f.radius.max() for f in [*slaves, *masters])
+    if not skips.quadrature:
+        slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
+    if not skips.clipping and zone.treatment in SEGMENTED:
+        scheme = replace(scheme, meet=partial(scheme.meet, clip_all=True))
     scheme = replace(scheme, closure=scheme.closure and cures.closure)
     return gap_operator(slaves, masters, count, len(points), search, scheme)
+
+
+def _as_bent(block: Facets) -> Facets:
+    """The faces treated as no affine images of their reference face."""
+    return replace(block, affine=np.zeros(len(block.affine), dtype=bool))
 
 
 def _initial_gaps(

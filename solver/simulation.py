@@ -22,8 +22,10 @@ from solver.mesh.catalogue import BY_NAME
 from solver.naming import body_infos
 from solver.plan import made_plan
 from solver.scene import Scene, ZoneScene, build_scene
+from solver.skips import NEEDED, Skips
 from solver.solution import NodalContact, Solution, StepResult, ZoneResult
 from solver.stress import normal_stress
+from solver.unloaded import without_unloaded
 
 Log = Callable[[str], Any]
 
@@ -39,18 +41,23 @@ def simulate(
     log: Log = lambda _: None,
     cures: Cures = ALL,
     clock: Clock | None = None,
+    skips: Skips = NEEDED,
 ) -> Solution:
     """Solve a case on its mesh.
 
     `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
-    `cures` turns what keeps the digits off, to show what it does. The time of every stage is added
-    to `clock`, where one is given. Raises InputError where the case and its mesh do not fit,
+    `cures` turns what keeps the digits off, to show what it does, and `skips` what is left out
+    where the scene does not need it. The time of every stage is added to `clock`, where one is
+    given. Raises InputError where the case and its mesh do not fit,
     SolveError where no solution is found.
     """
     started = time.process_time()
     clock = Clock() if clock is None else clock
-    scene = build_scene(case, mesh, swapped, hexahedra, clock, cures)
+    scene = build_scene(case, mesh, swapped, hexahedra, clock, cures, skips)
     check_geometry(scene)
+    if skips.unloaded:
+        with clock.stage("assembly"):
+            scene = without_unloaded(scene)
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
     with clock.stage("assembly"):
         problem = ContactProblem(scene)
@@ -125,15 +132,10 @@ def _recover(
         linear_solver=problem.linear_solver,
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
-        plan=[*made_plan(scene, states, problem.idle), _linear_solver(problem)],
+        plan=made_plan(problem, states),
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),
     )
-
-
-def _linear_solver(problem: ContactProblem) -> tuple[str, str]:
-    """A line of the plan: what solved the last system, and why that."""
-    return f"linear solver: {problem.linear_solver}", problem.why_solver
 
 
 def _output_mesh(scene: Scene) -> meshio.Mesh:

@@ -8,7 +8,7 @@ open, stress is positive in tension.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,17 @@ if TYPE_CHECKING:
 def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
     """The name of one solve of a case: direction and variant, where they are not the case's own."""
     return "-".join([name, *(["swapped"] if swapped else []), *([hexahedra] if hexahedra else [])])
+
+
+class Line(NamedTuple):
+    """A line of the plan: what was left out or decided, and why; `skip` is its switch in `Skips`.
+
+    Empty where it has none.
+    """
+
+    what: str
+    why: str
+    skip: str = ""
 
 
 @dataclass
@@ -135,7 +146,7 @@ class Solution:
     macro_elements: int
     iterations: int
     linear_solver: str
-    plan: list[tuple[str, str]]
+    plan: list[Line]
     matrix_entries: int = 0
     linear_iterations: int = 0
     accuracy: dict[str, float] = field(default_factory=dict)

@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 
 from solver.case import load_case
-from solver.solution import BodyInfo, Solution, StepResult, ZoneResult
+from solver.solution import BodyInfo, Line, Solution, StepResult, ZoneResult
 
 PLANE = """\
 name: two-blocks
@@ -107,7 +107,10 @@ def plane(folder: Path, text: str = PLANE) -> Solution:
         macro_elements=2,
         iterations=1,
         linear_solver="by hand",
-        plan=[("refinement", "none: by hand"), ("refinement", "said twice")],
+        plan=[
+            Line("refinement", "none: by hand", "refinement"),
+            Line("refinement", "said twice"),
+        ],
         matrix_entries=352,
         linear_iterations=3,
         seconds={"mesh": 0.25, "solve": 0.5},

@@ -148,7 +148,7 @@ def test_ordinary_material_stays_as_it_is():
     assert np.array_equal(plain.displacement, chosen.displacement)
     assert set(mixed.mean_stress) == {"TRIA6", "QUAD8"}
     assert np.abs(mixed.stress - plain.stress).max() < 1e-12 * 25
-    told = [what for what, _ in mixed.plan if what.startswith("mixed form")]
+    told = [line.what for line in mixed.plan if line.what.startswith("mixed form")]
     assert told == [f"mixed form in {sum(map(len, mixed.mean_stress.values()))} cells"]
 
 

@@ -49,7 +49,7 @@ def test_a_solve_whose_checks_hold_has_passed(tmp_path):
         "reference_cells": 3,
         "reference_faces": 3,
     }
-    assert verdict["plan"][0] == ["refinement", "none: by hand"]
+    assert verdict["plan"][0] == ["refinement", "none: by hand", "refinement"]
 
 
 def test_one_failing_check_fails_the_solve_and_is_the_reason(tmp_path):

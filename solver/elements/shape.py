@@ -76,8 +76,10 @@ def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
 def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
     from skfem import element
 
-    from solver.elements.added import ElementPyramid, ElementWedgeS2
+    if name in ("PENTA15", "PYRA5", "PYRA13"):
+        from solver.elements.added import ElementPyramid, ElementWedgeS2
 
+        return ElementWedgeS2() if name == "PENTA15" else ElementPyramid(name)
     makers = {
         "SEG2": element.ElementLineP1,
         "SEG3": element.ElementLineP2,
@@ -92,6 +94,5 @@ def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
         "HEXA20": element.ElementHexS2,
         "HEXA27": element.ElementHex2,
         "PENTA6": element.ElementWedge1,
-        "PENTA15": ElementWedgeS2,
     }
-    return makers[name]() if name in makers else ElementPyramid(name)
+    return makers[name]()

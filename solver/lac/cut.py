@@ -64,15 +64,18 @@ def cut(
     macro: list[np.ndarray],
     into_hexahedra: list[bool],
     uncut: list[bool] | None = None,
+    without_need: bool = False,
 ) -> CutMesh:
     """Cut the cells behind slave faces.
 
     `faces` are the slave faces of all zones, `macro` their macro-element numbers, `into_hexahedra`
     the choice for hexahedra, all by block; blocks marked `uncut` are left as they are.
+    `without_need`: those that own an inner node are cut as well.
     """
     left = uncut or [False] * len(faces)
     chosen = [
-        needs_cut(block.type.name) and not leave for block, leave in zip(faces, left, strict=True)
+        (without_need or needs_cut(block.type.name)) and not leave
+        for block, leave in zip(faces, left, strict=True)
     ]
     slaves = _slave_faces_by_cell(
         list(compress(faces, chosen)),
@@ -181,11 +184,12 @@ class _Template:
     """How one cell type is cut for one pattern of slave faces.
 
     Local node numbers: the parent's nodes, then the new ones, which lie at `new_nodes` (k, dim) of
-    the parent's reference cell; the last of them are the middles of the edges `new_edges` (e, 2),
-    given by local numbers. `sub_faces` by slave face.
+    the parent's reference cell; those numbered `middles` (e,) are the middles of the edges
+    `new_edges` (e, 2), given by local numbers. `sub_faces` by slave face.
     """
 
     new_nodes: np.ndarray
+    middles: np.ndarray
     new_edges: np.ndarray
     pieces: list[tuple[str, list[int]]]
     sub_faces: list[list[tuple[str, list[int]]]]
@@ -205,8 +209,8 @@ class _Template:
         if len(self.new_edges):
             ends = np.concatenate([corner, new], axis=1)[:, self.new_edges]
             straight = has_straight_edges(kind, corner)
-            first = new.shape[1] - len(self.new_edges)
-            new[straight, first:] = ends[straight].mean(axis=2)
+            among = self.middles - corner.shape[1]
+            new[np.ix_(straight, among)] = ends[straight].mean(axis=2)
         return new
 
 
@@ -225,7 +229,7 @@ def _template(name: str, pattern: Pattern) -> _Template:
         corners = face.nodes[: cell_type(face.type).n_vertices]
         carrier = next(p for p in pieces if any(set(f) == set(corners) for f in _faces(p)))
         pieces.remove(carrier)
-        cutter = _cutter(carrier, into_hexahedra)
+        cutter = _cutter(carrier, into_hexahedra or name == "HEXA27")
         new_pieces, new_faces = cutter(carrier, corners, places)
         pieces += new_pieces
         sub_faces.append(new_faces)
@@ -318,31 +322,43 @@ def _promote(
     pieces: list[Cell],
     sub_faces: list[list[Cell]],
 ) -> _Template:
-    """Number the nodes as parent's nodes then new ones; give quadratic pieces their mid-nodes."""
-    n = kind.n_vertices
-    new_nodes = [np.array(p) for p in places[n:]]
+    """Number the nodes as parent's nodes then new ones; give quadratic pieces their own nodes.
+
+    A node is known by the vertices whose mean it is. One that falls on a node of the parent, as the
+    middle of a quadratic edge that is cut, is that node.
+    """
+    known = {frozenset(owner): i for i, owner in enumerate(kind.owners)}
+    new_nodes: list[np.ndarray] = []
+    middles: list[int] = []
     new_edges: list[tuple[int, int]] = []
-    number = {i: i if i < n else kind.n_nodes + i - n for i in range(len(places))}
-    middle = {frozenset(edge): n + k for k, edge in enumerate(kind.edges)}
+
+    def number(vertices: frozenset[int]) -> int:
+        if vertices not in known:
+            place = np.mean([places[v] for v in sorted(vertices)], axis=0)
+            distance = np.abs(kind.nodes - place).max(axis=1)
+            known[vertices] = int(distance.argmin())
+            if distance.min() > _NO_SHARE:
+                known[vertices] = kind.n_nodes + len(new_nodes)
+                new_nodes.append(place)
+                if len(vertices) == 2:
+                    middles.append(known[vertices])
+                    new_edges.append(tuple(known[frozenset([v])] for v in sorted(vertices)))  # type: ignore[arg-type]
+        return known[vertices]
 
     def full(cell: Cell) -> tuple[str, list[int]]:
         skeleton, vertices = cell
-        nodes = [number[v] for v in vertices]
-        if kind.order == 1:
-            return skeleton, nodes
-        for i, j in BY_NAME[skeleton].edges:
-            edge = frozenset((vertices[i], vertices[j]))
-            if edge not in middle:
-                middle[edge] = kind.n_nodes + len(new_nodes)
-                new_nodes.append((np.array(places[vertices[i]]) + places[vertices[j]]) / 2)
-                new_edges.append((number[vertices[i]], number[vertices[j]]))
-            nodes.append(middle[edge])
-        return _QUADRATIC[skeleton], nodes
+        name = skeleton if kind.order == 1 else _QUADRATIC[skeleton]
+        name = _CENTRED.get(name, name) if kind.name in _CENTRED.values() else name
+        owners = BY_NAME[name].owners
+        return name, [number(frozenset(vertices[i] for i in owner)) for owner in owners]
 
+    for vertex in range(len(places)):
+        number(frozenset([vertex]))
     return _Template(
         pieces=[full(p) for p in pieces],
         sub_faces=[[full(f) for f in group] for group in sub_faces],
         new_nodes=np.array(new_nodes).reshape(-1, kind.dim),
+        middles=np.array(middles, dtype=int),
         new_edges=np.array(new_edges, dtype=int).reshape(-1, 2),
     )
 
@@ -356,3 +372,4 @@ _QUADRATIC = {
     "PENTA6": "PENTA15",
     "PYRA5": "PYRA13",
 }
+_CENTRED = {"QUAD8": "QUAD9", "HEXA20": "HEXA27"}

@@ -20,7 +20,7 @@ from solver.lac.segments import Segments, intersect
 # Slave-side entries of dual multipliers below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
 
-Meet = Callable[[list[Facets], list[Samples], list[Facets], float], list[tuple[int, int, Segments]]]
+Meet = Callable[..., list[tuple[int, int, Segments]]]
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,9 @@ class GapOperator:
     `area`, `covered` (k,): ∫ φ over the whole and the intersected surface; `mean` (m, k): values
     by multiplier averaged over the macro-elements of `surface`; `nodes` (k,): the nodes that
     multipliers belong to, None for macro-elements; `segments`: how many there are; `closed_faces`:
-    on how many faces the closure of integrals was used. `at_nodes` (n, k): the values at `nodes`,
-    then (n,), by multiplier, where some nodes have no multiplier of their own.
+    on how many faces the closure of integrals was used; `unclipped`: how many segments are whole
+    slave faces; `plain`: whether plain Gauss rules are exact on all of them. `at_nodes` (n, k): the
+    values at `nodes`, then (n,), by multiplier, where some nodes have no multiplier of their own.
     """
 
     matrix: sparse.csr_matrix
@@ -57,6 +58,8 @@ class GapOperator:
     surface: Surface
     segments: int
     closed_faces: int
+    unclipped: int = 0
+    plain: bool = False
     at_nodes: sparse.csr_matrix | None = None
 
 
@@ -66,17 +69,19 @@ def meet_in_segments(
     masters: list[Facets],
     reach: float,
     weighted: bool = False,
+    clip_all: bool = False,
 ) -> list[tuple[int, int, Segments]]:
     """Segments between all pairs of blocks: (slave block, master block, segments).
 
-    `weighted`: with quadrature for integrands weighted by linear shape functions of the slave.
+    `weighted`: with quadrature for integrands weighted by linear shape functions of the slave;
+    `clip_all`: slave faces that lie within one master face are clipped as the others.
     """
     return [
         (a, b, segments)
         for a, slave in enumerate(slaves)
         for b, master in enumerate(masters)
         for segments in intersect(
-            slave, master, reach, mortar_degree(slave.type.skeleton) if weighted else 0
+            slave, master, reach, mortar_degree(slave.type.skeleton) if weighted else 0, clip_all
         )
     ]
 
@@ -147,6 +152,8 @@ def gap_operator(
         surface,
         count,
         closed,
+        sum(int(s.whole.sum()) for _, _, s in found),
+        scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
     )
 
 

@@ -9,12 +9,13 @@ segment-to-segment contact method, CMAME 193 (2004) 601–629, for segments; Abb
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from solver.batch import invert
 from solver.elements import mortar_degree, shape_functions, simplex_rule
-from solver.lac.clipping import clip, overlap, triangles
+from solver.lac.clipping import clip, overlap, placed, triangles
 from solver.lac.facets import Facets, locate, shift
 from solver.lac.pairing import candidate_pairs
 from solver.mesh.catalogue import CellType
@@ -40,7 +41,7 @@ class Segments:
     `slave`, `master` (s,) index the two Facets; at each of q points: `slave_values`,
     `master_values` (s, q, n_nodes) shape functions, `weight` (s, q) surface measure × quadrature
     weight, `normal` (s, q, dim) the slave's and `gap` (s, q) the distance along it, positive when
-    open.
+    open. `whole` (s,): parts of slave faces that lie within the master face and were not clipped.
     """
 
     slave: np.ndarray
@@ -50,18 +51,22 @@ class Segments:
     weight: np.ndarray
     normal: np.ndarray
     gap: np.ndarray
+    whole: np.ndarray
 
 
-def intersect(slave: Facets, master: Facets, reach: float, more: int = 0) -> list[Segments]:
+def intersect(
+    slave: Facets, master: Facets, reach: float, more: int = 0, clip_all: bool = False
+) -> list[Segments]:
     """All segments between two blocks of faces, looked for within `reach` (a length).
 
     Their quadrature is exact for shape functions of affine faces times polynomials of degree
-    `more`.
+    `more`. `clip_all`: faces that lie within others are clipped as well.
     """
     i, j = facing_pairs(slave, master, reach)
     straight = slave.straight[i]
+    in_plane = partial(_in_plane, clip_all=clip_all)
     charts = (
-        (np.flatnonzero(straight & _above_each_other(slave, master, i, j)), _in_plane),
+        (np.flatnonzero(straight & _above_each_other(slave, master, i, j)), in_plane),
         (np.flatnonzero(~straight), _in_reference),
     )
     parts = []
@@ -87,7 +92,12 @@ def _above_each_other(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarra
 
 
 def _in_plane(
-    slave: Facets, master: Facets, pair: tuple[np.ndarray, np.ndarray], reach: float, more: int
+    slave: Facets,
+    master: Facets,
+    pair: tuple[np.ndarray, np.ndarray],
+    reach: float,
+    more: int,
+    clip_all: bool,
 ) -> Segments:
     """Segments of straight slave faces, cut in the plane of the slave face."""
     i, j = pair
@@ -97,15 +107,34 @@ def _in_plane(
     outline = _outline(master.type, bent=not master.straight[j].all())
     subject = _plane(shift(master, j, slave.centre[i])[:, outline[::-1]], tangents)
     degree = _degree(slave, master, i, j) + more
+    whole = np.zeros(len(i), dtype=bool)
+    if window.shape[2] == 2 and not clip_all:
+        meeting, whole = _meeting(window, subject, i, bool(master.straight[j].all()))
+        i, j, window, subject = (x[meeting] for x in (i, j, window, subject))
     count = np.full(len(i), subject.shape[1])
-    which, places, weight = _cut_pieces(window, subject, count, degree)
-    i, j = i[which], j[which]
+    which, places, weight = _cut_pieces(window, subject, count, degree, whole)
+    i, j, whole = i[which], j[which], whole[which]
     points = np.einsum("sqt,std->sqd", places, slave.tangents[i])
     normal = np.broadcast_to(slave.normal[i][:, None], points.shape)
     place, height = locate(slave.type, shift(slave, i, slave.centre[i]), points, normal)
     points = points + height[..., None] * normal
     normal = _directions(slave, i, place, normal)
-    return _with_master(slave, master, (i, j), place, points, weight, normal, reach)
+    return _with_master(slave, master, (i, j), place, points, weight, normal, reach, whole)
+
+
+def _meeting(
+    window: np.ndarray, subject: np.ndarray, slave: np.ndarray, convex: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """The pairs (k,) with a common area, and which of them (k,) are slave faces within the master.
+
+    Polygons (n, v, 2) of pairs, of the slave faces numbered `slave` (n,).
+    """
+    within, apart, nearly = placed(window, subject, convex)
+    held = np.zeros(slave.max(initial=-1) + 1, dtype=bool)
+    held[slave[within]] = True
+    # A face that counts as a whole has no sliver on the next master face.
+    meeting = np.flatnonzero(within | ~np.where(held[slave], nearly, apart))
+    return meeting, within[meeting]
 
 
 def _in_reference(
@@ -128,7 +157,8 @@ def _in_reference(
     window = kind.nodes[_outline(kind, bent=False)]
     window = np.broadcast_to(window, (len(i), *window.shape))
     degree = _degree(slave, master, i, j) + more
-    which, place, weight = _cut_pieces(window, subject, count, degree)
+    none = np.zeros(len(i), dtype=bool)
+    which, place, weight = _cut_pieces(window, subject, count, degree, none)
     i, j = i[which], j[which]
     values, slopes = shape_functions(kind.name).both(place)
     corner = shift(slave, i, slave.centre[i])
@@ -136,7 +166,8 @@ def _in_reference(
     vectors = _area_vectors_at(corner, slopes)
     stretch = np.linalg.norm(vectors, axis=-1)
     normal = _directions(slave, i, place, vectors / stretch[..., None])
-    return _with_master(slave, master, (i, j), place, points, weight * stretch, normal, reach)
+    weight, none = weight * stretch, none[which]
+    return _with_master(slave, master, (i, j), place, points, weight, normal, reach, none)
 
 
 def _directions(slave: Facets, i: np.ndarray, place: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -170,6 +201,7 @@ def _with_master(
     weight: np.ndarray,
     normal: np.ndarray,
     reach: float,
+    whole: np.ndarray,
 ) -> Segments:
     """Find each point's partner on the master face; leave out segments beyond the reach."""
     i, j = pair
@@ -183,6 +215,7 @@ def _with_master(
         weight[near],
         normal[near],
         gap[near],
+        whole[near],
     )
 
 
@@ -228,11 +261,12 @@ def _near(face: np.ndarray, n_vertices: int, rim: np.ndarray) -> tuple[np.ndarra
 
 
 def _cut_pieces(
-    window: np.ndarray, subject: np.ndarray, count: np.ndarray, degree: int
+    window: np.ndarray, subject: np.ndarray, count: np.ndarray, degree: int, whole: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pieces of the subjects within the windows: pair (s,), points (s, q, d), weights (s, q).
 
-    Polygons (n, v, 2) of `count` (n,) vertices in 3D; intervals (n, 2, 1) in 2D.
+    Polygons (n, v, 2) of `count` (n,) vertices in 3D; intervals (n, 2, 1) in 2D. `whole` (n,)
+    windows are known to lie within their subjects.
     """
     dim = window.shape[2]
     reference, weights = simplex_rule(dim, degree)
@@ -241,7 +275,11 @@ def _cut_pieces(
         pair = np.flatnonzero(length > 0)
         points = ends[pair, :1] + length[pair, None] * reference[:, 0]
         return pair, points[..., None], length[pair, None] * weights
-    pair, corner, area = triangles(*clip(subject, count, window))
+    part, full = np.flatnonzero(~whole), np.flatnonzero(whole)
+    clipped = triangles(*clip(subject[part], count[part], window[part]))
+    kept = triangles(window[full], np.full(len(full), window.shape[1]))
+    pair = np.concatenate([part[clipped[0]], full[kept[0]]])
+    corner, area = (np.concatenate(both) for both in zip(clipped[1:], kept[1:], strict=True))
     barycentric = np.column_stack([1 - reference.sum(axis=1), reference])
     points = np.einsum("qk,skt->sqt", barycentric, corner)
     return pair, points, 2 * area[:, None] * weights

@@ -40,12 +40,13 @@ def find_status(
     eligible: np.ndarray,
     pressure_scale: float,
     length: float,
+    confirm: bool = False,
 ) -> StatusResult:
     """Iterate from `start` (m,) until no status changes; only `eligible` (m,) may close.
 
     `pressure_scale` and `length` are the sizes below whose noise nothing changes. A set seen before
-    (a cycle) is broken by changing only the worst offender from then on. Raises SolveError when
-    there is no end within the allowed iterations.
+    (a cycle) is broken by changing only the worst offender from then on. `confirm`: the set that is
+    found is solved once more. Raises SolveError when there is no end within the allowed iterations.
     """
     closed, seen = start & eligible, set()
     changes: list[int] = []
@@ -59,6 +60,9 @@ def find_status(
         told = iteration, int(closed.sum()), len(closed), int(wrong.sum())
         _LOG.info("contact status: iteration %d, %d of %d closed, %d wrong", *told)
         if not wrong.any():
+            if confirm:
+                confirm = False
+                continue
             return StatusResult(closed, iteration, changes)
         seen.add(closed.tobytes())
         following = closed ^ wrong

@@ -24,7 +24,7 @@ _LOG = logging.getLogger(__name__)
 _MIN_GAIN = 0.5
 _MAX_REFINEMENTS = 6
 # A residual below this multiple of the machine precision, relative to the forces, is round-off.
-_ROUND_OFF = 8 * np.finfo(float).eps
+ROUND_OFF = 8 * np.finfo(float).eps
 # A refinement aims at this share of round-off, and at no smaller a gain.
 _WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
 # A macro-element's own coefficient must not be smaller than this share of its row's largest.
@@ -235,7 +235,7 @@ def solve(
     iterate: AnyIterate,
     scale: float,
     refine: bool = True,
-    round_off: float = _ROUND_OFF,
+    round_off: float = ROUND_OFF,
 ) -> tuple[AnyIterate, np.ndarray, float]:
     """Solve from an iterate; return the last one, multipliers (m,) and the relative residual.
 

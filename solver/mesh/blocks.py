@@ -26,7 +26,6 @@ import numpy as np
 
 from solver.mesh.catalogue import BY_NAME, CellType
 from solver.mesh.gmsh_session import current_model, session
-from solver.mesh.hybrid import cube
 from solver.mesh.keys import Keys
 from solver.mesh.sides import side_name
 
@@ -59,6 +58,8 @@ def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys, refine: int)
     if name == "bottom":
         origin[-1] = -size[-1]
     if cell.name.startswith(("PENTA", "PYRA")):
+        from solver.mesh.hybrid import cube
+
         return cube(name, cell, origin, size, keys, refine)
     return _Block(name, cell, origin, size, keys, refine).mesh()
 

@@ -172,4 +172,5 @@ def _segments(sample: Samples, master: Facets, hit: _Hits) -> Segments:
         sample.weight[face, q][:, None],
         sample.normal[face, q][:, None],
         hit.gap[:, None],
+        np.zeros(len(face), dtype=bool),
     )

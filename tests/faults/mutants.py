@@ -160,18 +160,20 @@ def _factor_of_half(true: Wrapped) -> Wrapped:
 
 
 def _never_closes(true: Wrapped) -> Wrapped:
-    return lambda solve, start, eligible, *scales: true(solve, start, eligible & False, *scales)
+    return lambda solve, start, eligible, *scales, **more: true(
+        solve, start, eligible & False, *scales, **more
+    )
 
 
 def _stays_closed(true: Wrapped) -> Wrapped:
     """Tension is borne."""
 
-    def status(solve: Any, start: Any, eligible: Any, *scales: float) -> Any:
+    def status(solve: Any, start: Any, eligible: Any, *scales: float, **more: bool) -> Any:
         def no_tension_seen(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             pressure, gap = solve(closed)
             return np.abs(pressure), gap
 
-        return true(no_tension_seen, eligible, eligible, *scales)
+        return true(no_tension_seen, eligible, eligible, *scales, **more)
 
     return status
 

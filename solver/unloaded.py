@@ -1,0 +1,74 @@
+"""Groups of bodies that nothing moves are left out of a solve: their answer is zero.
+
+Bodies belong together where a multiplier moves free unknowns of both. Without load, displacement
+imposed and initial overlap, u = 0 and p = 0 fulfil equilibrium, p ≥ 0, ḡ ≥ 0 and p ḡ = 0, whatever
+the status of their contact; ḡ stays the initial gap.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+
+from solver.bodies import body_of_unknowns, joined_bodies, rigid_motions, unheld_motion
+from solver.scene import Scene
+from solver.supports import FreeMotion
+
+
+def without_unloaded(scene: Scene) -> Scene:
+    """The scene without the cells and unknowns of such groups.
+
+    Nothing is left out where a body could move freely (a solve refuses it by name), or where there
+    would be nothing to solve.
+    """
+    gaps, free = _gaps(scene), scene.free
+    acting = (gaps @ free.basis).tocsr()
+    bodies = body_of_unknowns(free.basis, scene.body)
+    asleep = _unloaded(scene, gaps, acting, bodies)
+    kept = ~asleep[bodies]
+    if kept.all() or not kept.any() or _moves_freely(scene, gaps):
+        return scene
+    selection = None if free.selection is None else free.selection[kept]
+    blocks = (block.of(~asleep[scene.body[block.cells[:, 0]]]) for block in scene.blocks)
+    return replace(
+        scene,
+        asleep=asleep,
+        resting=np.asarray(abs(acting) @ (~kept).astype(float)) > 0,
+        blocks=[block for block in blocks if len(block.cells)],
+        free=FreeMotion(free.basis[:, np.flatnonzero(kept)], free.offset, selection),
+    )
+
+
+def _unloaded(
+    scene: Scene, gaps: sparse.csr_matrix, acting: sparse.csr_matrix, bodies: np.ndarray
+) -> np.ndarray:
+    """Which bodies (b,), of those with free unknowns, nothing moves.
+
+    `gaps` (k, n_dofs) on all unknowns, `acting` (k, n_free) on free ones, those of `bodies`.
+    """
+    n_bodies = len(scene.asleep)
+    group = joined_bodies(acting, bodies, n_bodies)
+    offset = scene.free.offset
+    moved = (scene.force != 0).any(axis=1) | (offset.reshape(scene.force.shape) != 0).any(axis=1)
+    awake = np.zeros(n_bodies, dtype=bool)
+    awake[scene.body[moved]] = True
+    initial = np.concatenate([np.empty(0), *(zone.operator.initial for zone in scene.zones)])
+    pushed = np.flatnonzero((initial < 0) | (gaps @ offset != 0))
+    awake[bodies[acting[pushed].indices]] = True
+    of_group = np.zeros(n_bodies, dtype=bool)
+    of_group[group[awake]] = True
+    with_unknowns = np.isin(np.arange(n_bodies), bodies)
+    return with_unknowns & ~of_group[group]
+
+
+def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:
+    covered = np.concatenate([zone.operator.covered for zone in scene.zones] or [np.empty(0)])
+    there = covered > 0
+    per_area = sparse.diags(1 / covered[there]) @ gaps[there]
+    motions = rigid_motions(scene.points, scene.body)
+    return unheld_motion(motions, scene.free.basis, per_area, len(scene.asleep)) is not None
+
+
+def _gaps(scene: Scene) -> sparse.csr_matrix:
+    empty = sparse.csr_matrix((0, scene.n_dofs))
+    return sparse.vstack([empty, *(zone.operator.matrix for zone in scene.zones)]).tocsr()
