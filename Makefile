@@ -18,7 +18,7 @@ SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTIN
 
 .PHONY: help all-cases family case report summary compare gallery orders study stability infsup
 .PHONY: scaling benchmark test accept
-.PHONY: format lint lock faults mutants kills docs bill clean clean-all
+.PHONY: format lint lock faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment study-environment gallery-environment test-environment lint-environment docs-environment
 
 help: ## list the targets
@@ -89,6 +89,11 @@ mutants: test-environment ## plant faults in the core, one at a time: which chec
 
 kills: test-environment ## kill runs at 100 random moments, and see that the next one recovers
 	@.venv/bin/python -m tests.workflow.kills $(ARGS)
+
+cluster-test: test-environment ## six solves through a SLURM of one machine, against a local run
+	@missing=$$(.venv/bin/python -m tests.workflow.slurm --missing); \
+	if test -n "$$missing"; then echo "make cluster-test: skipped: $$missing"; \
+	else $(INSTALL) slurm && .venv/bin/python -m tests.workflow.slurm; fi
 
 RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
 accept: environment ## take results as the accepted values, showing the difference: all or CASE=…

@@ -7,6 +7,7 @@ min_version("9.0")
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/start.smk"
+include: "workflow/rules/cluster.smk"
 
 
 rule all_cases:
@@ -23,3 +24,19 @@ include: "workflow/rules/study.smk"
 include: "workflow/rules/infsup.smk"
 include: "workflow/rules/stability.smk"
 include: "workflow/rules/scaling.smk"
+
+
+# Pages and gates run where Snakemake does, wherever it sends the other jobs.
+localrules:
+    all_cases,
+    report,
+    gate,
+    orders_page,
+    orders,
+    study,
+    infsup_page,
+    infsup,
+    stability_page,
+    stability,
+    scaling,
+    gallery,

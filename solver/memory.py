@@ -4,7 +4,7 @@ Measured as peak resident memory of 547 solves with PARDISO, all cell types, 20,
 unknowns: 100 MB for the program, then by unknown (of nodes times dimensions) 2.1 to 7.4 kB in the
 plane and 4.4 to 16 kB in space, the less the more elongated the bodies are. HEXA8 cubes take
 11 kB (1.2 GB at 109,500 unknowns, 5.4 GB at 530,000). A solve is refused by the least figure, so
-that none is refused that fits; the usual one is for a warning.
+that none is refused that fits; the usual one is for a warning, and a cluster is asked for the most.
 """
 
 import resource
@@ -17,22 +17,23 @@ from solver.errors import MachineError
 _PROGRAM = 100e6
 _LEAST = {2: 2.0e3, 3: 4.2e3}
 _USUAL = {2: 3.0e3, 3: 10.0e3}
+_MOST = {2: 7.4e3, 3: 16.0e3}
 # A cgroup without a limit has a number near 2⁶³ for one.
 _NO_LIMIT = 1 << 60
 
 
 @dataclass(frozen=True)
 class Need:
-    """Memory (bytes) of a solve: at least, and usually."""
+    """Memory (bytes) of a solve: at least, usually, and at most."""
 
     least: float
     usual: float
+    most: float
 
 
-def needed(points: int, dim: int) -> Need:
+def needed(points: float, dim: int) -> Need:
     """The memory of a solve on a mesh of so many points."""
-    unknowns = points * dim
-    return Need(_PROGRAM + _LEAST[dim] * unknowns, _PROGRAM + _USUAL[dim] * unknowns)
+    return Need(*(_PROGRAM + by[dim] * points * dim for by in (_LEAST, _USUAL, _MOST)))
 
 
 def available() -> float:

@@ -10,23 +10,8 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
-from solver.mesh.catalogue import BY_NAME
+from solver.size import Size, of_body
 from solver.study.description import Point, Study
-
-# Nodes for each product of divisions, in large meshes of divisions of equal size. TRIA and TETRA
-# cells are smaller than such a product.
-_NODES = {
-    "TRIA3": 1.1,
-    "TRIA6": 4.5,
-    "QUAD4": 1.0,
-    "QUAD8": 3.0,
-    "QUAD9": 4.0,
-    "TETRA4": 1.1,
-    "TETRA10": 8.0,
-    "HEXA8": 1.0,
-    "HEXA20": 4.0,
-    "HEXA27": 8.0,
-}
 
 
 class Announced(Protocol):
@@ -43,25 +28,18 @@ class Announced(Protocol):
 
 
 _START = 1.5  # seconds: libraries loaded, mesh made, record written
-# Seconds a solve: factor and power of the unknowns, by dimension.
-_COST = {2: (2e-5, 1.0), 3: (4e-6, 1.3)}
 
 
-def unknowns(point: Point) -> float:
-    """About how many unknowns a point has."""
-    total = 0.0
-    for cell, divisions in zip((point.slave, point.master), point.problem.divisions, strict=True):
-        cells = 1
-        for division in divisions:
-            cells *= division * point.level
-        total += cells * _NODES.get(cell, 2.0) * BY_NAME[cell].dim
-    return total
+def size(point: Point) -> Size:
+    """About how large the mesh of a point is."""
+    pairs = zip((point.slave, point.master), point.problem.divisions, strict=True)
+    bodies = [of_body(cells, divisions, point.level) for cells, divisions in pairs]
+    return Size(sum(body.points for body in bodies), bodies[0].dim)
 
 
 def modelled(point: Point, repetitions: int) -> float:
     """Seconds that a point takes on a machine like that on which the model was measured."""
-    factor, power = _COST[BY_NAME[point.slave].dim]
-    return _START + (1 + repetitions) * factor * unknowns(point) ** power
+    return _START + (1 + repetitions) * size(point).seconds
 
 
 def expected(

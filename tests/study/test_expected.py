@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from solver.study.description import read_study
-from solver.study.expected import announcement, expected, measured_before, model, unknowns
+from solver.study.expected import announcement, expected, measured_before, model, size
 
 STUDY = read_study(Path(__file__).parents[2] / "cases/study/study.yaml", "quick")
 MODEL = model(STUDY)
@@ -17,7 +17,7 @@ def test_unknowns_of_regular_grids_are_counted():
     point = next(p for p in STUDY.points if p.slave == "HEXA8" and p.level == 2)
     slave, master = point.problem.divisions
     cells = [d[0] * d[1] * d[2] * 8 for d in (slave, master)]
-    assert unknowns(point) == 3 * cells[0] + 3 * 4 * cells[1]
+    assert size(point).unknowns == 3 * cells[0] + 3 * 4 * cells[1]
 
 
 def test_what_was_measured_before_is_taken_as_it_is():

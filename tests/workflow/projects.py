@@ -47,11 +47,16 @@ def jobs(project, *arguments):
     return set(re.findall(r"^Job \d+: (.*)$", planned.stdout, re.MULTILINE))
 
 
-def new_project(folder):
+def copy_program(folder):
+    """All that a batch needs but its cases."""
     folder.mkdir(exist_ok=True)
     shutil.copy(ROOT / "Snakefile", folder)
     for name in ("workflow", "profiles", "solver"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+
+
+def new_project(folder):
+    copy_program(folder)
     write_case(folder / "cases" / "tiny", "tiny-a", "both")
     write_case(folder / "cases" / "tiny", "tiny-b")
     (folder / "cases" / "tiny" / "family.yaml").write_text("title: Tiny cases\n")

@@ -12,6 +12,9 @@ rule infsup_record:
         INFSUP_RECORD + ".log",
     benchmark:
         INFSUP_RECORD + ".benchmark"
+    resources:
+        mem_mb=lambda w, attempt: 2000 * attempt,
+        runtime=lambda w, attempt: 60 * attempt,
     params:
         quick=" --quick" * (config["stability"] == "quick"),
     message:

@@ -13,6 +13,9 @@ rule mesh:
         "results/{family}/{case}/mesh.log",
     benchmark:
         "results/{family}/{case}/mesh.benchmark"
+    resources:
+        mem_mb=lambda w, attempt: memory(RECIPES[w.family, w.case], attempt),
+        runtime=lambda w, attempt: minutes(RECIPES[w.family, w.case], attempt),
     params:
         content=lambda w: contents(RECIPES[w.family, w.case], *MESH_SOURCES),
     message:

@@ -23,6 +23,10 @@ def ladders():
     return found
 
 
+def level_file(w):
+    return ladders()[w.family, w.job][0].file
+
+
 def level_options(w):
     """How the command line is told which level of which ladder this is."""
     job, _ = ladders()[w.family, w.job]
@@ -35,7 +39,7 @@ def level_options(w):
 
 use rule solve as solve_level with:
     input:
-        case=lambda w: ladders()[w.family, w.job][0].file,
+        case=level_file,
         sources=SOLVER_SOURCES,
     output:
         verdict="results/orders/{family}/{job}/{level}/verdict.json",
@@ -43,9 +47,12 @@ use rule solve as solve_level with:
         "results/orders/{family}/{job}/{level}/log",
     benchmark:
         "results/orders/{family}/{job}/{level}/benchmark"
+    resources:
+        mem_mb=lambda w, attempt: memory(level_file(w), attempt, int(w.level)),
+        runtime=lambda w, attempt: minutes(level_file(w), attempt, int(w.level)),
     params:
         result="results/orders/{family}/{job}/{level}/result.vtkhdf",
-        content=lambda w: contents(ladders()[w.family, w.job][0].file, *SOLVER_SOURCES),
+        content=lambda w: contents(level_file(w), *SOLVER_SOURCES),
         options=level_options,
     message:
         "solve {wildcards.job} refined {wildcards.level} times"

@@ -37,7 +37,7 @@ rule scaling_point:
         f"{SCALED}/{{point}}.json",
     wildcard_constraints:
         point="[^/]+/[0-9]+",
-    threads: workflow.cores
+    threads: lambda w: workflow.cores
     message:
         "measure {wildcards.point}"
     shell:

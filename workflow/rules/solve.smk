@@ -40,6 +40,9 @@ rule solve:
         "results/{family}/{job}/log",
     benchmark:
         "results/{family}/{job}/benchmark"
+    resources:
+        mem_mb=lambda w, attempt: memory(BATCH[w.family, w.job].file, attempt),
+        runtime=lambda w, attempt: minutes(BATCH[w.family, w.job].file, attempt),
     params:
         result="results/{family}/{job}/result.vtkhdf",
         content=lambda w: content_of_solve(BATCH[w.family, w.job]),

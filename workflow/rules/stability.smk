@@ -15,6 +15,9 @@ rule sweep:
         "results/stability/{level}/{sweep}.log",
     benchmark:
         "results/stability/{level}/{sweep}.benchmark"
+    resources:
+        mem_mb=lambda w, attempt: 2000 * attempt,
+        runtime=lambda w, attempt: 60 * attempt,
     params:
         quick=QUICK,
     message:

@@ -70,7 +70,7 @@ rule study_point:
         f"{POINTS}/{{point}}.json",
     wildcard_constraints:
         point=".+/.+/.+/[0-9]+",
-    threads: workflow.cores
+    threads: lambda w: workflow.cores
     params:
         reference=lambda w, input: [f"--reference {r}" for r in input.reference],
     message:

@@ -1,0 +1,165 @@
+"""The batch on a cluster: six solves through Snakemake's SLURM executor, held against a local run.
+
+One case is wrong on purpose. One job is cancelled each time it runs: its case has to be `crashed`
+in the report, with the reason, and the next run has to do that one alone. The cluster is this
+machine, and is gone at the end, whatever happens.
+"""
+
+import argparse
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from tests.workflow.cluster import Cluster, missing
+from tests.workflow.projects import ROOT, copy_program, summary, without_times
+
+CASES = ("a", "e", "k", "z7")  # both directions of e; two in space
+WRONG = ("ssnp170-a", "ssnp170-wrong"), ("contact_pressure: 25.0", "contact_pressure: 26.0")
+CANCELLED = "ssnp170-k"
+# So short that the plugin's own waiting, which grows by 10 s a time, is most of what is left.
+CLUSTER = ("--workflow-profile", "workflow/profiles/slurm", "--latency-wait", "10")
+CLUSTER += (
+    "--slurm-init-seconds-before-status-checks",
+    "1",
+    "--seconds-between-status-checks",
+    "1",
+)
+KILLED = "CANCELLED"
+JOBS = "%i|%k|%T|%m|%l|%M"  # of squeue: number, comment, state, memory, time asked for, time taken
+
+
+def new_project(folder):
+    """A copy of the project with six solves."""
+    copy_program(folder)
+    family = folder / "cases" / "ssnp170"
+    family.mkdir(parents=True)
+    for name in ("family", *CASES):
+        shutil.copy(ROOT / "cases" / "ssnp170" / f"{name}.yaml", family)
+    text = (family / "a.yaml").read_text()
+    for true, false in WRONG:
+        text = text.replace(true, false)
+    (family / "wrong.yaml").write_text(text)
+    return folder
+
+
+def run(project, *options, environment=None):
+    """What Snakemake prints in a run that ends, as it must here, with a case that does not pass."""
+    command = [sys.executable, "-m", "snakemake", "all_cases", *options]
+    done = subprocess.run(
+        command,
+        cwd=project,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=300,
+    )
+    expect(
+        done.returncode == 1 and (project / "results/report/summary.json").is_file(), done.stdout
+    )
+    return done.stdout
+
+
+def expect(true, otherwise):
+    """Like assert, in a program."""
+    if not true:
+        raise RuntimeError(otherwise)
+
+
+def verdicts(project):
+    """What the summary says by job, without times and provenance, which name the run."""
+    return {
+        job: {k: v for k, v in without_times(told).items() if k != "provenance"}
+        for job, told in summary(project).items()
+    }
+
+
+def cancel(cluster, name, stop):
+    """Cancel each job that solves the case of this name as soon as it runs, until told to stop."""
+    while not stop.wait(0.5):
+        for number, comment, state, *_ in jobs(cluster):
+            if state == "RUNNING" and comment.endswith(name) and "solve" in comment:
+                cluster.ask("scancel", number)
+
+
+def jobs(cluster):
+    """All jobs of this cluster, one list of fields each."""
+    told = cluster.ask("squeue", "--states=all", "--noheader", f"--format={JOBS}")
+    return sorted((line.split("|") for line in told.splitlines()), key=lambda job: int(job[0]))
+
+
+def try_cluster(cluster, project, expected):
+    """The whole trial; what SLURM did, as the lines of a table."""
+    stop = threading.Event()
+    canceller = threading.Thread(target=cancel, args=(cluster, CANCELLED, stop))
+    canceller.start()
+    try:
+        run(project, *CLUSTER, environment=cluster.environment)
+    finally:
+        stop.set()
+        canceller.join()
+    told = verdicts(project)
+    lost = told.pop(CANCELLED)
+    expect(lost["verdict"] == "crashed", f"{CANCELLED}, cancelled: {lost['verdict']}")
+    expect(KILLED in lost["reason"], f"{CANCELLED}, cancelled: {lost['reason']}")
+    print(f"{CANCELLED}, cancelled: {lost['verdict']}: {lost['reason']}")
+    asked = [
+        float(memory.rstrip("M")) for _, _, state, memory, *_ in jobs(cluster) if state == KILLED
+    ]
+    expect(len(asked) == 2 and asked[1] == 2 * asked[0], f"memory asked for: {asked}")
+    others = {job: verdict for job, verdict in expected.items() if job != CANCELLED}
+    expect(told == others, difference(told, others))
+
+    again = run(project, *CLUSTER, environment=cluster.environment)
+    solved = re.findall(r"^Job \d+: (solve .*)$", again, re.MULTILINE)
+    expect(solved == [f"solve {CANCELLED}"], again)
+    told = verdicts(project)
+    expect(told == expected, difference(told, expected))
+    for job, verdict in sorted(told.items()):
+        print(f"{job}: {verdict['verdict']}, all values those of the local run")
+
+
+def difference(told, expected):
+    """Both summaries where they differ, to be read by someone."""
+    names = [name for name in {**expected, **told} if told.get(name) != expected.get(name)]
+    pairs = {name: {"cluster": told.get(name), "local": expected.get(name)} for name in names}
+    return json.dumps(pairs, indent=1)
+
+
+def main():
+    """Try it in a temporary folder; what is not as it must be ends it with status 1."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--missing", action="store_true", help="only say what is missing for it")
+    if parser.parse_args().missing:
+        print(missing())
+        return
+    if reason := missing():
+        sys.exit(f"no cluster can be started here: {reason}")
+    # A signal ends the program as an error does, so that the daemons go with it.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("terminated"))
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="cluster-") as name:
+        folder = Path(name)
+        # Daemons distrust what others could change, and a folder that they cannot pass.
+        folder.chmod(0o755)
+        local = new_project(folder / "local")
+        run(local, "--cores", "all")
+        expected = verdicts(local)
+        print(f"without a cluster: {len(expected)} solves, {time.monotonic() - began:.0f} s")
+        with Cluster(folder) as cluster:
+            try_cluster(cluster, new_project(folder / "cluster"), expected)
+            print("SLURM's jobs: number, rule and wildcards, state, memory, limit, time")
+            for job in jobs(cluster):
+                print("  " + "  ".join(job))
+    print(f"The batch on a cluster gives what it gives here ({time.monotonic() - began:.0f} s).")
+
+
+if __name__ == "__main__":
+    main()

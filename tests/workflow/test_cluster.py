@@ -1,0 +1,109 @@
+"""Jobs sent elsewhere: what they ask for, and those that are ended before they can say anything.
+
+The batch on a real cluster is tried by `make cluster-test`.
+"""
+
+import json
+import re
+
+import yaml
+
+from tests.workflow.cluster import missing
+from tests.workflow.projects import ROOT, jobs, new_project, snakemake, summary, write_case
+
+
+def let_die(project):
+    """Solves and meshes die with their shell while there is a file killed-RULE-NAME."""
+    for rule, wildcard in (("solve", "job"), ("mesh", "case")):
+        rules = project / "workflow" / "rules" / f"{rule}.smk"
+        die = f"test ! -e killed-{rule}-{{wildcards.{wildcard}}} || kill -9 $$; "
+        text, changed = re.subn(r'(    shell:\n        ")', rf"\g<1>{die}", rules.read_text())
+        assert changed == 1
+        rules.write_text(text)
+
+
+def test_what_is_ended_from_outside_is_crashed_and_done_by_the_next_run(tmp_path):
+    project = new_project(tmp_path / "project")
+    write_case(project / "cases" / "tiny", "doomed")
+    write_case(project / "cases" / "other", "other-a")
+    let_die(project)
+    # tiny-a: its mesh, without which neither direction is solved.
+    marks = [project / "killed-solve-doomed", project / "killed-mesh-tiny-a"]
+    for mark in marks:
+        mark.touch()
+
+    killed = snakemake(project)
+
+    assert killed.returncode != 0
+    verdicts = {name: (v["verdict"], v["transient"]) for name, v in summary(project).items()}
+    crashed = dict.fromkeys(("doomed", "tiny-a", "tiny-a-swapped"), ("crashed", True))
+    assert verdicts == {**crashed, "tiny-b": ("passed", False), "other-a": ("passed", False)}
+    assert "5 solves: 3 crashed, 2 passed." in killed.stdout
+    failures = project / "results" / "report" / "failures.txt"
+    assert re.search(r"^doomed: crashed: ended from outside$", failures.read_text(), re.MULTILINE)
+
+    # A batch of others does not take that report for its own.
+    assert "report of all cases" in jobs(project, "--config", "family=other")
+    for mark in marks:
+        mark.unlink()
+    again = snakemake(project)
+    assert again.returncode == 0, again.stdout
+    solved = re.findall(r"^Job \d+: (mesh|solve) (\S+)", again.stdout, re.MULTILINE)
+    assert sorted(solved) == [("mesh", "tiny-a"), *(("solve", name) for name in sorted(crashed))]
+    assert "All 5 solves passed." in again.stdout
+
+
+def asked(project, *calls):
+    """What calls in the Snakefile return."""
+    told = "\n".join(f'print("ASKED", {call})' for call in calls)
+    snakefile = project / "Snakefile"
+    snakefile.write_text(f"{(ROOT / 'Snakefile').read_text()}\n{told}\n")
+    run = snakemake(project, "--dry-run")
+    assert run.returncode == 0, run.stdout
+    return [json.loads(line) for line in re.findall(r"^ASKED (.*)$", run.stdout, re.MULTILINE)]
+
+
+def test_jobs_ask_for_memory_and_time_by_size_and_again_for_more(tmp_path):
+    project = new_project(tmp_path / "project")
+    tiny = project / "cases" / "tiny" / "tiny-b.yaml"
+    case = yaml.safe_load(tiny.read_text())
+    case["name"] = "large"
+    section = {"cells": "HEXA8", "divisions": [50, 50, 35]}
+    case["mesh"] |= {"bottom": section, "top": section}
+    tiny.with_name("large.yaml").write_text(yaml.safe_dump(case))
+    tiny.with_name("broken.yaml").write_text("name: [broken\n")
+    name = '"cases/tiny/{}.yaml"'.format
+    small, broken, large, twice, finer = asked(
+        project,
+        *(f"memory({name(each)}, 1)" for each in ("tiny-b", "broken", "large")),
+        f"memory({name('large')}, 2)",
+        f"memory({name('large')}, 1, 2)",
+    )
+    # 525,000 unknowns of HEXA8 take 5.4 GB.
+    assert 900 <= broken <= small < 1100
+    assert 6000 < large < 12000
+    assert twice == 2 * large
+    assert 7 * (large - 1000) < finer - 1000 < 9 * (large - 1000)
+    first, second, refined = asked(
+        project,
+        f"minutes({name('large')}, 1)",
+        f"minutes({name('large')}, 2)",
+        f"minutes({name('large')}, 1, 2)",
+    )
+    assert 20 < first < second == 2 * first < refined
+
+
+def test_the_profile_keeps_what_every_run_needs():
+    profiles = {
+        name: yaml.safe_load((ROOT / "profiles" / name / "config.yaml").read_text())
+        for name in ("default", "slurm")
+    }
+    kept = {key: value for key, value in profiles["default"].items() if key != "cores"}
+    assert kept.items() <= profiles["slurm"].items()
+    assert profiles["slurm"]["executor"] == "slurm"
+
+
+def test_a_machine_without_slurm_is_told_its_packages(tmp_path, monkeypatch):
+    monkeypatch.setattr("tests.workflow.cluster.SYSTEM", [])
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert re.match(r"no munged, .*; Debian's packages are munge slurm-wlm$", missing())

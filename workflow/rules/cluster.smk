@@ -1,0 +1,104 @@
+"""Jobs sent elsewhere: what they ask for, and what becomes of those that are ended from outside."""
+
+import subprocess
+
+from snakemake_interface_logger_plugins.common import LogEvent
+
+# In a job Snakemake runs in Snakemake, with its plugins' libraries: memory beside the solve's own.
+AROUND_MB = 900
+# From a cold shared folder three interpreters start before the solve does.
+START_MINUTES = 10
+# Contact takes several linear solves, and a node may be slower than where the model was measured.
+SLACK = 10
+
+
+@cache
+def size_of(file, refine):
+    from solver.size import of_mesh
+
+    return of_mesh(peek(Path(file)).get("mesh"), Path(file).parent, refine)
+
+
+def memory(file, attempt, refine=1):
+    """Megabytes that a job of this case asks for, more each time it has to be run again."""
+    from solver.memory import needed
+
+    size = size_of(file, refine)
+    return attempt * round(AROUND_MB + needed(size.points, size.dim).most / 1e6)
+
+
+def minutes(file, attempt, refine=1):
+    """Minutes that a job of this case asks for, more each time it has to be run again."""
+    seconds = size_of(file, refine).seconds
+    return attempt * round(START_MINUTES + SLACK * seconds / 60)
+
+
+# What was said of each job that failed, by what it should have made.
+FAILURES = {}
+
+
+def note_failure(record):
+    """A filter of the log that lets all through."""
+    if getattr(record, "event", None) == LogEvent.JOB_ERROR:
+        FAILURES.update(dict.fromkeys(record.output, record))
+    return True
+
+
+logger.addFilter(note_failure)
+
+
+def reason_of(failure):
+    """Why a job failed: what the executor says, and what it left in its own log, in one line."""
+    told = (failure.rule_msg or "").split(". ")[0]
+    for log in map(str, failure.log):
+        if log.startswith("results/") or not os.path.isfile(log):
+            continue
+        lines = Path(log).read_text("utf-8", errors="replace").splitlines()
+        said = [line.partition("error: ")[2].strip(" *") for line in lines]
+        told += "".join(f": {error}" for error in list(filter(None, said))[:1])
+    return told or "ended from outside"
+
+
+def give_verdict(job, failure):
+    """The verdict `crashed` for a job of the batch that was not left to write one itself."""
+    from solver.run import Job as Solve
+    from solver.run import record_crash
+
+    verdict = Path(verdict_of(job))
+    log = verdict.with_name("log")
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("a", encoding="utf-8") as file:
+        file.write(f"{reason_of(failure)}\n")
+    solve = Solve(
+        Path(job.file),
+        None if job.mesh else mesh_made_for(job),
+        job.swap,
+        job.hexahedra,
+    )
+    record_crash(solve, verdict, log)
+
+
+def report_failures():
+    """Give jobs that were ended from outside their verdict, and write the report that waits for it.
+
+    Snakemake's own rule cannot: what it needs was not made in this run. The next run takes these
+    verdicts away, does their jobs, and finds the list of failures too old to be true.
+    """
+    lost = 0
+    for job in RUN.values():
+        made = (verdict_of(job), str(mesh_made_for(job)))
+        failure = next((FAILURES[file] for file in made if file in FAILURES), None)
+        if failure and not Path(verdict_of(job)).exists():
+            give_verdict(job, failure)
+            lost += 1
+    verdicts = [verdict_of(job) for job in RUN.values()]
+    if lost and all(map(os.path.exists, verdicts)):
+        shown = [verdict for verdict in SHOWN if Path(verdict).is_file()]
+        command = [sys.executable, "-m", "solver", "report", *verdicts, *shown]
+        command += ["-o", "results/report", "--families", *FAMILY_FILES]
+        subprocess.run(command)
+        os.utime("results/report/failures.txt", (1, 1))
+
+
+onerror:
+    report_failures()
