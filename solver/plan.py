@@ -18,13 +18,8 @@ from solver.skips import EVERYTHING
 from solver.solution import Line
 
 
-def made_plan(problem: ContactProblem, states: Sequence[Equilibrium]) -> list[Line]:
-    """The lines of a solve, in the order of the work."""
-    return [*_decided(problem), *_noted(problem.scene, states), _linear_solver(problem)]
-
-
-def _decided(problem: ContactProblem) -> Iterator[Line]:
-    """What the scene alone decides, before the solve."""
+def decided(problem: ContactProblem) -> Iterator[Line]:
+    """What the scene alone decides, before the solve, in the order of the work."""
     scene = problem.scene
     if scene.skips == EVERYTHING:
         yield Line("everything is done", "as asked for by --everything, needed or not")
@@ -84,8 +79,9 @@ def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
         yield Line(f"{name}: {held} multipliers left out", why)
 
 
-def _noted(scene: Scene, states: Sequence[Equilibrium]) -> Iterator[Line]:
-    """What the solve found not to be needed."""
+def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Line]:
+    """What the solve found not to be needed, and what solved it."""
+    scene = problem.scene
     if scene.zones and len(states) > 1:
         why = "displacements are small: all load factors share them"
         yield Line("pairs and intersections found once", why)
@@ -98,7 +94,4 @@ def _noted(scene: Scene, states: Sequence[Equilibrium]) -> Iterator[Line]:
         yield Line("no new factor for each load factor", why, "status")
     if scene.skips.refinement and all(state.residual <= ROUND_OFF for state in states):
         yield Line("no further refinement", "the residual is round-off", "refinement")
-
-
-def _linear_solver(problem: ContactProblem) -> Line:
-    return Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
+    yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)

@@ -1,5 +1,6 @@
 """Solve a case on a mesh: from case and mesh to a Solution."""
 
+import logging
 import resource
 import time
 from collections.abc import Callable
@@ -20,15 +21,16 @@ from solver.faces import nodal_normals
 from solver.geometry import check_geometry
 from solver.mesh.catalogue import BY_NAME
 from solver.naming import body_infos
-from solver.plan import made_plan
+from solver.plan import decided, noted
 from solver.scene import Scene, ZoneScene, build_scene
 from solver.skips import NEEDED, Skips
-from solver.solution import NodalContact, Solution, StepResult, ZoneResult
+from solver.solution import Line, NodalContact, Solution, StepResult, ZoneResult
 from solver.stress import normal_stress
 from solver.unloaded import without_unloaded
 
 Log = Callable[[str], Any]
 
+_LOG = logging.getLogger(__name__)
 # Half, but for round-off.
 _HALF = 0.5 - 1e-9
 
@@ -75,10 +77,14 @@ def solve_problem(
     log: Log = lambda _: None,
 ) -> Solution:
     """Solve an assembled problem at all load factors; how it was assembled goes on record."""
+    plan = list(decided(problem))
+    for line in plan:
+        _LOG.info("plan: %s: %s", line.what, line.why)
     with clock.stage("solve"):
         states = _walk(problem, problem.scene.case.steps, log)
+    plan += noted(problem, states)
     with clock.stage("recovery"):
-        solution = _recover(problem.scene, problem, states, swapped, hexahedra)
+        solution = _recover(problem, states, plan, swapped, hexahedra)
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
@@ -100,12 +106,13 @@ def _walk(problem: ContactProblem, steps: tuple[float, ...], log: Log) -> list[E
 
 
 def _recover(
-    scene: Scene,
     problem: ContactProblem,
     states: list[Equilibrium],
+    plan: list[Line],
     swapped: bool,
     hexahedra: str | None,
 ) -> Solution:
+    scene = problem.scene
     last = states[-1]
     stress = nodal_stress(scene.points, scene.blocks, last.straining, last.extended)
     stress += scene.mean.nodal_stress(last.mean_stress, scene.blocks)
@@ -132,7 +139,7 @@ def _recover(
         linear_solver=problem.linear_solver,
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
-        plan=made_plan(problem, states),
+        plan=plan,
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),
     )
