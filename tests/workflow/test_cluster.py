@@ -4,8 +4,15 @@ The batch on a real cluster is tried by `make cluster-test`.
 """
 
 import json
+import os
 import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
+import pytest
 import yaml
 
 from tests.workflow.cluster import missing
@@ -107,3 +114,40 @@ def test_a_machine_without_slurm_is_told_its_packages(tmp_path, monkeypatch):
     monkeypatch.setattr("tests.workflow.cluster.SYSTEM", [])
     monkeypatch.setenv("PATH", str(tmp_path))
     assert re.match(r"no munged, .*; Debian's packages are munge slurm-wlm$", missing())
+
+
+def runs(process):
+    """Whether there is such a process that has not ended, waited for or not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+HOLD = """
+import pathlib, sys, time
+from tests.workflow.cluster import Cluster
+with Cluster(pathlib.Path(sys.argv[1])) as cluster:
+    print(*(daemon.pid for daemon in cluster.daemons), flush=True)
+    {then}
+"""
+
+
+@pytest.mark.skipif(bool(missing()), reason=missing() or "there is a SLURM")
+@pytest.mark.parametrize(
+    ("then", "number"), [("raise KeyError", None), ("time.sleep(60)", signal.SIGKILL)]
+)
+def test_daemons_end_with_what_started_them(then, number, tmp_path):
+    tmp_path.chmod(0o755)
+    command = [sys.executable, "-c", HOLD.format(then=then), tmp_path]
+    with subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as holder:
+        daemons = holder.stdout.readline().split()
+        if number:
+            os.kill(holder.pid, number)
+    assert len(daemons) == 3
+    deadline = time.monotonic() + 30
+    while any(map(runs, daemons)):
+        assert time.monotonic() < deadline
+        time.sleep(0.1)

@@ -48,15 +48,21 @@ logger.addFilter(note_failure)
 
 
 def reason_of(failure):
-    """Why a job failed: what the executor says, and what it left in its own log, in one line."""
-    told = (failure.rule_msg or "").split(". ")[0]
-    for log in map(str, failure.log):
-        if log.startswith("results/") or not os.path.isfile(log):
-            continue
-        lines = Path(log).read_text("utf-8", errors="replace").splitlines()
-        said = [line.partition("error: ")[2].strip(" *") for line in lines]
-        told += "".join(f": {error}" for error in list(filter(None, said))[:1])
-    return told or "ended from outside"
+    """Why a job failed, in one line: what the executor says, and the first error that it, or the log
+    it kept of the job, names."""
+    said = failure.rule_msg or ""
+    logs = [log for log in map(str, failure.log) if not log.startswith("results/")]
+    texts = [
+        Path(log).read_text("utf-8", errors="replace")
+        for log in logs
+        if os.path.isfile(log)
+    ]
+    lines = "\n".join([said, *texts]).splitlines()
+    errors = [
+        line.partition("error: ")[2].strip(" *'") for line in lines if "error: " in line
+    ]
+    told = filter(None, [said.split(". ")[0], *errors[:1]])
+    return ": ".join(told) or "ended from outside"
 
 
 def give_verdict(job, failure):
