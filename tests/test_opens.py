@@ -76,14 +76,21 @@ def assert_opened(opened, solution):
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("opened", [opened_by_vtk, opened_by_pyvista])
-@pytest.mark.parametrize("name", KINDS)
-def test_a_result_of_every_cell_type_opens(name, opened, tmp_path):
-    dim = BY_NAME[name].dim
+@pytest.fixture(scope="module", params=KINDS)
+def solved(request, tmp_path_factory):
+    """A solve with that cell type in the slave, and its result file."""
+    dim = BY_NAME[request.param].dim
     other = "TRIA6" if dim == 2 else "TETRA10"
-    solution = simulate(block_case(dim, UNITS), block_mesh(name, other, (2, 1)))
-    write_result(tmp_path / "result.vtkhdf", solution, [], {})
-    assert_opened(opened(tmp_path / "result.vtkhdf"), solution)
+    solution = simulate(block_case(dim, UNITS), block_mesh(request.param, other, (2, 1)))
+    path = tmp_path_factory.mktemp(request.param) / "result.vtkhdf"
+    write_result(path, solution, [], {})
+    return solution, path
+
+
+@pytest.mark.parametrize("opened", [opened_by_vtk, opened_by_pyvista])
+def test_a_result_of_every_cell_type_opens(solved, opened):
+    solution, path = solved
+    assert_opened(opened(path), solution)
 
 
 def labelled(solution):
