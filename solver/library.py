@@ -33,6 +33,7 @@ from solver.provenance import gather
 from solver.results import write_result
 from solver.run import mesh_of, solve_checked, summary
 from solver.schemas import key_path
+from solver.skips import EVERYTHING, NEEDED
 from solver.solution import Solution, ZoneResult
 from solver.verdict import of_solution
 
@@ -50,6 +51,7 @@ def solve_case(
     *,
     swapped: bool = False,
     hexahedra: str | None = None,
+    everything: bool = False,
     memory_check: bool = True,
     log: Callable[[str], Any] = lambda _: None,
 ) -> Solved:
@@ -59,8 +61,9 @@ def solve_case(
     working directory; numbers may be NumPy's), or a `Case`. `mesh`, a mesh file or a
     `meshio.Mesh` with named cell sets, is taken as it is in place of the case's own, and a
     mapping then needs no key `mesh`. `swapped` exchanges slave and master, `hexahedra` (pyramids
-    or hexahedra) overrides how slave hexahedra are cut. `log` is given lines on how it goes:
-    `log=print`. With `memory_check` a solve that cannot fit into memory is not begun.
+    or hexahedra) overrides how slave hexahedra are cut. `everything`: what the scene does not need
+    is done all the same (see `solver.skips`). With `memory_check` a solve that cannot fit into
+    memory is not begun. `log` is given lines on how it goes: `log=print`.
 
     A case of a file on its own mesh is held against its accepted values too.
 
@@ -75,7 +78,8 @@ def solve_case(
     if memory_check:
         check_memory(len(made.points), made.points.shape[1], given.path, log)
     accepted = mesh is None and given.path.is_file()
-    solution, checks = solve_checked(given, made, swapped, hexahedra, log, accepted)
+    skips = EVERYTHING if everything else NEEDED
+    solution, checks = solve_checked(given, made, swapped, hexahedra, log, accepted, skips=skips)
     file = given.mesh.get("path") if mesh is None else mesh
     provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
     return Solved(solution, checks, provenance)

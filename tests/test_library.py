@@ -126,6 +126,13 @@ def test_slave_and_master_exchanged_and_the_other_cut():
     assert cells == {"pyramids": {"hexahedron", "pyramid"}, "hexahedra": {"hexahedron"}}
 
 
+def test_everything_is_done_where_it_is_asked_for():
+    mesh = block_mesh("QUAD8", "QUAD8")  # a mid-node lies inside each face: no cut is needed
+    needed, everything = solve_case(CASE, mesh), solve_case(CASE, mesh, everything=True)
+    assert len(everything.points) > len(needed.points)
+    assert everything.pressure == pytest.approx(needed.pressure, rel=1e-12)
+
+
 def test_a_failed_check_is_a_verdict_not_an_error():
     solved = patch(reference={"kind": "analytical", "contact_pressure": 26.0})
     assert (solved.verdict, solved.passed) == ("failed", False)

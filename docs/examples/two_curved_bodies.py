@@ -77,6 +77,7 @@ DISC = pi * (BALL**2 - (BALL - TOP) ** 2)  # the area that is pressed
 
 CASE = {
     "name": "ball-in-cup",
+    "units": {"length": "mm", "stress": "MPa"},
     "materials": {
         "ball": {"young": 210000.0, "poisson": 0.3},
         "cup": {"young": 70000.0, "poisson": 0.3},
