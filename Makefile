@@ -70,7 +70,7 @@ scaling: environment ## growth with size, to a million unknowns; the small in a 
 	@$(SNAKEMAKE) scaling
 
 BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
-PLANNED = $(if $(filter quick,$(LEVEL)),cases/ssnp170/c.yaml,$(foreach case,b c k m o, \
+PLANNED = $(if $(filter quick,$(LEVEL)),cases/ssnp170/e.yaml,$(foreach case,b c k m o, \
   cases/ssnp170/$(case).yaml) cases/hydrostatic/coincident-hexa27.yaml)
 benchmark: environment ## ratios side by side: linear solvers, cut, cures, batch, CalculiX
 	@.venv/bin/python -m solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \

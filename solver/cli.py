@@ -15,8 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from solver.benchmark import commands as benchmark
 from solver.errors import InputError, SolveError, of_machine
-from solver.scaling import FULL, QUICK
 from solver.scaling import commands as scaling
 from solver.study import commands as study
 
@@ -129,11 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     study.add_commands(command)
     command = commands.add_parser("scaling", help="growth with size: points and their page")
     scaling.add_commands(command)
-    command = _add(commands, "benchmark", _benchmark, "measure ratios side by side")
-    command.add_argument("benchmark", type=Path, metavar="BENCHMARK.yaml")
-    command.add_argument("--quick", action="store_true", help="on tiny meshes, for a first look")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
-
+    benchmark.add_commands(commands)
     command = _add(commands, "sweep", _sweep, "push one quantity of a case through its values")
     command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
@@ -155,10 +151,6 @@ def _parser() -> argparse.ArgumentParser:
     command = _add(commands, "infsup-page", _infsup_page, "write the page of the inf-sup test")
     command.add_argument("record", type=Path, metavar="RECORD.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-
-    command = _add(commands, "savings", _savings, "measure what each line of a plan saves")
-    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="SAVINGS.json")
 
     command = _add(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -295,20 +287,6 @@ def _orders(options: argparse.Namespace) -> int:
     return PASSED
 
 
-def _benchmark(options: argparse.Namespace) -> int:
-    from solver.benchmark import words
-    from solver.benchmark.description import read_benchmark
-    from solver.benchmark.run import run_benchmark
-    from solver.files import write_text
-    from solver.verdict import to_json
-
-    benchmark = read_benchmark(options.benchmark, QUICK if options.quick else FULL)
-    record = run_benchmark(benchmark, partial(print, file=sys.stderr, flush=True))
-    write_text(options.output, to_json(record) + "\n")
-    print("\n".join(words.lines(record)))
-    return PASSED
-
-
 def _sweep(options: argparse.Namespace) -> int:
     from solver.stability.points import run_sweep
     from solver.stability.sweeps import read_sweep
@@ -343,13 +321,6 @@ def _infsup_page(options: argparse.Namespace) -> int:
     from solver.report.infsup import read_record, write_page
 
     write_page(read_record(options.record), options.output)
-    return PASSED
-
-
-def _savings(options: argparse.Namespace) -> int:
-    from solver.savings import write_savings
-
-    write_savings(options.output, options.cases, partial(print, flush=True))
     return PASSED
 
 

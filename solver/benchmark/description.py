@@ -15,6 +15,7 @@
           - {title: without MKL, free: true}         # free software alone
           - {title: not cut, treatment: uncut}       # of the interface
           - {title: no cures, cures: false}          # see `solver.cures`
+          - {title: nothing left out, everything: true}   # see `solver.skips`
           - {title: CalculiX, program: calculix}     # another code
     growth: [{series: hexa8, sizes: [1.0e+5, 3.0e+5]}]
     batch: {title: …, most: 2, cases: [case.yaml]}   # in one warm process, and one by one
@@ -44,6 +45,7 @@ class Way:
     free: bool = False
     treatment: str = "lac"
     cures: bool = True
+    everything: bool = False
     program: str = ""
 
 

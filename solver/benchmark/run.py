@@ -123,6 +123,7 @@ def _solve(place: Bench, comparison: Comparison, way: Way, case: Path, mesh: Pat
         free=way.free,
         treatment=way.treatment,
         cures=way.cures,
+        everything=way.everything,
     )
 
 

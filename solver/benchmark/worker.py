@@ -39,18 +39,20 @@ def solve(job: Mapping[str, Any]) -> dict[str, Any]:
     from solver.mesh import read_mesh
     from solver.norms import errors
     from solver.simulation import simulate
+    from solver.skips import EVERYTHING, NEEDED
     from solver.study.timing import repeated
 
     case = load_case(Path(job["case"]))
     zones = tuple(replace(zone, treatment=job["treatment"]) for zone in case.zones)
     case, mesh = replace(case, zones=zones), read_mesh(job["mesh"])
     cures = ALL if job["cures"] else Cures.none()
+    skips = EVERYTHING if job["everything"] else NEEDED
     if job["free"]:
         _without_mkl()
     first = Clock()
 
     def run(clock: Clock) -> Any:
-        return simulate(case, mesh, cures=cures, clock=clock)
+        return simulate(case, mesh, cures=cures, skips=skips, clock=clock)
 
     with standing_for_auto(job["solver"]):
         solution = run(first)

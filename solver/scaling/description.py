@@ -11,6 +11,7 @@
         cells: HEXA8                   # of both blocks
         divisions: [5, 4]              # of slave and master: their proportion
         slab: false                    # blocks as thick as the finer one's cells are wide
+        fit: [1.0e+4, 1.0e+5]          # of this series, where it is another
         sizes: [1.0e+4, 1.0e+5]        # unknowns that a mesh has at least
     goals:                        # numbers to reach, shown beside those measured
       - {title: …, series: hexa8, size: 1.0e+5, what: cpu, most: 12, unit: s, others: {…: 56}}
@@ -60,6 +61,7 @@ class Series:
     divisions: tuple[int, int]
     slab: bool
     sizes: tuple[int, ...]
+    fit: tuple[float, float]
 
     @cached_property
     def template(self) -> dict[str, Any]:
@@ -157,7 +159,6 @@ class Scaling:
     size: str
     threads: int
     limit: float
-    fit: tuple[float, float]
     series: tuple[Series, ...]
     goals: tuple[Goal, ...]
 
@@ -179,30 +180,31 @@ class Scaling:
 def read_scaling(path: Path, size: str = FULL) -> Scaling:
     """The family in a file, or its quick part; InputError says what is refused, what allowed."""
     content = read_mapping(path, SCALING_SCHEMA)
-    series = tuple(_series(path, i, item) for i, item in enumerate(content["series"]))
+    series = tuple(
+        _series(path, i, item, content["fit"]) for i, item in enumerate(content["series"])
+    )
     names = [one.name for one in series]
     for i, name in enumerate(names):
         if name in names[:i]:
             allowed = "the name is given twice; each needs its own"
             raise InputError(path, f"series[{i}].name", name, allowed)
-    low, high = content["fit"]
     return Scaling(
         path=path,
         title=content["title"],
         size=size,
         threads=content["threads"],
         limit=float(content["limit"]),
-        fit=(float(low), float(high)),
         series=tuple(_quick(path, content["quick"], series)) if size == QUICK else series,
         goals=tuple(_goals(path, content.get("goals", ()), names)),
     )
 
 
-def _series(path: Path, index: int, item: Mapping[str, Any]) -> Series:
+def _series(path: Path, index: int, item: Mapping[str, Any], fit: Sequence[float]) -> Series:
     case = path.parent / item["case"]
     if not case.is_file():
         raise InputError(path, f"series[{index}].case", item["case"], "no such file")
     slave, master = item["divisions"]
+    low, high = item.get("fit", fit)
     return Series(
         name=item["name"],
         title=item["title"],
@@ -211,6 +213,7 @@ def _series(path: Path, index: int, item: Mapping[str, Any]) -> Series:
         divisions=(slave, master),
         slab=item.get("slab", False),
         sizes=tuple(sorted(int(size) for size in item["sizes"])),
+        fit=(float(low), float(high)),
     )
 
 

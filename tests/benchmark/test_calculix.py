@@ -29,7 +29,7 @@ TABLE = """
 def small(cells):
     """Two blocks of few cells: the case and its mesh."""
     template = ROOT / "cases/scaling/templates/space.yaml"
-    point = Point(Series("few", cells, template, cells, (3, 2), False, (200,)), 200)
+    point = Point(Series("few", cells, template, cells, (3, 2), False, (200,), (100, 1000)), 200)
     case = point.parsed(Path("few.yaml"))
     return case, generate(case.mesh, "few")
 

@@ -23,6 +23,7 @@ def content():
     ways = [
         {"title": "first"},
         {"title": "no cures", "cures": False},
+        {"title": "everything", "everything": True},
         {"title": "odd", "treatment": "no-such-treatment"},
         {"title": "solver", "solver": "superlu", "free": True},
     ]
@@ -50,8 +51,14 @@ def test_the_whole_of_it(file, tmp_path, capsys):
     assert ways["odd"]["outcome"] != "solved"
     assert "no-such-treatment" in ways["odd"]["reason"]
     assert ways["solver"]["linear_solver"] == "SuperLU"
-    assert [ratio is None for ratio in ratios(comparison["ways"])] == [False, False, True, False]
-    for name in ("first", "solver"):
+    assert [ratio is None for ratio in ratios(comparison["ways"])] == [
+        False,
+        False,
+        False,
+        True,
+        False,
+    ]
+    for name in ("first", "everything", "solver"):
         assert ways[name]["pressure_max"] < 1e-10
         assert 0 < ways[name]["times"]["total"]["cpu"][0] < ways[name]["process"]["cpu"]
     assert [len(one) for one in record["batch"]["together"]["passes"]] == [2, 2]

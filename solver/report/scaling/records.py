@@ -66,11 +66,10 @@ class Measured:
 
 @dataclass(frozen=True)
 class Line:
-    """The points of a series, smallest first, and the sizes that exponents are fitted to."""
+    """The points of a series, smallest first."""
 
     series: Series
     points: Sequence[Measured]
-    fit: tuple[float, float]
 
     @cached_property
     def solved(self) -> list[Measured]:
@@ -80,13 +79,15 @@ class Line:
     @cached_property
     def fitted(self) -> list[Measured]:
         """The points that exponents are fitted to."""
-        chosen = window([m.point.size for m in self.solved], *self.fit)
+        chosen = window([m.point.size for m in self.solved], *self.series.fit)
         return [self.solved[i] for i in chosen]
 
     @property
     def on_large(self) -> bool:
-        """Whether exponents are those of large sizes: small ones are mostly start-up."""
-        return bool(self.fitted) and min(m.point.size for m in self.fitted) >= self.fit[0]
+        """Whether exponents are those of the sizes asked for, to the largest one."""
+        sizes = [m.point.size for m in self.fitted]
+        low, high = self.series.fit
+        return bool(sizes) and min(sizes) >= low and max(sizes) >= high
 
     def growth(self, stage: str) -> Growth | None:
         """The exponent of a stage, or of the whole process; None where it cannot be told."""
@@ -118,8 +119,7 @@ def read_lines(scaling: Scaling, folder: Path) -> list[Line]:
     """All series with the records of their points in `folder`; one without a record says so."""
     found = [Measured(point, _read(folder / f"{point.name}.json")) for point in scaling.points]
     return [
-        Line(series, [m for m in found if m.point.series is series], scaling.fit)
-        for series in scaling.series
+        Line(series, [m for m in found if m.point.series is series]) for series in scaling.series
     ]
 
 
