@@ -32,6 +32,8 @@ _TOLD = {
     "mdit-py-plugins": "MIT",
     "myst-parser": "MIT",
     "pandas": "BSD-3-Clause",
+    "pyobjc-core": "MIT",
+    "pyobjc-framework-cocoa": "MIT",
     "pyreadline3": "BSD-3-Clause",
     "roman-numerals": "0BSD OR CC0-1.0",
     "snakemake-executor-plugin-slurm": "MIT",
