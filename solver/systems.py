@@ -12,12 +12,14 @@ from scipy import sparse
 
 from solver.bodies import joined_bodies, whole_motions
 from solver.errors import SolveError
-from solver.linear.choice import Chosen
+from solver.linear.choice import Chosen, against_condensation
 from solver.linear.condensation import Constrained, condense, saddle_point
 from solver.linear.direct import Factor
 from solver.linear.krylov import EPSILON
 from solver.linear.multigrid import Unknowns
 from solver.scene import Scene
+
+_NOTHING_OWN = "constraints without an unknown of their own leave a saddle point"
 
 
 @dataclass(frozen=True)
@@ -149,12 +151,17 @@ class Systems:
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
             return _saddle_point(matrix, constraints)
+        if why := against_condensation(matrix, constraints):
+            try:
+                return saddle_point(matrix, constraints, why, weighted=False)
+            except SolveError:
+                pass  # pivots that no order of elimination avoids: condensation needs none of them
         return condense(matrix, constraints, own, unknowns)
 
 
 def _saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> Constrained:
     try:
-        return saddle_point(matrix, constraints)
+        return saddle_point(matrix, constraints, _NOTHING_OWN)
     except SolveError as error:
         raise SolveError(
             f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "

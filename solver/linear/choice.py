@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from solver.errors import SolveError
+from solver.linear.backends import BACKENDS
 from solver.linear.direct import Factor, factorise, wanted
 from solver.linear.krylov import EPSILON
 from solver.linear.multigrid import Multigrid, Unknowns
@@ -15,6 +16,10 @@ _LOG = logging.getLogger(__name__)
 MULTIGRID = "multigrid"
 MULTIGRID_FROM = 80_000
 """Unknowns in 3D from which multigrid takes less time, and less memory, than a factor."""
+FILL = 1.0
+"""Entries that condensing adds, over those of the matrix, from which a saddle point is quicker."""
+LEAST_FILL = 1_000_000
+"""Fewer than these take no time."""
 
 
 class Chosen:
@@ -74,6 +79,20 @@ def prepare(matrix: csr_matrix, unknowns: Unknowns) -> Chosen:
             # A factor decides whether the matrix is to blame.
             why = _instead(error)
     return Chosen(matrix, dim, factorise(matrix, dim=dim), why)
+
+
+def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
+    """Why `matrix` (n, n) had better not be condensed by `constraints` (m, n); empty else.
+
+    A constraint over w unknowns leaves a block of w² entries in the condensed system. Only PARDISO
+    factors saddle points in space well, and only multigrid large systems.
+    """
+    widths = np.diff(constraints.indptr).astype(float)
+    filled = float((widths**2).sum())
+    few = filled <= max(FILL * matrix.nnz, LEAST_FILL) or matrix.shape[0] >= MULTIGRID_FROM
+    if few or wanted() != "auto" or not BACKENDS["pardiso"].available():
+        return ""
+    return f"a condensed system would fill in: one constraint holds {widths.max():.0f} unknowns"
 
 
 def _against_multigrid(size: int, dim: int) -> str:

@@ -99,10 +99,11 @@ class Condensed:
 
 @dataclass(frozen=True)
 class Saddle:
-    """The system with the multipliers as unknowns, for constraints without a pivot of their own.
+    """The system with the multipliers as unknowns.
 
     `scaled` are the constraints with rows of unit size; the matrix is K + `weight` Ĝᵀ Ĝ, which
-    changes no solution and is positive definite: K alone is singular where contact holds a body.
+    changes no solution. With a weight it is positive definite, and filled in by wide constraints;
+    without, it is K alone, singular where contact holds a body.
     """
 
     constraints: sparse.csr_matrix
@@ -110,7 +111,7 @@ class Saddle:
     size: np.ndarray
     weight: float
     factor: Factor
-    why: str = "constraints without an unknown of their own leave a saddle point"
+    why: str
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
@@ -131,14 +132,19 @@ class Saddle:
         return float(np.abs(left).max(initial=0.0))
 
 
-def saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> Saddle:
-    """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular."""
+def saddle_point(
+    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, why: str, weighted: bool = True
+) -> Saddle:
+    """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular.
+
+    `weighted`: K made definite by the constraints, which any order of elimination takes.
+    """
     size = np.sqrt(np.asarray(constraints.multiply(constraints).sum(axis=1)).ravel())
     scaled = (sparse.diags(1 / size) @ constraints).tocsr()
-    weight = float(matrix.diagonal().max(initial=0.0))
-    rows = [[matrix + weight * (scaled.T @ scaled), -scaled.T], [-scaled, None]]
-    factor = factorise_indefinite(sparse.bmat(rows, format="csr"))
-    return Saddle(constraints, scaled, size, weight, factor)
+    weight = float(matrix.diagonal().max(initial=0.0)) if weighted else 0.0
+    upper = matrix + weight * (scaled.T @ scaled) if weighted else matrix
+    factor = factorise_indefinite(sparse.bmat([[upper, -scaled.T], [-scaled, None]], format="csr"))
+    return Saddle(constraints, scaled, size, weight, factor, why)
 
 
 def choose_pivots(

@@ -1,0 +1,69 @@
+"""Which way a constrained system is solved, and that every way gives the same answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from solver.linear import choice
+from solver.linear.backends import BACKENDS
+from solver.linear.choice import against_condensation
+from solver.linear.condensation import condense, saddle_point
+from solver.linear.direct import standing_for_auto
+from solver.linear.multigrid import Unknowns
+
+needs_pardiso = pytest.mark.skipif(
+    not BACKENDS["pardiso"].available(), reason="MKL PARDISO is not installed"
+)
+
+
+def chain_over_floor(count):
+    """A chain of springs that floats, and one held unknown that is the mean of all of it."""
+    line = sparse.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(count, count)).tolil()
+    line[0, 0] = line[-1, -1] = 1.0
+    matrix = sparse.block_diag([[[3.0]], line]).tocsr()
+    row = np.concatenate([[1.0], np.full(count, -1 / count)])[None]
+    return matrix, sparse.csr_matrix(row)
+
+
+def stands_for(matrix, dim=3):
+    n = matrix.shape[0]
+    return Unknowns(dim, np.arange(n), np.ones((n, 6)), np.zeros(n, dtype=int))
+
+
+@needs_pardiso
+@pytest.mark.parametrize("weighted", [True, False])
+def test_a_saddle_point_and_the_condensed_system_agree(weighted):
+    matrix, constraints = chain_over_floor(30)
+    force, violation = np.random.default_rng(0).standard_normal(31), np.array([0.2])
+    own = np.arange(31) == 0
+    condensed = condense(matrix, constraints, own, stands_for(matrix))
+    saddle = saddle_point(matrix, constraints, "tried", weighted)
+    found = [system.correction(force, violation) for system in (condensed, saddle)]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(constraints @ found[1], violation, rtol=1e-12)
+    left = force - matrix @ found[1]
+    np.testing.assert_allclose(condensed.multiplier(left), saddle.multiplier(left), rtol=1e-9)
+
+
+@needs_pardiso
+def test_wide_constraints_are_not_condensed(monkeypatch):
+    matrix, constraints = chain_over_floor(1200)
+    why = against_condensation(matrix, constraints)
+    assert why == "a condensed system would fill in: one constraint holds 1201 unknowns"
+    with standing_for_auto("cholmod"):
+        assert not against_condensation(matrix, constraints)
+    monkeypatch.setattr(choice, "MULTIGRID_FROM", 1201)
+    assert not against_condensation(matrix, constraints)
+
+
+def test_narrow_constraints_are_condensed():
+    matrix, constraints = chain_over_floor(900)
+    assert not against_condensation(matrix, constraints)
+
+
+def test_without_pardiso_all_is_condensed(monkeypatch):
+    missing = replace(BACKENDS["pardiso"], available=lambda: False)
+    monkeypatch.setitem(BACKENDS, "pardiso", missing)
+    assert not against_condensation(*chain_over_floor(1200))
