@@ -1,10 +1,11 @@
 """Memory: what a solve takes at least, what the machine has, and the refusal where that is less.
 
-Measured as peak resident memory of 547 solves with PARDISO, all cell types, 20,000 to 640,000
-unknowns: 100 MB for the program, then by unknown (of nodes times dimensions) 2.1 to 7.4 kB in the
-plane and 4.4 to 16 kB in space, the less the more elongated the bodies are. HEXA8 cubes take
-11 kB (1.2 GB at 109,500 unknowns, 5.4 GB at 530,000). A solve is refused by the least figure, so
-that none is refused that fits; the usual one is for a warning, and a cluster is asked for the most.
+Measured as peak resident memory of solves of all cell types, 547 of them with a factor by PARDISO and
+20,000 to 640,000 unknowns: 100 MB for the program, then by unknown (of nodes times dimensions) 1.9
+to 7.4 kB in the plane and 4.4 to 16 kB in space, the less the more elongated the bodies are. With
+multigrid it is 2.4 (TETRA4, columns of HEXA8) to 6 kB (HEXA20), for HEXA8 cubes 3.5 kB from 100,000 to 1,000,000
+unknowns. A solve is refused by the least figure, so that none is refused that fits; the usual one is
+for a warning, and a cluster is asked for the most, since a factor may have to take over.
 """
 
 import resource
@@ -15,8 +16,8 @@ from pathlib import Path
 from solver.errors import MachineError
 
 _PROGRAM = 100e6
-_LEAST = {2: 2.0e3, 3: 4.2e3}
-_USUAL = {2: 3.0e3, 3: 10.0e3}
+_LEAST = {2: 1.8e3, 3: 1.8e3}
+_USUAL = {2: 3.0e3, 3: 3.5e3}
 _MOST = {2: 7.4e3, 3: 16.0e3}
 # A cgroup without a limit has a number near 2⁶³ for one.
 _NO_LIMIT = 1 << 60

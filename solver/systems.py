@@ -35,7 +35,8 @@ def unknowns_of(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
     basis, dim = scene.free.basis.tocsc(), scene.points.shape[1]
     node = basis.indices[basis.indptr[:-1]] // dim
     together = basis.T @ whole_motions(motions, len(scene.asleep))
-    return Unknowns(dim, node, together, scene.body[node])
+    quadratic = any(block.type.order == 2 for block in scene.blocks)
+    return Unknowns(dim, node, together, scene.body[node], quadratic)
 
 
 def parts_of(scene: Scene, constraints: sparse.csr_matrix, bodies: np.ndarray) -> list[Part]:
@@ -151,7 +152,7 @@ class Systems:
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
             return _saddle_point(matrix, constraints)
-        if why := against_condensation(matrix, constraints):
+        if why := against_condensation(matrix, constraints, unknowns):
             try:
                 return saddle_point(matrix, constraints, why, weighted=False)
             except SolveError:

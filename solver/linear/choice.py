@@ -14,12 +14,22 @@ from solver.linear.multigrid import Multigrid, Unknowns
 _LOG = logging.getLogger(__name__)
 
 MULTIGRID = "multigrid"
-MULTIGRID_FROM = 80_000
-"""Unknowns in 3D from which multigrid takes less time, and less memory, than a factor."""
-FILL = 1.0
-"""Entries that condensing adds, over those of the matrix, from which a saddle point is quicker."""
-LEAST_FILL = 1_000_000
-"""Fewer than these take no time."""
+# Unknowns in space from which multigrid takes less time than a factor, and half the memory or less:
+# whether PARDISO makes the factor, whether cells are quadratic, which takes twice the iterations.
+_MULTIGRID_FROM = {
+    (True, False): 80_000,
+    (True, True): 150_000,
+    (False, False): 20_000,
+    (False, True): 100_000,
+}
+# From as many entries more than the matrix has, condensing is slower than a saddle point; a few
+# (the second figure) take no time.
+_FILL, _LEAST_FILL = 1.0, 1_000_000
+
+
+def multigrid_from(quadratic: bool) -> int:
+    """Unknowns in space from which multigrid is the quicker way, with what is installed here."""
+    return _MULTIGRID_FROM[BACKENDS["pardiso"].available(), quadratic]
 
 
 class Chosen:
@@ -66,13 +76,12 @@ def prepare(matrix: csr_matrix, unknowns: Unknowns) -> Chosen:
     a singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
     """
     dim, kind = unknowns.dim, wanted()
-    why = _against_multigrid(matrix.shape[0], dim) if kind == "auto" else "as asked for"
+    why = _against_multigrid(matrix.shape[0], unknowns) if kind == "auto" else "as asked for"
     by = MULTIGRID if kind == MULTIGRID or not why else "a factor"
     _LOG.info("linear system of %d unknowns, by %s", matrix.shape[0], by)
     if by == MULTIGRID:
-        why = (
-            why or f"{MULTIGRID_FROM} unknowns or more in space: quicker and smaller than a factor"
-        )
+        least = multigrid_from(unknowns.quadratic)
+        why = why or f"{least} unknowns or more in space: quicker and smaller than a factor"
         try:
             return Chosen(matrix, dim, Multigrid(matrix, unknowns), why)
         except SolveError as error:
@@ -81,7 +90,7 @@ def prepare(matrix: csr_matrix, unknowns: Unknowns) -> Chosen:
     return Chosen(matrix, dim, factorise(matrix, dim=dim), why)
 
 
-def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
+def against_condensation(matrix: csr_matrix, constraints: csr_matrix, unknowns: Unknowns) -> str:
     """Why `matrix` (n, n) had better not be condensed by `constraints` (m, n); empty else.
 
     A constraint over w unknowns leaves a block of w² entries in the condensed system. Only PARDISO
@@ -89,18 +98,20 @@ def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
     """
     widths = np.diff(constraints.indptr).astype(float)
     filled = float((widths**2).sum())
-    few = filled <= max(FILL * matrix.nnz, LEAST_FILL) or matrix.shape[0] >= MULTIGRID_FROM
-    if few or wanted() != "auto" or not BACKENDS["pardiso"].available():
+    few = filled <= max(_FILL * matrix.nnz, _LEAST_FILL)
+    large = unknowns.dim == 3 and matrix.shape[0] >= multigrid_from(unknowns.quadratic)
+    if few or large or wanted() != "auto" or not BACKENDS["pardiso"].available():
         return ""
     return f"a condensed system would fill in: one constraint holds {widths.max():.0f} unknowns"
 
 
-def _against_multigrid(size: int, dim: int) -> str:
+def _against_multigrid(size: int, unknowns: Unknowns) -> str:
     """Why a system of `size` unknowns is factored; empty where it is not."""
-    if dim == 2:
+    least = multigrid_from(unknowns.quadratic)
+    if unknowns.dim == 2:
         return "in the plane a factor is small"
-    if size < MULTIGRID_FROM:
-        return f"fewer than {MULTIGRID_FROM} unknowns: a factor is quicker than multigrid"
+    if size < least:
+        return f"fewer than {least} unknowns: a factor is quicker than multigrid"
     return ""
 
 

@@ -35,17 +35,19 @@ class Unknowns:
 
     `node` (n,): the node that each belongs to, at most `dim` to a node; `motions` (n, 3 or 6): the
     rigid motions, in these unknowns; `body` (n,): the number of the body. Bodies that slide on each
-    other share no aggregate.
+    other share no aggregate. `quadratic`: some of their cells are.
     """
 
     dim: int
     node: np.ndarray
     motions: np.ndarray
     body: np.ndarray
+    quadratic: bool = False
 
     def of(self, chosen: np.ndarray) -> "Unknowns":
         """What some of them stand for."""
-        return Unknowns(self.dim, self.node[chosen], self.motions[chosen], self.body[chosen])
+        arrays = self.node[chosen], self.motions[chosen], self.body[chosen]
+        return Unknowns(self.dim, *arrays, self.quadratic)
 
 
 @dataclass(frozen=True)

@@ -50,20 +50,21 @@ def test_a_saddle_point_and_the_condensed_system_agree(weighted):
 @needs_pardiso
 def test_wide_constraints_are_not_condensed(monkeypatch):
     matrix, constraints = chain_over_floor(1200)
-    why = against_condensation(matrix, constraints)
+    why = against_condensation(matrix, constraints, stands_for(matrix))
     assert why == "a condensed system would fill in: one constraint holds 1201 unknowns"
     with standing_for_auto("cholmod"):
-        assert not against_condensation(matrix, constraints)
-    monkeypatch.setattr(choice, "MULTIGRID_FROM", 1201)
-    assert not against_condensation(matrix, constraints)
+        assert not against_condensation(matrix, constraints, stands_for(matrix))
+    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: 1201)
+    assert not against_condensation(matrix, constraints, stands_for(matrix))
 
 
 def test_narrow_constraints_are_condensed():
     matrix, constraints = chain_over_floor(900)
-    assert not against_condensation(matrix, constraints)
+    assert not against_condensation(matrix, constraints, stands_for(matrix))
 
 
 def test_without_pardiso_all_is_condensed(monkeypatch):
     missing = replace(BACKENDS["pardiso"], available=lambda: False)
     monkeypatch.setitem(BACKENDS, "pardiso", missing)
-    assert not against_condensation(*chain_over_floor(1200))
+    matrix, constraints = chain_over_floor(1200)
+    assert not against_condensation(matrix, constraints, stands_for(matrix))

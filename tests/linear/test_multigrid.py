@@ -9,6 +9,7 @@ from scipy.sparse import block_diag, csr_matrix, eye
 from solver.elasticity import Block, lame_parameters, stiffness
 from solver.errors import SolveError
 from solver.linear import choice
+from solver.linear.backends import BACKENDS
 from solver.linear.direct import standing_for_auto
 from solver.linear.krylov import ROUGH
 from solver.linear.multigrid import Multigrid, Unknowns
@@ -147,17 +148,29 @@ def test_right_hand_side_that_is_no_number():
 
 def test_choice_by_size_and_dimension(monkeypatch):
     matrix, unknowns = clamped(6)
-    monkeypatch.setattr(choice, "MULTIGRID_FROM", matrix.shape[0])
+    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: matrix.shape[0])
     large = choice.prepare(matrix, unknowns)
     assert "multigrid" in large.name
     assert "unknowns or more in space" in large.why
     plane = choice.prepare(matrix, replace(unknowns, dim=2))
     assert "multigrid" not in plane.name
     assert "plane" in plane.why
-    monkeypatch.setattr(choice, "MULTIGRID_FROM", matrix.shape[0] + 1)
+    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: matrix.shape[0] + 1)
     small = choice.prepare(matrix, unknowns)
     assert "multigrid" not in small.name
     assert "fewer than" in small.why
+
+
+def test_quadratic_cells_and_pardiso_put_multigrid_off(monkeypatch):
+    def sizes(pardiso):
+        there = replace(BACKENDS["pardiso"], available=lambda: pardiso)
+        monkeypatch.setitem(BACKENDS, "pardiso", there)
+        return [choice.multigrid_from(quadratic) for quadratic in (False, True)]
+
+    with_it, without = sizes(True), sizes(False)
+    assert with_it[0] < with_it[1]
+    assert without[0] < without[1]
+    assert without[0] < with_it[0]
 
 
 def test_choice_as_asked_for():
