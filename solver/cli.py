@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 from solver.benchmark import commands as benchmark
 from solver.errors import InputError, SolveError, of_machine
+from solver.options import add_threads, limit_threads
 from solver.scaling import commands as scaling
+from solver.stability import commands as stability
 from solver.study import commands as study
 
 if TYPE_CHECKING:
@@ -27,15 +29,12 @@ Command = Callable[[argparse.Namespace], int]
 
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit status."""
     options = _parser().parse_args(arguments)
     if options.threads:
-        for variable in THREADS:  # read by the libraries when they are loaded
-            os.environ.setdefault(variable, str(options.threads))
+        limit_threads(options.threads)
     try:
         return options.run(options)
     except InputError as error:
@@ -79,7 +78,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--verdict", type=Path, metavar="VERDICT.json", help="written in any case")
     command.add_argument("--quiet", action="store_true", help="print nothing but errors")
     command.add_argument("--verbose", action="store_true", help="tell each stage, with the time")
-    command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
+    add_threads(command)
     command.add_argument(
         "--everything", action="store_true", help="do what the scene does not need as well"
     )
@@ -130,27 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     command = commands.add_parser("scaling", help="growth with size: points and their page")
     scaling.add_commands(command)
     benchmark.add_commands(commands)
-    command = _add(commands, "sweep", _sweep, "push one quantity of a case through its values")
-    command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
-    command.add_argument("--quick", action="store_true", help="some of the values only")
-    command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
-
-    command = _add(commands, "stability", _stability, "write the page of numerical stability")
-    command.add_argument("records", type=Path, nargs="+", metavar="RECORD.json")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    command.add_argument("--quick", action="store_true", help="say that values are left out")
-    command.add_argument("--infsup", type=Path, metavar="RECORD.json", help="show its record too")
-
-    command = _add(commands, "infsup", _infsup, "run the inf-sup test and the half-loaded block")
-    command.add_argument("ladders", type=Path, metavar="INFSUP.yaml")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
-    command.add_argument("--quick", action="store_true", help="fewer levels")
-    command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
-
-    command = _add(commands, "infsup-page", _infsup_page, "write the page of the inf-sup test")
-    command.add_argument("record", type=Path, metavar="RECORD.json")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    stability.add_commands(partial(_add, commands))
 
     command = _add(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -284,43 +263,6 @@ def _orders(options: argparse.Namespace) -> int:
     from solver.report.orders import write_orders
 
     write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
-    return PASSED
-
-
-def _sweep(options: argparse.Namespace) -> int:
-    from solver.stability.points import run_sweep
-    from solver.stability.sweeps import read_sweep
-
-    record = run_sweep(read_sweep(options.sweep, options.quick), options.output, print)
-    return PASSED if all(point["holds"] for point in record["points"]) else FAILED
-
-
-def _stability(options: argparse.Namespace) -> int:
-    from solver.report.infsup import read_record
-    from solver.report.stability import read_records, write_stability
-
-    theory = read_record(options.infsup) if options.infsup else None
-    records = read_records(options.records)
-    write_stability(records, options.output, options.quick, theory=theory)
-    return PASSED
-
-
-def _infsup(options: argparse.Namespace) -> int:
-    from solver.half_loaded import FACES, profiles
-    from solver.infsup_ladders import read_ladders, run
-    from solver.report.infsup import write_record
-
-    log = partial(print, flush=True)
-    ladders = [run(ladder, log) for ladder in read_ladders(options.ladders, options.quick)]
-    faces = FACES // 2 if options.quick else FACES
-    write_record(options.output, ladders, profiles(faces, log))
-    return PASSED
-
-
-def _infsup_page(options: argparse.Namespace) -> int:
-    from solver.report.infsup import read_record, write_page
-
-    write_page(read_record(options.record), options.output)
     return PASSED
 
 

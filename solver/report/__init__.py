@@ -28,9 +28,9 @@ def write_report(
     from solver.report.sections import sections
 
     folder.mkdir(parents=True, exist_ok=True)
-    rows = read_rows(verdicts)
     files = {file.resolve().parent.name: file for file in families}
-    parts = sections(rows, files, folder / "pictures")
+    parts = sections(read_rows(verdicts), files, folder / "pictures")
+    rows = [row for part in parts for row in part.rows]
     contents = {
         PAGE: main_page(parts, folder),
         "summary.json": tables.to_json(rows),

@@ -2,6 +2,7 @@
 
 title: A block on a rigid parabola
 description: What it shows, in a few sentences.
+order: 2                       # its place in the report; families without one come last, by name
 problem: |
   What is solved: bodies, materials, supports, loads.
 reference: |
@@ -15,6 +16,7 @@ reference_code:                # another code's own errors, drawn beside those o
   - {name: code_aster, version: "14.6", error: 4.0e-13, remark: most cases}
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -60,6 +62,7 @@ class Family:
     name: str
     title: str
     description: str = ""
+    order: float = math.inf
     problem: str = ""
     reference: str = ""
     figures: tuple[Figure, ...] = ()

@@ -52,7 +52,8 @@ def outcome(curves: Sequence[Curve]) -> str:
     slopes = [r for c in curves for e in ERRORS if (r := c.reached(e)) is not None]
     finest = [r for c in curves for e in ERRORS if (r := c.kept(e)) is not None]
     lost = sum(len(curve.rows) - len(curve.solved) for curve in curves)
-    text = f"{sum(slopes)} of {len(slopes)} slopes asked for are reached, on {len(curves)} ladders"
+    reached = f"{sum(slopes)} of {len(slopes)} slopes asked for are reached"
+    text = f"{reached if slopes else 'No slope is asked for'}, on {len(curves)} ladders"
     text += f"; {sum(finest)} of {len(finest)} errors at finest levels." if finest else "."
     return text + (f" {lost} levels have no result." if lost else "")
 

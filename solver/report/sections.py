@@ -149,11 +149,14 @@ class Section:
 
 
 def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[Section]:
-    """The sections of all rows; `files` holds the `family.yaml` of a family by its name."""
+    """The sections of all rows, in the order that families ask for, else in that of the rows.
+
+    `files` holds the `family.yaml` of a family by its name.
+    """
     found = []
     for name, members in families(rows).items():
         file = files.get(name)
         family = read_family(file) if file else Family(name, name)
         ladders = bool(file and file.with_name("orders.yaml").is_file())
         found.append(Section(family, members, pictures, ladders))
-    return found
+    return sorted(found, key=lambda section: section.family.order)

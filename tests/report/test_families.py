@@ -1,6 +1,7 @@
 """The page of a family: what its file tells, and kinds of reference that are kept apart."""
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from pathlib import Path
@@ -105,6 +106,17 @@ def test_every_family_of_ours_tells_problem_and_reference_and_draws_solves_it_ha
         case = load_case(path)
         jobs |= {case.name} | ({f"{case.name}-swapped"} if case.directions == "both" else set())
     assert {figure.job for figure in family.figures} <= jobs
+
+
+def test_families_come_in_the_order_they_ask_for(tmp_path):
+    for name, order in {"a": "", "b": "order: 2", "c": "", "d": "order: 1"}.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / FILE_NAME).write_text(f"title: {name}\n{order}\n")
+    verdicts = [verdict(f"{name}1", "passed", family=name) for name in "abcd"]
+    logged = report(tmp_path, verdicts, *(tmp_path / name / FILE_NAME for name in "abcd"))
+    assert re.findall(r"(\w) \S+ s \(1\)", logged) == ["d", "b", "a", "c"]
+    listed = json.loads((tmp_path / "summary.json").read_text())
+    assert [row["family"] for row in listed] == ["d", "b", "a", "c"]
 
 
 def test_pages_of_the_report_are_no_family_s():

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -109,6 +110,12 @@ def test_levels_without_a_result_are_points_and_failures_too(page, tmp_path):
     ]
     assert page.startswith("\n".join(failures))
     assert "2 of 4 slopes asked for are reached, on 4 ladders. 1 levels have no result." in page
+
+
+def test_where_no_slope_is_asked_for_none_is_counted(family, results):
+    asks_nothing = replace(family, least={})
+    curves = read_curves(asks_nothing, results)
+    assert orders.outcome(curves).startswith("No slope is asked for, on 4 ladders")
 
 
 def test_a_ladder_never_solved_is_missed(family, tmp_path):
