@@ -141,6 +141,9 @@ def _parser() -> argparse.ArgumentParser:
 
     command = _add(commands, "accept", _accept, "take results as the accepted values")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+
+    command = _add(commands, "serve", _serve, "stay warm and fork for each command of a batch")
+    command.add_argument("socket", type=int, metavar="FD", help="an open socket that listens")
     return parser
 
 
@@ -313,4 +316,14 @@ def _accept(options: argparse.Namespace) -> int:
         print(f"{solution.job}: {len(changes)} values accepted anew of {len(checks)}")
         for line in changes:
             print(f"  {line}")
+    return PASSED
+
+
+def _serve(options: argparse.Namespace) -> int:
+    import socket
+
+    from solver.server import serve
+
+    with socket.socket(fileno=options.socket) as listener:
+        serve(listener)
     return PASSED

@@ -55,11 +55,13 @@ TARGETS = {
     "report": Target([*SOLVER, "report", *VERDICTS, "-o", "results/report"], ("report/summary.*",)),
     "batch": Target(SNAKEMAKE, ("*",)),
     "batch's snakemake": Target(SNAKEMAKE, ("*",), struck="first"),
+    "batch's server": Target(SNAKEMAKE, ("*",), struck="server"),
     "batch's job": Target(SNAKEMAKE, ("*",), struck="job"),
 }
 
 SINGLE = ["mesh", "solve", "report"]
-MIXTURE = [*SINGLE, "batch", *SINGLE, "batch's snakemake", *SINGLE, "batch's job"]
+PARTS = ["batch", "batch's snakemake", "batch's server", "batch's job"]
+MIXTURE = [name for part in PARTS for name in (*SINGLE, part)]
 
 
 class Harness:
@@ -178,7 +180,8 @@ def _victims(first, struck):
     if struck == "first":
         return [first]
     session = [process for process in _processes() if _session(process) == first]
-    return [p for p in session if "solver" in _command(p)][:1] if struck == "job" else session
+    forks = [process for process in session if "solver" in _command(process)]
+    return {"server": forks[:1], "job": forks[-1:], "all": session}[struck]
 
 
 def _processes():

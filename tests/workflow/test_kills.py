@@ -4,7 +4,7 @@ from tests.workflow.kills import kill_at_random
 
 
 def test_what_is_killed_recovers(tmp_path):
-    targets = ["mesh", "batch's job", "solve", "report", "batch"]
+    targets = ["mesh", "batch's job", "solve", "report", "batch's server", "batch"]
     failures, struck = kill_at_random(tmp_path / "project", len(targets), 1, targets)
     assert failures == []
     assert struck.total() == len(targets)

@@ -88,6 +88,13 @@ def test_savings_that_were_measured_come_into_the_report(project):
     assert "tiny-a: 20.0 ms, 20% of the solve" in page.read_text()
 
 
+def test_a_changed_solver_runs_all_also_where_snakemake_remembers_nothing(project):
+    shutil.rmtree(project / ".snakemake")
+    assert jobs(project) == set()
+    append(project / "solver" / "linear" / "direct.py", "# changed\n")
+    assert jobs(project) == {"solve tiny-a", "solve tiny-a-swapped", "solve tiny-b"} | REPORT
+
+
 def test_one_case_again_is_one_case(project):
     verdict = "results/tiny/tiny-a-swapped/verdict.json"
     assert jobs(project, "--forcerun", verdict) == {"solve tiny-a-swapped"} | REPORT
@@ -123,7 +130,8 @@ def test_a_batch_with_every_kind_of_ending(project, tmp_path):
     (mine / "meshless.yaml").write_text(text)
     main = project / "solver" / "__main__.py"
     dies = "if 'solve' in sys.argv and 'doomed' in str(sys.argv): os.kill(os.getpid(), 9)\n"
-    main.write_text(f"import os, sys\n{dies}{main.read_text()}")
+    warm = "print('warm' if 'skfem' in sys.modules else 'cold')\n"
+    main.write_text(f"import os, sys\n{dies}{warm}{main.read_text()}")
 
     run = snakemake(project, "--config", f"cases={mine}", "family=my cases")
 
@@ -142,6 +150,7 @@ def test_a_batch_with_every_kind_of_ending(project, tmp_path):
     assert "nothing" in reasons["meshless"]
     for name in verdicts.keys() - {"good"}:
         assert re.search(rf"^{name}: {verdicts[name]}: \S", run.stdout, re.MULTILINE), name
+    assert (project / "results/my cases/good/log").read_text().startswith("warm\n")
     for page in ("summary.html", "my cases.html"):
         text = (project / "results" / "report" / page).read_text()
         assert all(name in text for name in verdicts)

@@ -25,6 +25,9 @@ VARIANTS = config["variants"] in (True, "true")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 MEMORY_CHECK = " --no-memory-check" * (config["memory_check"] in (False, "false"))
 PYTHON = shlex.quote(sys.executable)
+# Before a file for what it takes and a command of the solver, which runs in a fork of the run's
+# warm process, where there is one.
+SOLVER = f"{PYTHON} -IS solver/warm.py"
 
 # One solve. `mesh`: the user's mesh file, or None where a recipe generates it; `hexahedra`: how
 # hexahedra are cut, None for the case's own way.
@@ -32,7 +35,7 @@ Job = namedtuple("Job", "family case name file mesh swap hexahedra")
 
 
 def sources(*patterns):
-    """Source files of the solver, as inputs: whoever depends on them runs again on a change."""
+    """Source files of the solver."""
     return sorted(
         str(f) for p in patterns for f in Path("solver").glob(p) if f.is_file()
     )
@@ -52,8 +55,32 @@ def contents(*files):
 
     Snakemake's parameters count for this only where they are made from nothing but wildcards.
     """
-    told = "".join(f"{file} {content_of(file)}\n" for file in files)
-    return hashlib.sha256(told.encode()).hexdigest()
+    return digest("".join(f"{file} {content_of(file)}\n" for file in files))
+
+
+def digest(text):
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def text_of(file):
+    return file.read_text() if file.is_file() else ""
+
+
+def stamped(name, files):
+    """The one file that stands for many as an input of jobs, in a list: their hashes.
+
+    Snakemake looks at each input of each job. Written only where a hash changes, so that by its
+    date alone all that depends on it is made again, also where Snakemake's records are lost.
+    """
+    told = "".join(f"{content_of(file)}  {file}\n" for file in files)
+    stamp = Path("results/.sources") / f"{name}.sha256"
+    if workflow.is_main_process and told != text_of(stamp):
+        try:
+            stamp.parent.mkdir(parents=True, exist_ok=True)
+            stamp.write_text(told)
+        except OSError:
+            pass  # said by check_writable
+    return [str(stamp)]
 
 
 def stamp_of(file):
@@ -64,18 +91,15 @@ def stamp_of(file):
     return f"{about.st_size} {about.st_mtime_ns} {os.access(file, os.R_OK)}"
 
 
-REPORT_SOURCES = sources("report/**/*.py", "report/templates/*")
-READING = (
-    "case.py",
-    "dimension.py",
-    "errors.py",
-    "expressions.py",
-    "files.py",
-    "strict_yaml.py",
-    "schemas/*",
+OF_REPORT = sources("report/**/*.py", "report/templates/*")
+OF_SOLVER = sorted({*sources("**/*.py", "schemas/*")} - {*OF_REPORT})
+OF_MESH = sources(
+    *("case.py", "dimension.py", "errors.py", "expressions.py", "files.py"),
+    *("strict_yaml.py", "schemas/*", "mesh/*.py"),
 )
-MESH_SOURCES = sources(*READING, "mesh/*.py")
-SOLVER_SOURCES = sorted({*sources("**/*.py", "schemas/*")} - {*REPORT_SOURCES})
+REPORT_SOURCES = stamped("report", OF_REPORT)
+SOLVER_SOURCES = stamped("solver", OF_SOLVER)
+MESH_SOURCES = stamped("mesh", OF_MESH)
 
 
 def listed(value):

@@ -11,16 +11,15 @@ rule mesh:
         mesh="results/{family}/{case}/mesh.vtkhdf",
     log:
         "results/{family}/{case}/mesh.log",
-    benchmark:
-        "results/{family}/{case}/mesh.benchmark"
     resources:
         mem_mb=lambda w, attempt: memory(RECIPES[w.family, w.case], attempt),
         runtime=lambda w, attempt: minutes(RECIPES[w.family, w.case], attempt),
     params:
+        benchmark="results/{family}/{case}/mesh.benchmark",
         content=lambda w: contents(RECIPES[w.family, w.case], *MESH_SOURCES),
     message:
         "mesh {wildcards.case}"
     shell:
-        "{PYTHON} -m solver mesh {input.case:q} -o {output.mesh:q} > {log:q} 2>&1 || {{ died=$?;"
+        "{SOLVER} {params.benchmark:q} mesh {input.case:q} -o {output.mesh:q} > {log:q} 2>&1 || {{ died=$?;"
         ' test -s {log:q} || echo "meshing died with exit status $died" > {log:q};'
         " tail -n 1 {log:q} > {output.mesh:q}.reason; mv {output.mesh:q}.reason {output.mesh:q}; }}"

@@ -45,12 +45,11 @@ use rule solve as solve_level with:
         verdict="results/orders/{family}/{job}/{level}/verdict.json",
     log:
         "results/orders/{family}/{job}/{level}/log",
-    benchmark:
-        "results/orders/{family}/{job}/{level}/benchmark"
     resources:
         mem_mb=lambda w, attempt: memory(level_file(w), attempt, int(w.level)),
         runtime=lambda w, attempt: minutes(level_file(w), attempt, int(w.level)),
     params:
+        benchmark="results/orders/{family}/{job}/{level}/benchmark",
         result="results/orders/{family}/{job}/{level}/result.vtkhdf",
         content=lambda w: contents(level_file(w), *SOLVER_SOURCES),
         options=level_options,

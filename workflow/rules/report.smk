@@ -34,15 +34,14 @@ rule report:
         "results/report/failures.txt",
     log:
         "results/report/log",
-    benchmark:
-        "results/report/benchmark"
     params:
+        benchmark="results/report/benchmark",
         content=lambda w: contents(*FAMILY_FILES, *REPORT_SOURCES),
         shown=[verdict for verdict in SHOWN if Path(verdict).is_file()],
     message:
         "report of all cases"
     shell:
-        "{PYTHON} -m solver report {input.verdicts:q} {params.shown:q} -o results/report"
+        "{SOLVER} {params.benchmark:q} report {input.verdicts:q} {params.shown:q} -o results/report"
         " --families {input.families:q} 2>&1"
         " | tee {log:q}"
 

@@ -38,12 +38,11 @@ rule solve:
         verdict="results/{family}/{job}/verdict.json",
     log:
         "results/{family}/{job}/log",
-    benchmark:
-        "results/{family}/{job}/benchmark"
     resources:
         mem_mb=lambda w, attempt: memory(BATCH[w.family, w.job].file, attempt),
         runtime=lambda w, attempt: minutes(BATCH[w.family, w.job].file, attempt),
     params:
+        benchmark="results/{family}/{job}/benchmark",
         result="results/{family}/{job}/result.vtkhdf",
         content=lambda w: content_of_solve(BATCH[w.family, w.job]),
         options=lambda w: options_of(BATCH[w.family, w.job]),
@@ -51,7 +50,7 @@ rule solve:
         "solve {wildcards.job}"
     shell:
         "rm -f {params.result:q}; died=0;"
-        " {PYTHON} -m solver solve {input.case:q} {params.options}{MEMORY_CHECK}"
+        " {SOLVER} {params.benchmark:q} solve {input.case:q} {params.options}{MEMORY_CHECK}"
         " -o {params.result:q} --verdict {output.verdict:q} > {log:q} 2>&1 || died=$?;"
         " test -s {output.verdict:q}"
         " || {PYTHON} -m solver crashed {input.case:q} {params.options} --status $died"

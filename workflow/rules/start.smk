@@ -1,6 +1,10 @@
 """Before a run: the folder is this run's alone, and what an earlier one was kept from is due again."""
 
+import atexit
 import fcntl
+import socket
+import subprocess
+import tempfile
 import time
 from glob import glob
 from threading import Thread
@@ -95,11 +99,50 @@ def is_reason(mesh):
 def date_now():
     """Date files of the future now, after the clock went back: Snakemake goes by their order."""
     now = time.time()
-    files = {*SOLVER_SOURCES, *REPORT_SOURCES, *glob("results/**", recursive=True)}
-    files |= {job.file for job in BATCH.values()} | MESHES
+    stamps = {*SOLVER_SOURCES, *REPORT_SOURCES, *MESH_SOURCES}
+    files = {*glob("results/**", recursive=True)} | stamps | MESHES
+    files |= {job.file for job in BATCH.values()}
     for file in filter(os.path.exists, files):
         if os.stat(file).st_mtime > now and os.access(file, os.W_OK):
             os.utime(file)
+
+
+def is_warm(job):
+    """Whether a job asks the warm process; beside what is timed none is started."""
+    return "{SOLVER}" in (job.rule.shellcmd or "")
+
+
+def keep_warm():
+    """Start the process that forks for each job of this run, and ends with it.
+
+    It listens from now on and answers once it is warm; without it jobs start from nothing.
+    """
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    folder = tempfile.TemporaryDirectory()
+    with socket.socket(socket.AF_UNIX) as listener:
+        try:
+            listener.bind(f"{folder.name}/warm")
+        except OSError:
+            return  # a file system without sockets, or too long a name
+        listener.listen()
+        server = subprocess.Popen(
+            [sys.executable, "-m", "solver", "serve", str(listener.fileno())],
+            stdin=subprocess.PIPE,  # its end tells that this run has ended
+            pass_fds=[listener.fileno()],
+            env={**os.environ, **dict.fromkeys(names, "1")},
+        )
+    os.environ["WARM_SOLVER"] = f"{folder.name}/warm"
+    atexit.register(folder.cleanup)
+    atexit.register(server.communicate)
+
+
+onstart:
+    if workflow.is_main_process and workflow.local_exec:
+        # Each look for jobs to start sets a timer for another one, so that there are ever more.
+        workflow.scheduler.job_rate_limiter = None
+        # Elsewhere the system's own libraries start threads, and forks may hang.
+        if sys.platform == "linux" and any(map(is_warm, workflow.dag.needrun_jobs())):
+            keep_warm()
 
 
 if workflow.is_main_process and not workflow.dryrun:
