@@ -115,5 +115,5 @@ def _write(axes: Any, element: ET.Element) -> None:
         va="baseline",
         rotation=-float(turn[1]) if turn else 0,
         rotation_mode="anchor",
-        fontweight=style.get("font-weight", "normal"),
+        fontweight="bold" if "font-weight" in style else "normal",
     )

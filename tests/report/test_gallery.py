@@ -24,7 +24,7 @@ from solver.report.gallery.shapes import Shape  # noqa: E402
 
 @pytest.fixture(scope="module")
 def opengl():
-    if why := probe.why_not():
+    if why := probe.set_up():
         pytest.skip(why)
 
 
@@ -127,7 +127,7 @@ def batch(folder):
 
 
 def test_without_opengl_the_report_draws_and_says_why(tmp_path, monkeypatch):
-    monkeypatch.setattr(probe, "why_not", lambda: "VTK finds no OpenGL here (SIGSEGV)")
+    monkeypatch.setattr(probe, "set_up", lambda: "VTK finds no OpenGL here (SIGSEGV)")
     said = []
     write_gallery(batch(tmp_path), tmp_path / "out", log=said.append)
     assert said[0] == "Drawing without OpenGL: VTK finds no OpenGL here (SIGSEGV)."
@@ -183,12 +183,25 @@ def test_the_command(tmp_path, capsys):
 def test_why_pyvista_cannot_draw(status, said, expected, monkeypatch):
     ended = subprocess.CompletedProcess([], status, "", said)
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: ended)
-    assert probe.why_not() == f"VTK finds no OpenGL here ({expected})"
+    assert probe.set_up() == f"VTK finds no OpenGL here ({expected})"
+
+
+def test_osmesa_is_named_where_it_is_what_works(monkeypatch):
+    def only_osmesa(command, env, **_):
+        works = env.get("VTK_DEFAULT_OPENGL_WINDOW") == "vtkOSOpenGLRenderWindow"
+        return subprocess.CompletedProcess(command, 0 if works else -signal.SIGSEGV, "", "")
+
+    monkeypatch.setattr(subprocess, "run", only_osmesa)
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    assert probe.set_up() == "VTK finds no OpenGL here (SIGSEGV)", "what a user names is kept"
+    monkeypatch.delenv("VTK_DEFAULT_OPENGL_WINDOW")
+    assert probe.set_up() == ""
+    assert os.environ["VTK_DEFAULT_OPENGL_WINDOW"] == "vtkOSOpenGLRenderWindow"
 
 
 def test_why_pyvista_cannot_draw_when_it_is_not_there(monkeypatch):
     monkeypatch.setattr(probe, "find_spec", lambda _: None)
-    assert probe.why_not() == "PyVista is not installed (make gallery installs it)"
+    assert probe.set_up() == "PyVista is not installed (make gallery installs it)"
 
 
 def test_a_driver_that_never_ends(monkeypatch):
@@ -196,4 +209,4 @@ def test_a_driver_that_never_ends(monkeypatch):
         raise subprocess.TimeoutExpired(command, timeout)
 
     monkeypatch.setattr(subprocess, "run", hang)
-    assert probe.why_not() == "VTK has drawn nothing within 120 s"
+    assert probe.set_up() == "VTK has drawn nothing within 120 s"

@@ -33,11 +33,11 @@ def write_gallery(
     is newer than its result and the drawing stays.
     """
     from solver.files import write_text
-    from solver.report.gallery.probe import why_not
+    from solver.report.gallery.probe import set_up
     from solver.report.html import environment
     from solver.report.rows import families, read_rows
 
-    reason = "asked for" if plain else why_not()
+    reason = "asked for" if plain else set_up()
     log(f"Drawing {'without OpenGL: ' + reason if reason else 'by PyVista'}.")
     draw, ending = _drawing(plain=bool(reason))
     pictures = [_picture(row, folder, draw, ending) for row in read_rows(verdicts)]

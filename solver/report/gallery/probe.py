@@ -3,23 +3,40 @@
 `python -m solver.report.gallery.probe` draws a box, and says with what.
 """
 
+import os
 import re
 import signal
 import subprocess
 import sys
 from importlib.util import find_spec
 
+_WINDOW, _OSMESA = "VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow"
 # The first start of a graphics driver may take its time.
 _SECONDS = 120.0
 
 
-def why_not() -> str:
-    """Why PyVista cannot draw here, in one line; empty where it can."""
+def set_up() -> str:
+    """Find a way for PyVista to draw here; returns why there is none, in one line, else nothing.
+
+    VTK finds a screen's OpenGL and EGL by itself. OSMesa has to be named in the environment, which
+    is done here where it is what works.
+    """
     if find_spec("pyvista") is None:
         return "PyVista is not installed (make gallery installs it)"
+    reason = _attempt({})
+    if reason and _WINDOW not in os.environ and not _attempt({_WINDOW: _OSMESA}):
+        os.environ[_WINDOW] = _OSMESA
+        return ""
+    return reason
+
+
+def _attempt(setting: dict[str, str]) -> str:
+    """Why a picture could not be drawn with these settings of the environment."""
     command = [sys.executable, "-m", __name__]
     try:
-        run = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS)
+        run = subprocess.run(
+            command, capture_output=True, text=True, timeout=_SECONDS, env={**os.environ, **setting}
+        )
     except subprocess.TimeoutExpired:
         return f"VTK has drawn nothing within {_SECONDS:.0f} s"
     if run.returncode == 0:
