@@ -125,6 +125,8 @@ class Cluster:
         )
         configuration = self.folder / "slurm.conf"
         configuration.write_text(text)
+        # Not to look for control groups: a container may have none, and none are used.
+        (self.folder / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n")
         for name in COMMANDS:
             command = self.folder / "bin" / name
             command.write_text(
