@@ -79,7 +79,7 @@ def solve_problem(
     """Solve an assembled problem at all load factors; how it was assembled goes on record."""
     plan = list(decided(problem))
     for line in plan:
-        _LOG.info("plan: %s: %s", line.what, line.why)
+        _LOG.info("plan: %s (%s)", line.what, line.why)
     with clock.stage("solve"):
         states = _walk(problem, problem.scene.case.steps, log)
     plan += noted(problem, states)
