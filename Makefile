@@ -1,12 +1,14 @@
 # Everything is run from here: `make help` lists the targets.
 # Settings: CORES=4 (all), CASES=folder (case files of yours join the batch), MKL=no (without Intel
-# MKL), PYTHON=python3.12; for Snakemake: CONFIG='variants=true', ARGS='--dry-run'.
+# MKL), QUIET=yes (failures and the outcome alone), PYTHON=python3.12; for Snakemake:
+# CONFIG='variants=true', ARGS='--dry-run'.
 
 PYTHON ?= python3
 CORES ?= all
 MKL ?=
 ARGS =
 CONFIG =
+QUIET =
 CASES =
 
 .DEFAULT_GOAL := help
@@ -14,7 +16,9 @@ MAKEFLAGS += --no-print-directory
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
-SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(ARGS) $(if $(SETTINGS),--config $(SETTINGS)) --
+SILENCE = $(if $(QUIET),--quiet rules progress reason host)
+SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
+	$(if $(SETTINGS),--config $(SETTINGS)) --
 
 .PHONY: help all-cases family case report summary compare gallery orders study stability infsup
 .PHONY: scaling benchmark test accept

@@ -34,7 +34,8 @@ def telling(verbose: bool, quiet: bool = False) -> Iterator[None]:
     logger.addHandler(held)
     logger.setLevel(logging.INFO)
     logger.propagate = False
-    patience.start()
+    if not verbose:
+        patience.start()
     try:
         yield
     finally:

@@ -118,8 +118,8 @@ def try_cluster(cluster, project, expected):
     expect(told == others, difference(told, others))
 
     again = run(project, *CLUSTER, environment=cluster.environment)
-    solved = re.findall(r"^Job \d+: (solve .*)$", again, re.MULTILINE)
-    expect(solved == [f"solve {CANCELLED}"], again)
+    solved = re.findall(r"^(\S+): .* \[\d+/\d+\]$", again, re.MULTILINE)
+    expect(solved == [CANCELLED], again)
     told = verdicts(project)
     expect(told == expected, difference(told, expected))
     for job, verdict in sorted(told.items()):

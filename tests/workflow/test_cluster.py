@@ -55,7 +55,8 @@ def test_what_is_ended_from_outside_is_crashed_and_done_by_the_next_run(tmp_path
         mark.unlink()
     again = snakemake(project)
     assert again.returncode == 0, again.stdout
-    solved = re.findall(r"^Job \d+: (mesh|solve) (\S+)", again.stdout, re.MULTILINE)
+    log = max((project / ".snakemake" / "log").glob("*.log")).read_text()
+    solved = re.findall(r"^Job \d+: (mesh|solve) (\S+)", log, re.MULTILINE)
     assert sorted(solved) == [("mesh", "tiny-a"), *(("solve", name) for name in sorted(crashed))]
     assert "All 5 solves passed." in again.stdout
 

@@ -20,6 +20,10 @@ def solved(tmp_path_factory):
     project = new_project(tmp_path_factory.mktemp("solved"))
     done = snakemake(project)
     assert done.returncode == 0, done.stdout
+    told = re.findall(r"^(\S+): passed, worst error .* \[(\d)/3\]$", done.stdout, re.MULTILINE)
+    assert [number for _, number in told] == ["1", "2", "3"]
+    assert {name for name, _ in told} == {"tiny-a", "tiny-a-swapped", "tiny-b"}
+    assert not re.search(r"Job \d|\r", done.stdout)  # Snakemake's own lines; a terminal's
     assert "All 3 solves passed. Report: results/report/summary.html" in done.stdout
     return project
 

@@ -15,11 +15,6 @@ from snakemake.utils import validate
 
 validate(config, "../schemas/config.schema.yaml")
 
-# One line a job is printed when it ends; two more for each that is chosen and started are too many.
-logger.addFilter(
-    lambda record: not record.getMessage().startswith(("Select jobs", "Execute "))
-)
-
 VARIANTS = config["variants"] in (True, "true")
 # Jobs share their bytecode: to compile the sources anew in each costs a third of a small solve.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -50,9 +50,8 @@ rule solve:
         "solve {wildcards.job}"
     shell:
         "rm -f {params.result:q}; died=0;"
-        " {SOLVER} {params.benchmark:q} solve {input.case:q} {params.options}{MEMORY_CHECK}"
+        " {SOLVER} {params.benchmark:q} solve {input.case:q} {params.options}{MEMORY_CHECK} --verbose"
         " -o {params.result:q} --verdict {output.verdict:q} > {log:q} 2>&1 || died=$?;"
         " test -s {output.verdict:q}"
         " || {PYTHON} -m solver crashed {input.case:q} {params.options} --status $died"
-        " --log {log:q} --verdict {output.verdict:q} >> {log:q};"
-        " tail -n 1 {log:q}"
+        " --log {log:q} --verdict {output.verdict:q} >> {log:q}"

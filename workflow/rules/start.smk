@@ -2,6 +2,7 @@
 
 import atexit
 import fcntl
+import logging
 import socket
 import subprocess
 import tempfile
@@ -10,6 +11,9 @@ from glob import glob
 from threading import Thread
 
 from snakemake.scheduling.job_scheduler import JobScheduler
+from snakemake.settings.enums import Quietness
+
+from workflow.progress import Progress, hides
 
 
 def take_lock():
@@ -43,6 +47,23 @@ def survive_termination():
     """
     ending = JobScheduler.exit_gracefully
     JobScheduler.exit_gracefully = lambda *of: Thread(target=ending, args=of).start()
+
+
+def tell_progress():
+    """Say what becomes of the jobs in place of what Snakemake says; where it is quiet, nothing."""
+    settings, handlers = workflow.output_settings, logger.handlers
+    if settings.dryrun:  # which Snakemake tells well
+        return
+    shown = [each for each in handlers if each.name == "DefaultStreamHandler"]
+    if {Quietness.PROGRESS, Quietness.ALL} & set(settings.quiet or ()):
+        for handler in shown:
+            handler.setLevel(logging.WARNING)
+        return
+    progress = Progress(sys.stdout, sys.stderr)
+    logger.addFilter(progress)
+    atexit.register(progress.close)
+    for handler in [] if settings.verbose else shown:
+        handler.addFilter(lambda record: not hides(record))
 
 
 def check_writable():
@@ -151,3 +172,4 @@ if workflow.is_main_process and not workflow.dryrun:
     survive_termination()
     forget_transient()
     date_now()
+    tell_progress()

@@ -1,0 +1,218 @@
+"""What a run tells while it works: a line for each solve that ends, and how far the run is.
+
+Snakemake logs the start and the end of each job as an event; a filter of its logger hears them,
+whatever is shown. On a terminal the state of the run is its last line, rewritten in place; in a
+file it is a line a minute.
+"""
+
+import logging
+import os
+import shutil
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event, RLock, Thread
+from typing import Any, TextIO
+
+# The rules that a run is about, by what one of their jobs is called.
+COUNTED = {
+    "solve": "solve",
+    "solve_level": "solve",
+    "sweep": "sweep",
+    "infsup_record": "test",
+    "study_point": "point",
+    "scaling_point": "point",
+}
+# Rules whose jobs print by themselves: the last line is theirs as long as they run.
+TALKING = (
+    *("report", "orders_page", "stability_page", "infsup_page", "gallery"),
+    *("study", "study_point", "scaling", "scaling_point"),
+)
+# What Snakemake says that is of no use to whoever sees the jobs.
+_CHATTER = ("Select jobs", "Execute ", "Using shell", "Assuming unrestricted", "Touching output")
+_BAD = ("failed", "unreliable", "refused", "crashed")
+_EVENTS = ("job_info", "job_started", "job_finished", "progress", "run_info", "resources_info")
+_ON_TERMINAL, _IN_FILE = 1.0, 60.0
+# A guess of the time left from less than this is no guess.
+_LEAST_JOBS, _LEAST_SECONDS = 3, 5.0
+
+
+@dataclass(frozen=True)
+class Running:
+    """A job at work: its rule, what it says of itself, its log if it has one, when it began."""
+
+    rule: str
+    message: str
+    log: Path | None
+    began: float
+
+
+class State:
+    """How far a run is, by the events of its jobs; `clock` gives seconds."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        self.clock = clock
+        self.running: dict[int, Running] = {}
+        self.total = self.done = self.bad = 0
+        self.broken: set[int] = set()
+        self.began: float | None = None
+        self.word = "job"
+
+    def expect(self, jobs: Mapping[str, int]) -> None:
+        """Take what a run is going to do, as numbers of jobs by rule."""
+        rules = [rule for rule in COUNTED if jobs.get(rule)]
+        self.total = sum(jobs[rule] for rule in rules)
+        words = {COUNTED[rule] for rule in rules}
+        self.word = words.pop() if len(words) == 1 else "job"
+
+    def start(self, number: int, rule: str, message: str, log: Path | None) -> None:
+        """A job begins, perhaps once more."""
+        self.broken.discard(number)
+        self.running[number] = Running(rule, message, log, self.clock())
+        if rule in COUNTED and self.began is None:
+            self.began = self.clock()
+
+    def fail(self, number: int) -> None:
+        """A job breaks off; it may begin once more."""
+        self.running.pop(number, None)
+        self.broken.add(number)
+
+    def end(self, number: int) -> str | None:
+        """A job ends; the last line of its log with the count, if it is one that counts."""
+        job = self.running.pop(number, None)
+        if job is None or job.rule not in COUNTED:
+            return None
+        self.done += 1
+        said = last_line(job.log)
+        self.bad += said.partition(": ")[2].startswith(_BAD)
+        return f"{said} [{self.done}/{self.total}]" if said else None
+
+    @property
+    def not_passed(self) -> int:
+        """How many solves did not pass, and how many jobs broke off."""
+        return self.bad + len(self.broken)
+
+    @property
+    def talking(self) -> bool:
+        """Whether a job is at work that prints by itself."""
+        return any(job.rule in TALKING for job in self.running.values())
+
+    @property
+    def left(self) -> float | None:
+        """Seconds that the rest may take, going by those that are done; None while unknown."""
+        if self.began is None or self.done < _LEAST_JOBS:
+            return None
+        spent = self.clock() - self.began
+        return spent / self.done * (self.total - self.done) if spent > _LEAST_SECONDS else None
+
+    def told(self) -> str:
+        """The state in one line."""
+        parts = [f"{self.done} of {self.total} {self.word}s done"]
+        parts += [f"{self.not_passed} not passed"] * bool(self.not_passed)
+        parts += [f"{len(self.running)} running"] * bool(self.running)
+        if self.left is not None:
+            parts.append(f"about {duration(self.left)} left")
+        return ", ".join(parts) + self._longest()
+
+    def _longest(self) -> str:
+        """The job that has run longest, and what it does."""
+        jobs = sorted(self.running.values(), key=lambda job: job.began)
+        if not jobs:
+            return ""
+        seconds = self.clock() - jobs[0].began
+        said = last_line(jobs[0].log) if seconds > _LEAST_SECONDS else ""
+        return f" – {jobs[0].message}" + (f" ({duration(seconds)}): {said}" if said else "")
+
+
+class Progress(logging.Filter):
+    """Hears the events of Snakemake's logger and tells what comes of them; lets all pass.
+
+    Ends of solves go to `out`, the state to `status`.
+    """
+
+    def __init__(self, out: TextIO, status: TextIO, state: State | None = None):
+        super().__init__()
+        self.out, self.status, self.state = out, status, state or State()
+        self.terminal = status.isatty()
+        self._lock, self._stop, self._shown = RLock(), Event(), False
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Take an event in; never refuses a record."""
+        with self._lock:
+            self._wipe()
+            self._hear(str(getattr(record, "event", None) or ""), record.__dict__)
+        return True
+
+    def _hear(self, event: str, of: Mapping[str, Any]) -> None:
+        state, line = self.state, None
+        if event == "run_info":
+            state.expect(of["stats"])
+            Thread(target=self._tick, daemon=True).start()
+        elif event == "job_info":
+            log = next(iter(of["log"]), None)
+            message = of["rule_msg"] or of["rule_name"]
+            state.start(of["jobid"], of["rule_name"], message, Path(log) if log else None)
+        elif event == "job_finished":
+            line = state.end(of["job_id"])
+        elif event == "job_error":
+            state.fail(of["jobid"])
+        if line:
+            print(line, file=self.out, flush=True)
+            if self.terminal:
+                self._show()
+
+    def _tick(self) -> None:
+        while not self._stop.wait(_ON_TERMINAL if self.terminal else _IN_FILE):
+            with self._lock:
+                self._show()
+
+    def _show(self) -> None:
+        """Write the state where nobody else does."""
+        state = self.state
+        if self._stop.is_set() or state.talking or not state.total or state.done == state.total:
+            return
+        if self.terminal:
+            width = shutil.get_terminal_size().columns - 1
+            self._wipe()
+            self.status.write(state.told()[:width])
+            self._shown = True
+        else:
+            self.status.write(f"{time.strftime('%H:%M:%S')} {state.told()}\n")
+        self.status.flush()
+
+    def _wipe(self) -> None:
+        if self._shown:
+            self.status.write("\r\x1b[K")
+            self.status.flush()
+            self._shown = False
+
+    def close(self) -> None:
+        """Leave the terminal clean."""
+        with self._lock:
+            self._stop.set()
+            self._wipe()
+
+
+def hides(record: logging.LogRecord) -> bool:
+    """Whether a record is of no use beside the progress."""
+    event = str(getattr(record, "event", None) or "")
+    return event in _EVENTS or record.getMessage().startswith(_CHATTER)
+
+
+def last_line(log: Path | None, most: int = 4096) -> str:
+    """The last line of a file that has any text; empty where there is none."""
+    try:
+        with Path(log or os.devnull).open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - most))
+            lines = file.read().decode(errors="replace").split("\n")
+    except OSError:
+        return ""
+    return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+
+def duration(seconds: float) -> str:
+    """Seconds in words."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
