@@ -10,17 +10,16 @@ rule infsup_record:
         INFSUP_RECORD,
     log:
         INFSUP_RECORD + ".log",
-    benchmark:
-        INFSUP_RECORD + ".benchmark"
     resources:
         mem_mb=lambda w, attempt: 2000 * attempt,
         runtime=lambda w, attempt: 60 * attempt,
     params:
+        benchmark=INFSUP_RECORD + ".benchmark",
         quick=" --quick" * (config["stability"] == "quick"),
     message:
         "inf-sup test"
     shell:
-        "{PYTHON} -m solver infsup {input.ladders:q} -o {output:q}{params.quick} --threads 1"
+        "{SOLVER} {params.benchmark:q} infsup {input.ladders:q} -o {output:q}{params.quick}"
         " > {log:q} 2>&1"
 
 

@@ -13,18 +13,17 @@ rule sweep:
         "results/stability/{level}/{sweep}.json",
     log:
         "results/stability/{level}/{sweep}.log",
-    benchmark:
-        "results/stability/{level}/{sweep}.benchmark"
     resources:
         mem_mb=lambda w, attempt: 2000 * attempt,
         runtime=lambda w, attempt: 60 * attempt,
     params:
+        benchmark="results/stability/{level}/{sweep}.benchmark",
         quick=QUICK,
     message:
         "sweep {wildcards.sweep}"
     shell:
         # Points that do not hold are for the gate to judge, once the page is there.
-        "{PYTHON} -m solver sweep {input.sweep:q} -o {output:q}{params.quick} --threads 1"
+        "{SOLVER} {params.benchmark:q} sweep {input.sweep:q} -o {output:q}{params.quick}"
         " > {log:q} 2>&1 || test -s {output:q}"
 
 
