@@ -21,6 +21,8 @@ def draw_plane(solution: Solution, title: str, magnified: float = 0.0) -> Markup
     """
     drawing = Drawing(WIDTH, HEIGHT, title)
     _blocks(drawing, solution, (4, 10, 190, HEIGHT - 20), magnified)
+    if magnified:
+        drawing.text(6, HEIGHT - 4, f"displacement × {magnified:g}", color=MUTED)
     zones = solution.zones[:3]
     each = HEIGHT / max(1, len(zones))
     for i, zone in enumerate(zones):

@@ -34,6 +34,8 @@ def draw_space(solution: Solution, title: str, magnified: float = 0.0) -> Markup
     """
     drawing = Drawing(WIDTH, HEIGHT, title)
     _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24), magnified)
+    if magnified:
+        drawing.text(6, HEIGHT - 4, f"displacement × {magnified:g}", color=MUTED)
     if solution.zones:
         _plan(drawing, solution, solution.zones[0], (420, 40, 240, HEIGHT - 110))
     return drawing.svg()

@@ -12,6 +12,8 @@ from solver.cli import main
 from solver.report.gallery import probe, write_gallery
 from solver.report.geometry import macro_edges
 from solver.report.layout import magnification
+from solver.report.plane import draw_plane
+from solver.report.space import draw_space
 from solver.results import write_result
 from solver.verdict import to_json
 from tests import handmade
@@ -88,6 +90,16 @@ def test_only_what_presses_is_shown_of_a_wide_surface(tmp_path):
 def test_the_displacement_is_magnified_by_a_round_number():
     for largest, expected in ((1.0, 5.0), (0.003, 2000.0), (70.0, 0.05), (0.0, 1.0)):
         assert magnification(np.array([[0.0, largest]]), 100.0) == expected
+
+
+def test_the_report_draws_bodies_deformed_too(tmp_path):
+    for draw_it, make in ((draw_plane, handmade.plane), (draw_space, handmade.solid)):
+        plain, deformed = (draw_it(make(tmp_path), "", times) for times in (0.0, 50.0))
+        assert "displacement" not in plain
+        assert ">displacement × 50<" in deformed
+        paths = [re.findall(r' d="([^"]*)"', svg) for svg in (plain, deformed)]
+        assert len(paths[0]) == len(paths[1])
+        assert paths[0] != paths[1]
 
 
 def test_edges_of_macro_elements_have_their_mid_nodes():
