@@ -298,13 +298,14 @@ class ContactProblem:
         if scale == 0:
             return Accuracy({"forces": float(forces.max()) / force_scale})
         gaps = self.gaps[closed]
+        moving = gaps @ sparse.diags((np.diff(scene.free.basis.indptr) > 0).astype(float))
         noise = np.repeat(forces, dim) + residual * force_scale
         known = scene.rounding * self.covered * (self.initial != 0)
         known = known[closed] + EPSILON * iterate.displacement.opening_size(gaps, dim)
         smallest = float(self.area.min()) ** (1 / (dim - 1))
         causes = {
-            "forces": pressure_of_forces(gaps, noise),
-            "gap": pressure_of_gaps(gaps, known, self.diagonal),
+            "forces": pressure_of_forces(moving, noise),
+            "gap": pressure_of_gaps(moving, known, self.diagonal),
             "coordinates": scale * scene.rounding / smallest,
             "stress": max(unit * stress, EPSILON * mean_stress),
             "slender": unit * slender,

@@ -39,6 +39,11 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
         names = body_names(scene)
         what = f"left out, at rest without pressure: {', '.join(names[b] for b in asleep)}"
         yield Line(what, "no load, displacement imposed or overlap reaches them", "unloaded")
+    held = np.flatnonzero(scene.held)
+    if len(held):
+        names = body_names(scene)
+        what = f"no stiffness of {', '.join(names[b] for b in held)}"
+        yield Line(what, "supports or rigidity hold all of it where it is", "unloaded")
     if len(problem.parts) > 1:
         why = "no contact joins them"
         yield Line(f"{len(problem.parts)} groups of bodies solved apart", why, "apart")

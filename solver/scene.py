@@ -78,8 +78,8 @@ class Scene:
     the volume cells before the cut, by type, and `volume_groups` which of them each named group
     holds. `rounding`: how well the coordinates are known (a length). `unnamed`: how many groups of
     the mesh, and of its faces and edges, the case does not name. `asleep` (b,) bodies and `resting`
-    (k,) multipliers are left out since nothing moves them (see `solver.unloaded`): `blocks` and
-    `free` are without them.
+    (k,) multipliers are left out since nothing moves them, and the cells of `held` (b,) bodies (see
+    `solver.unloaded`): `blocks` and `free` are without them.
     """
 
     case: Case
@@ -100,6 +100,7 @@ class Scene:
     skips: Skips
     unnamed: tuple[int, int]
     asleep: np.ndarray
+    held: np.ndarray
     resting: np.ndarray
 
     @property
@@ -164,6 +165,7 @@ def build_scene(
         skips=skips,
         unnamed=unnamed,
         asleep=np.zeros(int(body.max()) + 1, dtype=bool),
+        held=np.zeros(int(body.max()) + 1, dtype=bool),
         resting=np.zeros(sum(len(zone.operator.initial) for zone in scenes), dtype=bool),
     )
 

@@ -2,7 +2,9 @@
 
 Bodies belong together where a multiplier moves free unknowns of both. Without load, displacement
 imposed and initial overlap, u = 0 and p = 0 fulfil equilibrium, p ≥ 0, ḡ ≥ 0 and p ḡ = 0, whatever
-the status of their contact; ḡ stays the initial gap.
+the status of their contact; ḡ stays the initial gap. A body that supports or its rigidity hold all
+over, where it is, has neither strain nor a free unknown: its stiffness is not needed, whatever
+presses on it.
 """
 
 from dataclasses import replace
@@ -16,23 +18,27 @@ from solver.supports import FreeMotion
 
 
 def without_unloaded(scene: Scene) -> Scene:
-    """The scene without the cells and unknowns of such groups.
+    """The scene without the cells and unknowns of such groups, and the cells of bodies held.
 
-    Nothing is left out where a body could move freely (a solve refuses it by name), or where there
-    would be nothing to solve.
+    No group is left out where a body could move freely (a solve refuses it by name), and nothing
+    where there would be nothing to solve.
     """
     gaps, free = _gaps(scene), scene.free
     acting = (gaps @ free.basis).tocsr()
     bodies = body_of_unknowns(free.basis, scene.body)
-    asleep = _unloaded(scene, gaps, acting, bodies)
+    asleep, held = _unloaded(scene, gaps, acting, bodies)
+    if asleep.any() and _moves_freely(scene, gaps):
+        asleep[:] = False
     kept = ~asleep[bodies]
-    if kept.all() or not kept.any() or _moves_freely(scene, gaps):
+    if not (asleep | held).any() or not kept.any():
         return scene
     selection = None if free.selection is None else free.selection[kept]
-    blocks = (block.of(~asleep[scene.body[block.cells[:, 0]]]) for block in scene.blocks)
+    out = (asleep | held)[scene.body]
+    blocks = (block.of(~out[block.cells[:, 0]]) for block in scene.blocks)
     return replace(
         scene,
         asleep=asleep,
+        held=held,
         resting=np.asarray(abs(acting) @ (~kept).astype(float)) > 0,
         blocks=[block for block in blocks if len(block.cells)],
         free=FreeMotion(free.basis[:, np.flatnonzero(kept)], free.offset, selection),
@@ -41,24 +47,25 @@ def without_unloaded(scene: Scene) -> Scene:
 
 def _unloaded(
     scene: Scene, gaps: sparse.csr_matrix, acting: sparse.csr_matrix, bodies: np.ndarray
-) -> np.ndarray:
-    """Which bodies (b,), of those with free unknowns, nothing moves.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which bodies (b,) nothing moves: those with free unknowns, and those without.
 
     `gaps` (k, n_dofs) on all unknowns, `acting` (k, n_free) on free ones, those of `bodies`.
     """
     n_bodies = len(scene.asleep)
     group = joined_bodies(acting, bodies, n_bodies)
     offset = scene.free.offset
-    moved = (scene.force != 0).any(axis=1) | (offset.reshape(scene.force.shape) != 0).any(axis=1)
-    awake = np.zeros(n_bodies, dtype=bool)
-    awake[scene.body[moved]] = True
+    awake, imposed = np.zeros((2, n_bodies), dtype=bool)
+    imposed[scene.body[(offset.reshape(scene.force.shape) != 0).any(axis=1)]] = True
+    awake[scene.body[(scene.force != 0).any(axis=1)]] = True
+    awake |= imposed
     initial = np.concatenate([np.empty(0), *(zone.operator.initial for zone in scene.zones)])
     pushed = np.flatnonzero((initial < 0) | (gaps @ offset != 0))
     awake[bodies[acting[pushed].indices]] = True
     of_group = np.zeros(n_bodies, dtype=bool)
     of_group[group[awake]] = True
     with_unknowns = np.isin(np.arange(n_bodies), bodies)
-    return with_unknowns & ~of_group[group]
+    return with_unknowns & ~of_group[group], ~with_unknowns & ~imposed
 
 
 def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:

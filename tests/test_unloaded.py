@@ -7,16 +7,18 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.case import parse_case
+from solver.case import load_case, parse_case
 from solver.clock import Clock
 from solver.contact import ContactProblem
 from solver.errors import InputError
+from solver.run import mesh_of
 from solver.scene import build_scene
 from solver.simulation import simulate
 from solver.skips import NEEDED
 from solver.unloaded import without_unloaded
 from tests.scenes import PRESSURE, block_mesh
 
+CASES = Path(__file__).parents[1] / "cases"
 SCENE = """
 name: side-by-side
 mesh: {recipe: blocks}
@@ -160,6 +162,40 @@ def test_a_case_without_any_load_is_solved_as_it_is(mesh):
     found = solved(mesh, ("pressure: 25.0", "pressure: 0.0"))
     assert told(found, "unloaded") == []
     assert not found.displacement.any()
+
+
+@pytest.mark.parametrize("cells", ["QUAD4", "TRIA6"])
+def test_a_rigid_body_has_no_stiffness_and_bears_its_load(cells):
+    mesh = side_by_side(block_mesh("QUAD8", cells, (1, 3)))
+    text = "\n".join(line for line in SCENE.split("\n") if "far" not in line)
+    text = text.replace("materials: {all:", "bodies: {bottom: {rigid: true}}\nmaterials: {top:")
+    text = text.replace(
+        "slave: bottom_contact, master: top_contact", "slave: top_contact, master: bottom_contact"
+    )
+    case = parse_case(text.replace("  - {group: base, fix: [y]}\n", ""), Path("rigid.yaml"))
+    short, full = simulate(case, mesh), simulate(case, mesh, skips=replace(NEEDED, unloaded=False))
+    assert told(short, "unloaded") == ["no stiffness of bottom"]
+    assert told(full, "unloaded") == []
+    for solution in (short, full):
+        assert solution.zones[0].multiplier == pytest.approx(PRESSURE, rel=1e-12)
+        assert max(solution.balance.values()) < 1e-13
+    assert np.abs(short.displacement - full.displacement).max() < 1e-15
+
+
+def test_on_a_rigid_body_a_gap_is_judged_by_the_stiffness_of_the_other():
+    case = load_case(CASES / "manufactured/quad4.yaml")
+    for skips in (NEEDED, replace(NEEDED, unloaded=False)):
+        assert 1e-14 < simulate(case, mesh_of(case), skips=skips).accuracy["gap"] < 1e-10
+
+
+def test_a_body_that_supports_move_keeps_its_stiffness(mesh):
+    """All nodes of the upper far block are given a displacement, zero only where it touches."""
+    moved = ("loads:", "  - {group: top_far, fix: {x: 0.0, y: 0.001*y}}\nloads:")
+    free = ("  - {group: symx_far, fix: [x]}\n", "  - {group: bottom_far, fix: [x]}\n")
+    found = solved(mesh, moved, free)
+    assert told(found, "unloaded") == ["left out, at rest without pressure: bottom_far"]
+    top = nodes_of(found, far=True) & (found.mesh.points[:, 1] > 0.1)
+    assert np.abs(found.stress[top]).max() > 1
 
 
 def test_a_body_outside_every_zone_is_solved_on_its_own(mesh):
