@@ -47,6 +47,17 @@ def write_text(path: str | Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
+def last_line(path: Path | None, most: int = 4096) -> str:
+    """The last line with any text among the `most` last bytes of a file; empty where none is."""
+    try:
+        with Path(path or os.devnull).open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - most))
+            lines = file.read().decode(errors="replace").split("\n")
+    except OSError:
+        return ""
+    return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+
 def seal(path: Path) -> None:
     """Append the hash of all that a file holds, for `is_sealed`."""
     mark = _SEAL % _digest(path, path.stat().st_size)

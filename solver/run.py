@@ -14,6 +14,7 @@ from solver.case import Case, check_mesh_file, load_case
 from solver.checks import CheckResult, run_checks
 from solver.clock import Clock
 from solver.errors import InputError, MachineError, SolveError, of_machine
+from solver.files import last_line
 from solver.memory import check_memory
 from solver.mesh import generate, read_mesh, transform
 from solver.norms import errors
@@ -131,7 +132,7 @@ def record_crash(
         case: Case | Path = load_case(job.case)
     except InputError:
         case = job.case
-    said = _last_line(log_file) if log_file else ""
+    said = last_line(log_file)
     if status:
         reason = _death(status) + (f"; last words: {said}" if said else "")
     else:
@@ -191,11 +192,3 @@ def _ending(error: Exception) -> tuple[str, str, bool]:
     if reason := of_machine(error):
         return REFUSED if isinstance(error, OSError) else CRASHED, reason, True
     return CRASHED, f"{type(error).__name__}: {' '.join(str(error).split())}", False
-
-
-def _last_line(path: Path) -> str:
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
-    except OSError:
-        return ""
-    return next((line.strip() for line in reversed(lines) if line.strip()), "")

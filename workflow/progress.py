@@ -6,7 +6,6 @@ file it is a line a minute.
 """
 
 import logging
-import os
 import shutil
 import time
 from collections.abc import Callable, Mapping
@@ -14,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, RLock, Thread
 from typing import Any, TextIO
+
+from solver.files import last_line
 
 # The rules that a run is about, by what one of their jobs is called.
 COUNTED = {
@@ -198,17 +199,6 @@ def hides(record: logging.LogRecord) -> bool:
     """Whether a record is of no use beside the progress."""
     event = str(getattr(record, "event", None) or "")
     return event in _EVENTS or record.getMessage().startswith(_CHATTER)
-
-
-def last_line(log: Path | None, most: int = 4096) -> str:
-    """The last line of a file that has any text; empty where there is none."""
-    try:
-        with Path(log or os.devnull).open("rb") as file:
-            file.seek(max(0, file.seek(0, os.SEEK_END) - most))
-            lines = file.read().decode(errors="replace").split("\n")
-    except OSError:
-        return ""
-    return next((line.strip() for line in reversed(lines) if line.strip()), "")
 
 
 def duration(seconds: float) -> str:

@@ -10,8 +10,9 @@ import sys
 
 import pytest
 
+from solver.files import last_line
 from tests.workflow.projects import new_project, snakemake
-from workflow.progress import Progress, State, duration, hides, last_line
+from workflow.progress import Progress, State, duration, hides
 
 
 class Time:
