@@ -20,7 +20,8 @@ def draw_plane(solution: Solution, title: str, magnified: float = 0.0) -> Markup
     The blocks are moved by their displacement, `magnified` so many times.
     """
     drawing = Drawing(WIDTH, HEIGHT, title)
-    _blocks(drawing, solution, (4, 10, 190, HEIGHT - 20), magnified)
+    room = 14 if magnified else 0
+    _blocks(drawing, solution, (4, 10, 190, HEIGHT - 20 - room), magnified)
     if magnified:
         drawing.text(6, HEIGHT - 4, f"displacement × {magnified:g}", color=MUTED)
     zones = solution.zones[:3]

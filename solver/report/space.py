@@ -33,7 +33,8 @@ def draw_space(solution: Solution, title: str, magnified: float = 0.0) -> Markup
     In the view points are moved by their displacement, `magnified` so many times.
     """
     drawing = Drawing(WIDTH, HEIGHT, title)
-    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24), magnified)
+    room = 10 if magnified else 0
+    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24 - room), magnified)
     if magnified:
         drawing.text(6, HEIGHT - 4, f"displacement × {magnified:g}", color=MUTED)
     if solution.zones:
