@@ -13,7 +13,7 @@ from scipy import sparse
 from solver.bodies import joined_bodies, whole_motions
 from solver.errors import SolveError
 from solver.linear.choice import Chosen, against_condensation
-from solver.linear.condensation import Constrained, condense, saddle_point
+from solver.linear.condensation import Condensed, Constrained, condense, saddle_point
 from solver.linear.direct import Factor
 from solver.linear.krylov import EPSILON
 from solver.linear.multigrid import Unknowns
@@ -116,11 +116,19 @@ class Systems:
         self._matrix, self._constraints, self._own = matrix, constraints, own
         self._unknowns, self._parts = unknowns, parts
         self._kept: dict[int, tuple[bytes, Constrained]] = {}
+        self._gave_up: dict[int, str] = {}
         self.latest: Constrained | None = None
 
     def forget(self) -> None:
         """Keep no factor."""
-        self._kept.clear()
+        for number in list(self._kept):
+            self._drop(number)
+
+    def _drop(self, number: int) -> None:
+        """Keep of a part's system only why multigrid gave up on it, if it did."""
+        system = self._kept.pop(number)[1]
+        if isinstance(system, Condensed):
+            self._gave_up[number] = system.factor.gave_up
 
     def closed(self, closed: np.ndarray) -> Constrained:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
@@ -140,11 +148,13 @@ class Systems:
         key = closed.tobytes()
         if number not in self._kept or self._kept[number][0] != key:
             # The factor before it gives its memory back first.
-            self._kept.pop(number, None)
-            self._kept[number] = key, self._factored(chosen, closed)
+            if number in self._kept:
+                self._drop(number)
+            gave_up = self._gave_up.get(number, "")
+            self._kept[number] = key, self._factored(chosen, closed, gave_up)
         return self._kept[number][1]
 
-    def _factored(self, chosen: np.ndarray | None, closed: np.ndarray) -> Constrained:
+    def _factored(self, chosen: np.ndarray | None, closed: np.ndarray, gave_up: str) -> Constrained:
         matrix, constraints = self._matrix, self._constraints[closed]
         own, unknowns = self._own, self._unknowns
         if chosen is not None:
@@ -157,7 +167,7 @@ class Systems:
                 return saddle_point(matrix, constraints, why, weighted=False)
             except SolveError:
                 pass  # pivots that no order of elimination avoids: condensation needs none of them
-        return condense(matrix, constraints, own, unknowns)
+        return condense(matrix, constraints, own, unknowns, gave_up)
 
 
 def _saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> Constrained:

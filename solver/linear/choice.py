@@ -36,11 +36,12 @@ class Chosen:
     """What solves one system, as often as wanted: `name`, and `why` it was chosen.
 
     Multigrid gives way to a factor once it does not converge: thin cells, nearly incompressible
-    material.
+    material. `gave_up` then says why; else it is empty.
     """
 
     def __init__(self, matrix: csr_matrix, dim: int, solver: Factor | Multigrid, why: str):
         self._matrix, self._dim, self._solver, self.why = matrix, dim, solver, why
+        self.gave_up = ""
 
     @property
     def name(self) -> str:
@@ -62,16 +63,17 @@ class Chosen:
         except SolveError as error:
             if not isinstance(self._solver, Multigrid):
                 raise
-            self.why = _instead(error)
+            self.why = self.gave_up = _instead(error)
             _LOG.info("%s", self.why)
         self._solver.close()
         self._solver = factorise(self._matrix, dim=self._dim)
         return self._solver.solve(right, accuracy)
 
 
-def prepare(matrix: csr_matrix, unknowns: Unknowns) -> Chosen:
+def prepare(matrix: csr_matrix, unknowns: Unknowns, gave_up: str = "") -> Chosen:
     """Make ready to solve with a symmetric positive definite `matrix` (n, n), both halves stored.
 
+    `gave_up`: why multigrid did for a matrix like it, and is not tried again; empty: it did not.
     Raises SolveError where the matrix is not positive definite or singular to working precision;
     a singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
     """
@@ -79,15 +81,17 @@ def prepare(matrix: csr_matrix, unknowns: Unknowns) -> Chosen:
     why = _against_multigrid(matrix.shape[0], unknowns) if kind == "auto" else "as asked for"
     by = MULTIGRID if kind == MULTIGRID or not why else "a factor"
     _LOG.info("linear system of %d unknowns, by %s", matrix.shape[0], by)
-    if by == MULTIGRID:
+    if by == MULTIGRID and not gave_up:
         least = multigrid_from(unknowns.quadratic)
         why = why or f"{least} unknowns or more in space: quicker and smaller than a factor"
         try:
             return Chosen(matrix, dim, Multigrid(matrix, unknowns), why)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
-            why = _instead(error)
-    return Chosen(matrix, dim, factorise(matrix, dim=dim), why)
+            gave_up = _instead(error)
+    chosen = Chosen(matrix, dim, factorise(matrix, dim=dim), gave_up or why)
+    chosen.gave_up = gave_up
+    return chosen
 
 
 def against_condensation(matrix: csr_matrix, constraints: csr_matrix, unknowns: Unknowns) -> str:

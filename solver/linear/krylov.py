@@ -23,9 +23,9 @@ def conjugate_gradients(
     """Solve for the columns of `right` (n, k) at once; return the solution and the iterations.
 
     `accuracy` is residual over right-hand side, in 2-norms. Raises SolveError where `most`
-    iterations do not reach it, or a third of them not a third of the digits. The flexible form
-    (Golub and Ye, SIAM J. Sci. Comput. 21 (1999) 1305): the preconditioner is rounded, so it is
-    linear only to single precision.
+    iterations do not reach it, or a third or two thirds of them not that part of the digits. The
+    flexible form (Golub and Ye, SIAM J. Sci. Comput. 21 (1999) 1305): the preconditioner is
+    rounded, so it is linear only to single precision.
     """
     solution, residual = np.zeros_like(right), right.copy()
     start = np.linalg.norm(right, axis=0)
@@ -33,8 +33,9 @@ def conjugate_gradients(
     direction = improved
     energy = np.sum(residual * improved, axis=0)
     iteration, reached = 0, float(start.any())
+    thirds = most // 3, 2 * most // 3, most
     while reached > accuracy:
-        if iteration == most or (iteration == most // 3 and reached > accuracy ** (1 / 3)):
+        if iteration in thirds and reached > accuracy ** (iteration / most):
             raise SolveError(
                 f"conjugate gradients leave a residual of {reached:.0e} in {iteration} iterations"
             )

@@ -14,6 +14,7 @@ from solver.linear.direct import standing_for_auto
 from solver.linear.krylov import ROUGH
 from solver.linear.multigrid import Multigrid, Unknowns
 from solver.mesh.catalogue import BY_NAME
+from solver.systems import Part, Systems
 from tests.scenes import grid
 
 
@@ -192,8 +193,33 @@ def test_a_factor_takes_over_where_multigrid_does_not_converge(options):
         chosen = choice.prepare(matrix, unknowns)
         assert "multigrid" in chosen.name
         np.testing.assert_allclose(chosen.solve(matrix @ exact), exact, rtol=1e-6)
-    assert "multigrid" not in chosen.name
-    assert "conjugate gradients leave a residual" in chosen.why
+        assert "multigrid" not in chosen.name
+        assert "conjugate gradients leave a residual" in chosen.why
+        again = choice.prepare(matrix, unknowns, chosen.gave_up)
+        assert (again.name, again.why) == (chosen.name, chosen.why)
+
+
+def test_multigrid_that_gave_up_is_not_tried_for_another_status(monkeypatch):
+    tried = []
+
+    def give_up(self, right, accuracy):
+        tried.append(self)
+        raise SolveError("conjugate gradients leave a residual of 1e-02 in 50 iterations")
+
+    monkeypatch.setattr(Multigrid, "solve", give_up)
+    matrix, unknowns = clamped(4)
+    n = matrix.shape[0]
+    rows = csr_matrix(([1.0, -1.0, 1.0, -1.0], ([0, 0, 1, 1], [0, 90, 3, 93])), shape=(2, n))
+    own = np.isin(np.arange(n), [0, 3])
+    parts = [Part(np.ones(n, dtype=bool), np.ones(2, dtype=bool))]
+    systems = Systems(matrix, rows, own, unknowns, parts)
+    with standing_for_auto("multigrid"):
+        for closed in ([True, True], [True, False], [False, False]):
+            system = systems.closed(np.array(closed))
+            change = system.correction(np.ones(n), np.zeros(sum(closed)))
+            left = np.ones(n) - matrix @ change
+            assert system.imbalance(left) < 1e-9
+    assert len(tried) == 1
 
 
 def test_free_body_is_refused():
