@@ -6,10 +6,10 @@ from solver.scaling.description import Point, Scaling
 _START = 5.0  # seconds: three interpreters, libraries loaded, small mesh
 # Wall seconds, meshing included: factor and power of the unknowns, by dimension and order.
 _COST = {
-    (2, 1): (4e-5, 1.0),
-    (2, 2): (4e-5, 1.0),
-    (3, 1): (4e-5, 1.1),
-    (3, 2): (6e-5, 1.1),
+    (2, 1): (2.8e-5, 1.0),
+    (2, 2): (2.8e-5, 1.0),
+    (3, 1): (2.5e-5, 1.1),
+    (3, 2): (5.5e-5, 1.1),
 }
 
 
