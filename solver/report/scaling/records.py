@@ -127,7 +127,7 @@ def _read(path: Path) -> Mapping[str, Any]:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return {"outcome": "crashed", "reason": "there is no record of this point"}
+        return {"outcome": "missing", "reason": "there is no record of this point"}
 
 
 def reached(scaling: Scaling, lines: Sequence[Line]) -> list[Reached]:
