@@ -134,6 +134,8 @@ def _load() -> ctypes.CDLL | None:
         try:
             library = ctypes.CDLL(str(path))
             library.MKL_Set_Interface_Layer(0)  # 32-bit integers, whatever the environment says
+            # Intel's threads, also where gmsh has brought GNU's: with these the last digits differ.
+            library.MKL_Set_Threading_Layer(0)
         except (OSError, AttributeError):
             continue
         library.pardiso.restype = None

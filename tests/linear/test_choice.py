@@ -1,5 +1,7 @@
 """Which way a constrained system is solved, and that every way gives the same answer."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -68,3 +70,20 @@ def test_without_pardiso_all_is_condensed(monkeypatch):
     monkeypatch.setitem(BACKENDS, "pardiso", missing)
     matrix, constraints = chain_over_floor(1200)
     assert not against_condensation(matrix, constraints, stands_for(matrix))
+
+
+@needs_pardiso
+@pytest.mark.parametrize("before", ["", "import gmsh"])
+def test_pardiso_has_the_same_threads_whatever_was_loaded_before(before):
+    """Else the last digits of a result depend on whether its mesh was made in the same process."""
+    script = f"""{before}
+import numpy as np
+from scipy.sparse import csr_matrix
+from solver.linear.pardiso import Pardiso
+Pardiso(csr_matrix(np.eye(3))).solve(np.ones((3, 1)))
+print(open("/proc/self/maps").read())
+"""
+    command = [sys.executable, "-c", script]
+    loaded = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "libmkl_intel_thread" in loaded
+    assert "libmkl_gnu_thread" not in loaded
