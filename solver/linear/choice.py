@@ -18,7 +18,7 @@ MULTIGRID = "multigrid"
 # whether PARDISO makes the factor, whether cells are quadratic, which takes twice the iterations.
 _MULTIGRID_FROM = {
     (True, False): 80_000,
-    (True, True): 150_000,
+    (True, True): 200_000,
     (False, False): 20_000,
     (False, True): 100_000,
 }
