@@ -43,7 +43,7 @@ class Target:
 
 
 SOLVER = [*PYTHON, "solver"]
-SOLVE = ["--mesh", f"{FOLDER}/mesh.vtkhdf", "-o", f"{FOLDER}/result.vtkhdf"]
+SOLVE = ["--mesh", f"{FOLDER}/mesh.vtkhdf", "--verbose", "-o", f"{FOLDER}/result.vtkhdf"]
 TARGETS = {
     "mesh": Target(
         [*SOLVER, "mesh", CASE, "-o", f"{FOLDER}/mesh.vtkhdf"], ("tiny/tiny-a/mesh.vtkhdf",)

@@ -101,7 +101,9 @@ def test_the_studies_are_those_of_the_project():
 
 def run_lines(project, lines, page):
     """The statuses of shell lines; those of the installation find everything there."""
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST")}
+    # Tests run by make: its level would make it tell the folders that it enters.
+    left_out = ("PYTEST", "MAKELEVEL")
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(left_out)}
     environment |= {"MAKEFLAGS": "INSTALL=:", "GITHUB_STEP_SUMMARY": str(page)}
     return [
         subprocess.run(["bash", "-ec", line], cwd=project, env=environment).returncode
