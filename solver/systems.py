@@ -12,7 +12,7 @@ from scipy import sparse
 
 from solver.bodies import joined_bodies, whole_motions
 from solver.errors import SolveError
-from solver.linear.choice import Chosen, against_condensation
+from solver.linear.choice import Chosen, against_condensation, against_multigrid
 from solver.linear.condensation import Condensed, Constrained, condense, saddle_point
 from solver.linear.direct import Factor
 from solver.linear.krylov import EPSILON
@@ -127,7 +127,7 @@ class Systems:
     def _drop(self, number: int) -> None:
         """Keep of a part's system only why multigrid gave up on it, if it did."""
         system = self._kept.pop(number)[1]
-        if isinstance(system, Condensed):
+        if isinstance(system, Condensed) and system.factor.gave_up:
             self._gave_up[number] = system.factor.gave_up
 
     def closed(self, closed: np.ndarray) -> Constrained:
@@ -162,12 +162,13 @@ class Systems:
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
             return _saddle_point(matrix, constraints)
-        if why := against_condensation(matrix, constraints, unknowns):
+        against = gave_up or against_multigrid(matrix, unknowns)
+        if against and (why := against_condensation(matrix, constraints)):
             try:
                 return saddle_point(matrix, constraints, why, weighted=False)
             except SolveError:
                 pass  # pivots that no order of elimination avoids: condensation needs none of them
-        return condense(matrix, constraints, own, unknowns, gave_up)
+        return condense(matrix, constraints, own, unknowns, against)
 
 
 def _saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> Constrained:

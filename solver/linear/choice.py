@@ -4,6 +4,7 @@ import logging
 
 import numpy as np
 from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from solver.errors import SolveError
 from solver.linear.backends import BACKENDS
@@ -14,6 +15,7 @@ from solver.linear.multigrid import Multigrid, Unknowns
 _LOG = logging.getLogger(__name__)
 
 MULTIGRID = "multigrid"
+_ASKED = "as asked for"
 # Unknowns in space from which multigrid takes less time than a factor, and half the memory or less:
 # whether PARDISO makes the factor, whether cells are quadratic, which takes twice the iterations.
 _MULTIGRID_FROM = {
@@ -22,6 +24,9 @@ _MULTIGRID_FROM = {
     (False, False): 20_000,
     (False, True): 100_000,
 }
+# Mean front of two cubes, one on the other, over the power 2/3 of their nodes: the sizes above are
+# of such. Flat and slender bodies, which multigrid finds hard, have fronts of less than half that.
+_FRONT, _FLAT = 0.85, 0.5
 # From as many entries more than the matrix has, condensing is slower than a saddle point; a few
 # (the second figure) take no time.
 _FILL, _LEAST_FILL = 1.0, 1_000_000
@@ -70,53 +75,79 @@ class Chosen:
         return self._solver.solve(right, accuracy)
 
 
-def prepare(matrix: csr_matrix, unknowns: Unknowns, gave_up: str = "") -> Chosen:
+def prepare(matrix: csr_matrix, unknowns: Unknowns, against: str | None = None) -> Chosen:
     """Make ready to solve with a symmetric positive definite `matrix` (n, n), both halves stored.
 
-    `gave_up`: why multigrid did for a matrix like it, and is not tried again; empty: it did not.
-    Raises SolveError where the matrix is not positive definite or singular to working precision;
-    a singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
+    `against`: why multigrid is not tried, as it gave up on a matrix like it; empty: it is; None: as
+    `against_multigrid` has it. Raises SolveError where the matrix is not positive definite or
+    singular to working precision; a singular matrix that multigrid solves for a consistent
+    right-hand side goes unnoticed.
     """
-    dim, kind = unknowns.dim, wanted()
-    why = _against_multigrid(matrix.shape[0], unknowns) if kind == "auto" else "as asked for"
-    by = MULTIGRID if kind == MULTIGRID or not why else "a factor"
+    dim = unknowns.dim
+    if against is None:
+        against = against_multigrid(matrix, unknowns)
+    by = "a factor" if against else MULTIGRID
     _LOG.info("linear system of %d unknowns, by %s", matrix.shape[0], by)
-    if by == MULTIGRID and not gave_up:
+    gave_up = ""
+    if not against:
         least = multigrid_from(unknowns.quadratic)
-        why = why or f"{least} unknowns or more in space: quicker and smaller than a factor"
+        why = f"{least} unknowns or more in space: quicker and smaller than a factor"
         try:
-            return Chosen(matrix, dim, Multigrid(matrix, unknowns), why)
+            solver = Multigrid(matrix, unknowns)
+            return Chosen(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
-            gave_up = _instead(error)
-    chosen = Chosen(matrix, dim, factorise(matrix, dim=dim), gave_up or why)
+            against = gave_up = _instead(error)
+    chosen = Chosen(matrix, dim, factorise(matrix, dim=dim), against)
     chosen.gave_up = gave_up
     return chosen
 
 
-def against_condensation(matrix: csr_matrix, constraints: csr_matrix, unknowns: Unknowns) -> str:
-    """Why `matrix` (n, n) had better not be condensed by `constraints` (m, n); empty else.
+def against_multigrid(matrix: csr_matrix, unknowns: Unknowns) -> str:
+    """Why a system with the stiffness `matrix` (n, n) is factored; empty where it is not."""
+    if wanted() != "auto":
+        return "" if wanted() == MULTIGRID else _ASKED
+    least = multigrid_from(unknowns.quadratic)
+    if unknowns.dim == 2:
+        return "in the plane a factor is small"
+    if matrix.shape[0] < least:
+        return f"fewer than {least} unknowns: a factor is quicker than multigrid"
+    if _front(matrix, unknowns.node) < _FLAT * _FRONT * (least / unknowns.dim) ** (2 / 3):
+        return f"flat or slender bodies: a factor is as small as for fewer than {least} unknowns"
+    return ""
 
-    A constraint over w unknowns leaves a block of w² entries in the condensed system. Only PARDISO
-    factors saddle points in space well, and only multigrid large systems.
+
+def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
+    """Why `matrix` (n, n) had better not be condensed by `constraints` (m, n), but factored.
+
+    Empty where it had. A constraint over w unknowns leaves a block of w² entries in the condensed
+    system. Only PARDISO factors saddle points in space well.
     """
     widths = np.diff(constraints.indptr).astype(float)
     filled = float((widths**2).sum())
     few = filled <= max(_FILL * matrix.nnz, _LEAST_FILL)
-    large = unknowns.dim == 3 and matrix.shape[0] >= multigrid_from(unknowns.quadratic)
-    if few or large or wanted() != "auto" or not BACKENDS["pardiso"].available():
+    if few or wanted() != "auto" or not BACKENDS["pardiso"].available():
         return ""
     return f"a condensed system would fill in: one constraint holds {widths.max():.0f} unknowns"
 
 
-def _against_multigrid(size: int, unknowns: Unknowns) -> str:
-    """Why a system of `size` unknowns is factored; empty where it is not."""
-    least = multigrid_from(unknowns.quadratic)
-    if unknowns.dim == 2:
-        return "in the plane a factor is small"
-    if size < least:
-        return f"fewer than {least} unknowns: a factor is quicker than multigrid"
-    return ""
+def _front(matrix: csr_matrix, node: np.ndarray) -> float:
+    """Mean front of a factor, in nodes, when these are numbered by reverse Cuthill and McKee.
+
+    A bound of what a factor costs (George, Liu, Computer Solution of Large Sparse Positive Definite
+    Systems, 1981, ch. 4). `node` (n,): the node of each unknown.
+    """
+    _, first, number = np.unique(node, return_index=True, return_inverse=True)
+    of_nodes = matrix[first]
+    size = len(first)
+    graph = csr_matrix(
+        (np.ones(of_nodes.nnz, dtype=np.int8), number[of_nodes.indices], of_nodes.indptr),
+        shape=(size, size),
+    )
+    rank = np.empty(size, dtype=int)
+    rank[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(size)
+    lowest = np.minimum.reduceat(rank[graph.indices], graph.indptr[:-1])
+    return float((rank - lowest).mean())
 
 
 def _instead(error: SolveError) -> str:

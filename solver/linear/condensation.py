@@ -178,12 +178,12 @@ def condense(
     constraints: sparse.csr_matrix,
     own: np.ndarray,
     unknowns: Unknowns,
-    gave_up: str = "",
+    against: str | None = None,
 ) -> Condensed:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
-    `own` (n,) marks what may be eliminated, `unknowns` tells what each is, `gave_up` why multigrid
-    is not tried.
+    `own` (n,) marks what may be eliminated, `unknowns` tells what each is, `against` why multigrid
+    is not tried (see `prepare`).
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
@@ -203,7 +203,7 @@ def condense(
         pulled = (coupling[:, kept_columns].T @ follow).tocsr()
         added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
         matrix = (matrix[kept_columns][:, kept_columns] + added).tocsr()
-    factor = prepare(matrix, unknowns.of(kept_columns), gave_up)
+    factor = prepare(matrix, unknowns.of(kept_columns), against)
     return Condensed(expansion, pivot, coefficient, factor, coupling)
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from solver.linear import choice
 from solver.linear.backends import BACKENDS
 from solver.linear.choice import against_condensation
 from solver.linear.condensation import condense, saddle_point
@@ -50,26 +49,24 @@ def test_a_saddle_point_and_the_condensed_system_agree(weighted):
 
 
 @needs_pardiso
-def test_wide_constraints_are_not_condensed(monkeypatch):
+def test_wide_constraints_are_not_condensed():
     matrix, constraints = chain_over_floor(1200)
-    why = against_condensation(matrix, constraints, stands_for(matrix))
+    why = against_condensation(matrix, constraints)
     assert why == "a condensed system would fill in: one constraint holds 1201 unknowns"
     with standing_for_auto("cholmod"):
-        assert not against_condensation(matrix, constraints, stands_for(matrix))
-    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: 1201)
-    assert not against_condensation(matrix, constraints, stands_for(matrix))
+        assert not against_condensation(matrix, constraints)
 
 
 def test_narrow_constraints_are_condensed():
     matrix, constraints = chain_over_floor(900)
-    assert not against_condensation(matrix, constraints, stands_for(matrix))
+    assert not against_condensation(matrix, constraints)
 
 
 def test_without_pardiso_all_is_condensed(monkeypatch):
     missing = replace(BACKENDS["pardiso"], available=lambda: False)
     monkeypatch.setitem(BACKENDS, "pardiso", missing)
     matrix, constraints = chain_over_floor(1200)
-    assert not against_condensation(matrix, constraints, stands_for(matrix))
+    assert not against_condensation(matrix, constraints)
 
 
 @needs_pardiso

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse import block_diag, csr_matrix, eye
+from scipy.sparse import block_diag, csr_matrix, diags, eye, kron
 
 from solver.elasticity import Block, lame_parameters, stiffness
 from solver.errors import SolveError
@@ -160,6 +160,19 @@ def test_choice_by_size_and_dimension(monkeypatch):
     small = choice.prepare(matrix, unknowns)
     assert "multigrid" not in small.name
     assert "fewer than" in small.why
+
+
+def test_a_slender_body_is_factored_whatever_its_size(monkeypatch):
+    count = 100  # nodes in a row, each beside two others: a front of one node
+    row = diags([-1.0, 4.0, -1.0], [-1, 0, 1], shape=(count, count))
+    matrix = csr_matrix(kron(row, np.eye(3)))
+    node = np.repeat(np.arange(count), 3)
+    unknowns = Unknowns(3, node, np.ones((3 * count, 6)), np.zeros(3 * count, dtype=int))
+    assert choice._front(matrix, node) == pytest.approx((count - 1) / count)
+    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: 3 * count)
+    chosen = choice.prepare(matrix, unknowns)
+    assert "multigrid" not in chosen.name
+    assert "flat or slender" in chosen.why
 
 
 def test_quadratic_cells_and_pardiso_put_multigrid_off(monkeypatch):
