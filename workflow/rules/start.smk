@@ -166,7 +166,8 @@ onstart:
             keep_warm()
 
 
-if workflow.is_main_process and not workflow.dryrun:
+# A dry run as well: else it would not tell what is due again.
+if workflow.is_main_process:
     check_writable()
     LOCK = take_lock()
     survive_termination()
