@@ -101,12 +101,13 @@ def draw_level(
     label: str,
     color: str,
     dashes: tuple[float, ...] = (),
+    lowered: float = 0.0,
 ) -> None:
-    """A line across the plot at a value, its label on the right of it."""
+    """A line across the plot at a value, its label on the right of it, `lowered` by some pixels."""
     at = float(y(value))
     dashed: dict[str, Style] = {"stroke_dasharray": dashes} if dashes else {}
     drawing.line(x.start, at, x.end, at, stroke=color, stroke_width=1.2, **dashed)
-    drawing.text(x.end + 8, at + 4, label, color=color)
+    drawing.text(x.end + 8, at + 4 + lowered, label, color=color)
 
 
 def round_off(unknowns: int) -> tuple[float, float]:

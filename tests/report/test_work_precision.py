@@ -272,6 +272,15 @@ def draw(study, results):
     return [ET.tostring(part, encoding="unicode") for part in ET.fromstring(drawing)]
 
 
+@pytest.mark.parametrize("uncertainty", [LIMIT / 1.1, LIMIT, LIMIT * 1.1, LIMIT * 100])
+def test_labels_at_the_right_keep_apart(panel, monkeypatch, uncertainty):
+    monkeypatch.setattr(Panel, "uncertainty", uncertainty)
+    drawing = ET.fromstring(draw_figure(panel, Looks(panel.lines)))
+    texts = {"".join(t.itertext()): float(t.get("y")) for t in drawing.iter() if t.get("y")}
+    limit, reference = texts["0.1 %"], texts["reference ±"]
+    assert abs(limit - reference) >= 12
+
+
 def test_no_two_treatments_look_alike(panel):
     looks = Looks(panel.lines)
     keys = set()

@@ -1,5 +1,6 @@
 """The figure of a panel: log–log error against time, a plot for each pair, a line per treatment."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,8 +20,8 @@ from solver.report.svg import INK, MUTED, RED, Drawing, Style
 from solver.report.work_precision.records import ERRORS, Line, Measured, Panel, shown
 
 PLOT, HEIGHT, LEFT, RIGHT, APART = 268, 340, 58, 112, 14
-# A row of the legend, and about the width of a letter in it.
-_ROW, _LETTER = 18, 5.5
+# A row of the legend, about the width of a letter in it, the height of a label.
+_ROW, _LETTER, _LABEL = 18, 5.5, 13
 # The strip under a plot that does not reach down to round-off.
 _STRIP = 16
 _BOTTOM = HEIGHT - 48
@@ -99,7 +100,10 @@ def draw_figure(panel: Panel, looks: Looks) -> Markup:
         draw_level(drawing, x, y, LIMIT, "0.1 %" if last else "", RED)
         if panel.uncertainty:
             label = "reference ±" if last else ""
-            draw_level(drawing, x, y, panel.uncertainty, label, MUTED, (6, 4))
+            # Its label keeps off that of the limit.
+            below = float(y(panel.uncertainty) - y(LIMIT))
+            lowered = math.copysign(max(0.0, _LABEL - abs(below)), below)
+            draw_level(drawing, x, y, panel.uncertainty, label, MUTED, (6, 4), lowered)
         drawing.text(start + PLOT, 14, pair, "end", color=INK, weight="bold")
         for line in panel.lines:
             if line.pair == pair:
