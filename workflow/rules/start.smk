@@ -162,7 +162,9 @@ onstart:
         # Each look for jobs to start sets a timer for another one, so that there are ever more.
         workflow.scheduler.job_rate_limiter = None
         # Elsewhere the system's own libraries start threads, and forks may hang.
-        if sys.platform == "linux" and any(map(is_warm, workflow.dag.needrun_jobs())):
+        if sys.platform == "linux" and any(
+            map(is_warm, workflow.dag.needrun_jobs())
+        ):
             keep_warm()
 
 
