@@ -60,11 +60,10 @@ def unsupported(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> sparse.
     return (motions @ sparse.csr_matrix(chosen)).tocsr()
 
 
-def body_of_unknowns(basis: sparse.csr_matrix, body: np.ndarray) -> np.ndarray:
-    """The body (n_free,) of each free unknown; `basis` (n_dofs, n_free), `body` (n_nodes,)."""
+def nodes_of_unknowns(basis: sparse.csr_matrix, dim: int) -> np.ndarray:
+    """The node (n_free,) of each free unknown; `basis` (dim · n_nodes, n_free)."""
     columns = basis.tocsc()
-    dim = basis.shape[0] // len(body)
-    return body[columns.indices[columns.indptr[:-1]] // dim]
+    return columns.indices[columns.indptr[:-1]] // dim
 
 
 def joined_bodies(gaps: sparse.csr_matrix, bodies: np.ndarray, n_bodies: int) -> np.ndarray:

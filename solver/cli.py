@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from solver.benchmark import commands as benchmark
 from solver.errors import InputError, SolveError, of_machine
-from solver.options import add_threads, limit_threads
+from solver.options import add_command, add_threads, limit_threads
 from solver.scaling import commands as scaling
 from solver.stability import commands as stability
 from solver.study import commands as study
@@ -68,11 +68,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.set_defaults(threads=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
-    command = _add(commands, "mesh", _mesh, "write the mesh of a case, its transform applied")
+    command = add_command(
+        commands, "mesh", _mesh, "write the mesh of a case, its transform applied"
+    )
     command.add_argument("case", type=Path, metavar="CASE.yaml")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="MESH")
 
-    command = _add(commands, "solve", _solve, "solve a case, check it and write the result")
+    command = add_command(commands, "solve", _solve, "solve a case, check it and write the result")
     _add_job(command)
     command.add_argument("-o", "--output", type=Path, required=True, metavar="RESULT.vtkhdf")
     command.add_argument("--verdict", type=Path, metavar="VERDICT.json", help="written in any case")
@@ -86,17 +88,17 @@ def _parser() -> argparse.ArgumentParser:
         "--no-memory-check", action="store_true", help="start even where memory cannot suffice"
     )
 
-    command = _add(commands, "crashed", _crashed, "write the verdict of a solve that died")
+    command = add_command(commands, "crashed", _crashed, "write the verdict of a solve that died")
     _add_job(command)
     command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
     command.add_argument("--log", type=Path, help="its last line tells the reason")
     command.add_argument("--status", type=int, metavar="N", help="its exit status")
 
-    command = _add(commands, "check", _check, "run the checks of stored results again")
+    command = add_command(commands, "check", _check, "run the checks of stored results again")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
     command.add_argument("--json", action="store_true", help="print a list of verdicts")
 
-    command = _add(commands, "report", _report, "write the report of many verdicts")
+    command = add_command(commands, "report", _report, "write the report of many verdicts")
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
@@ -108,18 +110,18 @@ def _parser() -> argparse.ArgumentParser:
         help="what families are about; default: those in cases/",
     )
 
-    command = _add(commands, "gallery", _gallery, "draw results with PyVista, on a page")
+    command = add_command(commands, "gallery", _gallery, "draw results with PyVista, on a page")
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
     command.add_argument("--plain", action="store_true", help="without PyVista and OpenGL")
 
-    command = _add(commands, "compare", _compare, "say what is new since another batch")
+    command = add_command(commands, "compare", _compare, "say what is new since another batch")
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
-    command = _add(commands, "orders", _orders, "write the page of orders of convergence")
+    command = add_command(commands, "orders", _orders, "write the page of orders of convergence")
     command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
     command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the levels")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
@@ -129,29 +131,24 @@ def _parser() -> argparse.ArgumentParser:
     command = commands.add_parser("scaling", help="growth with size: points and their page")
     scaling.add_commands(command)
     benchmark.add_commands(commands)
-    stability.add_commands(partial(_add, commands))
+    stability.add_commands(commands)
 
-    command = _add(commands, "validate", _validate, "say whether case files are valid")
+    command = add_command(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
     command.add_argument("--mesh", action="store_true", help="mesh them too and check the groups")
 
-    command = _add(commands, "new", _new, "write a commented case file to start from")
+    command = add_command(commands, "new", _new, "write a commented case file to start from")
     command.add_argument("name", nargs="?", metavar="NAME", help="default: as FILE")
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: NAME.yaml")
 
-    command = _add(commands, "accept", _accept, "take results as the accepted values")
+    command = add_command(commands, "accept", _accept, "take results as the accepted values")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
 
-    command = _add(commands, "serve", _serve, "stay warm and fork for each command of a batch")
+    command = add_command(
+        commands, "serve", _serve, "stay warm and fork for each command of a batch"
+    )
     command.add_argument("socket", type=int, metavar="FD", help="an open socket that listens")
     return parser
-
-
-def _add(commands: Any, name: str, run: Command, purpose: str) -> argparse.ArgumentParser:
-    text = f"{purpose[0].upper()}{purpose[1:]}."
-    command = commands.add_parser(name, help=purpose, description=text)
-    command.set_defaults(run=run)
-    return command
 
 
 def _add_job(command: argparse.ArgumentParser) -> None:

@@ -1,10 +1,12 @@
 """The cures against lost digits, each with a switch for the map of numerical stability."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+
+from solver.switches import Switches
 
 
 @dataclass(frozen=True)
-class Cures:
+class Cures(Switches):
     """What the solver does to keep its digits: all of it unless a sweep turns something off.
 
     local_coordinates: points are counted from the middle of the mesh.
@@ -28,11 +30,6 @@ class Cures:
     remainder: bool = True
     mixed: bool = True
     extended: bool = True
-
-    @classmethod
-    def none(cls) -> "Cures":
-        """A plain implementation."""
-        return cls(**{field.name: False for field in fields(cls)})
 
 
 ALL = Cures()

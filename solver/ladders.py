@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from solver.errors import InputError
+from solver.descriptions import file_beside
 from solver.schemas import LADDERS_SCHEMA
 from solver.solution import job_name
 from solver.strict_yaml import read_mapping
@@ -103,11 +103,8 @@ def read_ladders(path: Path) -> Family:
 
 def _ladder(path: Path, content: Mapping[str, Any], index: int) -> Ladder:
     item = content["ladders"][index]
-    case = path.parent / item["case"]
-    if not case.is_file():
-        raise InputError(path, f"ladders[{index}].case", item["case"], "no such file")
     return Ladder(
-        case=case,
+        case=file_beside(path, f"ladders[{index}].case", item["case"]),
         levels=tuple(item.get("levels", content["levels"])),
         problem=item.get("problem", ""),
         label=item.get("label", ""),

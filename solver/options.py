@@ -1,9 +1,22 @@
-"""The number of threads, an option of several commands."""
+"""What several commands of the program have in common."""
 
 import argparse
 import os
+from collections.abc import Callable
+from typing import Any
 
-_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""The variables that tell the libraries how many threads to use."""
+
+
+def add_command(
+    commands: Any, name: str, run: Callable[[argparse.Namespace], int], purpose: str
+) -> argparse.ArgumentParser:
+    """Add a command by its name, what runs it, and its purpose in words."""
+    text = f"{purpose[0].upper()}{purpose[1:]}."
+    command: argparse.ArgumentParser = commands.add_parser(name, help=purpose, description=text)
+    command.set_defaults(run=run)
+    return command
 
 
 def add_threads(command: argparse.ArgumentParser) -> None:
@@ -13,5 +26,5 @@ def add_threads(command: argparse.ArgumentParser) -> None:
 
 def limit_threads(number: int) -> None:
     """Tell the libraries, which read it when they are loaded; the environment comes first."""
-    for variable in _VARIABLES:
+    for variable in THREADS:
         os.environ.setdefault(variable, str(number))

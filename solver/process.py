@@ -11,16 +11,15 @@ from pathlib import Path
 from threading import Event, Timer
 
 from solver.clock import now
-
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+from solver.options import THREADS
 
 
 @dataclass(frozen=True)
 class Ended:
     """How a process ended: exit status (negative: by that signal), None where it was stopped.
 
-    `output` is what it printed; wall and processor seconds of it and its children, and the largest
-    resident memory of any of them, MB.
+    That is after `limit` seconds. `output` is what it printed; wall and processor seconds of it and
+    its children, and the largest resident memory of any of them, MB.
     """
 
     status: int | None
@@ -28,6 +27,7 @@ class Ended:
     wall: float
     cpu: float
     peak_memory_mb: float
+    limit: float
 
     @property
     def used(self) -> dict[str, float]:
@@ -36,7 +36,9 @@ class Ended:
 
     @property
     def reason(self) -> str:
-        """How it died and its last words; for a process that did."""
+        """How it died and its last words, or that it was stopped; not for one that ended well."""
+        if self.status is None:
+            return f"no end within {self.limit:g} s"
         lines = [line for line in self.output.splitlines() if line.strip()]
         last = lines[-1].strip() if lines else "no word"
         return f"the process died with exit status {self.status}: {last}"
@@ -111,4 +113,4 @@ def run_apart(
         text = output.read().decode(errors="replace")
     cpu = used.ru_utime + used.ru_stime
     ending = None if over.is_set() else process.returncode
-    return Ended(ending, text, wall, cpu, used.ru_maxrss / 1024)
+    return Ended(ending, text, wall, cpu, used.ru_maxrss / 1024, limit)

@@ -1,10 +1,12 @@
 """What a solve leaves out where its scene does not need it, each with a switch."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+
+from solver.switches import Switches
 
 
 @dataclass(frozen=True)
-class Skips:
+class Skips(Switches):
     """What changes arithmetic, but, to round-off, no result: all of it is left out as a rule.
 
     cut: cells whose slave faces own an inner node are not cut.
@@ -26,12 +28,8 @@ class Skips:
     unloaded: bool = True
     apart: bool = True
 
-    @classmethod
-    def none(cls) -> "Skips":
-        """Everything is done, needed or not."""
-        return cls(**{field.name: False for field in fields(cls)})
-
 
 NEEDED = Skips()
 """Only what is needed is done."""
 EVERYTHING = Skips.none()
+"""All is done, needed or not."""

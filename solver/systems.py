@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from solver.bodies import joined_bodies, whole_motions
+from solver.bodies import joined_bodies, nodes_of_unknowns, whole_motions
 from solver.errors import SolveError
 from solver.linear.choice import Chosen, against_condensation, against_multigrid
 from solver.linear.condensation import Condensed, Constrained, condense, saddle_point
@@ -32,8 +32,8 @@ class Part:
 
 def unknowns_of(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
     """What the free unknowns of a scene stand for, given the rigid motions of its bodies."""
-    basis, dim = scene.free.basis.tocsc(), scene.points.shape[1]
-    node = basis.indices[basis.indptr[:-1]] // dim
+    basis, dim = scene.free.basis, scene.points.shape[1]
+    node = nodes_of_unknowns(basis, dim)
     together = basis.T @ whole_motions(motions, len(scene.asleep))
     quadratic = any(block.type.order == 2 for block in scene.blocks)
     return Unknowns(dim, node, together, scene.body[node], quadratic)
@@ -116,7 +116,7 @@ class Systems:
         self._matrix, self._constraints, self._own = matrix, constraints, own
         self._unknowns, self._parts = unknowns, parts
         self._kept: dict[int, tuple[bytes, Constrained]] = {}
-        self._gave_up: dict[int, str] = {}
+        self._against: dict[int, str] = {}
         self.latest: Constrained | None = None
 
     def forget(self) -> None:
@@ -128,7 +128,7 @@ class Systems:
         """Keep of a part's system only why multigrid gave up on it, if it did."""
         system = self._kept.pop(number)[1]
         if isinstance(system, Condensed) and system.factor.gave_up:
-            self._gave_up[number] = system.factor.gave_up
+            self._against[number] = system.factor.gave_up
 
     def closed(self, closed: np.ndarray) -> Constrained:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
@@ -150,11 +150,10 @@ class Systems:
             # The factor before it gives its memory back first.
             if number in self._kept:
                 self._drop(number)
-            gave_up = self._gave_up.get(number, "")
-            self._kept[number] = key, self._factored(chosen, closed, gave_up)
+            self._kept[number] = key, self._factored(number, chosen, closed)
         return self._kept[number][1]
 
-    def _factored(self, chosen: np.ndarray | None, closed: np.ndarray, gave_up: str) -> Constrained:
+    def _factored(self, number: int, chosen: np.ndarray | None, closed: np.ndarray) -> Constrained:
         matrix, constraints = self._matrix, self._constraints[closed]
         own, unknowns = self._own, self._unknowns
         if chosen is not None:
@@ -162,7 +161,9 @@ class Systems:
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
             return _saddle_point(matrix, constraints)
-        against = gave_up or against_multigrid(matrix, unknowns)
+        if number not in self._against:
+            self._against[number] = against_multigrid(matrix, unknowns)
+        against = self._against[number]
         if against and (why := against_condensation(matrix, constraints)):
             try:
                 return saddle_point(matrix, constraints, why, weighted=False)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
-from solver.bodies import body_of_unknowns, joined_bodies, rigid_motions, unheld_motion
+from solver.bodies import joined_bodies, nodes_of_unknowns, rigid_motions, unheld_motion
 from solver.scene import Scene
 from solver.supports import FreeMotion
 
@@ -25,7 +25,7 @@ def without_unloaded(scene: Scene) -> Scene:
     """
     gaps, free = _gaps(scene), scene.free
     acting = (gaps @ free.basis).tocsr()
-    bodies = body_of_unknowns(free.basis, scene.body)
+    bodies = scene.body[nodes_of_unknowns(free.basis, scene.points.shape[1])]
     asleep, held = _unloaded(scene, gaps, acting, bodies)
     if asleep.any() and _moves_freely(scene, gaps):
         asleep[:] = False

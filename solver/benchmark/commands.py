@@ -6,25 +6,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from solver.options import add_command
 from solver.scaling import FULL, QUICK
 
 
 def add_commands(commands: Any) -> None:
     """Add both commands to those of the program."""
-    command = _add(commands, "benchmark", _benchmark, "measure ratios side by side")
+    command = add_command(commands, "benchmark", _benchmark, "measure ratios side by side")
     command.add_argument("benchmark", type=Path, metavar="BENCHMARK.yaml")
     command.add_argument("--quick", action="store_true", help="on tiny meshes, for a first look")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="RECORD.json")
 
-    command = _add(commands, "savings", _savings, "measure what each line of a plan saves")
+    command = add_command(commands, "savings", _savings, "measure what each line of a plan saves")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="SAVINGS.json")
-
-
-def _add(commands: Any, name: str, run: Any, purpose: str) -> argparse.ArgumentParser:
-    command = commands.add_parser(name, help=purpose, description=f"{purpose.capitalize()}.")
-    command.set_defaults(run=run)
-    return command
 
 
 def _benchmark(options: argparse.Namespace) -> int:

@@ -29,10 +29,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from solver.errors import InputError
+from solver.descriptions import file_beside, refuse_unknown
 from solver.scaling import QUICK
 from solver.scaling.description import Point, Scaling, Series, read_scaling
-from solver.schemas import BENCHMARK_SCHEMA, hint
+from solver.schemas import BENCHMARK_SCHEMA
 from solver.strict_yaml import read_mapping
 
 
@@ -90,9 +90,7 @@ def read_benchmark(path: Path, size: str) -> Benchmark:
     known = {series.name: series for series in scaling.series}
 
     def find(item: Mapping[str, Any], key: str, sizes: Sequence[int]) -> Series:
-        if item["series"] not in known:
-            allowed = f"there is no such series; {hint(item['series'], known)}"
-            raise InputError(path, f"{key}.series", item["series"], allowed)
+        refuse_unknown(path, f"{key}.series", item["series"], "series", known)
         return replace(known[item["series"]], sizes=tuple(sizes))
 
     comparisons = []
@@ -120,8 +118,7 @@ def read_benchmark(path: Path, size: str) -> Benchmark:
 
 
 def _batch(path: Path, item: Mapping[str, Any]) -> Batch:
-    cases = tuple(path.parent / case for case in item["cases"])
-    for i, case in enumerate(cases):
-        if not case.is_file():
-            raise InputError(path, f"batch.cases[{i}]", item["cases"][i], "no such file")
+    cases = tuple(
+        file_beside(path, f"batch.cases[{i}]", case) for i, case in enumerate(item["cases"])
+    )
     return Batch(item["title"], float(item["most"]), cases)

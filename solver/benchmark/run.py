@@ -39,8 +39,7 @@ class Bench:
         done = run_apart(command, self.cores, self.limit)
         if done.status == 0:
             return json.loads(output.read_text(encoding="utf-8"))
-        told = f"no end within {self.limit:g} s" if done.status is None else done.reason
-        return {"outcome": "crashed", "reason": told}
+        return {"outcome": "crashed", "reason": done.reason}
 
     def command(self, *arguments: object) -> Record:
         """What a command of the program took."""

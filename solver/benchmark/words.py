@@ -4,11 +4,9 @@ import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from solver.scaling.growth import fit_growth
+from solver.scaling.growth import BY_FACES, fit_growth
 
 Record = Mapping[str, Any]
-# Stages that grow with the faces of the interface.
-_BY_FACES = ("cut", "pairing")
 
 
 def lines(record: Record) -> Iterator[str]:
@@ -110,7 +108,7 @@ def grown(points: Sequence[Record]) -> Iterator[str]:
         return
     for name, exponent, share in stages(solved):
         power = "    –" if exponent is None else f"{exponent:5.2f}"
-        over = "faces" if name in _BY_FACES else "unknowns"
+        over = "faces" if name in BY_FACES else "unknowns"
         yield f"  {name:<26} exponent {power} over {over:<9} {100 * share:5.1f} %"
     last = solved[-1]
     process = last["process"]
@@ -126,6 +124,6 @@ def stages(points: Sequence[Record]) -> Iterator[tuple[str, float | None, float]
     costs = [{"whole": p["process"]["cpu"], **p["stage_cpu_seconds"]} for p in points]
     whole = costs[-1]["whole"]
     for name in costs[-1]:
-        work = [p["faces" if name in _BY_FACES else "dofs"] for p in points]
+        work = [p["faces" if name in BY_FACES else "dofs"] for p in points]
         growth = fit_growth(work, [cost.get(name, 0.0) for cost in costs])
         yield name, growth.value if growth else None, costs[-1][name] / whole

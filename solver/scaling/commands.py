@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from solver.options import add_command
 from solver.scaling import FULL, SIZES
 
 
@@ -21,8 +22,7 @@ def add_commands(command: argparse.ArgumentParser) -> None:
 
 
 def _add(commands: Any, name: str, run: Any, purpose: str) -> argparse.ArgumentParser:
-    command = commands.add_parser(name, help=purpose, description=f"{purpose.capitalize()}.")
-    command.set_defaults(run=run)
+    command = add_command(commands, name, run, purpose)
     command.add_argument("scaling", type=Path, metavar="SCALING.yaml")
     command.add_argument("--size", choices=SIZES, default=FULL)
     return command

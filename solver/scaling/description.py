@@ -33,10 +33,10 @@ from typing import Any
 import yaml
 
 from solver.case import Case, parse_case
-from solver.errors import InputError
+from solver.descriptions import file_beside, point_of, refuse_twins, refuse_unknown
 from solver.mesh.catalogue import BY_NAME
 from solver.scaling import FULL, QUICK
-from solver.schemas import SCALING_SCHEMA, hint
+from solver.schemas import SCALING_SCHEMA
 from solver.strict_yaml import read_mapping
 
 GROWTH = "growth of "
@@ -170,11 +170,7 @@ class Scaling:
 
     def point(self, name: str) -> Point:
         """The point of that name; InputError where there is none."""
-        for point in self.points:
-            if point.name == name:
-                return point
-        allowed = f"no such point; {hint(name, (point.name for point in self.points))}"
-        raise InputError(self.path, "point", name, allowed)
+        return point_of(self.path, self.points, name)
 
 
 def read_scaling(path: Path, size: str = FULL) -> Scaling:
@@ -184,10 +180,7 @@ def read_scaling(path: Path, size: str = FULL) -> Scaling:
         _series(path, i, item, content["fit"]) for i, item in enumerate(content["series"])
     )
     names = [one.name for one in series]
-    for i, name in enumerate(names):
-        if name in names[:i]:
-            allowed = "the name is given twice; each needs its own"
-            raise InputError(path, f"series[{i}].name", name, allowed)
+    refuse_twins(path, "series", series)
     return Scaling(
         path=path,
         title=content["title"],
@@ -200,15 +193,12 @@ def read_scaling(path: Path, size: str = FULL) -> Scaling:
 
 
 def _series(path: Path, index: int, item: Mapping[str, Any], fit: Sequence[float]) -> Series:
-    case = path.parent / item["case"]
-    if not case.is_file():
-        raise InputError(path, f"series[{index}].case", item["case"], "no such file")
     slave, master = item["divisions"]
     low, high = item.get("fit", fit)
     return Series(
         name=item["name"],
         title=item["title"],
-        case=case,
+        case=file_beside(path, f"series[{index}].case", item["case"]),
         cells=item["cells"],
         divisions=(slave, master),
         slab=item.get("slab", False),
@@ -221,18 +211,14 @@ def _quick(path: Path, quick: Mapping[str, Any], series: Sequence[Series]) -> It
     """The small sizes of some series."""
     known = {one.name: one for one in series}
     for i, name in enumerate(quick["series"]):
-        if name not in known:
-            allowed = f"there is no such series; {hint(name, known)}"
-            raise InputError(path, f"quick.series[{i}]", name, allowed)
+        refuse_unknown(path, f"quick.series[{i}]", name, "series", known)
         small = tuple(size for size in known[name].sizes if size <= quick["largest"])
         yield replace(known[name], sizes=small)
 
 
 def _goals(path: Path, items: Sequence[Mapping[str, Any]], names: Sequence[str]) -> Iterator[Goal]:
     for i, item in enumerate(items):
-        if item["series"] not in names:
-            allowed = f"there is no such series; {hint(item['series'], names)}"
-            raise InputError(path, f"goals[{i}].series", item["series"], allowed)
+        refuse_unknown(path, f"goals[{i}].series", item["series"], "series", names)
         yield Goal(
             title=item["title"],
             series=item["series"],

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+BY_FACES = ("cut", "pairing")
+"""Stages whose work is the interface: they grow with its faces, not with the unknowns."""
+
 
 @dataclass(frozen=True)
 class Growth:

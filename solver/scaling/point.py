@@ -27,7 +27,7 @@ from typing import Any
 from solver.clock import now
 from solver.files import write_text
 from solver.memory import available
-from solver.process import Ended, cores_for, run_apart
+from solver.process import cores_for, run_apart
 from solver.scaling.description import Point, Scaling
 
 SOLVED = "solved"
@@ -92,12 +92,12 @@ def _solve(
     found = {"meshing": meshed.used, "process": {}} | dict.fromkeys(_FROM_VERDICT)
     found |= {"verdict": None, "faces": None, "machine": {}}
     if meshed.status != 0:
-        return found | _ended("failed", f"no mesh: {_why(meshed, limit)}")
+        return found | _ended("failed", f"no mesh: {meshed.reason}")
     command = [*solver, "solve", str(case), "--mesh", str(mesh), "-o", str(folder / "r.vtkhdf")]
     done = run_apart([*command, "--verdict", str(verdict)], cores, limit, memory)
     found["process"] = done.used
     if not verdict.is_file():
-        return found | _ended("failed" if done.status is None else "crashed", _why(done, limit))
+        return found | _ended("failed" if done.status is None else "crashed", done.reason)
     content = json.loads(verdict.read_text(encoding="utf-8"))
     found |= {key: content[key] for key in _FROM_VERDICT}
     found |= {"verdict": content["verdict"], "machine": content["provenance"]}
@@ -106,10 +106,6 @@ def _solve(
         return found | _ended(_OUTCOMES.get(content["verdict"], "failed"), reason)
     found["faces"] = sum(body["faces"] for body in content["bodies"])
     return found | _ended(SOLVED, content["reason"])
-
-
-def _why(process: Ended, limit: float) -> str:
-    return f"no end within {limit:g} s" if process.status is None else process.reason
 
 
 def _ended(outcome: str, reason: str) -> dict[str, Any]:

@@ -1,33 +1,38 @@
 """The commands of numerical stability: sweeps, the inf-sup test, and their pages."""
 
 import argparse
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from solver.options import add_threads
-
-# Adds a command by its name, what runs it, and its purpose in words.
-Add = Callable[[str, Callable[[argparse.Namespace], int], str], argparse.ArgumentParser]
+from solver.options import add_command, add_threads
 
 
-def add_commands(add: Add) -> None:
-    """Add the commands, each by `add`."""
-    command = add("sweep", _sweep, "push one quantity of a case through its values")
+def add_commands(commands: Any) -> None:
+    """Add the commands to those of the program."""
+    command = add_command(
+        commands, "sweep", _sweep, "push one quantity of a case through its values"
+    )
     command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
     _add_record(command, quick="some of the values only")
 
-    command = add("stability", _stability, "write the page of numerical stability")
+    command = add_command(
+        commands, "stability", _stability, "write the page of numerical stability"
+    )
     command.add_argument("records", type=Path, nargs="+", metavar="RECORD.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--quick", action="store_true", help="say that values are left out")
     command.add_argument("--infsup", type=Path, metavar="RECORD.json", help="show its record too")
 
-    command = add("infsup", _infsup, "run the inf-sup test and the half-loaded block")
+    command = add_command(
+        commands, "infsup", _infsup, "run the inf-sup test and the half-loaded block"
+    )
     command.add_argument("ladders", type=Path, metavar="INFSUP.yaml")
     _add_record(command, quick="fewer levels")
 
-    command = add("infsup-page", _infsup_page, "write the page of the inf-sup test")
+    command = add_command(
+        commands, "infsup-page", _infsup_page, "write the page of the inf-sup test"
+    )
     command.add_argument("record", type=Path, metavar="RECORD.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
 

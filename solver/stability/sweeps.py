@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from solver.case import Case, parse_case
+from solver.descriptions import file_beside
 from solver.errors import InputError
 from solver.expressions import Expression
 from solver.schemas import SWEEP_SCHEMA
@@ -109,10 +110,7 @@ def read_sweep(path: Path, quick: bool = False) -> Sweep:
 
 
 def _base(path: Path, name: str, item: Mapping[str, Any]) -> dict[str, Any]:
-    file = path.parent / item["case"]
-    if not file.is_file():
-        raise InputError(path, f"meshes.{name}.case", item["case"], "no such file")
-    return read_mapping(file)
+    return read_mapping(file_beside(path, f"meshes.{name}.case", item["case"]))
 
 
 def _shown(value: Value) -> str:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from solver.errors import InputError
+from solver.options import add_command
 from solver.study import FULL, SIZES
 
 STUDY = "STUDY.yaml"
@@ -29,8 +30,7 @@ def add_commands(command: argparse.ArgumentParser) -> None:
 
 
 def _add(commands: Any, name: str, run: Any, purpose: str) -> argparse.ArgumentParser:
-    command = commands.add_parser(name, help=purpose, description=f"{purpose.capitalize()}.")
-    command.set_defaults(run=run)
+    command = add_command(commands, name, run, purpose)
     command.add_argument("study", type=Path, metavar=STUDY)
     command.add_argument("--size", choices=SIZES, default=FULL)
     return command

@@ -36,9 +36,10 @@ from typing import Any
 import yaml
 
 from solver.case import Case, parse_case
+from solver.descriptions import file_beside, point_of, refuse_twins, refuse_unknown
 from solver.errors import InputError
 from solver.mesh.catalogue import BY_NAME
-from solver.schemas import STUDY_SCHEMA, hint
+from solver.schemas import STUDY_SCHEMA
 from solver.strict_yaml import read_mapping
 from solver.study import FULL, QUICK
 
@@ -181,11 +182,7 @@ class Study:
 
     def point(self, name: str) -> Point:
         """The point of that name; InputError where there is none."""
-        for point in self.points:
-            if point.name == name:
-                return point
-        allowed = f"no such point; {hint(name, (point.name for point in self.points))}"
-        raise InputError(self.path, "point", name, allowed)
+        return point_of(self.path, self.points, name)
 
 
 def read_study(path: Path, size: str = FULL) -> Study:
@@ -196,8 +193,8 @@ def read_study(path: Path, size: str = FULL) -> Study:
         for t in content["treatments"]
     )
     problems = tuple(_problem(path, i, p) for i, p in enumerate(content["problems"]))
-    _refuse_twins(path, "treatments", treatments)
-    _refuse_twins(path, "problems", problems)
+    refuse_twins(path, "treatments", treatments)
+    refuse_twins(path, "problems", problems)
     study = Study(
         path=path,
         title=content["title"],
@@ -213,9 +210,7 @@ def read_study(path: Path, size: str = FULL) -> Study:
 
 
 def _problem(path: Path, index: int, item: Mapping[str, Any]) -> Problem:
-    case = path.parent / item["case"]
-    if not case.is_file():
-        raise InputError(path, f"problems[{index}].case", item["case"], "no such file")
+    case = file_beside(path, f"problems[{index}].case", item["case"])
     pairs = tuple((slave, master) for slave, master in item["pairs"])
     for number, pair in enumerate(pairs):
         if BY_NAME[pair[0]].dim != BY_NAME[pair[1]].dim:
@@ -246,9 +241,7 @@ def _varied(
     known = {"problem": _by_name(problems), "treatment": _by_name(treatments)}
     for i, item in enumerate(content.get("linear_solvers", ())):
         for key, names in known.items():
-            if item[key] not in names:
-                allowed = f"there is no such {key}; {hint(item[key], names)}"
-                raise InputError(path, f"linear_solvers[{i}].{key}", item[key], allowed)
+            refuse_unknown(path, f"linear_solvers[{i}].{key}", item[key], key, names)
         for solver in item["solvers"]:
             yield item["problem"], *item["pair"], item["treatment"], solver
 
@@ -260,9 +253,7 @@ def _quick(study: Study, content: Mapping[str, Any]) -> Study:
     quick, problems = content["quick"], _by_name(study.problems)
     chosen = []
     for name, pairs in quick["pairs"].items():
-        if name not in problems:
-            allowed = f"there is no such problem; {hint(name, problems)}"
-            raise InputError(study.path, f"quick.pairs.{name}", pairs, allowed)
+        refuse_unknown(study.path, f"quick.pairs.{name}", name, "problem", problems, pairs)
         levels = problems[name].levels[: quick["levels"]]
         kept = tuple((slave, master) for slave, master in pairs)
         chosen.append(replace(problems[name], pairs=kept, levels=levels))
@@ -273,12 +264,3 @@ def _quick(study: Study, content: Mapping[str, Any]) -> Study:
 
 def _by_name(items: Iterable[Any]) -> dict[str, Any]:
     return {item.name: item for item in items}
-
-
-def _refuse_twins(path: Path, key: str, items: Sequence[Any]) -> None:
-    seen: set[str] = set()
-    for i, item in enumerate(items):
-        if item.name in seen:
-            allowed = "the name is given twice; each needs its own"
-            raise InputError(path, f"{key}[{i}].name", item.name, allowed)
-        seen.add(item.name)

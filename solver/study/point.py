@@ -88,11 +88,9 @@ def _in_process(job: Mapping[str, Any], limit: float, cores: list[int]) -> dict[
     """What the measuring process found, or why it found nothing."""
     command = [sys.executable, "-m", "solver.study.measure", json.dumps(job)]
     done = run_apart(command, cores, limit)
-    if done.status is None:
-        return _ended("failed", f"no end within {limit:g} s")
     if done.status == 0:
         return json.loads(Path(job["output"]).read_text(encoding="utf-8"))
-    return _ended("crashed", done.reason)
+    return _ended("failed" if done.status is None else "crashed", done.reason)
 
 
 def _ended(outcome: str, reason: str) -> dict[str, Any]:

@@ -174,6 +174,30 @@ def find_jobs():
     return {key: job for key, job in jobs.items() if not chosen or job.family in chosen}
 
 
+def older(file, time):
+    """Whether a file is missing, or was written before that time."""
+    return not Path(file).is_file() or Path(file).stat().st_mtime < time
+
+
+def measured_points(read, model, file, size, folder):
+    """The points by name that a file describes; says how long those that are missing will take.
+
+    `read` the file at its `size`; `model` has the seconds of each point, `folder` its record.
+    """
+    from solver.errors import InputError
+    from solver.study.expected import announcement
+
+    try:
+        content = read(Path(file), size)
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
+    newest = max(Path(source).stat().st_mtime for source in [file, *SOLVER_SOURCES])
+    points = {point.name: point for point in content.points}
+    pending = [name for name in points if older(f"{folder}/{name}.json", newest)]
+    logger.info(announcement(content, model(content), Path(folder), pending))
+    return points
+
+
 def verdict_of(job):
     return f"results/{job.family}/{job.name}/verdict.json"
 

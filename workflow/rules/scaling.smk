@@ -8,24 +8,10 @@ SCALING_PAGE = "scaling" if SCALE == "full" else f"scaling-{SCALE}"
 
 @cache
 def scaling():
-    """The points by name; says how long those that are missing will take."""
-    from solver.errors import InputError
     from solver.scaling.description import read_scaling
     from solver.scaling.expected import model
-    from solver.study.expected import announcement
 
-    try:
-        content = read_scaling(Path(SCALING_FILE), SCALE)
-    except InputError as error:
-        raise WorkflowError(str(error)) from None
-    newest = max(Path(s).stat().st_mtime for s in [SCALING_FILE, *SOLVER_SOURCES])
-    pending = [
-        point.name
-        for point in content.points
-        if older(f"{SCALED}/{point.name}.json", newest)
-    ]
-    logger.info(announcement(content, model(content), Path(SCALED), pending))
-    return {point.name: point for point in content.points}
+    return measured_points(read_scaling, model, SCALING_FILE, SCALE, SCALED)
 
 
 # A point always ends with a record, whatever became of it.

@@ -138,7 +138,8 @@ def keep_warm():
 
     It listens from now on and answers once it is warm; without it jobs start from nothing.
     """
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    from solver.options import THREADS
+
     folder = tempfile.TemporaryDirectory()
     with socket.socket(socket.AF_UNIX) as listener:
         try:
@@ -150,7 +151,7 @@ def keep_warm():
             [sys.executable, "-m", "solver", "serve", str(listener.fileno())],
             stdin=subprocess.PIPE,  # its end tells that this run has ended
             pass_fds=[listener.fileno()],
-            env={**os.environ, **dict.fromkeys(names, "1")},
+            env={**os.environ, **dict.fromkeys(THREADS, "1")},
         )
     os.environ["WARM_SOLVER"] = f"{folder.name}/warm"
     atexit.register(folder.cleanup)

@@ -9,30 +9,10 @@ MEASURING_SOURCES = [STUDY_FILE, *SOLVER_SOURCES]
 
 @cache
 def study():
-    """The study and its points by name; says how long those that are missing will take."""
-    from solver.errors import InputError
     from solver.study.description import read_study
-    from solver.study.expected import announcement, model
+    from solver.study.expected import model
 
-    try:
-        content = read_study(Path(STUDY_FILE), SIZE)
-    except InputError as error:
-        raise WorkflowError(str(error)) from None
-    newest = max(Path(source).stat().st_mtime for source in MEASURING_SOURCES)
-    pending = [
-        point.name for point in content.points if older(record_of(point.name), newest)
-    ]
-    logger.info(announcement(content, model(content), Path(POINTS), pending))
-    return {point.name: point for point in content.points}
-
-
-def record_of(point):
-    return f"{POINTS}/{point}.json"
-
-
-def older(file, time):
-    """Whether a file is missing, or was written before that time."""
-    return not Path(file).is_file() or Path(file).stat().st_mtime < time
+    return measured_points(read_study, model, STUDY_FILE, SIZE, POINTS)
 
 
 def reference_of(w):
@@ -82,7 +62,7 @@ rule study_point:
 
 rule study:
     input:
-        records=lambda w: [record_of(point) for point in study()],
+        records=lambda w: [f"{POINTS}/{point}.json" for point in study()],
         study=STUDY_FILE,
         sources=REPORT_SOURCES,
     output:

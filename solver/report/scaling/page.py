@@ -12,7 +12,6 @@ from solver.report.html import environment
 from solver.report.scaling import words
 from solver.report.scaling.figure import SMALL, Drawn, draw_bar, draw_key, draw_plot, look
 from solver.report.scaling.records import (
-    BY_FACES,
     OTHER,
     WHOLE,
     Line,
@@ -24,6 +23,7 @@ from solver.report.scaling.records import (
 from solver.report.tables import as_csv
 from solver.scaling import FULL
 from solver.scaling.description import Scaling
+from solver.scaling.growth import BY_FACES
 
 _SIDES = {3: "Space", 2: "Plane"}
 

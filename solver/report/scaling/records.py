@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from solver.scaling.description import GROWTH, Goal, Point, Scaling, Series
-from solver.scaling.growth import Growth, fit_growth, window
+from solver.scaling.growth import BY_FACES, Growth, fit_growth, window
 from solver.scaling.point import SOLVED
 
 WHOLE, OTHER = "whole", "start-up"
-# Stages whose work is the interface: they grow with its faces, not with the unknowns.
-BY_FACES = ("cut", "pairing")
 
 
 @dataclass(frozen=True)
@@ -27,6 +25,11 @@ class Measured:
     def solved(self) -> bool:
         """Whether there is a solve to show."""
         return self.record["outcome"] == SOLVED
+
+    @property
+    def why_not(self) -> str:
+        """Why there is none."""
+        return f"{self.record['outcome']}: {self.record['reason']}"
 
     @property
     def cpu(self) -> float:
@@ -148,7 +151,7 @@ def _reached(goal: Goal, line: Line | None) -> Reached:
     if m is None:
         return Reached(goal, None, "not in this part of the family")
     if not m.solved:
-        return Reached(goal, None, f"{m.record['outcome']}: {m.record['reason']}")
+        return Reached(goal, None, m.why_not)
     return Reached(goal, m.answer(goal.what), "")
 
 
@@ -157,7 +160,7 @@ def failures(lines: Sequence[Line]) -> list[tuple[str, str]]:
     lost = []
     for m in (m for line in lines for m in line.points):
         if not m.solved:
-            lost.append((m.point.name, f"{m.record['outcome']}: {m.record['reason']}"))
+            lost.append((m.point.name, m.why_not))
         elif m.record["verdict"] != "passed":
             lost.append((m.point.name, f"{m.record['verdict']}: {m.record['reason']}"))
     return lost
