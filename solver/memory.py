@@ -3,10 +3,10 @@
 Measured as peak resident memory of solves of all cell types, 547 of them with a factor by PARDISO
 and 20,000 to 640,000 unknowns: 100 MB for the program, then by unknown (of nodes times dimensions)
 1.9 to 7.4 kB in the plane and 4.4 to 16 kB in space, the less the more elongated the bodies are.
-With multigrid it is 2.4 (TETRA4; columns of HEXA8) to 6 kB (HEXA20), for HEXA8 cubes 3.5 kB from
-100,000 to 1,000,000 unknowns. A solve is refused by the least figure, so that none is refused that
-fits; the usual one is for a warning, and a cluster is asked for the most, since a factor may have
-to take over.
+With multigrid it is 2.2 (TETRA4; columns of HEXA8) to 4.1 kB (HEXA20), for HEXA8 cubes 2.3 to
+2.4 kB from 500,000 to 1,000,000 unknowns. A solve is refused by the least figure, so that none is
+refused that fits; the usual one is for a warning, and a cluster is asked for the most, since a
+factor may have to take over.
 """
 
 import resource

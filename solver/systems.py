@@ -12,7 +12,7 @@ from scipy import sparse
 
 from solver.bodies import joined_bodies, nodes_of_unknowns, whole_motions
 from solver.errors import SolveError
-from solver.linear.choice import Chosen, against_condensation, against_multigrid
+from solver.linear.choice import Chosen, against_condensation
 from solver.linear.condensation import Condensed, Constrained, condense, saddle_point
 from solver.linear.direct import Factor
 from solver.linear.krylov import EPSILON
@@ -116,7 +116,7 @@ class Systems:
         self._matrix, self._constraints, self._own = matrix, constraints, own
         self._unknowns, self._parts = unknowns, parts
         self._kept: dict[int, tuple[bytes, Constrained]] = {}
-        self._against: dict[int, str] = {}
+        self._gave_up: dict[int, str] = {}
         self.latest: Constrained | None = None
 
     def forget(self) -> None:
@@ -128,7 +128,7 @@ class Systems:
         """Keep of a part's system only why multigrid gave up on it, if it did."""
         system = self._kept.pop(number)[1]
         if isinstance(system, Condensed) and system.factor.gave_up:
-            self._against[number] = system.factor.gave_up
+            self._gave_up[number] = system.factor.gave_up
 
     def closed(self, closed: np.ndarray) -> Constrained:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
@@ -161,15 +161,12 @@ class Systems:
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
             return _saddle_point(matrix, constraints)
-        if number not in self._against:
-            self._against[number] = against_multigrid(matrix, unknowns)
-        against = self._against[number]
-        if against and (why := against_condensation(matrix, constraints)):
+        if why := against_condensation(matrix, constraints):
             try:
                 return saddle_point(matrix, constraints, why, weighted=False)
             except SolveError:
                 pass  # pivots that no order of elimination avoids: condensation needs none of them
-        return condense(matrix, constraints, own, unknowns, against)
+        return condense(matrix, constraints, own, unknowns, self._gave_up.get(number, ""))
 
 
 def _saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> Constrained:

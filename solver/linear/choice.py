@@ -4,10 +4,10 @@ import logging
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from solver.errors import SolveError
 from solver.linear.backends import BACKENDS
+from solver.linear.condensed_matrix import Symmetric
 from solver.linear.direct import Factor, factorise, wanted
 from solver.linear.krylov import EPSILON
 from solver.linear.multigrid import Multigrid, Unknowns
@@ -24,9 +24,6 @@ _MULTIGRID_FROM = {
     (False, False): 20_000,
     (False, True): 100_000,
 }
-# Mean front of two cubes, one on the other, over the power 2/3 of their nodes: the sizes above are
-# of such. Flat and slender bodies, which multigrid finds hard, have fronts of less than half that.
-_FRONT, _FLAT = 0.85, 0.5
 # From as many entries more than the matrix has, condensing is slower than a saddle point; a few
 # (the second figure) take no time.
 _FILL, _LEAST_FILL = 1.0, 1_000_000
@@ -44,7 +41,7 @@ class Chosen:
     material. `gave_up` then says why; else it is empty.
     """
 
-    def __init__(self, matrix: csr_matrix, dim: int, solver: Factor | Multigrid, why: str):
+    def __init__(self, matrix: Symmetric, dim: int, solver: Factor | Multigrid, why: str):
         self._matrix, self._dim, self._solver, self.why = matrix, dim, solver, why
         self.gave_up = ""
 
@@ -71,24 +68,20 @@ class Chosen:
             self.why = self.gave_up = _instead(error)
             _LOG.info("%s", self.why)
         self._solver.close()
-        self._solver = factorise(self._matrix, dim=self._dim)
+        self._solver = factorise(self._matrix.tocsr(), dim=self._dim)
         return self._solver.solve(right, accuracy)
 
 
-def prepare(matrix: csr_matrix, unknowns: Unknowns, against: str | None = None) -> Chosen:
-    """Make ready to solve with a symmetric positive definite `matrix` (n, n), both halves stored.
+def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> Chosen:
+    """Make ready to solve with a symmetric positive definite `matrix` (n, n).
 
-    `against`: why multigrid is not tried, as it gave up on a matrix like it; empty: it is; None: as
-    `against_multigrid` has it. Raises SolveError where the matrix is not positive definite or
-    singular to working precision; a singular matrix that multigrid solves for a consistent
-    right-hand side goes unnoticed.
+    `gave_up`: why multigrid did on a matrix like it; then it is not tried again. Raises SolveError
+    where the matrix is not positive definite or singular to working precision; a singular matrix
+    that multigrid solves for a consistent right-hand side goes unnoticed.
     """
-    dim = unknowns.dim
-    if against is None:
-        against = against_multigrid(matrix, unknowns)
-    by = "a factor" if against else MULTIGRID
-    _LOG.info("linear system of %d unknowns, by %s", matrix.shape[0], by)
-    gave_up = ""
+    dim, size = unknowns.dim, matrix.shape[0]
+    against = gave_up or _against_multigrid(size, unknowns)
+    _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
         least = multigrid_from(unknowns.quadratic)
         why = f"{least} unknowns or more in space: quicker and smaller than a factor"
@@ -98,23 +91,20 @@ def prepare(matrix: csr_matrix, unknowns: Unknowns, against: str | None = None) 
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
             against = gave_up = _instead(error)
-    chosen = Chosen(matrix, dim, factorise(matrix, dim=dim), against)
+            _LOG.info("%s", against)
+    chosen = Chosen(matrix, dim, factorise(matrix.tocsr(), dim=dim), against)
     chosen.gave_up = gave_up
     return chosen
 
 
-def against_multigrid(matrix: csr_matrix, unknowns: Unknowns) -> str:
-    """Why a system with the stiffness `matrix` (n, n) is factored; empty where it is not."""
+def _against_multigrid(size: int, unknowns: Unknowns) -> str:
+    """Why a system of that size is factored; empty where it is not."""
     if wanted() != "auto":
         return "" if wanted() == MULTIGRID else _ASKED
-    least = multigrid_from(unknowns.quadratic)
     if unknowns.dim == 2:
         return "in the plane a factor is small"
-    if matrix.shape[0] < least:
-        return f"fewer than {least} unknowns: a factor is quicker than multigrid"
-    if _front(matrix, unknowns.node) < _FLAT * _FRONT * (least / unknowns.dim) ** (2 / 3):
-        return f"flat or slender bodies: a factor is as small as for fewer than {least} unknowns"
-    return ""
+    least = multigrid_from(unknowns.quadratic)
+    return f"fewer than {least} unknowns: a factor is quicker than multigrid" * (size < least)
 
 
 def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
@@ -129,25 +119,6 @@ def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
     if few or wanted() != "auto" or not BACKENDS["pardiso"].available():
         return ""
     return f"a condensed system would fill in: one constraint holds {widths.max():.0f} unknowns"
-
-
-def _front(matrix: csr_matrix, node: np.ndarray) -> float:
-    """Mean front of a factor, in nodes, when these are numbered by reverse Cuthill and McKee.
-
-    A bound of what a factor costs (George, Liu, Computer Solution of Large Sparse Positive Definite
-    Systems, 1981, ch. 4). `node` (n,): the node of each unknown.
-    """
-    _, first, number = np.unique(node, return_index=True, return_inverse=True)
-    of_nodes = matrix[first]
-    size = len(first)
-    graph = csr_matrix(
-        (np.ones(of_nodes.nnz, dtype=np.int8), number[of_nodes.indices], of_nodes.indptr),
-        shape=(size, size),
-    )
-    rank = np.empty(size, dtype=int)
-    rank[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(size)
-    lowest = np.minimum.reduceat(rank[graph.indices], graph.indptr[:-1])
-    return float((rank - lowest).mean())
 
 
 def _instead(error: SolveError) -> str:

@@ -14,6 +14,7 @@ from scipy import sparse
 
 from solver.errors import SolveError
 from solver.linear.choice import Chosen, prepare
+from solver.linear.condensed_matrix import CondensedMatrix, Symmetric
 from solver.linear.direct import Factor, factorise_indefinite
 from solver.linear.krylov import EPSILON, ROUGH
 from solver.linear.multigrid import Unknowns
@@ -178,12 +179,12 @@ def condense(
     constraints: sparse.csr_matrix,
     own: np.ndarray,
     unknowns: Unknowns,
-    against: str | None = None,
+    gave_up: str = "",
 ) -> Condensed:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
-    `own` (n,) marks what may be eliminated, `unknowns` tells what each is, `against` why multigrid
-    is not tried (see `prepare`).
+    `own` (n,) marks what may be eliminated, `unknowns` tells what each is, `gave_up` why multigrid
+    is not tried again (see `prepare`).
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
@@ -199,11 +200,12 @@ def condense(
     rest = constraints[:, kept_columns]
     follow = (sparse.diags(-1 / coefficient) @ rest).tocsr() if len(pivot) else rest
     expansion = _expansion(n, kept_columns, pivot, follow)
+    condensed: Symmetric = matrix
     if len(pivot):
         pulled = (coupling[:, kept_columns].T @ follow).tocsr()
         added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
-        matrix = (matrix[kept_columns][:, kept_columns] + added).tocsr()
-    factor = prepare(matrix, unknowns.of(kept_columns), against)
+        condensed = CondensedMatrix(matrix, kept_columns, added.tocsr())
+    factor = prepare(condensed, unknowns.of(kept_columns), gave_up)
     return Condensed(expansion, pivot, coefficient, factor, coupling)
 
 

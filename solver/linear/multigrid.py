@@ -14,14 +14,20 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from solver.errors import SolveError
+from solver.linear.condensed_matrix import Symmetric
 from solver.linear.krylov import EPSILON, conjugate_gradients, in_single
 
 COARSEST = 600
 """Unknowns at which the hierarchy ends: that level is inverted as a dense matrix."""
 LARGEST_DENSE = 4_000
 """More unknowns than this where the aggregates no longer grow: multigrid is of no use."""
+MOST_NEIGHBOURS = 50
+"""More aggregates than this, on the mean, that some node feels together with one; 20 to 35 do as a
+rule. Contact couples all that lies on one face: of hundreds of faces, coarse levels fill in."""
 MAX_ITERATIONS = 150
 _ROWS_AT_ONCE = 30_000  # whole nodes
+_BLOCKS_AT_ONCE = 100_000
+_PARTS = 8  # of a product of matrices that is formed in parts
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
 # The iteration approaches the largest eigenvalue from below.
@@ -72,8 +78,8 @@ class Level:
 class Multigrid:
     """A hierarchy for one matrix. `iterations`: the most that a solve has taken so far."""
 
-    def __init__(self, matrix: csr_matrix, unknowns: Unknowns):
-        """Set up for a symmetric positive definite `matrix` (n, n), both halves stored.
+    def __init__(self, matrix: Symmetric, unknowns: Unknowns):
+        """Set up for a symmetric positive definite `matrix` (n, n).
 
         Raises SolveError where the diagonal is not positive or nothing coarsens.
         """
@@ -145,14 +151,15 @@ def _places(unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
     return 3 * number + rank, unknowns.body[first]
 
 
-def _in_blocks(matrix: csr_matrix, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
+def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
     """The scaled matrix in single precision and blocks of three; rows without unknown are zero.
 
     Row and column i go to `place` (n,) i of `size`. Some rows at a time: no copy in double
     precision is made of the whole.
     """
     order, place = np.argsort(place), place.astype(np.int32)
-    rows, parts = place[order], []
+    rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
+    blocks, columns = np.empty((0, 3, 3), dtype=np.float32), np.empty(0, dtype=np.int32)
     for first in range(0, size, _ROWS_AT_ONCE):
         last = min(first + _ROWS_AT_ONCE, size)
         low, high = np.searchsorted(rows, (first, last))
@@ -162,11 +169,14 @@ def _in_blocks(matrix: csr_matrix, scale: np.ndarray, place: np.ndarray, size: i
         values *= scale[some.indices]
         starts = np.concatenate([[0], np.cumsum(counts)])
         arrays = values.astype(np.float32), place[some.indices], starts
-        parts.append(csr_matrix(arrays, shape=(last - first, size)).tobsr((3, 3)))
-    blocks = np.concatenate([part.data for part in parts])
-    columns = np.concatenate([part.indices for part in parts])
-    lengths = np.concatenate([[0], *(np.diff(part.indptr) for part in parts)])
-    return bsr_matrix((blocks, columns, np.cumsum(lengths)), shape=(size, size))
+        part = csr_matrix(arrays, shape=(last - first, size)).tobsr((3, 3))
+        before, after = len(columns), len(columns) + len(part.indices)
+        # The system moves pages where an array grows: at no time are there two of it.
+        blocks.resize((after, 3, 3), refcheck=False)
+        columns.resize(after, refcheck=False)
+        blocks[before:], columns[before:] = part.data, part.indices
+        lengths.append(np.diff(part.indptr))
+    return bsr_matrix((blocks, columns, np.cumsum(np.concatenate(lengths))), shape=(size, size))
 
 
 def _hierarchy(
@@ -179,22 +189,54 @@ def _hierarchy(
         tentative, coarse_motions, coarse_body = _aggregate(matrix, motions, body)
         if tentative.nnz == 0 or 2 * tentative.shape[1] > matrix.shape[0]:
             break
-        smoothed = (tentative - matrix @ tentative * np.float32(_SMOOTHED / bound)).tobsr(
-            tentative.blocksize
-        )
-        width = tentative.blocksize[1]
-        restriction = smoothed.T.tobsr((width, tentative.blocksize[0]))
-        coarse = (restriction @ (matrix @ smoothed)).tobsr((width, width))
+        smoothed = matrix @ tentative
+        smoothed.data *= -np.float32(_SMOOTHED / bound)
+        height, width = tentative.blocksize
+        smoothed = (tentative + smoothed).tobsr((height, width))
+        _refuse_fill(smoothed)
+        restriction = smoothed.T.tobsr((width, height))
+        coarse = _coarse(matrix, smoothed)
         coarse, motions, scale = _scaled(coarse, coarse_motions)
         _scale_blocks(smoothed, np.ones(smoothed.shape[0]), scale)
         _scale_blocks(restriction, scale, np.ones(smoothed.shape[0]))
         levels.append(Level(matrix, bound, smoothed, restriction))
         matrix, body = coarse, coarse_body
     if matrix.shape[0] > LARGEST_DENSE:
-        raise SolveError(f"multigrid ends at {matrix.shape[0]} unknowns: nothing coarsens further")
+        raise SolveError(f"its levels end at {matrix.shape[0]} unknowns: nothing coarsens further")
     dense = matrix.toarray().astype(float)
     inverse = np.linalg.pinv((dense + dense.T) / 2, rcond=1e-7, hermitian=True)
     return levels, inverse.astype(np.float32)
+
+
+def _refuse_fill(prolongation: bsr_matrix) -> None:
+    """Raise SolveError where the next level will have too many neighbours, before it is formed."""
+    height, width = prolongation.blocksize
+    shape = prolongation.shape[0] // height, prolongation.shape[1] // width
+    ones = np.ones(len(prolongation.indices), dtype=np.float32)
+    felt = csr_matrix((ones, prolongation.indices, prolongation.indptr), shape=shape)
+    near = (felt.T @ felt).nnz / shape[1]
+    if near > MOST_NEIGHBOURS:
+        raise SolveError(f"its coarse levels would fill in, to {near:.0f} neighbours or more")
+
+
+def _coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
+    """Pᵀ A P, some rows of A at a time: A P is large."""
+    height, width = prolongation.blocksize
+    count, size = matrix.shape[0] // height, prolongation.shape[1]
+    total = bsr_matrix((size, size), dtype=np.float32, blocksize=(width, width))
+    step = max(1, -(-count // _PARTS))
+    for first in range(0, count, step):
+        some, fine = (_rows(each, first, first + step) for each in (matrix, prolongation))
+        total = total + (fine.T @ (some @ prolongation)).tobsr((width, width))
+    return total
+
+
+def _rows(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
+    """Some rows of blocks."""
+    starts = matrix.indptr[first : last + 1]
+    chosen = slice(starts[0], starts[-1])
+    arrays = matrix.data[chosen], matrix.indices[chosen], starts - starts[0]
+    return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
 
 
 def _aggregate(
@@ -235,8 +277,12 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     diagonal = matrix.diagonal().astype(float)
     there = diagonal > 0
     scale = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
-    weights = scale.astype(np.float32).reshape(-1, size)[matrix.indices]
-    inner = np.matmul(np.abs(matrix.data), weights[:, :, None])[:, :, 0]
+    weights = scale.astype(np.float32).reshape(-1, size)
+    inner = np.empty(matrix.data.shape[:2], dtype=np.float32)
+    for first in range(0, len(inner), _BLOCKS_AT_ONCE):
+        some = slice(first, first + _BLOCKS_AT_ONCE)
+        columns = weights[matrix.indices[some], :, None]
+        inner[some] = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
     sums = scale * np.add.reduceat(inner, matrix.indptr[:-1], axis=0).ravel()
     scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
     _scale_blocks(matrix, scale, scale)

@@ -11,6 +11,7 @@ from scipy import sparse
 from solver.linear.backends import BACKENDS
 from solver.linear.choice import against_condensation
 from solver.linear.condensation import condense, saddle_point
+from solver.linear.condensed_matrix import CondensedMatrix
 from solver.linear.direct import standing_for_auto
 from solver.linear.multigrid import Unknowns
 
@@ -84,3 +85,32 @@ print(open("/proc/self/maps").read())
     loaded = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "libmkl_intel_thread" in loaded
     assert "libmkl_gnu_thread" not in loaded
+
+
+def between_two_chains(count):
+    """Two chains, the facing ends of which stay together through three multipliers."""
+    line = sparse.diags([-1.0, 2.5, -1.0], [-1, 0, 1], shape=(count, count))
+    matrix = sparse.block_diag([line, 3 * line]).tocsr()
+    columns = [[0, count, count + 1], [1, count + 1, count + 2], [2, count + 2, count + 3]]
+    rows = np.repeat(np.arange(3), 3)
+    weights = np.tile([1.0, -0.3, -0.7], 3)
+    return matrix, sparse.csr_matrix((weights, (rows, np.ravel(columns))), shape=(3, 2 * count))
+
+
+def test_condensed_matrix_is_that_of_the_expansion():
+    matrix, constraints = between_two_chains(12)
+    own = np.arange(24) < 12
+    system = condense(matrix, constraints, own, stands_for(matrix, dim=2))
+    expected = (system.expansion.T @ matrix @ system.expansion).toarray()
+    np.testing.assert_allclose((constraints @ system.expansion).toarray(), 0, atol=1e-15)
+    kept = np.setdiff1d(np.arange(24), system.pivot)
+    added = sparse.csr_matrix(expected) - matrix[kept][:, kept]
+    condensed = CondensedMatrix(matrix, kept, added.tocsr())
+    x = np.random.default_rng(1).standard_normal((21, 2))
+    np.testing.assert_allclose(condensed @ x, expected @ x, atol=1e-14)
+    np.testing.assert_allclose(condensed.diagonal(), expected.diagonal(), atol=1e-15)
+    np.testing.assert_allclose(condensed.tocsr().toarray(), expected, atol=1e-15)
+    some = np.array([20, 3, 7])
+    np.testing.assert_allclose(condensed[some].toarray(), expected[some], atol=1e-15)
+    right = np.random.default_rng(2).standard_normal(21)
+    np.testing.assert_allclose(expected @ system.factor.solve(right), right, atol=1e-13)

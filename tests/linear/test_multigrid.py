@@ -1,15 +1,17 @@
 """Multigrid on blocks of HEXA8: solutions known beforehand, iterations, and when it gives way."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse import block_diag, csr_matrix, diags, eye, kron
+from scipy.sparse import block_array, block_diag, bsr_matrix, csr_matrix, eye, kron, random_array
 
 from solver.elasticity import Block, lame_parameters, stiffness
 from solver.errors import SolveError
-from solver.linear import choice
+from solver.linear import choice, multigrid
 from solver.linear.backends import BACKENDS
+from solver.linear.condensation import condense
 from solver.linear.direct import standing_for_auto
 from solver.linear.krylov import ROUGH
 from solver.linear.multigrid import Multigrid, Unknowns
@@ -137,7 +139,7 @@ def test_nodes_without_neighbours_do_not_coarsen():
     count = 4500
     node = np.arange(count) // 3
     unknowns = Unknowns(3, node, np.ones((count, 6)), np.zeros(count, dtype=int))
-    with pytest.raises(SolveError, match="multigrid ends at 4500 unknowns: nothing coarsens"):
+    with pytest.raises(SolveError, match="its levels end at 4500 unknowns: nothing coarsens"):
         Multigrid(csr_matrix(eye(count)), unknowns)
 
 
@@ -162,17 +164,51 @@ def test_choice_by_size_and_dimension(monkeypatch):
     assert "fewer than" in small.why
 
 
-def test_a_slender_body_is_factored_whatever_its_size(monkeypatch):
-    count = 100  # nodes in a row, each beside two others: a front of one node
-    row = diags([-1.0, 4.0, -1.0], [-1, 0, 1], shape=(count, count))
-    matrix = csr_matrix(kron(row, np.eye(3)))
-    node = np.repeat(np.arange(count), 3)
-    unknowns = Unknowns(3, node, np.ones((3 * count, 6)), np.zeros(3 * count, dtype=int))
-    assert choice._front(matrix, node) == pytest.approx((count - 1) / count)
-    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: 3 * count)
-    chosen = choice.prepare(matrix, unknowns)
+def tied_to_one_node(count: int):
+    """A clamped cube, all nodes of which feel one free node of another body."""
+    matrix, unknowns = clamped(count)
+    n = matrix.shape[0]
+    link = csr_matrix(np.tile(np.eye(3), (n // 3, 1)))
+    tied = block_array([[matrix + eye(n), -link], [-link.T, n * eye(3)]]).tocsr()
+    node = np.append(unknowns.node, [unknowns.node.max() + 1] * 3)
+    body, shifts = np.repeat([0, 1], [n, 3]), np.hstack([np.eye(3), np.zeros((3, 3))])
+    return tied, Unknowns(3, node, np.vstack([unknowns.motions, shifts]), body)
+
+
+def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
+    def untouched(*_):
+        raise AssertionError("the coarse level is formed")
+
+    matrix, unknowns = tied_to_one_node(14)
+    monkeypatch.setattr(multigrid, "_coarse", untouched)
+    with pytest.raises(SolveError, match=r"its coarse levels would fill in, to \d+ neighbours"):
+        Multigrid(matrix, unknowns)
+    with standing_for_auto("multigrid"):
+        chosen = choice.prepare(matrix, unknowns)
     assert "multigrid" not in chosen.name
-    assert "flat or slender" in chosen.why
+    assert chosen.gave_up == chosen.why
+
+
+def test_parts_of_a_setup_make_no_difference(monkeypatch):
+    matrix, unknowns = two_blocks(8)
+    right = np.random.default_rng(2).standard_normal(matrix.shape[0])
+    whole = Multigrid(matrix, unknowns).solve(right)
+    for name, few in (("_ROWS_AT_ONCE", 90), ("_BLOCKS_AT_ONCE", 500), ("_PARTS", 37)):
+        monkeypatch.setattr(multigrid, name, few)
+    found = Multigrid(matrix, unknowns).solve(right)
+    np.testing.assert_allclose(found, whole, rtol=0, atol=1e-12 * np.abs(whole).max())
+
+
+def test_coarse_matrix_is_that_of_the_prolongation():
+    rng = np.random.default_rng(3)
+    fine = random_array((40, 40), density=0.2, rng=rng, format="csr")
+    fine = csr_matrix((fine + fine.T + 20 * eye(40)), dtype=np.float32)
+    matrix = bsr_matrix(kron(fine, np.ones((3, 3))), blocksize=(3, 3), dtype=np.float32)
+    way = kron(random_array((40, 7), density=0.5, rng=rng), np.ones((3, 6)))
+    way = bsr_matrix(way, blocksize=(3, 6), dtype=np.float32)
+    exact = way.toarray().astype(float).T @ matrix.toarray() @ way.toarray()
+    found = multigrid._coarse(matrix, way).toarray()
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
 
 
 def test_quadratic_cells_and_pardiso_put_multigrid_off(monkeypatch):
@@ -244,3 +280,21 @@ def test_free_body_is_refused():
         pytest.raises(SolveError, match=r"singular|not positive definite"),
     ):
         choice.prepare(matrix, unknowns).solve(np.ones(matrix.shape[0]))
+
+
+def test_memory_beside_the_stiffness_is_less_than_one_and_a_half_of_its_own(monkeypatch):
+    monkeypatch.setattr(multigrid, "_ROWS_AT_ONCE", 3_000)
+    monkeypatch.setattr(multigrid, "_BLOCKS_AT_ONCE", 10_000)
+    matrix, unknowns = clamped(24)
+    size = matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes
+    rows = csr_matrix(([1.0, -1.0], ([0, 0], [0, 90])), shape=(1, matrix.shape[0]))
+    own = np.arange(matrix.shape[0]) == 0
+    right = np.ones(matrix.shape[0])
+    with standing_for_auto("multigrid"):
+        tracemalloc.start()
+        system = condense(matrix, rows, own, unknowns)
+        system.correction(right, np.zeros(1))
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert "multigrid" in system.factor.name
+    assert peak < 1.5 * size
