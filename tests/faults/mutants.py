@@ -156,7 +156,7 @@ def _first_system_kept(true: Wrapped) -> Wrapped:
 
 def _factor_of_half(true: Wrapped) -> Wrapped:
     """As of another stiffness, and no refinement that would make up for it."""
-    return lambda matrix, *rest: true(matrix * 0.5, *rest)
+    return lambda matrix, *rest: true(matrix.tocsr() * 0.5, *rest)
 
 
 def _never_closes(true: Wrapped) -> Wrapped:
