@@ -3,8 +3,8 @@
 Measured as peak resident memory of solves of all cell types, 547 of them with a factor by PARDISO
 and 20,000 to 640,000 unknowns: 100 MB for the program, then by unknown (of nodes times dimensions)
 1.9 to 7.4 kB in the plane and 4.4 to 16 kB in space, the less the more elongated the bodies are.
-With multigrid it is 2.2 (TETRA4; columns of HEXA8) to 4.1 kB (HEXA20), for HEXA8 cubes 2.3 to
-2.4 kB from 500,000 to 1,000,000 unknowns. A solve is refused by the least figure, so that none is
+With multigrid it is 1.9 (TETRA4) to 4.1 kB (HEXA20), for HEXA8 cubes 2.3 to 2.4 kB from 500,000
+to 1,000,000 unknowns. A solve is refused by the least figure, so that none is
 refused that fits; the usual one is for a warning, and a cluster is asked for the most, since a
 factor may have to take over.
 """
@@ -17,8 +17,8 @@ from pathlib import Path
 from solver.errors import MachineError
 
 _PROGRAM = 100e6
-_LEAST = {2: 1.8e3, 3: 1.8e3}
-_USUAL = {2: 3.0e3, 3: 3.5e3}
+_LEAST = {2: 1.8e3, 3: 1.6e3}
+_USUAL = {2: 3.0e3, 3: 2.4e3}
 _MOST = {2: 7.4e3, 3: 16.0e3}
 # A cgroup without a limit has a number near 2⁶³ for one.
 _NO_LIMIT = 1 << 60
@@ -36,6 +36,11 @@ class Need:
 def needed(points: float, dim: int) -> Need:
     """The memory of a solve on a mesh of so many points."""
     return Need(*(_PROGRAM + by[dim] * points * dim for by in (_LEAST, _USUAL, _MOST)))
+
+
+def peak_mb(used: resource.struct_rusage) -> float:
+    """The largest resident memory of a process, MB, of what the system tells of it in KiB."""
+    return used.ru_maxrss * 1024 / 1e6
 
 
 def available() -> float:

@@ -11,6 +11,7 @@ from pathlib import Path
 from threading import Event, Timer
 
 from solver.clock import now
+from solver.memory import peak_mb
 from solver.options import THREADS
 
 
@@ -49,7 +50,7 @@ def used_since(started: float) -> dict[str, float]:
     return {
         "wall": now() - started,
         "cpu": time.process_time(),
-        "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak_memory_mb": peak_mb(resource.getrusage(resource.RUSAGE_SELF)),
     }
 
 
@@ -113,4 +114,4 @@ def run_apart(
         text = output.read().decode(errors="replace")
     cpu = used.ru_utime + used.ru_stime
     ending = None if over.is_set() else process.returncode
-    return Ended(ending, text, wall, cpu, used.ru_maxrss / 1024, limit)
+    return Ended(ending, text, wall, cpu, peak_mb(used), limit)

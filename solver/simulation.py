@@ -19,6 +19,7 @@ from solver.elasticity import nodal_stress
 from solver.errors import SolveError
 from solver.faces import nodal_normals
 from solver.geometry import check_geometry
+from solver.memory import peak_mb
 from solver.mesh.catalogue import BY_NAME
 from solver.naming import body_infos
 from solver.plan import decided, noted
@@ -65,7 +66,7 @@ def simulate(
         problem = ContactProblem(scene)
     solution = solve_problem(problem, clock, swapped, hexahedra, log)
     solution.cpu_seconds = time.process_time() - started
-    solution.peak_memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
 
 

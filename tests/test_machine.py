@@ -5,13 +5,14 @@ import os
 import resource
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from solver.cli import main
 from solver.errors import MachineError
 from solver.files import replacing
-from solver.memory import available, check_memory, needed
+from solver.memory import available, check_memory, needed, peak_mb
 from tests.machine import obeying_permissions, small_disk
 from tests.workflow.projects import CASE, ROOT, without_times
 
@@ -96,11 +97,17 @@ def test_left_over_temporaries_of_dead_processes_go(tmp_path):
     assert {file.name for file in tmp_path.iterdir()} == {"a.json", alive.name}
 
 
+def test_peak_memory_is_told_in_megabytes():
+    assert peak_mb(SimpleNamespace(ru_maxrss=1_000_000)) == 1024
+
+
 def test_memory_needed_is_below_what_was_measured():
-    for unknowns, measured in ((108_915, 0.52), (523_032, 1.88), (1_045_764, 3.78)):
+    for unknowns, measured in ((516_360, 1.30), (1_044_690, 2.47)):
         need = needed(unknowns // 3, 3)
         assert need.least < measured * GIGABYTE
         assert need.usual == pytest.approx(measured * GIGABYTE, rel=0.1)
+    of_tetra4 = needed(1_087_281 // 3, 3)  # the smallest
+    assert of_tetra4.least < 0.9 * 2.20 * GIGABYTE
 
 
 def test_what_cannot_fit_is_refused_and_what_may_not_is_warned_of():
@@ -108,12 +115,12 @@ def test_what_cannot_fit_is_refused_and_what_may_not_is_warned_of():
     with pytest.raises(MachineError) as refused:
         check_memory(2_000_000, 3, "big.yaml", told.append, free=8 * GIGABYTE)
     line = str(refused.value)
-    assert line.startswith("big.yaml: memory = '6000000 unknowns': needs at least 11 GB, 8 GB are")
+    assert line.startswith("big.yaml: memory = '6000000 unknowns': needs at least 9.7 GB, 8 GB are")
     assert "coarser mesh" in line
     assert "--no-memory-check" in line
     assert told == []
-    check_memory(1_000_000, 3, "big.yaml", told.append, free=8 * GIGABYTE)
-    assert told == ["memory may run out: about 11 GB of 8 GB free"]
+    check_memory(1_000_000, 3, "big.yaml", told.append, free=7 * GIGABYTE)
+    assert told == ["memory may run out: about 7.3 GB of 7 GB free"]
     check_memory(1_000_000, 2, "big.yaml", told.append, free=8 * GIGABYTE)
     assert len(told) == 1
 
@@ -135,6 +142,7 @@ def test_the_memory_there_is_heeds_the_limit_of_the_process():
 LIMITED = """
 import resource, sys
 from pathlib import Path
+from types import SimpleNamespace
 from solver.cli import main
 
 main(["solve", sys.argv[1], "-o", sys.argv[1] + ".vtkhdf", "--quiet"])

@@ -81,7 +81,8 @@ class Multigrid:
     def __init__(self, matrix: Symmetric, unknowns: Unknowns):
         """Set up for a symmetric positive definite `matrix` (n, n).
 
-        Raises SolveError where the diagonal is not positive or nothing coarsens.
+        Raises SolveError where the diagonal is not positive, nothing coarsens, or coarse levels
+        would fill in.
         """
         diagonal = matrix.diagonal()
         if not (diagonal > 0).all():
@@ -224,7 +225,7 @@ def _coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
     height, width = prolongation.blocksize
     count, size = matrix.shape[0] // height, prolongation.shape[1]
     total = bsr_matrix((size, size), dtype=np.float32, blocksize=(width, width))
-    step = max(1, -(-count // _PARTS))
+    step = -(-count // _PARTS)
     for first in range(0, count, step):
         some, fine = (_rows(each, first, first + step) for each in (matrix, prolongation))
         total = total + (fine.T @ (some @ prolongation)).tobsr((width, width))

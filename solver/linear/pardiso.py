@@ -128,6 +128,8 @@ def _library() -> ctypes.CDLL | None:
 
 
 def _load() -> ctypes.CDLL | None:
+    # Intel's threads would spin for 200 ms after each task: longer than a small factor takes.
+    os.environ.setdefault("KMP_BLOCKTIME", "1")
     roots = [sys.prefix, site.USER_BASE, os.environ.get("MKLROOT")]
     folders = [Path(root) / "lib" for root in roots if root]
     for path in [found for folder in folders for found in sorted(folder.glob("libmkl_rt.so*"))]:
