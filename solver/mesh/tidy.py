@@ -169,7 +169,10 @@ def _attached(blocks: list[_Block], dim: int, n_points: int, where: object) -> l
 def _compact(
     points: np.ndarray, blocks: list[_Block], node_groups: dict[str, np.ndarray]
 ) -> meshio.Mesh:
-    used = np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
+    present = np.zeros(len(points), dtype=bool)
+    for block in blocks:
+        present[block.nodes] = True
+    used = np.flatnonzero(present)
     new = np.full(len(points), -1)
     new[used] = np.arange(len(used))
     names = sorted({name for block in blocks for name in block.groups})
