@@ -9,7 +9,7 @@ import argparse
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -24,8 +24,6 @@ from solver.study import commands as study
 
 if TYPE_CHECKING:
     from solver.run import Job
-
-Command = Callable[[argparse.Namespace], int]
 
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 

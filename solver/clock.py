@@ -17,7 +17,7 @@ def now() -> float:
     return time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
-def _processor() -> float:
+def processor_time() -> float:
     """Seconds of this process and of those that it started and waited for, as to read a mesh."""
     ended = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + ended.ru_utime + ended.ru_stime
@@ -35,10 +35,10 @@ class Clock:
         """Count the time within the block to the stage `name`."""
         if name not in self.seconds:
             _LOG.info("%s", name)
-        wall, cpu = time.perf_counter(), _processor()
+        wall, cpu = time.perf_counter(), processor_time()
         try:
             yield
         finally:
-            spent = _processor() - cpu
+            spent = processor_time() - cpu
             self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + spent
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - wall

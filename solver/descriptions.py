@@ -1,6 +1,6 @@
 """What files that describe measurements have in common: names looked up, files named in them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -39,14 +39,14 @@ def refuse_twins(path: Path, key: str, items: Iterable[Named]) -> None:
 
 
 def refuse_unknown(
-    path: Path, key: str, name: str, kind: str, known: Iterable[str], value: object = None
+    path: Path, key: str, name: str, kind: str, known: Collection[str], value: object = None
 ) -> None:
     """Raise InputError where a `name` is none of the `known` ones of its `kind`.
 
     `value`: what stands under `key`, where that is not the name itself.
     """
-    if name not in (names := list(known)):
-        allowed = f"there is no such {kind}; {hint(name, names)}"
+    if name not in known:
+        allowed = f"there is no such {kind}; {hint(name, known)}"
         raise InputError(path, key, name if value is None else value, allowed)
 
 

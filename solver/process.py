@@ -4,13 +4,12 @@ import os
 import resource
 import subprocess
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
 
-from solver.clock import now
+from solver.clock import now, processor_time
 from solver.memory import peak_mb
 from solver.options import THREADS
 
@@ -49,7 +48,7 @@ def used_since(started: float) -> dict[str, float]:
     """What this process took: wall seconds since `started`, processor seconds, peak memory, MB."""
     return {
         "wall": now() - started,
-        "cpu": time.process_time(),
+        "cpu": processor_time(),
         "peak_memory_mb": peak_mb(resource.getrusage(resource.RUSAGE_SELF)),
     }
 

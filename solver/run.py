@@ -2,7 +2,6 @@
 
 import os
 import signal
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ import meshio
 
 from solver.case import Case, check_mesh_file, load_case
 from solver.checks import CheckResult, run_checks
-from solver.clock import Clock
+from solver.clock import Clock, processor_time
 from solver.errors import InputError, MachineError, SolveError, of_machine
 from solver.files import last_line
 from solver.memory import check_memory
@@ -164,7 +163,7 @@ def summary(verdict: dict[str, Any]) -> str:
 
 def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[str, Any]:
     """The verdict of a solve that comes to its end; `beside` lies where the verdict will."""
-    started, clock = time.process_time(), Clock()
+    started, clock = processor_time(), Clock()
     output.parent.mkdir(parents=True, exist_ok=True)  # better refused now than after the solve
     with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
@@ -176,7 +175,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[s
     solution, checks = solve_checked(
         case, mesh, job.swapped, job.hexahedra, log, accepted, clock, skips
     )
-    solution.cpu_seconds = time.process_time() - started
+    solution.cpu_seconds = processor_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
     with clock.stage("write"):
         write_result(output, solution, checks, provenance)

@@ -142,7 +142,6 @@ def test_the_memory_there_is_heeds_the_limit_of_the_process():
 LIMITED = """
 import resource, sys
 from pathlib import Path
-from types import SimpleNamespace
 from solver.cli import main
 
 main(["solve", sys.argv[1], "-o", sys.argv[1] + ".vtkhdf", "--quiet"])
