@@ -43,6 +43,9 @@ _QUANTITY = {
     "body_force": "body_force",
 }
 
+_COMPARED = ("contact_pressure", "normal_stress", "gap", "displacement", "stress")
+_MOST_TOLERANT = "must be at most 1: an error of 1 is as large as the reference itself"
+
 
 @dataclass(frozen=True)
 class Material:
@@ -311,6 +314,7 @@ def _check(case: Case) -> None:
             raise InputError(case.path, "steps", list(case.steps), allowed)
     _check_listed_twice(case)
     _check_errors(case)
+    _check_reference(case)
     if case.plane:
         check_dimension(case, 2)
 
@@ -351,6 +355,40 @@ def _check_errors(case: Case) -> None:
         else:
             continue
         raise InputError(case.path, f"tolerance.{error}", case.tolerance[error], allowed)
+
+
+def _check_reference(case: Case) -> None:
+    """Every value of the reference feeds a check, and every tolerance can be exceeded."""
+    for check, tolerance in case.tolerance.items():
+        if tolerance > 1:
+            raise InputError(case.path, f"tolerance.{check}", tolerance, _MOST_TOLERANT)
+    for key in ("contact_pressure", "gap"):
+        if key in case.reference and not case.zones:
+            allowed = "cannot be compared: the case has no contact"
+            raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+    if case.reference_kind and not case.reference and case.solution is None:
+        allowed = f"gives no value to compare with; give one of {', '.join(_COMPARED)}"
+        raise InputError(case.path, "reference.kind", case.reference_kind, allowed)
+    if case.solution is not None and not _uses_solution(case):
+        from solver.solutions import ERRORS
+
+        known = [name for name, what in ERRORS.items() if what in case.solution.quantities]
+        allowed = (
+            "nothing is compared with it; give a value (`contact_pressure: solution`) or a "
+            f"tolerance for one of {', '.join(known)}"
+        )
+        raise InputError(case.path, "reference.solution", case.solution.name, allowed)
+
+
+def _uses_solution(case: Case) -> bool:
+    """Whether a check is fed by the exact solution, or loads are, where other values are given."""
+    from solver.solutions import ERRORS
+
+    if EXACT in case.reference.values() or case.tolerance.keys() & ERRORS.keys():
+        return True
+    given = [load.value for load in case.loads]
+    given += [value for support in case.supports for value in support.fix.values()]
+    return bool(case.reference) and EXACT in given
 
 
 def _check_listed_twice(case: Case) -> None:
