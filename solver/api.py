@@ -62,8 +62,8 @@ def solve_case(
     `meshio.Mesh` with named cell sets, is taken as it is in place of the case's own, and a
     mapping then needs no key `mesh`. `swapped` exchanges slave and master, `hexahedra` (pyramids
     or hexahedra) overrides how slave hexahedra are cut. `everything`: what the scene does not need
-    is done all the same (see `solver.simulation.skips`). With `memory_check` a solve that cannot fit into
-    memory is not begun. `log` is given lines on how it goes: `log=print`.
+    is done all the same (see `solver.simulation.skips`). With `memory_check` a solve that cannot
+    fit into memory is not begun. `log` is given lines on how it goes: `log=print`.
 
     A case of a file on its own mesh is held against its accepted values too.
 

@@ -3,8 +3,8 @@
     python -IS solver/commands/warm.py BENCHMARK COMMAND …
 
 Python with all packages takes 0.7 s to start, a small case 0.1 s to solve. This client needs none
-of them; `solver.commands.server`, at the socket that the environment names, forks for each command. Exit
-status, output and files are those of the command. What it took goes to the file BENCHMARK, in
+of them; `solver.commands.server`, at the socket that the environment names, forks for each command.
+Exit status, output and files are those of the command. What it took goes to the file BENCHMARK, in
 Snakemake's columns.
 """
 

@@ -114,18 +114,19 @@ class StepResult:
 class Solution:
     """One solve, complete: everything the result file, the checks and the report need.
 
-    `mesh` is the cut mesh (volume cells only; slave sub-faces are in the zones). `displacement`
-    (n, dim), `stress` (n, 6) in the order of `solver.mechanics.fem.stress` and averaged per body, `body` (n,).
-    `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone. `balance`
-    names relative imbalances (of forces and moments, relative to the load). `length` is the largest
-    extent of the mesh, `load_scale` the largest pressure of the load or else the largest stress.
-    `accuracy` are the relative errors that rounding alone may cause, by cause (`solver.simulation.accuracy`).
-    `mean_stress` holds, by cell type, the stress s of cells in mixed form at their nodes (n_cells,
-    n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`). `errors` are the norms of `solver.verification.norms`
-    where the case names an exact solution. `matrix_entries`: those of the stiffness on the
-    free unknowns, both halves; `linear_iterations` the most that one solution of the linear system
-    took, 0 by a factor alone. `seconds` and `stage_cpu_seconds` are wall and processor time by
-    stage, `peak_memory_mb` the process's largest resident size.
+    `mesh` is the cut mesh (volume cells only; slave sub-faces are in the zones). `displacement` (n,
+    dim), `stress` (n, 6) in the order of `solver.mechanics.fem.stress` and averaged per body,
+    `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
+    `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
+    the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
+    largest stress. `accuracy` are the relative errors that rounding alone may cause, by cause (see
+    `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
+    form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
+    `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
+    `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
+    the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
+    `stage_cpu_seconds` are wall and processor time by stage, `peak_memory_mb` the process's largest
+    resident size.
     """
 
     case: Case

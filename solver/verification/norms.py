@@ -13,7 +13,7 @@ in cells in mixed form):
     pressure_means        |p_h − p̄| / |p̄|                    p̄: mean of p over each macro-element
     pressure_oscillation  largest |e₋ − 2 e + e₊| / largest p   e = p_h − p̄ of neighbours where p is
                                                              smooth; of nodal multipliers p_h − p
-                                                             at nodes (see solver.verification.oscillation)
+                                                             at nodes (see `oscillation`)
     half_width, peak      of the half ellipse fitted to p_h (Hertz), relative
 
 In the first two of the pressure p_h is the field that the treatment of the interface solves for:

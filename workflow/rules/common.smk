@@ -87,10 +87,10 @@ def stamp_of(file):
 
 
 OF_REPORT = sources("report/**/*.py", "report/templates/*")
-OF_SOLVER = sorted({*sources("**/*.py", "schemas/*")} - {*OF_REPORT})
+OF_SOLVER = sorted({*sources("**/*.py", "case/schemas/*")} - {*OF_REPORT})
 OF_MESH = sources(
-    *("case.py", "dimension.py", "errors.py", "expressions.py", "files.py"),
-    *("strict_yaml.py", "schemas/*", "mesh/*.py"),
+    *("case/**/*.py", "case/schemas/*", "system/errors.py", "system/files.py"),
+    *("system/hdf5.py", "mesh/**/*.py"),
 )
 REPORT_SOURCES = stamped("report", OF_REPORT)
 SOLVER_SOURCES = stamped("solver", OF_SOLVER)

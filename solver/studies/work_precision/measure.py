@@ -1,4 +1,6 @@
-"""The process that measures one point: `python -m solver.studies.work_precision.measure JOB`, JOB a JSON object.
+"""The process that measures one point, given as a JSON object.
+
+    python -m solver.studies.work_precision.measure JOB
 
 Its numerical libraries read the number of threads when they are loaded, and peak memory is the
 process's own: hence a process for each point.
