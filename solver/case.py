@@ -10,6 +10,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from solver.descriptions import require_file
 from solver.dimension import check_dimension
 from solver.errors import InputError
 from solver.expressions import Expression
@@ -156,8 +157,8 @@ def parse_case(text: str, path: Path) -> Case:
 def check_mesh_file(case: Case) -> None:
     """Raise `InputError` where the case names a mesh file that is not there."""
     path = case.mesh.get("path")
-    if path and not path.is_file():
-        raise InputError(case.path, "mesh.file", str(path), "no such file")
+    if path:
+        require_file(case.path, "mesh.file", path, str(path))
 
 
 class _Reader:
