@@ -118,6 +118,7 @@ lint: lint-environment ## check format, style and types of the sources
 	.venv/bin/python -m ruff check .
 	.venv/bin/snakefmt --check Snakefile workflow
 	.venv/bin/python -m mypy
+	.venv/bin/lint-imports --no-logo
 
 environment:
 	@$(INSTALL) run
@@ -157,7 +158,7 @@ lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrad
 
 clean: ## remove results and caches
 	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +
-	@rm -rf .snakemake .sphinx .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	@rm -rf .snakemake .sphinx .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
 	@find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
 clean-all: clean ## remove the environment too

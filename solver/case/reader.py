@@ -10,6 +10,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from solver.case.descriptions import require_file
 from solver.case.expressions import Expression
 from solver.case.rules import check_dimension
 from solver.case.schemas import CASE_SCHEMA, hint, key_path, validate
@@ -156,8 +157,8 @@ def parse_case(text: str, path: Path) -> Case:
 def check_mesh_file(case: Case) -> None:
     """Raise `InputError` where the case names a mesh file that is not there."""
     path = case.mesh.get("path")
-    if path and not path.is_file():
-        raise InputError(case.path, "mesh.file", str(path), "no such file")
+    if path:
+        require_file(case.path, "mesh.file", path, str(path))
 
 
 class _Reader:

@@ -16,6 +16,7 @@ from solver.case.reader import (
     Observation,
     Support,
     Zone,
+    check_mesh_file,
     load_case,
     parse_case,
 )
@@ -148,6 +149,14 @@ def test_numbers_are_floats():
     assert all(type(m.young) is float for m in case.materials.values())
     assert all(type(factor) is float for factor in case.steps)
     assert type(case.zones[0].interference) is float
+
+
+def test_a_mesh_file_of_too_long_a_name():
+    case = parse_case(
+        MINIMAL.replace("{recipe: blocks, size: 1.0}", f"{{file: {'a' * 256}}}"), PATH
+    )
+    with pytest.raises(InputError, match=r"^family/c\.yaml: mesh\.file = .* no such file$"):
+        check_mesh_file(case)
 
 
 def test_load_case_reads_the_file(tmp_path):
