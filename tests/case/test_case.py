@@ -173,6 +173,9 @@ def test_needed_keys(key):
         parse_case("\n".join(lines), PATH)
 
 
+SOLUTION_ALONE = (
+    "reference: {kind: analytical, solution: {name: hydrostatic, pressure: 1, material: all}}"
+)
 REFUSED = [
     # unknown keys, with the nearest allowed one
     ('"a\\nb": 1', "'a\\nb' = 1: unknown key; allowed: "),
@@ -329,12 +332,11 @@ REFUSED = [
         "reference.contact_pressure = '25.0': cannot be compared: the case has no contact",
     ),
     (
-        "reference: {kind: analytical, solution: {name: hydrostatic, pressure: 1, material: all}}",
+        SOLUTION_ALONE,
         "reference.solution = 'hydrostatic': nothing is compared with it; give a value",
     ),
     (
-        "reference: {kind: analytical, solution: {name: hydrostatic, pressure: 1, material: all},"
-        " displacement: [0, 0, 0]}",
+        f"{SOLUTION_ALONE[:-1]}, normal_stress: 1}}",
         "reference.solution = 'hydrostatic': nothing is compared with it; give a value",
     ),
     ("counts: {top: {cells: 1.5}}", "counts.top.cells = 1.5: must be a whole number"),
