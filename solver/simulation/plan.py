@@ -64,9 +64,6 @@ def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
     whole = [kind for kind in kinds if not needs_cut(kind)]
     if zone.treatment.cut and whole and scene.skips.cut:
         yield Line(f"{name}: no cut", f"{', '.join(whole)} faces own an inner node", "cut")
-    if operator.unclipped:
-        what = f"{name}: {operator.unclipped} of {operator.segments} segments not clipped"
-        yield Line(what, "there a slave face lies within one master face", "clipping")
     if operator.closed_faces:
         why = "some faces are no affine images of their reference face"
         why = why if scene.skips.quadrature else "as asked for"

@@ -1,7 +1,6 @@
 """From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import meshio
@@ -16,9 +15,9 @@ from solver.mechanics.fem.mixed import MeanStress
 from solver.mechanics.fem.supports import FreeMotion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
 from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
-from solver.mechanics.mortar.held import joined
+from solver.mechanics.mortar.held import merge_fixed_multipliers
 from solver.mechanics.mortar.operator import GapOperator, gap_operator
-from solver.mechanics.mortar.treatments import SEGMENTED, TREATMENTS, Treatment, scheme_of
+from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.attributes import Attributes
 from solver.simulation.cures import ALL, Cures
@@ -176,7 +175,7 @@ def _without_held(zones: list[ZoneScene], free: FreeMotion) -> list[ZoneScene]:
     for zone in zones:
         operator = zone.operator
         if zone.treatment.joins:
-            operator = joined(operator, free.basis)
+            operator = merge_fixed_multipliers(operator, free.basis)
         found.append(replace(zone, first=first, operator=operator))
         first += len(operator.initial)
     return found
@@ -283,8 +282,6 @@ def _operator(
     if not skips.quadrature:
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
-    if not skips.clipping and zone.treatment in SEGMENTED:
-        scheme = replace(scheme, meet=partial(scheme.meet, clip_all=True))
     scheme = replace(scheme, closure=scheme.closure and cures.closure)
     return gap_operator(slaves, masters, count, len(points), search, scheme)
 
