@@ -24,6 +24,7 @@ SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 .PHONY: scaling benchmark test accept
 .PHONY: format lint lock faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment study-environment gallery-environment test-environment lint-environment docs-environment
+.PHONY: bill-environment
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -137,13 +138,20 @@ lint-environment:
 docs-environment:
 	@$(INSTALL) run docs
 
+bill-environment:
+	@$(INSTALL) run bill
+
 docs: docs-environment ## write the documentation as a site into results/docs
 	@.venv/bin/python -m sphinx --quiet --fresh-env --fail-on-warning --keep-going \
 	  -c docs/site -d .sphinx . results/docs
 	@.venv/bin/python docs/site/links.py results/docs
 
-bill: environment ## write the bill of materials: every locked package, licence and hash
-	@.venv/bin/python workflow/bill.py results/bill-of-materials.json
+BILL = results/bill-of-materials.json
+bill: bill-environment ## write the bill of materials: every installed package and its licence
+	@mkdir -p results
+	@.venv/bin/cyclonedx-py environment .venv/bin/python --pyproject pyproject.toml \
+	  --output-reproducible --output-file $(BILL)
+	@echo "Bill of materials: $(BILL)"
 
 LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --no-annotate --custom-compile-command 'make lock'
@@ -151,7 +159,7 @@ LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
-	@for group in build mkl slurm pictures gallery test lint docs lock; do \
+	@for group in build mkl slurm pictures gallery test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 
