@@ -1,21 +1,21 @@
 """Verification of mortar contact: meshes, solves, checks and reports cases.
 
-As a library: `from solver import solve_case` (see `solver.library`).
+As a library: `from solver import solve_case` (see `solver.api`).
 """
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from solver.errors import InputError, SolveError
-    from solver.library import Solved, solve_case
+    from solver.api import Solved, solve_case
+    from solver.system.errors import InputError, SolveError
 
 __all__ = ["InputError", "SolveError", "Solved", "solve_case"]
 
 _HOME = {
-    "InputError": "solver.errors",
-    "SolveError": "solver.errors",
-    "Solved": "solver.library",
-    "solve_case": "solver.library",
+    "InputError": "solver.system.errors",
+    "SolveError": "solver.system.errors",
+    "Solved": "solver.api",
+    "solve_case": "solver.api",
 }
 
 

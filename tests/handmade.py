@@ -5,8 +5,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from solver.case import load_case
-from solver.solution import BodyInfo, Line, Solution, StepResult, ZoneResult
+from solver.case.reader import load_case
+from solver.simulation.solution import BodyInfo, Line, Solution, StepResult, ZoneResult
 
 PLANE = """\
 name: two-blocks

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from solver.elements import shape_functions
-from solver.lac.facets import facets
+from solver.mechanics.fem import shape_functions
+from solver.mechanics.mortar.facets import facets
 from solver.mesh.catalogue import BY_NAME
 
 

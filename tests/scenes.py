@@ -5,7 +5,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from solver.case import Case, parse_case
+from solver.case.reader import Case, parse_case
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME, cell_type
 
@@ -65,7 +65,7 @@ def moved(mesh: meshio.Mesh, amount: float, seed: int = 0) -> meshio.Mesh:
 
 def straightened(mesh: meshio.Mesh) -> meshio.Mesh:
     """Mid-nodes put back on straight edges (and into the middle of faces and cells)."""
-    from solver.elements import shape_functions
+    from solver.mechanics.fem import shape_functions
 
     points = mesh.points.copy()
     for block in mesh.cells:

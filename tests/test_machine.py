@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from solver.cli import main
-from solver.errors import MachineError
-from solver.files import replacing
-from solver.memory import available, check_memory, needed, peak_mb
+from solver.commands.cli import main
+from solver.system.errors import MachineError
+from solver.system.files import replacing
+from solver.system.memory import available, check_memory, needed, peak_mb
 from tests.machine import obeying_permissions, small_disk
 from tests.workflow.projects import CASE, ROOT, without_times
 
@@ -127,7 +127,7 @@ def test_what_cannot_fit_is_refused_and_what_may_not_is_warned_of():
 
 def test_the_memory_there_is_heeds_the_limit_of_the_process():
     assert 0 < available() < 1e15
-    asked = "from solver.memory import available; print(available())"
+    asked = "from solver.system.memory import available; print(available())"
     limited = subprocess.run(
         [sys.executable, "-c", asked],
         cwd=ROOT,
@@ -142,7 +142,7 @@ def test_the_memory_there_is_heeds_the_limit_of_the_process():
 LIMITED = """
 import resource, sys
 from pathlib import Path
-from solver.cli import main
+from solver.commands.cli import main
 
 main(["solve", sys.argv[1], "-o", sys.argv[1] + ".vtkhdf", "--quiet"])
 used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()

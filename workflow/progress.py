@@ -14,7 +14,7 @@ from pathlib import Path
 from threading import Event, RLock, Thread
 from typing import Any, TextIO
 
-from solver.files import last_line
+from solver.system.files import last_line
 
 # The rules that a run is about, by what one of their jobs is called.
 COUNTED = {

@@ -10,15 +10,19 @@ from importlib import import_module
 from inspect import getdoc
 from typing import Any
 
-from solver.case import Case, Material, Zone
-from solver.checks import CHECKS, RELATIVE, Check
+from solver.case.reader import Case, Material, Zone
+from solver.case.schemas import CASE_SCHEMA
+from solver.case.solutions import SOLUTIONS
 from solver.report.html import MEANING
-from solver.schemas import CASE_SCHEMA
-from solver.solutions import SOLUTIONS
+from solver.verification.checks import CHECKS, RELATIVE, Check
 
 # What the objects of a case file become, which knows the defaults of their keys.
 _CLASSES = {"": Case, "contact[]": Zone, "materials.*": Material}
-_RECIPES = ("solver.mesh.blocks", "solver.mesh.hybrid", "solver.mesh.mapped")
+_RECIPES = (
+    "solver.mesh.recipes.blocks",
+    "solver.mesh.recipes.hybrid",
+    "solver.mesh.recipes.mapped",
+)
 
 
 def case_keys() -> str:
@@ -106,7 +110,7 @@ def recipes() -> str:
 
 def transforms() -> str:
     """What the module of the transform says of its keys."""
-    return _told("solver.mesh.transforms")
+    return _told("solver.mesh.changes.transforms")
 
 
 def _told(module: str) -> str:

@@ -15,9 +15,9 @@ from typing import Any
 import meshio
 from meshio._mesh import topological_dimension
 
-from solver.errors import InputError
-from solver.files import replacing
 from solver.mesh.catalogue import BY_NAME
+from solver.system.errors import InputError
+from solver.system.files import replacing
 
 # meshio knows the nodes of PENTA15 and PYRA13, but its table of dimensions has no line for them.
 for _kind in BY_NAME.values():
@@ -35,21 +35,21 @@ def generate(recipe: Mapping[str, Any], where: str) -> meshio.Mesh:
 
 def transform(mesh: meshio.Mesh, spec: Mapping[str, Any], where: str = "transform") -> meshio.Mesh:
     """The mesh changed as a case file's `transform:` mapping says; see `transforms`."""
-    from solver.mesh import transforms
+    from solver.mesh.changes import transforms
 
     return transforms.transform(mesh, spec, where)
 
 
 def read_mesh(path: str | os.PathLike[str]) -> meshio.Mesh:
     """The mesh in a file, by its extension; see `formats`. Raises InputError naming the file."""
-    from solver.mesh import formats
+    from solver.mesh.files import formats
 
     return formats.read(Path(path))
 
 
 def write_mesh(mesh: meshio.Mesh, path: str | os.PathLike[str]) -> None:
     """Write the mesh as VTKHDF, whole or not at all; the same mesh gives the same bytes."""
-    from solver.mesh import vtkhdf
+    from solver.mesh.files import vtkhdf
 
     path = Path(path)
     if path.suffix != ".vtkhdf":

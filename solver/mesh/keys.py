@@ -7,7 +7,7 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from solver.errors import InputError
+from solver.system.errors import InputError
 
 
 class Keys:

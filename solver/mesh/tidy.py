@@ -3,9 +3,9 @@
 import meshio
 import numpy as np
 
-from solver.errors import InputError
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME, CellType
 from solver.mesh.orient import right_side_out
+from solver.system.errors import InputError
 
 _RANK = {cell.name: i for i, cell in enumerate(BY_NAME.values())}
 _SHOWN = 5

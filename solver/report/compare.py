@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver.files import write_text
 from solver.report.differences import Comparison, Pair, read_batch
 from solver.report.html import environment
 from solver.report.tables import md
+from solver.system.files import write_text
 
 PAGE = "compare.html"
 CHANGES = ("solve", "quantity", "before", "now", "change")

@@ -11,12 +11,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from solver.checks import ROUND_OFF
-from solver.errors import InputError
+from solver.case.schemas import SUMMARY_SCHEMA, validate
 from solver.report import formats, stages
 from solver.report.rows import WORDS, Row, natural
 from solver.report.tables import outcome
-from solver.schemas import SUMMARY_SCHEMA, validate
+from solver.system.errors import InputError
+from solver.verification.checks import ROUND_OFF
 
 SUMMARY = "summary.json"
 # A solve whose time changed is worth a line from this ratio on, and from these seconds.

@@ -23,10 +23,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from solver.errors import InputError
-from solver.expressions import Expression
-from solver.schemas import FAMILY_SCHEMA
-from solver.strict_yaml import read_mapping
+from solver.case.expressions import Expression
+from solver.case.schemas import FAMILY_SCHEMA
+from solver.case.yaml import read_mapping
+from solver.system.errors import InputError
 
 FILE_NAME = "family.yaml"
 # Pages of the report that are no family's: a family of that name has its page under another.

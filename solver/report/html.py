@@ -5,9 +5,9 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from solver.orders import ERRORS
 from solver.report import PAGE, formats
 from solver.report.families import page_name, paragraphs
+from solver.studies.fits import ERRORS
 
 # What each check looks at, in the order of the table of checks.
 MEANING = {

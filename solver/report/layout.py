@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from solver.report.svg import BLUE, MUTED, ORANGE, PAPER, mixed
-from solver.solution import BodyInfo, Solution, ZoneResult
+from solver.simulation.solution import BodyInfo, Solution, ZoneResult
 
 Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
 Placement = Callable[[np.ndarray], np.ndarray]  # coordinates (…, dim) to pixels (…, 2)

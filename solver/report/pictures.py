@@ -6,15 +6,15 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from solver.errors import InputError
-from solver.expressions import Expression
-from solver.files import write_text
+from solver.case.expressions import Expression
 from solver.report.plane import draw_plane
 from solver.report.profile import draw_profile
 from solver.report.rows import Row
 from solver.report.space import draw_space
-from solver.results import read_result
-from solver.solution import Solution
+from solver.simulation.solution import Solution
+from solver.system.errors import InputError
+from solver.system.files import write_text
+from solver.verification.results import read_result
 
 MOST_CELLS = 100_000
 

@@ -9,9 +9,9 @@ from typing import Any
 from solver.report.rows import Row
 
 FILE = Path("benchmark/savings.json")
-"""What `solver.savings` writes, in the folder of results."""
+"""What `solver.studies.benchmark.savings` writes, in the folder of results."""
 UNMEASURED = "not measured: make benchmark"
-# What each switch of `solver.skips.Skips` leaves out, in the order of the work.
+# What each switch of `solver.simulation.skips.Skips` leaves out, in the order of the work.
 TITLES = {
     "cut": "the cut of slave cells",
     "clipping": "clipping of faces",

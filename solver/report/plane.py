@@ -8,8 +8,8 @@ from solver.report.geometry import plane_cells
 from solver.report.layout import Frame, apart, edge_color, extents, fit, tangent, tint
 from solver.report.profile import expected
 from solver.report.svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
-from solver.solution import Solution, ZoneResult
-from solver.units import with_unit
+from solver.simulation.solution import Solution, ZoneResult
+from solver.verification.units import with_unit
 
 WIDTH, HEIGHT = 760, 330
 

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from solver.exact import ExactValues
-from solver.expressions import Expression, evaluate
-from solver.faces import surface_points
+from solver.case.expressions import Expression, evaluate
+from solver.mechanics.fem.faces import surface_points
 from solver.report.axes import Scale, draw_axes
 from solver.report.layout import extents, plan_axes, tangent
 from solver.report.svg import BLUE, INK, PAPER, Drawing, mixed
-from solver.samples import expected_pressure
-from solver.solution import NodalContact, Solution, ZoneResult
-from solver.units import with_unit
+from solver.simulation.exact import ExactValues
+from solver.simulation.solution import NodalContact, Solution, ZoneResult
+from solver.verification.samples import expected_pressure
+from solver.verification.units import with_unit
 
 WIDTH, HEIGHT = 470, 372
 # Where less than this share of the interface is pressed, only that and what is next to it is drawn.

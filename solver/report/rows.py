@@ -93,7 +93,7 @@ class Row:
 
     @cached_property
     def norms(self) -> Mapping[str, float]:
-        """Errors against the exact solution by their names in `solver.norms`."""
+        """Errors against the exact solution by their names in `solver.verification.norms`."""
         errors = self.verdict.get("errors") or {}
         return {name: value for name, value in errors.items() if value is not None}
 

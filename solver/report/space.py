@@ -16,8 +16,8 @@ from solver.report.layout import (
     tint,
 )
 from solver.report.svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
-from solver.solution import Solution, ZoneResult
-from solver.units import with_unit
+from solver.simulation.solution import Solution, ZoneResult
+from solver.verification.units import with_unit
 
 WIDTH, HEIGHT = 760, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.results import read_result
+from solver.verification.results import read_result
 
 FILE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "two_curved_bodies.py"
 SPEC = importlib.util.spec_from_file_location("two_curved_bodies", FILE)

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from solver.checks import CHECKS
+from solver.case.schemas import CASE_SCHEMA
+from solver.case.solutions import SOLUTIONS
 from solver.mesh.recipes import _RECIPES
 from solver.report.html import NORMS
-from solver.schemas import CASE_SCHEMA
-from solver.solutions import SOLUTIONS
+from solver.verification.checks import CHECKS
 
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"

@@ -7,10 +7,10 @@ import gmsh
 import meshio
 import numpy as np
 
-from solver.cli import main
+from solver.commands.cli import main
 from solver.mesh import generate, write_mesh
 from solver.mesh.catalogue import cell_type
-from solver.mesh.gmsh_session import number_of, session
+from solver.mesh.recipes.gmsh_session import number_of, session
 
 MESHES = ("mesh.med", "mesh.msh", "binary.msh", "mesh.inp", "mesh.vtu", "mesh.vtkhdf")
 CASE = """\

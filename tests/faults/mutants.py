@@ -18,14 +18,14 @@ from unittest.mock import patch
 
 import numpy as np
 
-from solver.case import load_case
-from solver.checks import run_checks
-from solver.errors import InputError, SolveError
-from solver.norms import errors
-from solver.regression import accepted_values
-from solver.run import mesh_of
-from solver.simulation import simulate
-from solver.verdict import of_solution
+from solver.case.reader import load_case
+from solver.simulation.simulate import simulate
+from solver.system.errors import InputError, SolveError
+from solver.verification.checks import run_checks
+from solver.verification.norms import errors
+from solver.verification.regression import accepted_values
+from solver.verification.run import mesh_of
+from solver.verification.verdict import of_solution
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 PLANE, SOLID = "ssnp170/c", "opening/overlap-tetra10-hexa8"
@@ -206,80 +206,85 @@ class _Alike:
 
 MUTANTS = (
     Mutant("gap-sign", "the initial gap counts with the wrong sign", CLOSING,
-           "solver.lac.operator:_integrals", changed(lambda p: replace(p, gap=-p.gap))),
+           "solver.mechanics.mortar.operator:_integrals",
+           changed(lambda p: replace(p, gap=-p.gap))),
     Mutant("operator-sign", "the gap operator has the wrong sign: surfaces attract", PLANE,
-           "solver.scene:gap_operator", changed(lambda o: replace(o, matrix=-o.matrix))),
+           "solver.simulation.scene:gap_operator", changed(lambda o: replace(o, matrix=-o.matrix))),
     Mutant("normal-side", "slave and master faces are turned inward", PLANE,
-           "solver.scene:facets", given(lambda x, kind, nodes, n: (x, kind, nodes[:, ::-1], n))),
+           "solver.simulation.scene:facets",
+           given(lambda x, kind, nodes, n: (x, kind, nodes[:, ::-1], n))),
     Mutant("master-order", "master shape functions are given to the next node", TILTED,
-           "solver.lac.operator:_integrals",
+           "solver.mechanics.mortar.operator:_integrals",
            changed(lambda p: replace(p, master=np.roll(p.master, 1, axis=2)))),
     Mutant("slave-side-lost", "slave nodes are missing in the gap's derivative", PLANE,
-           "solver.lac.operator:_integrals", changed(lambda p: replace(p, slave=0 * p.slave))),
+           "solver.mechanics.mortar.operator:_integrals",
+           changed(lambda p: replace(p, slave=0 * p.slave))),
     Mutant("sliver-lost", "the smallest segment is dropped", PLANE,
-           "solver.lac.operator:intersect", changed(_one_dropped)),
+           "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
     Mutant("sliver-lost-3d", "the smallest segment is dropped, in space", TILTED_SOLID,
-           "solver.lac.operator:intersect", changed(_one_dropped)),
+           "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
     Mutant("pair-lost", "one master face is overlooked when faces are paired", PLANE,
-           "solver.lac.segments:candidate_pairs", changed(_master_overlooked)),
+           "solver.mechanics.mortar.segments:candidate_pairs", changed(_master_overlooked)),
     Mutant("macro-element-dropped", "one macro-element may never close", PLANE,
-           "solver.contact:ContactProblem.__init__", _never_closing),
+           "solver.simulation.problem:ContactProblem.__init__", _never_closing),
     Mutant("macro-element-numbers", "sub-faces go to the next macro-element", VARYING,
-           "solver.scene:cut", changed(_rolled_sub_faces)),
+           "solver.simulation.scene:cut", changed(_rolled_sub_faces)),
     Mutant("template-off-by-one", "the cut's first sub-face takes its nodes one further on", PLANE,
-           "solver.lac.cut:_template", changed(_template_off_by_one)),
+           "solver.mechanics.mortar.cut:_template", changed(_template_off_by_one)),
     Mutant("template-piece-lost", "the cut loses a piece of the cell", SOLID,
-           "solver.lac.cut:_template", changed(_template_piece_lost)),
+           "solver.mechanics.mortar.cut:_template", changed(_template_piece_lost)),
     Mutant("jacobian", "the Jacobian of one cell is one per cent too large", PLANE,
-           "solver.elasticity:physical_gradients",
+           "solver.mechanics.fem.elasticity:physical_gradients",
            changed(lambda found: (found[0], _first_scaled(found[1], 1.01)))),
     Mutant("node-order", "the first two nodes of every cell are exchanged", PLANE,
-           "solver.elasticity:physical_gradients",
+           "solver.mechanics.fem.elasticity:physical_gradients",
            changed(lambda found: (found[0][:, :, [1, 0, *range(2, found[0].shape[2])]], found[1]))),
     Mutant("quadrature-weight", "one weight of the cells' quadrature is ten per cent off", BENT,
-           "solver.elasticity:volume_rule",
+           "solver.mechanics.fem.elasticity:volume_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
     Mutant("segment-weight", "one weight of the segments' quadrature is ten per cent off", TILTED,
-           "solver.lac.segments:simplex_rule",
+           "solver.mechanics.mortar.segments:simplex_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
     Mutant("load-weight", "one weight of the loads' quadrature is ten per cent off", PLANE,
-           "solver.loads:face_rule", changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
+           "solver.mechanics.fem.loads:face_rule",
+           changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
     Mutant("poisson-term", "Lamé's λ is that of plane stress", PLANE,
-           "solver.attributes:lame_parameters",
+           "solver.simulation.attributes:lame_parameters",
            changed(lambda lm: (2 * lm[0] * lm[1] / (lm[0] + 2 * lm[1]), lm[1]))),
     Mutant("shear-modulus", "E / (2 + ν) in place of E / (2 (1 + ν))", PLANE,
-           "solver.attributes:lame_parameters", changed(lambda lm: (lm[0], lm[1] * 2.6 / 2.3))),
+           "solver.simulation.attributes:lame_parameters",
+           changed(lambda lm: (lm[0], lm[1] * 2.6 / 2.3))),
     Mutant("pressure-sign", "a pressure pulls", PLANE,
-           "solver.attributes:face_forces", changed(lambda force: -force)),
+           "solver.simulation.attributes:face_forces", changed(lambda force: -force)),
     Mutant("load-side", "a load acts on the faces as seen from the other side", TILTED,
-           "solver.loads:area_vectors", changed(lambda vectors: -vectors)),
+           "solver.mechanics.fem.loads:area_vectors", changed(lambda vectors: -vectors)),
     Mutant("load-mean", "a load is shared among a face's nodes alike", BENT,
-           "solver.loads:shape_functions",
+           "solver.mechanics.fem.loads:shape_functions",
            lambda true: lambda name: _Alike(true(name))),
     Mutant("coverage-lost", "the part that is covered is taken for the whole face", PARTLY,
-           "solver.scene:gap_operator",
+           "solver.simulation.scene:gap_operator",
            changed(lambda o: replace(o, covered=o.area,
                                      surface=replace(o.surface, covered=o.surface.area)))),
     Mutant("stress-mean", "stress at nodes is the plain mean over the cell's quadrature", LAYERS,
-           "solver.elasticity:_extrapolation",
+           "solver.mechanics.fem.elasticity:_extrapolation",
            changed(lambda fit: np.full(fit.shape, 1 / fit.shape[1]))),
     Mutant("stale-system", "the factored system is that of the first status", CLOSING,
-           "solver.contact:ContactProblem._constrained", _first_system_kept),
+           "solver.simulation.problem:ContactProblem._constrained", _first_system_kept),
     Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,
-           "solver.linear.condensation:prepare", _factor_of_half),
+           "solver.mechanics.linear.condensation:prepare", _factor_of_half),
     Mutant("multiplier-sign", "the multiplier balances the wrong way", PLANE,
-           "solver.linear.condensation:Condensed.multiplier", changed(lambda p: -p)),
+           "solver.mechanics.linear.condensation:Condensed.multiplier", changed(lambda p: -p)),
     Mutant("never-closes", "the contact status finds nothing to close", CLOSING,
-           "solver.contact:find_status", _never_closes),
+           "solver.simulation.problem:find_status", _never_closes),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
-           "solver.contact:find_status", _stays_closed),
+           "solver.simulation.problem:find_status", _stays_closed),
     Mutant("support-lost", "a support loses its last node", PLANE,
-           "solver.attributes:Attributes.nodes", changed(lambda nodes: nodes[:-1])),
+           "solver.simulation.attributes:Attributes.nodes", changed(lambda nodes: nodes[:-1])),
     Mutant("material-mixed-up", "the two bodies have each other's material", LAYERS,
-           "solver.attributes:Attributes._by_material",
+           "solver.simulation.attributes:Attributes._by_material",
            changed(lambda values: {k: v[::-1] for k, v in values.items()})),
     Mutant("origin-forgotten", "expressions see coordinates counted from the middle", VARYING,
-           "solver.attributes:Attributes.__init__",
+           "solver.simulation.attributes:Attributes.__init__",
            lambda true: lambda self, case, mesh, cut, zones, origin: true(
                self, case, mesh, cut, zones, 0 * origin)),
 )  # fmt: skip

@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from solver.files import seal
+from solver.system.files import seal
 
 Change = Callable[[bytes, random.Random], bytes]
 

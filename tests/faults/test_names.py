@@ -2,7 +2,7 @@
 
 import xml.etree.ElementTree as ET
 
-from solver.cli import main
+from solver.commands.cli import main
 from tests.faults.corpus import CASE, RECIPE
 
 FOLDER = "a $(touch hurt)'; touch hurt #<b>&"

@@ -15,7 +15,7 @@ MEMORY = 6 << 30
 
 def outcome(arguments: Sequence[str]) -> dict:
     """Status, output and error lines of one command of the solver's."""
-    from solver.cli import main
+    from solver.commands.cli import main
 
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

@@ -12,7 +12,7 @@ import vtk
 from vtk.util.numpy_support import numpy_to_vtk
 
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME
-from solver.mesh.gmsh_session import number_of, session
+from solver.mesh.recipes.gmsh_session import number_of, session
 from tests.mesh.curved import Curved, ours
 
 _POINT = 15  # gmsh's number of the type

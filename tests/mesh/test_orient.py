@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.errors import InputError
 from solver.mesh.catalogue import BY_NAME
 from solver.mesh.orient import right_side_out, vertex_jacobians
 from solver.mesh.tidy import tidy
+from solver.system.errors import InputError
 from tests.mesh.curved import KINDS
 
 

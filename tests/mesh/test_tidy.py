@@ -4,8 +4,8 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.errors import InputError
 from solver.mesh.tidy import tidy
+from solver.system.errors import InputError
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
 

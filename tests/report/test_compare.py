@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from solver.cli import main
+from solver.commands.cli import main
 from tests.report.test_report import BATCH, NASTY, read_page, verdict
 from tests.workflow.projects import ROOT
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.case import load_case
-from solver.cli import main
+from solver.case.reader import load_case
+from solver.commands.cli import main
 from solver.report import formats, write_report
 from solver.report.families import FILE_NAME, page_name, paragraphs, read_family
 from solver.report.profile import draw_profile
-from solver.results import write_result
-from solver.solution import NodalContact
+from solver.simulation.solution import NodalContact
+from solver.verification.results import write_result
 from tests import handmade
 from tests.report.test_pictures import SVG, polygons
 from tests.report.test_report import CHECK, verdict

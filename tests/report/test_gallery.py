@@ -8,14 +8,14 @@ import subprocess
 import numpy as np
 import pytest
 
-from solver.cli import main
+from solver.commands.cli import main
 from solver.report.gallery import probe, write_gallery
 from solver.report.geometry import macro_edges
 from solver.report.layout import magnification
 from solver.report.plane import draw_plane
 from solver.report.space import draw_space
-from solver.results import write_result
-from solver.verdict import to_json
+from solver.verification.results import write_result
+from solver.verification.verdict import to_json
 from tests import handmade
 
 pyvista = pytest.importorskip("pyvista", reason="PyVista is not installed")

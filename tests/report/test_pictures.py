@@ -15,7 +15,7 @@ from solver.report.plane import draw_plane
 from solver.report.rows import Row
 from solver.report.space import draw_space, pressure_color
 from solver.report.svg import BLUE, ORANGE, Drawing, mixed
-from solver.results import write_result
+from solver.verification.results import write_result
 from tests import handmade
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -65,7 +65,7 @@ def audit(event, details):
                  "socket.sendto", "urllib.Request"):
         raise SystemExit(f"network: {event} {details}")
 sys.addaudithook(audit)
-from solver.cli import main
+from solver.commands.cli import main
 case, result, folder = sys.argv[1:]
 assert main(["solve", case, "-o", result, "--verdict", f"{folder}/verdict.json"]) == 0
 assert main(["check", result]) == 0

@@ -15,7 +15,7 @@ FAULTS = """\
 import pathlib, resource, sys
 fault = pathlib.Path("fault").exists() and "solve" in sys.argv
 if fault and "hungry" in str(sys.argv):
-    import solver.run
+    import solver.verification.run
     used = int(pathlib.Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used, used))
 """

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from solver.files import last_line
+from solver.system.files import last_line
 from tests.workflow.projects import new_project, snakemake
 from workflow.progress import Progress, State, duration, hides
 

@@ -14,14 +14,14 @@ SLACK = 10
 
 @cache
 def size_of(file, refine):
-    from solver.size import of_mesh
+    from solver.mesh.size import of_mesh
 
     return of_mesh(peek(Path(file)).get("mesh"), Path(file).parent, refine)
 
 
 def memory(file, attempt, refine=1):
     """Megabytes that a job of this case asks for, more each time it has to be run again."""
-    from solver.memory import needed
+    from solver.system.memory import needed
 
     size = size_of(file, refine)
     return attempt * round(AROUND_MB + needed(size.points, size.dim).most / 1e6)
@@ -67,8 +67,8 @@ def reason_of(failure):
 
 def give_verdict(job, failure):
     """The verdict `crashed` for a job of the batch that was not left to write one itself."""
-    from solver.run import Job as Solve
-    from solver.run import record_crash
+    from solver.verification.run import Job as Solve
+    from solver.verification.run import record_crash
 
     verdict = Path(verdict_of(job))
     log = verdict.with_name("log")

@@ -22,7 +22,7 @@ MEMORY_CHECK = " --no-memory-check" * (config["memory_check"] in (False, "false"
 PYTHON = shlex.quote(sys.executable)
 # Before a file for what it takes and a command of the solver, which runs in a fork of the run's
 # warm process, where there is one.
-SOLVER = f"{PYTHON} -IS solver/warm.py"
+SOLVER = f"{PYTHON} -IS solver/commands/warm.py"
 
 # One solve. `mesh`: the user's mesh file, or None where a recipe generates it; `hexahedra`: how
 # hexahedra are cut, None for the case's own way.
@@ -87,10 +87,10 @@ def stamp_of(file):
 
 
 OF_REPORT = sources("report/**/*.py", "report/templates/*")
-OF_SOLVER = sorted({*sources("**/*.py", "schemas/*")} - {*OF_REPORT})
+OF_SOLVER = sorted({*sources("**/*.py", "case/schemas/*")} - {*OF_REPORT})
 OF_MESH = sources(
-    *("case.py", "dimension.py", "errors.py", "expressions.py", "files.py"),
-    *("strict_yaml.py", "schemas/*", "mesh/*.py"),
+    *("case/**/*.py", "case/schemas/*", "system/errors.py", "system/files.py"),
+    *("system/hdf5.py", "mesh/**/*.py"),
 )
 REPORT_SOURCES = stamped("report", OF_REPORT)
 SOLVER_SOURCES = stamped("solver", OF_SOLVER)
@@ -184,8 +184,8 @@ def measured_points(read, model, file, size, folder):
 
     `read` the file at its `size`; `model` has the seconds of each point, `folder` its record.
     """
-    from solver.errors import InputError
-    from solver.study.expected import announcement
+    from solver.system.errors import InputError
+    from solver.studies.work_precision.expected import announcement
 
     try:
         content = read(Path(file), size)

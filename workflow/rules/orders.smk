@@ -9,7 +9,7 @@ LADDER_FILES = sorted(
 @cache
 def ladders():
     """The jobs of all ladders by (family, folder), and their levels."""
-    from solver.ladders import read_ladders
+    from solver.studies.orders.description import read_ladders
 
     found = {}
     for file in LADDER_FILES:

@@ -8,8 +8,8 @@ SCALING_PAGE = "scaling" if SCALE == "full" else f"scaling-{SCALE}"
 
 @cache
 def scaling():
-    from solver.scaling.description import read_scaling
-    from solver.scaling.expected import model
+    from solver.studies.scaling.description import read_scaling
+    from solver.studies.scaling.expected import model
 
     return measured_points(read_scaling, model, SCALING_FILE, SCALE, SCALED)
 

@@ -9,8 +9,8 @@ MEASURING_SOURCES = [STUDY_FILE, *SOLVER_SOURCES]
 
 @cache
 def study():
-    from solver.study.description import read_study
-    from solver.study.expected import model
+    from solver.studies.work_precision.description import read_study
+    from solver.studies.work_precision.expected import model
 
     return measured_points(read_study, model, STUDY_FILE, SIZE, POINTS)
 

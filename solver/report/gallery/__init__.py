@@ -32,10 +32,10 @@ def write_gallery(
     By PyVista, unless `plain` or it cannot draw here; the page says which, and why. A picture that
     is newer than its result and the drawing stays.
     """
-    from solver.files import write_text
     from solver.report.gallery.probe import set_up
     from solver.report.html import environment
     from solver.report.rows import families, read_rows
+    from solver.system.files import write_text
 
     reason = "asked for" if plain else set_up()
     log(f"Drawing {'without OpenGL: ' + reason if reason else 'by PyVista'}.")

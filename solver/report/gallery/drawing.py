@@ -9,11 +9,11 @@ import pyvista
 from matplotlib.colors import LinearSegmentedColormap
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from solver.files import replacing
 from solver.report.gallery.shapes import Shape
 from solver.report.space import PRESSURE
 from solver.report.svg import BLUE, INK, MUTED, ORANGE, PAPER, mixed
-from solver.units import with_unit
+from solver.system.files import replacing
+from solver.verification.units import with_unit
 
 WIDTH, HEIGHT = 1560, 600
 # From little to much, light to dark, as far from the blues of pressure as can be.

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from solver.files import replacing
 from solver.report.layout import magnification
 from solver.report.plane import draw_plane
 from solver.report.raster import available, to_png
 from solver.report.space import draw_space
-from solver.results import read_result
+from solver.system.files import replacing
+from solver.verification.results import read_result
 
 ENDING = ".png" if available() else ".svg"
 

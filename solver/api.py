@@ -1,0 +1,227 @@
+"""The solver as a library: one call from a case to its solution, for scripts and notebooks.
+
+    from solver import solve_case
+
+    solved = solve_case("cases/ssnp170/e.yaml")
+    print(solved.verdict, solved.pressure.max())
+
+What a case says is held against the same schema whether it comes from a file or as a mapping, and
+is refused by the same messages.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import meshio
+import numpy as np
+
+from solver.case.expressions import Expression
+from solver.case.reader import Case, load_case, parse_case
+from solver.case.schemas import key_path
+from solver.mesh import read_mesh
+from solver.mesh.tidy import tidy
+from solver.simulation.skips import EVERYTHING, NEEDED
+from solver.simulation.solution import Solution, ZoneResult
+from solver.system.errors import InputError
+from solver.system.memory import check_memory
+from solver.system.provenance import gather
+from solver.verification.checks import CheckResult
+from solver.verification.results import write_result
+from solver.verification.run import mesh_of, solve_checked, summary
+from solver.verification.verdict import of_solution
+
+CaseLike: TypeAlias = Case | Mapping[str, Any] | str | os.PathLike[str]
+MeshLike: TypeAlias = meshio.Mesh | str | os.PathLike[str]
+
+# What messages name where there is no file.
+_NO_FILE, _NO_MESH_FILE = "case", "mesh"
+_CUTS = ("pyramids", "hexahedra")
+
+
+def solve_case(
+    case: CaseLike,
+    mesh: MeshLike | None = None,
+    *,
+    swapped: bool = False,
+    hexahedra: str | None = None,
+    everything: bool = False,
+    memory_check: bool = True,
+    log: Callable[[str], Any] = lambda _: None,
+) -> Solved:
+    """Solve a case and check the solution; nothing is written.
+
+    `case` is the path of a case file, a mapping with the same keys (paths in it are relative to the
+    working directory; numbers may be NumPy's), or a `Case`. `mesh`, a mesh file or a
+    `meshio.Mesh` with named cell sets, is taken as it is in place of the case's own, and a
+    mapping then needs no key `mesh`. `swapped` exchanges slave and master, `hexahedra` (pyramids
+    or hexahedra) overrides how slave hexahedra are cut. `everything`: what the scene does not need
+    is done all the same (see `solver.simulation.skips`). With `memory_check` a solve that cannot
+    fit into memory is not begun. `log` is given lines on how it goes: `log=print`.
+
+    A case of a file on its own mesh is held against its accepted values too.
+
+    Raises:
+        InputError: case or mesh are refused, in one line: file, key, value, what is allowed.
+        SolveError: there is no solution to be found: no convergence, a singular system.
+    """
+    if hexahedra not in (None, *_CUTS):
+        raise InputError("solve_case", "hexahedra", hexahedra, f"allowed: {', '.join(_CUTS)}")
+    given = _case(case, mesh)
+    made = mesh_of(given) if mesh is None else _mesh(mesh)
+    if memory_check:
+        check_memory(len(made.points), made.points.shape[1], given.path, log)
+    accepted = mesh is None and given.path.is_file()
+    skips = EVERYTHING if everything else NEEDED
+    solution, checks = solve_checked(given, made, swapped, hexahedra, log, accepted, skips=skips)
+    file = given.mesh.get("path") if mesh is None else mesh
+    provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
+    return Solved(solution, checks, provenance)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A solve that came to its end, with its checks.
+
+    Arrays are in the units of the case. n counts the nodes of the mesh after the cut, m the
+    macro-elements of all contact zones, one zone after the other in the order of the case;
+    `zones` has them apart, with areas, normals and faces. `solution` has everything.
+    """
+
+    solution: Solution
+    checks: list[CheckResult]
+    provenance: dict[str, str | int]
+
+    @cached_property
+    def record(self) -> dict[str, Any]:
+        """All that the report would show, plain values as `check --json` prints them."""
+        return of_solution(self.solution, self.checks, None, self.provenance)
+
+    @property
+    def verdict(self) -> str:
+        """One of passed, failed and unreliable, as in the report."""
+        return self.record["verdict"]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all checks hold and rounding has left digits enough."""
+        return self.record["passed"]
+
+    @property
+    def reason(self) -> str:
+        """Why it did not pass, in one line; empty where it did."""
+        return self.record["reason"]
+
+    @property
+    def points(self) -> np.ndarray:
+        """Nodes (n, dim), undeformed."""
+        return self.solution.mesh.points
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement (n, dim) at the nodes."""
+        return self.solution.displacement
+
+    @property
+    def stress(self) -> np.ndarray:
+        """Stress (n, 6) at the nodes, xx, yy, zz, xy, yz, xz, positive in tension."""
+        return self.solution.stress
+
+    @property
+    def zones(self) -> dict[str, ZoneResult]:
+        """The contact zones by name."""
+        return {zone.name: zone for zone in self.solution.zones}
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Centres (m, dim) of the macro-elements."""
+        none = np.empty((0, self.points.shape[1]))
+        return np.concatenate([none, *(zone.centre for zone in self.solution.zones)])
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Contact pressure (m,) on the macro-elements, ≥ 0 in compression."""
+        return np.concatenate([np.empty(0), *(zone.multiplier for zone in self.solution.zones)])
+
+    @property
+    def gap(self) -> np.ndarray:
+        """Average gap (m,) of the macro-elements, ≥ 0 where open."""
+        return np.concatenate([np.empty(0), *(zone.gap for zone in self.solution.zones)])
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the result file, as `solve -o` does: whole or not at all; name it `.vtkhdf`."""
+        write_result(Path(path), self.solution, self.checks, self.provenance)
+
+    def picture(self) -> str:
+        """The report's picture, as SVG: both meshes and the contact pressure."""
+        from solver.report.pictures import draw
+
+        return str(draw(self.solution, self.solution.job))
+
+    def profile(self, along: str | None = None, zone: str | None = None) -> str:
+        """The report's figure of the pressure along the interface, as SVG.
+
+        Over the distance along the interface, or over an expression in x, y, z, r such as "r"; of
+        the first zone, or the one named.
+        """
+        from solver.report.pictures import draw_pressure
+
+        over = Expression(along, where="profile", key="along") if along else None
+        return str(draw_pressure(self.solution, self.solution.job, over, zone))
+
+    def __str__(self) -> str:
+        return summary(self.record)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the picture, and the verdict in one line."""
+        from markupsafe import escape
+
+        return f"<figure>{self.picture()}<figcaption>{escape(self)}</figcaption></figure>"
+
+
+def _case(given: CaseLike, mesh: MeshLike | None) -> Case:
+    if isinstance(given, Case):
+        return given
+    if isinstance(given, Mapping):
+        content = _plain(given, ())
+        if mesh is not None:
+            file = os.fspath(mesh) if isinstance(mesh, str | os.PathLike) else _NO_MESH_FILE
+            content.setdefault("mesh", {"file": file})
+        # JSON is YAML: from here on it is as if it had been read from a file.
+        return parse_case(json.dumps(content, ensure_ascii=False, indent=1), Path(_NO_FILE))
+    if isinstance(given, str | os.PathLike):
+        return load_case(Path(given))
+    raise InputError("solve_case", "case", given, "must be a path, a mapping or a Case")
+
+
+def _mesh(given: MeshLike) -> meshio.Mesh:
+    if isinstance(given, meshio.Mesh):
+        return tidy(given, _NO_MESH_FILE)
+    if isinstance(given, str | os.PathLike):
+        return read_mesh(given)
+    raise InputError("solve_case", "mesh", given, "must be a path or a meshio.Mesh")
+
+
+def _plain(value: Any, keys: tuple[str | int, ...]) -> Any:
+    """A value as a file could hold it; refused where none could."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise InputError(_NO_FILE, key_path([*keys, str(key)]), None, "keys must be text")
+        return {key: _plain(item, (*keys, key)) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item, (*keys, i)) for i, item in enumerate(value)]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    allowed = "must be a number, text, true or false, a list or a mapping"
+    raise InputError(_NO_FILE, key_path(keys), value, allowed)

@@ -1,0 +1,1 @@
+"""What is asked: the case file, its model, its rules and the exact solutions it can name."""

@@ -1,0 +1,79 @@
+"""The JSON Schemas of the project's files, and a refused value told in one line.
+
+A schema's own `description` is what a message says is allowed, so that schema and messages agree.
+"""
+
+import json
+from collections.abc import Iterable
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from solver.system.errors import InputError
+
+BENCHMARK_SCHEMA = Path(__file__).with_name("benchmark.schema.json")
+CASE_SCHEMA = Path(__file__).with_name("case.schema.json")
+INFSUP_SCHEMA = Path(__file__).with_name("infsup.schema.json")
+LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")
+FAMILY_SCHEMA = Path(__file__).with_name("family.schema.json")
+SCALING_SCHEMA = Path(__file__).with_name("scaling.schema.json")
+STUDY_SCHEMA = Path(__file__).with_name("study.schema.json")
+SUMMARY_SCHEMA = Path(__file__).with_name("summary.schema.json")
+SWEEP_SCHEMA = Path(__file__).with_name("sweep.schema.json")
+
+
+def validate(content: object, schema: Path, where: object) -> None:
+    """Raise `InputError` for the first thing in `content` that the schema refuses."""
+    from jsonschema.exceptions import relevance
+
+    errors = list(_validator(schema).iter_errors(content))
+    if errors:
+        raise _refusal(max(errors, key=relevance), where)
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """`did you mean …?` when one of the known names is near, else the list of them."""
+    known = sorted(known)
+    near = get_close_matches(str(name), known, n=1)
+    listed = f"allowed: {', '.join(known)}" if known else "there is none"
+    return f"did you mean {near[0]}? ({listed})" if near else listed
+
+
+def key_path(keys: Iterable[str | int]) -> str:
+    """`contact[0].slave` for the keys `("contact", 0, "slave")`."""
+    path = ""
+    for key in keys:
+        name = str(key) if str(key).isprintable() else repr(key)
+        step = f"[{key}]" if isinstance(key, int) else name
+        path += step if isinstance(key, int) or not path else f".{step}"
+    return path
+
+
+@cache
+def _validator(schema: Path) -> Any:
+    from jsonschema.validators import Draft202012Validator
+
+    return Draft202012Validator(json.loads(schema.read_text(encoding="utf-8")))
+
+
+def _refusal(error: Any, where: object) -> InputError:
+    keys, rule = list(error.absolute_path), error.validator
+    if rule == "additionalProperties":
+        known = error.schema.get("properties", {})
+        unknown = next(key for key in error.instance if key not in known)
+        path = key_path([*keys, unknown])
+        return InputError(
+            where, path, error.instance[unknown], f"unknown key; {hint(unknown, known)}"
+        )
+    if rule == "required":
+        missing = next(key for key in error.validator_value if key not in error.instance)
+        return InputError(where, key_path([*keys, missing]), None, "this key is needed")
+    if rule == "enum" and "propertyNames" in error.absolute_schema_path:
+        unknown = error.instance
+        path = key_path([*keys, unknown])
+        return InputError(where, path, None, f"unknown key; {hint(unknown, error.validator_value)}")
+    allowed = f"must be {error.schema.get('description', error.message)}"
+    if rule == "uniqueItems":
+        allowed += ", each once"
+    return InputError(where, key_path(keys) or "file", error.instance, allowed)

@@ -1,0 +1,158 @@
+"""What an exact solution is: documented parameters, and fields that can be asked for anywhere.
+
+A solution may have several parts (the inner and the outer cylinder) with formulas of their own. Its
+fields take the part of each point, since a point of the interface belongs to both and a node of a
+facetted circle may lie on the wrong side of it; left out, each point is taken by its place. Every
+formula holds a little beyond its part, so that it can be evaluated on a mesh that does not fill the
+exact geometry.
+"""
+
+from dataclasses import field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from solver.case.reader import Material
+
+Part = np.ndarray | int | None
+
+# The errors of `solver.verification.norms`, and what a solution must have for each to be known.
+ERRORS: dict[str, str] = {
+    "displacement_l2": "displacement",
+    "displacement_h1": "gradient",
+    "stress_l2": "stress",
+    "stress_max": "stress",
+    "pressure_l2": "contact_pressure",
+    "pressure_max": "contact_pressure",
+    "pressure_means": "contact_pressure",
+    "pressure_oscillation": "contact_pressure",
+    "half_width": "half_width",
+    "peak": "peak",
+}
+
+
+class ParameterError(ValueError):
+    """A parameter has a value that is not allowed."""
+
+    def __init__(self, parameter: str, value: object, allowed: str):
+        self.parameter, self.value, self.allowed = parameter, value, allowed
+        super().__init__(f"{parameter} = {value!r}: {allowed}")
+
+
+def parameter(doc: str, **options: Any) -> Any:
+    """A dataclass field with its meaning, and in `source` where a case file says it already."""
+    source = options.pop("source", None)
+    return field(metadata={"doc": doc, "source": source}, **options)
+
+
+class ExactSolution:
+    """A documented solution of a contact problem.
+
+    Points `x` are (n, dim). Values: `contact_pressure` (n,) ≥ 0, `gap` (n,) ≥ 0, `displacement`
+    (n, dim), `gradient` (n, dim, dim) with ∂u_i/∂x_j at [i, j], `stress` (n, 6) as xx, yy, zz, xy,
+    yz, xz, `body_force` (n, dim) per volume. `quantities` lists those that the solution has; asking
+    for another raises NotImplementedError.
+    """
+
+    name: ClassVar[str]
+    parts: ClassVar[tuple[str, ...]] = ("body",)
+    quantities: ClassVar[frozenset[str]] = frozenset({"contact_pressure"})
+    dim: int
+
+    def contact_pressure(self, x: np.ndarray) -> np.ndarray:
+        """Contact pressure (n,) at points of the interface."""
+        raise self._missing("contact_pressure")
+
+    def gap(self, x: np.ndarray) -> np.ndarray:
+        """Normal gap (n,) at points of the interface."""
+        raise self._missing("gap")
+
+    def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        """Displacement (n, dim)."""
+        raise self._missing("displacement")
+
+    def gradient(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        """Displacement gradient (n, dim, dim)."""
+        raise self._missing("gradient")
+
+    def stress(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        """Stress (n, 6)."""
+        raise self._missing("stress")
+
+    def body_force(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        """Force per volume (n, dim) that balances the stress: −div σ."""
+        raise self._missing("body_force")
+
+    def regular(self, x: np.ndarray) -> np.ndarray:
+        """Where (n,) the contact pressure is smooth: away from the ends of a contact area."""
+        return np.ones(len(x), dtype=bool)
+
+    def level(self, x: np.ndarray) -> np.ndarray:
+        """A distance (n,) from the interface, positive on the side of the second part."""
+        return np.full(len(x), -1.0)
+
+    def body_part(self, nodes: np.ndarray) -> int:
+        """The part that a body with these nodes (n, dim) is."""
+        return int(self.level(nodes).mean() > 0)
+
+    def part_of(self, x: np.ndarray, part: Part) -> np.ndarray:
+        """The part (n,) of each point; where it is not given, by place."""
+        return (self.level(x) > 0).astype(int) if part is None else np.broadcast_to(part, len(x))
+
+    def _missing(self, quantity: str) -> NotImplementedError:
+        offered = ", ".join(sorted(self.quantities))
+        return NotImplementedError(f"{self.name} has no {quantity}; it offers {offered}")
+
+    def require(self, allowed: str, **values: bool) -> None:
+        """Raise ParameterError for the first parameter whose condition does not hold."""
+        for key, holds in values.items():
+            if not holds:
+                raise ParameterError(key, getattr(self, key), allowed)
+
+
+class ElasticSolution(ExactSolution):
+    """A solution of linear elasticity, known in the interior too: small strain, isotropic.
+
+    In two dimensions plane strain. Stress follows from `gradient` by Hooke's law.
+    """
+
+    quantities: ClassVar[frozenset[str]] = frozenset(
+        {"contact_pressure", "gap", "displacement", "gradient", "stress", "body_force"}
+    )
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """The material of each part."""
+        raise NotImplementedError
+
+    def gap(self, x: np.ndarray) -> np.ndarray:
+        """Closed everywhere."""
+        return np.zeros(len(x))
+
+    def stress(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        """Stress (n, 6) by Hooke's law from the gradient."""
+        return self.hooke(self.gradient(x, part), self.part_of(x, part))
+
+    def body_force(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        """None."""
+        return np.zeros((len(x), self.dim))
+
+    def hooke(self, gradient: np.ndarray, part: np.ndarray) -> np.ndarray:
+        """Stress (n, 6) of displacement gradients (n, dim, dim) in the materials of the parts."""
+        lame, shear = (values[part] for values in np.array([lame_of(m) for m in self.materials]).T)
+        strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
+        stress = np.zeros((len(gradient), 6))
+        stress[:, :3] = (lame * np.einsum("nii->n", gradient))[:, None]
+        for i in range(self.dim):
+            stress[:, i] += 2 * shear * strain[:, i, i]
+        stress[:, 3] = 2 * shear * strain[:, 0, 1]
+        if self.dim == 3:
+            stress[:, 4] = 2 * shear * strain[:, 1, 2]
+            stress[:, 5] = 2 * shear * strain[:, 0, 2]
+        return stress
+
+
+def lame_of(material: Material) -> tuple[float, float]:
+    """Lamé's λ and μ of a material."""
+    shear = material.young / (2 * (1 + material.poisson))
+    return 2 * shear * material.poisson / (1 - 2 * material.poisson), shear

@@ -1,0 +1,90 @@
+"""The case file that `new` writes: one that runs as it is, with a comment on every key."""
+
+from pathlib import Path
+
+from solver.case.reader import parse_case
+from solver.system.errors import InputError
+from solver.system.files import write_text
+
+TEMPLATE = """\
+# A case file: change it to your problem, then
+#   python -m solver validate --mesh FILE                    says whether it is valid
+#   python -m solver solve FILE -o {name}.vtkhdf     solves and checks it
+# Paths are relative to this file. Units are yours: lengths, forces, stresses that fit together.
+
+name: {name}
+title: Two blocks pressed together
+
+# What your numbers are in; shown beside them, and nothing else.
+units: {{length: mm, stress: MPa}}
+
+# A mesh made by recipe ...
+mesh:
+  recipe: blocks
+  size: 50.0
+  bottom: {{cells: HEXA8, divisions: 3}}
+  top: {{cells: HEXA8, divisions: 2}}
+# ... or your own (.med .msh .inp .vtu), whose groups are then known by their names there:
+# mesh: {{file: my-mesh.med}}
+
+# plane: strain                          # for plane meshes, and only there
+
+# By group of volume cells, or `all`. `form` of the unknowns: displacement, or mixed (displacement
+# and pressure) for nearly incompressible material; automatic takes the latter above 0.499.
+materials:
+  all: {{young: 2000.0, poisson: 0.3, form: automatic}}
+
+# Directions x, y, z, or `normal` (a plane of symmetry that lies any way); with a colon, a value.
+supports:
+  - {{group: symx, fix: [x]}}
+  - {{group: symy, fix: [normal]}}
+  - {{group: base, fix: {{z: 0.0}}}}
+
+# pressure (positive inwards) or traction: [x, y, z] on faces; body_force: [x, y, z] on cells.
+# A value may be an expression in x, y, z, r, pi, sqrt, sin, cos, such as "25 * (1 - x / 50)".
+loads:
+  - {{group: press, pressure: 25.0}}
+
+# Contact zones. The finer surface, or that of the softer body, is the better slave.
+contact:
+  - name: interface
+    slave: bottom_contact
+    master: top_contact
+    hexahedra: pyramids                  # how slave hexahedra are cut: pyramids or hexahedra
+    treatment: lac                       # or uncut, nodal, nodal_dual, node_to_segment, quadrature
+    # points: 4                          # each way on a slave face, for quadrature alone
+    normal: element                      # gaps are measured along: element (normals of faces),
+                                         # nodal (their means at the nodes)
+    interference: 0.0                    # overlap at the start, of bodies modelled apart
+#   clearance: 0.0                       # the gap at the start, a number or an expression, in place
+                                         # of the one between the faces as meshed
+
+directions: first                        # or both: solved again with slave and master exchanged
+steps: [0.5, 1.0]                        # load factors
+observe:                                 # the contact element nearest to a point, at every step
+  - {{zone: interface, nearest: [25.0, 25.0, 0.0]}}
+
+# What the results are checked against; leave out what you do not know. A documented solution is
+# named under `solution`, with its parameters; then `solution` stands for any value here, in loads
+# (traction: solution) and in supports (fix: {{x: solution}}), and errors are measured in norms.
+reference:
+  kind: analytical                       # analytical, manufactured, refined (with its relative
+                                         # uncertainty: 2.0e-3) or other_code (with code: {{name:
+                                         # …, version: "…"}})
+  solution: {{name: uniform_compression, base: -50.0}}
+  contact_pressure: 25.0                 # >= 0 in compression
+  normal_stress: -25.0                   # > 0 in tension
+  gap: 0.0                               # >= 0 open
+  displacement: [0.00375 * x, 0.00375 * y, -0.0125 * (z + 50)]
+
+tolerance: 1.0e-3                        # or by check: {{multiplier: 1.0e-6, element_gap: 1.0e-8}}
+"""
+
+
+def write_template(name: str, path: Path) -> None:
+    """Write a commented case of that name; InputError for a bad name or a file already there."""
+    text = TEMPLATE.format(name=name)
+    parse_case(text, path)
+    if path.exists():
+        raise InputError(path, "file", None, "is there already; choose another with -o")
+    write_text(path, text)

@@ -1,0 +1,321 @@
+"""The command line: `python -m solver COMMAND …`.
+
+Exit status: 0 all checks hold; 1 a check fails or the result is unreliable; 2 the input is refused;
+3 the solve failed; 70 an error of the program itself; 130 interrupted. What a command needs is
+imported when it runs, so that help comes at once.
+"""
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from solver.commands import benchmark, scaling, stability, study
+from solver.commands.options import add_command, add_threads, limit_threads
+from solver.system.errors import InputError, SolveError, of_machine
+
+if TYPE_CHECKING:
+    from solver.verification.run import Job
+
+PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the exit status."""
+    options = _parser().parse_args(arguments)
+    if options.threads:
+        limit_threads(options.threads)
+    try:
+        return options.run(options)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return REFUSED
+    except SolveError as error:
+        print(error, file=sys.stderr)
+        return NO_RESULT
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return PASSED
+    except Exception as error:  # noqa: BLE001 -- status 1, Python's own, means a failed check
+        return _unexpected(error)
+
+
+def _unexpected(error: Exception) -> int:
+    """One line for what the machine lacks, a traceback for a bug."""
+    if reason := of_machine(error):
+        print(reason, file=sys.stderr)
+        return REFUSED if isinstance(error, OSError) else NO_RESULT
+    traceback.print_exception(error)
+    return BUG
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m solver", description="Verified contact solves."
+    )
+    parser.set_defaults(threads=None)
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    command = add_command(
+        commands, "mesh", _mesh, "write the mesh of a case, its transform applied"
+    )
+    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="MESH")
+
+    command = add_command(commands, "solve", _solve, "solve a case, check it and write the result")
+    _add_job(command)
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="RESULT.vtkhdf")
+    command.add_argument("--verdict", type=Path, metavar="VERDICT.json", help="written in any case")
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    command.add_argument("--verbose", action="store_true", help="tell each stage, with the time")
+    add_threads(command)
+    command.add_argument(
+        "--everything", action="store_true", help="do what the scene does not need as well"
+    )
+    command.add_argument(
+        "--no-memory-check", action="store_true", help="start even where memory cannot suffice"
+    )
+
+    command = add_command(commands, "crashed", _crashed, "write the verdict of a solve that died")
+    _add_job(command)
+    command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
+    command.add_argument("--log", type=Path, help="its last line tells the reason")
+    command.add_argument("--status", type=int, metavar="N", help="its exit status")
+
+    command = add_command(commands, "check", _check, "run the checks of stored results again")
+    command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+    command.add_argument("--json", action="store_true", help="print a list of verdicts")
+
+    command = add_command(commands, "report", _report, "write the report of many verdicts")
+    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
+    command.add_argument(
+        "--families",
+        type=Path,
+        nargs="*",
+        metavar="FAMILY.yaml",
+        help="what families are about; default: those in cases/",
+    )
+
+    command = add_command(commands, "gallery", _gallery, "draw results with PyVista, on a page")
+    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
+    command.add_argument("--plain", action="store_true", help="without PyVista and OpenGL")
+
+    command = add_command(commands, "compare", _compare, "say what is new since another batch")
+    command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
+    command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
+    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
+
+    command = add_command(commands, "orders", _orders, "write the page of orders of convergence")
+    command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
+    command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the levels")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+
+    command = commands.add_parser("study", help="error against run time: points and their page")
+    study.add_commands(command)
+    command = commands.add_parser("scaling", help="growth with size: points and their page")
+    scaling.add_commands(command)
+    benchmark.add_commands(commands)
+    stability.add_commands(commands)
+
+    command = add_command(commands, "validate", _validate, "say whether case files are valid")
+    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
+    command.add_argument("--mesh", action="store_true", help="mesh them too and check the groups")
+
+    command = add_command(commands, "new", _new, "write a commented case file to start from")
+    command.add_argument("name", nargs="?", metavar="NAME", help="default: as FILE")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: NAME.yaml")
+
+    command = add_command(commands, "accept", _accept, "take results as the accepted values")
+    command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+
+    command = add_command(
+        commands, "serve", _serve, "stay warm and fork for each command of a batch"
+    )
+    command.add_argument("socket", type=int, metavar="FD", help="an open socket that listens")
+    return parser
+
+
+def _add_job(command: argparse.ArgumentParser) -> None:
+    """What singles out one solve: case, mesh, direction, variant."""
+    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, taken as it is")
+    command.add_argument("--swap", action="store_true", help="exchange slave and master")
+    command.add_argument("--hexahedra", choices=("pyramids", "hexahedra"), help="how they are cut")
+    command.add_argument(
+        "--refine", type=int, default=1, metavar="N", help="multiply the recipe's divisions"
+    )
+
+
+def _mesh(options: argparse.Namespace) -> int:
+    from solver.case.reader import load_case
+    from solver.mesh import write_mesh
+    from solver.verification.run import mesh_of
+
+    write_mesh(mesh_of(load_case(options.case)), options.output)
+    return PASSED
+
+
+def _job(options: argparse.Namespace) -> "Job":
+    from solver.verification.run import Job
+
+    return Job(options.case, options.mesh, options.swap, options.hexahedra, options.refine)
+
+
+def _solve(options: argparse.Namespace) -> int:
+    from solver.system.progress import telling
+    from solver.verification.run import solve
+
+    log = _silent if options.quiet else partial(print, flush=True)
+    checked, everything = not options.no_memory_check, options.everything
+    job = replace(_job(options), memory_check=checked, everything=everything)
+    with telling(options.verbose, options.quiet):
+        verdict = solve(job, options.output, options.verdict, log)
+    return PASSED if verdict["passed"] else FAILED
+
+
+def _silent(line: str) -> None:
+    """Print nothing."""
+
+
+def _crashed(options: argparse.Namespace) -> int:
+    from solver.verification.run import record_crash, summary
+
+    print(summary(record_crash(_job(options), options.verdict, options.log, options.status)))
+    return PASSED
+
+
+def _check(options: argparse.Namespace) -> int:
+    from solver.verification.run import check, summary
+    from solver.verification.verdict import to_json
+
+    verdicts = [check(result) for result in options.results]
+    if options.json:
+        print(to_json(verdicts))
+    else:
+        for verdict in verdicts:
+            print(summary(verdict))
+            for row in verdict["checks"]:
+                print("  " + _row(row))
+    return PASSED if all(verdict["passed"] for verdict in verdicts) else FAILED
+
+
+def _row(check: dict[str, Any]) -> str:
+    name = f"{check['name']} {check['zone'] or ''}"
+    extremes = f"{check['minimum']:.10g} … {check['maximum']:.10g}"
+    error = f"error {check['error']:.1e} (allowed {check['tolerance']:.0e})"
+    return f"{'ok' if check['passed'] else 'FAILED':<7}{name:<40}{extremes:<36}{error}"
+
+
+def _verdicts(options: argparse.Namespace) -> list[Path]:
+    """The verdicts named, and all in the folder of results, but those of ladders' levels."""
+    verdicts = list(options.verdicts)
+    if options.results:
+        found = sorted(options.results.glob("**/verdict.json"))
+        # The levels of ladders have a page of their own.
+        verdicts += [p for p in found if "orders" not in p.relative_to(options.results).parts]
+    if not verdicts:
+        where = options.results or options.run.__name__.strip("_")
+        raise InputError(where, "VERDICT.json", None, "there is none")
+    return verdicts
+
+
+def _gallery(options: argparse.Namespace) -> int:
+    from solver.report.gallery import write_gallery
+
+    write_gallery(_verdicts(options), options.output, options.plain, partial(print, flush=True))
+    return PASSED
+
+
+def _report(options: argparse.Namespace) -> int:
+    from solver.report import write_report
+
+    verdicts = _verdicts(options)
+    families = options.families
+    if families is None:
+        families = sorted(Path("cases").glob("*/family.yaml"))
+    return write_report(verdicts, options.output, families=families)
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from solver.report.compare import compare
+
+    return FAILED if compare(options.base, options.this, options.output).worse else PASSED
+
+
+def _orders(options: argparse.Namespace) -> int:
+    from solver.studies.orders.description import read_ladders
+    from solver.studies.orders.page import write_orders
+
+    write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
+    return PASSED
+
+
+def _validate(options: argparse.Namespace) -> int:
+    status = PASSED
+    for path in options.cases:
+        try:
+            _validate_one(path, options.mesh)
+        except InputError as error:
+            print(error, file=sys.stderr)
+            status = REFUSED
+        else:
+            print(f"{path}: valid")
+    return status
+
+
+def _validate_one(path: Path, with_mesh: bool) -> None:
+    from solver.case.reader import check_mesh_file, load_case
+
+    case = load_case(path)
+    check_mesh_file(case)
+    if with_mesh:
+        from solver.simulation.groups import check_groups
+        from solver.verification.run import mesh_of
+
+        check_groups(case, mesh_of(case))
+
+
+def _new(options: argparse.Namespace) -> int:
+    from solver.case.template import write_template
+
+    name = options.name or (options.output.stem if options.output else "new-case")
+    path = options.output or Path(f"{name}.yaml")
+    write_template(name, path)
+    print(f"{path}: written; next: python -m solver solve {path} -o {name}.vtkhdf")
+    return PASSED
+
+
+def _accept(options: argparse.Namespace) -> int:
+    from solver.verification.checks import run_checks
+    from solver.verification.regression import accept, accepted_values
+    from solver.verification.results import read_result
+
+    for path in options.results:
+        solution = read_result(path).solution
+        checks = run_checks(solution, accepted_values(solution))
+        changes = accept(solution, checks)
+        print(f"{solution.job}: {len(changes)} values accepted anew of {len(checks)}")
+        for line in changes:
+            print(f"  {line}")
+    return PASSED
+
+
+def _serve(options: argparse.Namespace) -> int:
+    import socket
+
+    from solver.commands.server import serve
+
+    with socket.socket(fileno=options.socket) as listener:
+        serve(listener)
+    return PASSED

@@ -1,0 +1,78 @@
+"""Run a command of the solver in a process that is warm, or in a new one where there is none.
+
+    python -IS solver/commands/warm.py BENCHMARK COMMAND …
+
+Python with all packages takes 0.7 s to start, a small case 0.1 s to solve. This client needs none
+of them; `solver.commands.server`, at the socket that the environment names, forks for each command.
+Exit status, output and files are those of the command. What it took goes to the file BENCHMARK, in
+Snakemake's columns.
+"""
+
+import json
+import os
+import signal
+import socket
+import sys
+import time
+from datetime import timedelta
+
+SOCKET = "WARM_SOLVER"
+LIMIT = 1 << 16  # bytes of a message
+# A fork keeps the threads that its libraries were loaded with.
+THREADS = "OMP_NUM_THREADS"
+_COLUMNS = "s h:m:s max_rss max_vms max_uss max_pss io_in io_out mean_load cpu_time"
+
+
+def main(benchmark: str, command: list[str]) -> int:
+    """The exit status of the command, as a shell tells it."""
+    # Ctrl-C is for the command to answer: its end is waited for.
+    signal.signal(signal.SIGINT, lambda *_: None)
+    started = time.monotonic()
+    place = os.environ.get(SOCKET)
+    ended = _warm(place, command) if place else None
+    if ended is None:
+        python = sys.executable
+        ended = outcome(os.spawnv(os.P_NOWAIT, python, [python, "-m", "solver", *command]))
+    _write_benchmark(benchmark, time.monotonic() - started, ended)
+    status = os.waitstatus_to_exitcode(ended["status"])
+    return status if status >= 0 else 128 - status
+
+
+def outcome(process: int) -> dict:
+    """How a child ended, once it has: its wait status, processor time (s), memory (kB)."""
+    _, status, used = os.wait4(process, 0)
+    return {
+        "status": status,
+        "cpu_time": used.ru_utime + used.ru_stime,
+        "max_rss": used.ru_maxrss,
+    }
+
+
+def _warm(place: str, command: list[str]) -> dict | None:
+    """What became of the command in a fork; None where no answer comes."""
+    request = {"command": command, "threads": os.environ.get(THREADS)}
+    with socket.socket(socket.AF_UNIX) as connection:
+        try:
+            connection.connect(place)
+            socket.send_fds(connection, [json.dumps(request).encode()], [1, 2])
+            return json.loads(connection.recv(LIMIT) or "null")
+        except OSError:
+            return None
+
+
+def _write_benchmark(path: str, seconds: float, ended: dict) -> None:
+    known = {
+        "s": f"{seconds:.4f}",
+        "h:m:s": str(timedelta(seconds=int(seconds))),
+        "max_rss": f"{ended['max_rss'] / 1024:.2f}",
+        "mean_load": f"{100 * ended['cpu_time'] / seconds:.2f}",
+        "cpu_time": f"{ended['cpu_time']:.2f}",
+    }
+    columns = _COLUMNS.split()
+    with open(path, "w", encoding="utf-8") as file:  # noqa: PTH123 -- pathlib is long to import
+        print(*columns, sep="\t", file=file)
+        print(*(known.get(column, "NA") for column in columns), sep="\t", file=file)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1], sys.argv[2:]))

@@ -1,0 +1,1 @@
+"""Arrays only: finite elements, mortar contact, linear solvers. Knows no case, file or report."""

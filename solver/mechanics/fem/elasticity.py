@@ -1,0 +1,247 @@
+"""Linear elasticity over mixed cells: stiffness, internal forces, stress at nodes.
+
+One block per cell type; every degree of freedom belongs to a node (`dof = dim · node + component`).
+Source: Bathe, Finite Element Procedures, §5.3. Works on arrays alone.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from solver.mechanics.fem import shape_functions, volume_rule
+from solver.mechanics.fem.assembly import CellSum, degrees_of_freedom
+from solver.mechanics.fem.small_matrices import invert
+from solver.mesh.catalogue import CellType
+from solver.system.errors import SolveError
+
+# Bytes of gradients handled at once: small enough to stay in the processor's cache.
+_CHUNK_BYTES = 1 << 20
+_ALL = slice(None)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Cells of one type with their material.
+
+    `cells` (n, n_nodes) node numbers; `lame` and `shear` (n,) Lamé's λ and μ, in units of stress
+    (plane strain in 2D); `straight`: all their edges are.
+    """
+
+    type: CellType
+    cells: np.ndarray
+    lame: np.ndarray
+    shear: np.ndarray
+    straight: bool = True
+
+    @property
+    def rule(self) -> tuple[np.ndarray, np.ndarray]:
+        """The quadrature points (q, dim) and weights (q,) of the block."""
+        return volume_rule(self.type.name, self.straight)
+
+    def of(self, chosen: np.ndarray) -> "Block":
+        """The chosen (n,) of its cells."""
+        cells, lame, shear = self.cells[chosen], self.lame[chosen], self.shear[chosen]
+        return replace(self, cells=cells, lame=lame, shear=shear)
+
+
+def lame_parameters(young: np.ndarray, poisson: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lamé's λ and μ from Young's modulus and Poisson's ratio (3D and plane strain)."""
+    shear = young / (2 * (1 + poisson))
+    return 2 * shear * poisson / (1 - 2 * poisson), shear
+
+
+def physical_gradients(
+    points: np.ndarray, cells: np.ndarray, kind: CellType, reference: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gradients (n, q, n_nodes, dim) and Jacobian determinants (n, q) at reference points (q, dim).
+
+    Raises SolveError where a Jacobian is not positive, naming how many cells.
+    """
+    dn = shape_functions(kind.name).gradients(reference)
+    corner = points[cells]
+    corner = corner - corner[:, :1]
+    jacobian = np.einsum("cai,qaj->cqij", corner, dn, optimize=True)
+    determinant, inverse = invert(jacobian)
+    bad = (determinant <= 0).any(axis=1)
+    if bad.any():
+        raise SolveError(f"{int(bad.sum())} {kind.name} cells are inverted or degenerate")
+    return np.matmul(dn, inverse), determinant
+
+
+def _chunks(block: Block, dim: int) -> Iterator[slice]:
+    points, _ = block.rule
+    size = len(points) * block.type.n_nodes * dim * 8
+    step = max(1, _CHUNK_BYTES // size)
+    for start in range(0, len(block.cells), step):
+        yield slice(start, start + step)
+
+
+def element_matrices(points: np.ndarray, block: Block, part: slice = _ALL) -> np.ndarray:
+    """Stiffness matrices (n, dim · n_nodes, dim · n_nodes) of a part of a block's cells."""
+    dim, nodes = points.shape[1], block.type.n_nodes
+    reference, weights = block.rule
+    gradient, determinant = physical_gradients(points, block.cells[part], block.type, reference)
+    flat = gradient.reshape(*gradient.shape[:2], nodes * dim)
+    weighted = flat * (weights * determinant)[:, :, None]
+    products = np.matmul(np.swapaxes(weighted, 1, 2), flat)
+    products = products.reshape(-1, nodes, dim, nodes, dim)
+    shear = block.shear[part, None, None, None, None]
+    stiffness = products * block.lame[part, None, None, None, None]
+    stiffness += shear * np.swapaxes(products, 2, 4)
+    trace = block.shear[part, None, None] * np.einsum("caibi->cab", products)
+    for i in range(dim):
+        stiffness[:, :, i, :, i] += trace
+    return stiffness.reshape(-1, nodes * dim, nodes * dim)
+
+
+def stiffness(
+    points: np.ndarray, blocks: list[Block], kept: np.ndarray | None = None
+) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """The stiffness matrix (k, k), symmetric, both halves stored, and its whole diagonal (n_dofs,).
+
+    Of all degrees of freedom, or of those `kept` (k,), in ascending order, alone.
+    """
+    n, dim = points.shape
+    total = CellSum([block.cells for block in blocks], n, dim, kept)
+    for block in blocks:
+        for part in _chunks(block, dim):
+            total.add(block.cells[part], element_matrices(points, block, part))
+    return total.matrix, total.diagonal
+
+
+def internal_force(
+    points: np.ndarray, blocks: list[Block], displacement: np.ndarray, extended: bool = False
+) -> np.ndarray:
+    """Internal forces (n_nodes, dim) of a displacement (n_nodes, dim), summed cell by cell.
+
+    Strains are taken from differences of displacement within the cell: the large common part of a
+    displacement, which carries no strain, then costs no digits, as it would in the assembled
+    product K·u. A displacement may come in several parts (parts, n_nodes, dim), of which it is the
+    sum to more digits than one number holds: their differences are summed, not they themselves.
+    `extended`: in extended precision, as the result is then; some fifty times slower.
+    """
+    n, dim = points.shape
+    points, displacement = _in_precision(points, displacement, extended)
+    force = np.zeros(n * dim, dtype=points.dtype)
+    if not displacement.any():
+        return force.reshape(n, dim)
+    for block in blocks:
+        reference, weights = block.rule
+        for part in _chunks(block, dim):
+            cells = block.cells[part]
+            gradient, determinant = physical_gradients(points, cells, block.type, reference)
+            stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
+            stress *= (weights * determinant)[:, :, None, None]
+            nodal = np.einsum("cqaj,cqij->cai", gradient, stress, optimize=True)
+            np.add.at(force, degrees_of_freedom(cells, dim).ravel(), nodal.ravel())
+    return force.reshape(n, dim)
+
+
+def _in_precision(
+    points: np.ndarray, displacement: np.ndarray, extended: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    kind = np.longdouble if extended else float
+    return np.asarray(points, dtype=kind), np.asarray(displacement, dtype=kind)
+
+
+def cancellation(
+    points: np.ndarray, blocks: list[Block], displacement: np.ndarray
+) -> tuple[np.ndarray, float, float]:
+    """The sizes of what is summed up to forces (n_nodes,), and to stresses, at most.
+
+    A sum keeps no more digits than its largest term leaves: times the unit of rounding, these are
+    the errors of `internal_force` and of stresses. The third is the largest stress that the forces
+    stand for, which is large on the small faces of a slender cell. Taken at the middle of each
+    cell, from a displacement (n_nodes, dim) or several parts of it.
+    """
+    force, highest, slender = np.zeros(len(points)), 0.0, 0.0
+    displacement = displacement.reshape(-1, *points.shape).sum(axis=0)
+    for block in blocks:
+        reference, weights = block.rule
+        middle = (weights @ reference / weights.sum())[None]
+        for part in _chunks(block, points.shape[1]):
+            cells = block.cells[part]
+            gradient, determinant = physical_gradients(points, cells, block.type, middle)
+            slope = np.linalg.norm(gradient[:, 0], axis=2)
+            nodal = displacement[cells]
+            apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
+            stiff = block.lame[part] + 2 * block.shear[part]
+            stress = stiff * np.einsum("ca,ca->c", slope, apart)
+            extent = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
+            nodal_force = (determinant[:, 0] * weights.sum() * stress)[:, None] * slope
+            np.add.at(force, cells.ravel(), nodal_force.ravel())
+            highest = max(highest, float(stress.max(initial=0.0)))
+            on_small_faces = stress * extent * slope.max(axis=1)
+            slender = max(slender, float(on_small_faces.max(initial=0.0)))
+    return force, highest, slender
+
+
+def _stress(
+    gradient: np.ndarray,
+    displacement: np.ndarray,
+    cells: np.ndarray,
+    lame: np.ndarray,
+    shear: np.ndarray,
+) -> np.ndarray:
+    """In-plane or 3D stress tensors (n, q, dim, dim) in cells (n, n_nodes)."""
+    nodal = displacement.reshape(-1, *displacement.shape[-2:])[:, cells]
+    difference = (nodal - nodal[:, :, :1]).sum(axis=0)
+    slope = np.einsum("cai,cqaj->cqij", difference, gradient, optimize=True)
+    stress = shear[:, None, None, None] * (slope + np.swapaxes(slope, 2, 3))
+    pressure = lame[:, None] * np.einsum("cqii->cq", slope)
+    for i in range(slope.shape[-1]):
+        stress[:, :, i, i] += pressure
+    return stress
+
+
+def nodal_stress(
+    points: np.ndarray, blocks: list[Block], displacement: np.ndarray, extended: bool = False
+) -> np.ndarray:
+    """Stress (n_nodes, 6) as xx, yy, zz, xy, yz, xz, the mean over the cells around each node.
+
+    In each cell the stress at the points of a low-order rule is fitted by the linear shape
+    functions of its vertices (least squares) and read at its nodes; gradients at a node itself
+    would not exist at a pyramid's apex. `extended`: strains are taken in extended precision.
+    """
+    n = len(points)
+    points, displacement = _in_precision(points, displacement, extended)
+    total, count = np.zeros(6 * n), np.zeros(n)
+    for block in blocks:
+        reference, _ = block.rule
+        fit = _extrapolation(block.type, reference)
+        for part in _chunks(block, points.shape[1]):
+            cells = block.cells[part]
+            gradient, _ = physical_gradients(points, cells, block.type, reference)
+            stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
+            full = _voigt(stress, block.lame[part], block.shear[part])
+            nodal = np.einsum("aq,cqs->cas", fit, full, optimize=True)
+            places = 6 * cells[:, :, None] + np.arange(6)
+            np.add.at(total, places.ravel(), nodal.ravel())
+        count += np.bincount(block.cells.ravel(), minlength=n)
+    return total.reshape(n, 6) / np.maximum(count, 1)[:, None]
+
+
+def _extrapolation(kind: CellType, reference: np.ndarray) -> np.ndarray:
+    """Matrix (n_nodes, q): values at quadrature points to values at nodes, by a linear fit."""
+    if len(reference) == 1:
+        return np.ones((kind.n_nodes, 1))
+    linear = shape_functions(kind.skeleton)
+    vertices = linear.type.n_nodes
+    at_nodes = np.vstack([np.eye(vertices), linear.values(kind.nodes[vertices:])])
+    return at_nodes @ np.linalg.pinv(linear.values(reference))
+
+
+def _voigt(stress: np.ndarray, lame: np.ndarray, shear: np.ndarray) -> np.ndarray:
+    """(n, q, dim, dim) tensors as (n, q, 6); in plane strain σ_zz = ν (σ_xx + σ_yy)."""
+    full = np.zeros((*stress.shape[:2], 6))
+    for i in range(stress.shape[-1]):
+        full[:, :, i] = stress[:, :, i, i]
+    full[:, :, 3] = stress[:, :, 0, 1]
+    if stress.shape[-1] == 3:
+        full[:, :, 4], full[:, :, 5] = stress[:, :, 1, 2], stress[:, :, 0, 2]
+    else:
+        poisson = (lame / (2 * (lame + shear)))[:, None]
+        full[:, :, 2] = poisson * (full[:, :, 0] + full[:, :, 1])
+    return full

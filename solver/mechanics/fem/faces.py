@@ -1,0 +1,231 @@
+"""Faces of a group on the boundary of the bodies: owner cell, outward orientation, geometry."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import meshio
+import numpy as np
+
+from solver.mechanics.fem import face_rule, shape_functions
+from solver.mechanics.fem.gauss import gauss_rule
+from solver.mesh.catalogue import BY_MESHIO, CellType, cell_type
+from solver.system.errors import InputError
+
+# Points each way on a face: enough for pressures that end with a vertical tangent.
+FACE_POINTS = 8
+
+
+@dataclass(frozen=True)
+class FaceBlock:
+    """Faces of one type whose owners are of one type.
+
+    `nodes` (n, n_nodes) turned outward; `number` (n,) their places in the group; `owner` (n,) the
+    owner's index in the mesh's block of type `owner_type`; `local` (n,) which of its faces it is.
+    """
+
+    type: CellType
+    nodes: np.ndarray
+    number: np.ndarray
+    owner_type: CellType
+    owner: np.ndarray
+    local: np.ndarray
+
+
+def volume_cells(mesh: meshio.Mesh) -> dict[str, np.ndarray]:
+    """The cells of full dimension by type name, in the order of the mesh's blocks."""
+    dim = mesh.points.shape[1]
+    kinds = [(BY_MESHIO[block.type], block.data) for block in mesh.cells]
+    return {kind.name: data for kind, data in kinds if kind.dim == dim}
+
+
+def boundary_faces(mesh: meshio.Mesh, group: str, where: object, key: str) -> list[FaceBlock]:
+    """The faces of a group, each with the one volume cell behind it.
+
+    Raises InputError (naming file `where` and `key`) for a face with no cell behind it, with a cell
+    on both sides, or listed twice.
+    """
+    wanted = _corner_sets(_group_faces(mesh, group))
+    marked = np.zeros(len(mesh.points), dtype=bool)
+    marked[wanted[wanted >= 0]] = True
+    sides = _candidate_sides(mesh, marked)
+    corners = np.concatenate([wanted] + [side.corners for side in sides])
+    _, label = np.unique(corners, axis=0, return_inverse=True)
+    label = label.ravel()
+    place = np.full(label.max() + 1 if len(label) else 0, -1)
+    place[label[: len(wanted)]] = np.arange(len(wanted))
+    repeated = len(wanted) - int((place >= 0).sum())
+    if repeated:
+        raise InputError(where, key, group, f"the group lists {repeated} of its faces twice")
+    owners = np.bincount(label[len(wanted) :], minlength=len(place))[label[: len(wanted)]]
+    _refuse_odd_owners(mesh, wanted, owners, group, where, key)
+    return _match(mesh, sides, place[label[len(wanted) :]])
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One local face of all the cells of a block that may carry a face of the group."""
+
+    owner_type: CellType
+    local: int
+    cells: np.ndarray
+    corners: np.ndarray
+
+
+def _group_faces(mesh: meshio.Mesh, group: str) -> list[np.ndarray]:
+    dim = mesh.points.shape[1]
+    found = []
+    for block, members in zip(mesh.cells, mesh.cell_sets[group], strict=True):
+        kind = BY_MESHIO[block.type]
+        if kind.dim == dim - 1 and members is not None and len(members):
+            found.append(block.data[np.asarray(members, dtype=int)][:, : kind.n_vertices])
+    return found
+
+
+def _corner_sets(faces: list[np.ndarray]) -> np.ndarray:
+    """Sorted corner nodes of faces as rows (n, 4), filled up with −1."""
+    rows = [np.full((len(f), 4), -1) for f in faces]
+    for row, face in zip(rows, faces, strict=True):
+        row[:, : face.shape[1]] = np.sort(face, axis=1)
+    return np.concatenate(rows) if rows else np.empty((0, 4), dtype=int)
+
+
+def _candidate_sides(mesh: meshio.Mesh, marked: np.ndarray) -> list[_Side]:
+    """The sides of volume cells all of whose corners are marked nodes."""
+    sides = []
+    for name, cells in volume_cells(mesh).items():
+        kind = cell_type(name)
+        near = np.flatnonzero(marked[cells[:, : kind.n_vertices]].any(axis=1))
+        for local, face in enumerate(kind.faces):
+            corner = face.nodes[: cell_type(face.type).n_vertices]
+            nodes = cells[near][:, corner]
+            hit = marked[nodes].all(axis=1)
+            if hit.any():
+                sides.append(_Side(kind, local, near[hit], _corner_sets([nodes[hit]])))
+    return sides
+
+
+def _refuse_odd_owners(
+    mesh: meshio.Mesh,
+    corners: np.ndarray,
+    owners: np.ndarray,
+    group: str,
+    where: object,
+    key: str,
+) -> None:
+    for count, what in ((owners == 0, "no cell behind it"), (owners > 1, "a cell on both sides")):
+        if count.any():
+            first = corners[np.flatnonzero(count)[0]]
+            place = mesh.points[first[first >= 0]].mean(axis=0)
+            at = ", ".join(f"{x:.6g}" for x in place)
+            raise InputError(
+                where,
+                key,
+                group,
+                f"{int(count.sum())} of its faces have {what} (the first near ({at})); "
+                "faces on the outside of a body are allowed",
+            )
+
+
+def _match(mesh: meshio.Mesh, sides: list[_Side], number: np.ndarray) -> list[FaceBlock]:
+    cells = volume_cells(mesh)
+    found: dict[tuple[str, str], list[tuple[np.ndarray, ...]]] = {}
+    start = 0
+    for side in sides:
+        part = number[start : start + len(side.cells)]
+        start += len(side.cells)
+        hit = part >= 0
+        if not hit.any():
+            continue
+        face = side.owner_type.faces[side.local]
+        owner = side.cells[hit]
+        nodes = cells[side.owner_type.name][owner][:, face.nodes]
+        local = np.full(len(owner), side.local)
+        key = (face.type, side.owner_type.name)
+        found.setdefault(key, []).append((nodes, part[hit], owner, local))
+    blocks = []
+    for (face_type, owner_type), parts in found.items():
+        nodes, place, owner, local = (np.concatenate(p) for p in zip(*parts, strict=True))
+        order = np.argsort(place)
+        blocks.append(
+            FaceBlock(
+                cell_type(face_type),
+                nodes[order],
+                place[order],
+                cell_type(owner_type),
+                owner[order],
+                local[order],
+            )
+        )
+    return blocks
+
+
+def area_vectors(points: np.ndarray, nodes: np.ndarray, tangents: np.ndarray) -> np.ndarray:
+    """Outward normal × surface measure (n, q, dim) of faces, from shape gradients at q points.
+
+    `tangents` (q, n_nodes, dim − 1) are the face type's reference gradients.
+    """
+    corner = points[nodes]
+    slope = np.einsum("fad,qat->fqtd", corner - corner[:, :1], tangents, optimize=True)
+    if points.shape[1] == 2:
+        tangent = slope[:, :, 0]
+        return np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1)
+    return np.cross(slope[:, :, 0], slope[:, :, 1])
+
+
+def face_integrals(
+    points: np.ndarray, nodes: np.ndarray, face_type: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """∫ N_a n dS over each face (n, n_nodes, dim), and ∫ n dS (n, dim)."""
+    reference, weights = face_rule(face_type)
+    values, tangents = shape_functions(face_type).both(reference)
+    vectors = area_vectors(points, nodes, tangents) * weights[:, None]
+    return np.einsum("qa,fqd->fad", values, vectors), vectors.sum(axis=1)
+
+
+def nodal_normals(points: np.ndarray, faces: list[tuple[str, np.ndarray]]) -> np.ndarray:
+    """Unit normals (n_points, dim) of a surface of faces (type, nodes) at its nodes.
+
+    The mean of the normals there of the faces around a node, weighted by area; zero away from the
+    surface. Components of round-off size are zero, so that a plane along the axes has normals along
+    the axes.
+    """
+    total = np.zeros_like(points)
+    for name, nodes in faces:
+        kind = cell_type(name)
+        np.add.at(
+            total, nodes, area_vectors(points, nodes, shape_functions(name).gradients(kind.nodes))
+        )
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    total /= np.where(length > 0, length, 1.0)
+    total[np.abs(total) < 16 * np.finfo(float).eps] = 0.0
+    return total
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Quadrature points on faces: `place` (k, dim), `weight` (k,), `macro` (k,) of the face."""
+
+    place: np.ndarray
+    weight: np.ndarray
+    macro: np.ndarray
+
+    def means(self, values: np.ndarray) -> np.ndarray:
+        """The mean of values (k,) over each macro-element."""
+        return np.bincount(self.macro, self.weight * values) / np.bincount(self.macro, self.weight)
+
+
+def surface_points(
+    points: np.ndarray, faces: Sequence[tuple[str, np.ndarray, np.ndarray]]
+) -> SurfacePoints:
+    """Points all over a slave surface: (type, nodes, macro-element) by block."""
+    place, weight, macro = [], [], []
+    for name, nodes, owner in faces:
+        kind = cell_type(name)
+        reference, weights = gauss_rule(kind.name, FACE_POINTS)
+        values, slopes = shape_functions(kind.name).both(reference)
+        measure = np.linalg.norm(area_vectors(points, nodes, slopes), axis=2) * weights
+        where = np.einsum("qa,fad->fqd", values, points[nodes], optimize=True)
+        place.append(where.reshape(-1, points.shape[1]))
+        weight.append(measure.ravel())
+        macro.append(np.repeat(owner, len(weights)))
+    return SurfacePoints(np.concatenate(place), np.concatenate(weight), np.concatenate(macro))

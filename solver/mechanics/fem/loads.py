@@ -1,0 +1,78 @@
+"""Nodal forces of pressures, tractions and body forces."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from solver.mechanics.fem import face_rule, shape_functions, volume_rule
+from solver.mechanics.fem.faces import area_vectors
+from solver.mechanics.fem.small_matrices import invert
+from solver.mechanics.fem.stress import traction
+from solver.system.errors import SolveError
+
+# A value of position: points (n, dim) to values (n,) or (n, dim).
+Field = Callable[[np.ndarray], np.ndarray]
+
+
+def face_forces(
+    points: np.ndarray, nodes: np.ndarray, face_type: str, value: Field, pressure: bool
+) -> np.ndarray:
+    """Forces (n_points, dim) on faces (n, n_nodes) turned outward.
+
+    `value` gives a pressure (stress, positive inwards) or, where `pressure` is False, the traction
+    vector (stress).
+    """
+    reference, weights = face_rule(face_type)
+    values, slopes = shape_functions(face_type).both(reference)
+    vectors = area_vectors(points, nodes, slopes) * weights[:, None]
+    given = _at(points, nodes, values, value)
+    if pressure:
+        vectors = -vectors * given[..., None]
+    else:
+        vectors = np.linalg.norm(vectors, axis=2)[..., None] * given
+    return _gather(points, nodes, np.einsum("qa,fqd->fad", values, vectors))
+
+
+def stress_forces(
+    points: np.ndarray, nodes: np.ndarray, face_type: str, stress: Field, pressure: bool
+) -> np.ndarray:
+    """Forces (n_points, dim) of a stress field (n, 6) on faces (n, n_nodes) turned outward.
+
+    The traction is σ·n; where `pressure` is True, only its part along n.
+    """
+    reference, weights = face_rule(face_type)
+    values, slopes = shape_functions(face_type).both(reference)
+    vectors = area_vectors(points, nodes, slopes) * weights[:, None]
+    given = _at(points, nodes, values, stress)
+    flat = vectors.reshape(-1, vectors.shape[-1])
+    force = traction(given.reshape(len(flat), 6), flat)
+    if pressure:
+        along = np.einsum("nd,nd->n", force, flat) / np.einsum("nd,nd->n", flat, flat)
+        force = along[:, None] * flat
+    return _gather(points, nodes, np.einsum("qa,fqd->fad", values, force.reshape(vectors.shape)))
+
+
+def body_forces(points: np.ndarray, cells: np.ndarray, cell_type: str, value: Field) -> np.ndarray:
+    """Forces (n_points, dim) of a force per volume, given as a vector field, on cells."""
+    reference, weights = volume_rule(cell_type)
+    values, slopes = shape_functions(cell_type).both(reference)
+    corner = points[cells]
+    jacobian = np.einsum("cad,qat->cqdt", corner - corner[:, :1], slopes, optimize=True)
+    determinant, _ = invert(jacobian)
+    if (determinant <= 0).any():
+        raise SolveError(f"{cell_type} cells under a body force are inverted or degenerate")
+    force = _at(points, cells, values, value) * (determinant * weights)[..., None]
+    return _gather(points, cells, np.einsum("qa,cqd->cad", values, force))
+
+
+def _at(points: np.ndarray, nodes: np.ndarray, values: np.ndarray, value: Field) -> np.ndarray:
+    place = np.einsum("qa,fad->fqd", values, points[nodes])
+    given = value(place.reshape(-1, points.shape[1]))
+    return given.reshape(*place.shape[:2], *given.shape[1:])
+
+
+def _gather(points: np.ndarray, nodes: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    total = np.zeros_like(points)
+    for d in range(points.shape[1]):
+        total[:, d] = np.bincount(nodes.ravel(), forces[..., d].ravel(), minlength=len(points))
+    return total

@@ -1,0 +1,98 @@
+"""Shape functions by cell type, in the node order of the catalogue, over scikit-fem's elements."""
+
+from functools import cache
+
+import numpy as np
+
+from solver.mesh.catalogue import BY_NAME, CellType
+
+# Mid-edge nodes off the middle by less than this share of the edge make no bent edge.
+_STRAIGHT = 1e-9
+
+
+class ShapeFunctions:
+    """The shape functions of one cell type.
+
+    scikit-fem numbers the degrees of freedom of an element in its own way; they are matched here
+    with the catalogue's nodes by their place in the reference cell.
+    """
+
+    def __init__(self, name: str):
+        self.type = BY_NAME[name]
+        self._element = _scikit_fem_element(name)
+        places = np.asarray(self._element.doflocs)
+        distance = np.linalg.norm(self.type.nodes[:, None] - places[None], axis=2)
+        self._order = distance.argmin(axis=1)
+        if distance.min(axis=1).max() > 1e-12 or len(set(self._order)) != self.type.n_nodes:
+            raise AssertionError(f"{name}: the nodes of the catalogue and the element differ")
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Values (..., n_nodes) at the reference points (..., dim)."""
+        return self._evaluate(points)[0]
+
+    def gradients(self, points: np.ndarray) -> np.ndarray:
+        """Reference gradients (..., n_nodes, dim) at the reference points (..., dim)."""
+        return self._evaluate(points)[1]
+
+    def both(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (..., n_nodes) and gradients (..., n_nodes, dim) at once."""
+        return self._evaluate(points)
+
+    def _evaluate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        flat = np.ascontiguousarray(np.reshape(points, (-1, self.type.dim)).T, dtype=float)
+        values = np.empty((flat.shape[1], self.type.n_nodes))
+        gradients = np.empty((flat.shape[1], self.type.n_nodes, self.type.dim))
+        for node, dof in enumerate(self._order):
+            value, gradient = self._element.lbasis(flat, int(dof))
+            values[:, node] = value
+            gradients[:, node] = np.asarray(gradient).T
+        shape = np.shape(points)[:-1]
+        return (
+            values.reshape(*shape, self.type.n_nodes),
+            gradients.reshape(*shape, self.type.n_nodes, self.type.dim),
+        )
+
+
+@cache
+def shape_functions(name: str) -> ShapeFunctions:
+    """The shape functions of the cell type `name` (the field's name: `HEXA20`)."""
+    return ShapeFunctions(name)
+
+
+def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
+    """Which cells or faces (c,), of node coordinates (c, n_nodes, dim), have straight edges.
+
+    That is, mid-edge nodes in the middle, to 1e-9 of the edge: all cells of linear types.
+    """
+    if kind.order == 1:
+        return np.ones(len(corner), dtype=bool)
+    ends = corner[:, np.array(kind.edges)]
+    n = kind.n_vertices
+    offset = corner[:, n : n + len(kind.edges)] - ends.mean(axis=2)
+    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    return (np.linalg.norm(offset, axis=2) <= _STRAIGHT * length).all(axis=1)
+
+
+def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
+    from skfem import element
+
+    if name in ("PENTA15", "PYRA5", "PYRA13"):
+        from solver.mechanics.fem.extra_elements import ElementPyramid, ElementWedgeS2
+
+        return ElementWedgeS2() if name == "PENTA15" else ElementPyramid(name)
+    makers = {
+        "SEG2": element.ElementLineP1,
+        "SEG3": element.ElementLineP2,
+        "TRIA3": element.ElementTriP1,
+        "TRIA6": element.ElementTriP2,
+        "QUAD4": element.ElementQuad1,
+        "QUAD8": element.ElementQuadS2,
+        "QUAD9": element.ElementQuad2,
+        "TETRA4": element.ElementTetP1,
+        "TETRA10": element.ElementTetP2,
+        "HEXA8": element.ElementHex1,
+        "HEXA20": element.ElementHexS2,
+        "HEXA27": element.ElementHex2,
+        "PENTA6": element.ElementWedge1,
+    }
+    return makers[name]()

@@ -1,0 +1,114 @@
+"""Supports as a change of unknowns: displacement = offset + basis · free unknowns."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from solver.system.errors import InputError
+
+# Directions (unit vectors) whose part outside the others is smaller depend on them.
+_DEPENDENT = 1e-8
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Imposed displacement of nodes (n,) along unit directions (n, dim), of values (n,)."""
+
+    key: str
+    nodes: np.ndarray
+    directions: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """u = offset + basis · x: `basis` (n_dofs, n_free) has orthonormal columns, offset (n_dofs,).
+
+    `selection` (n_free,) are the free degrees of freedom where the basis merely picks them.
+    """
+
+    basis: sparse.csr_matrix
+    offset: np.ndarray
+    selection: np.ndarray | None
+
+    def reduced(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+        """basisᵀ · matrix · basis."""
+        if self.selection is not None:
+            return matrix[self.selection][:, self.selection]
+        return (self.basis.T @ matrix @ self.basis).tocsr()
+
+
+def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed], where: object) -> FreeMotion:
+    """What the supports leave free.
+
+    Raises InputError where two supports ask a node for different displacements.
+    """
+    nodes = np.concatenate([np.empty(0, dtype=int), *(f.nodes for f in fixed)])
+    directions = np.concatenate([np.empty((0, dim)), *(f.directions for f in fixed)])
+    values = np.concatenate([np.empty(0), *(f.values for f in fixed)])
+    source = np.repeat(np.arange(len(fixed)), [len(f.nodes) for f in fixed])
+    order = np.argsort(nodes, kind="stable")
+    nodes, directions, values, source = (a[order] for a in (nodes, directions, values, source))
+    # Per node an orthonormal set of held directions is grown, one support at a time.
+    held = np.zeros((n_nodes, dim, dim))
+    count = np.zeros(n_nodes, dtype=int)
+    offset = np.zeros((n_nodes, dim))
+    rank = np.arange(len(nodes)) - np.searchsorted(nodes, nodes)
+    largest = np.abs(values).max(initial=0.0)
+    for k in range(rank.max(initial=-1) + 1):
+        now = rank == k
+        node, direction = nodes[now], directions[now]
+        rest = direction - np.einsum("nrd,nr->nd", held[node], _parts(held[node], direction))
+        rest -= np.einsum("nrd,nr->nd", held[node], _parts(held[node], rest))
+        length = np.linalg.norm(rest, axis=1)
+        missing = values[now] - np.einsum("nd,nd->n", direction, offset[node])
+        new = length > _DEPENDENT
+        clash = ~new & (np.abs(missing) > 1e-9 * largest)
+        if clash.any():
+            first = np.flatnonzero(clash)[0]
+            key = fixed[source[now][first]].key
+            raise InputError(
+                where,
+                key,
+                float(values[now][first]),
+                f"{int(clash.sum())} nodes are given another displacement by a support before it",
+            )
+        node, unit = node[new], rest[new] / length[new][:, None]
+        held[node, count[node]] = unit
+        offset[node] += unit * (missing[new] / length[new])[:, None]
+        count[node] += 1
+    return _basis(held, count, offset)
+
+
+def _parts(held: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    return np.einsum("nrd,nd->nr", held, vector)
+
+
+def _basis(held: np.ndarray, count: np.ndarray, offset: np.ndarray) -> FreeMotion:
+    n, dim, _ = held.shape
+    axis = (held != 0).sum(axis=2).max(axis=1, initial=0) <= 1
+    free = np.ones((n, dim), dtype=bool)
+    free[axis] = (held[axis] == 0).all(axis=1)
+    turned = np.flatnonzero(~axis)
+    free[turned] = np.arange(dim) < dim - count[turned][:, None]
+    number = np.cumsum(free.ravel()).reshape(n, dim) - 1
+    straight = free.copy()
+    straight[turned] = False
+    rows = [np.flatnonzero(straight.ravel())]
+    columns, entries = [number[straight]], [np.ones(len(rows[0]))]
+    if len(turned):
+        # The singular vectors past the held ones span what is left free.
+        _, _, vectors = np.linalg.svd(held[turned])
+        for k in range(dim):
+            some = dim - count[turned] > k
+            node = turned[some]
+            complement = vectors[some, count[node] + k]
+            rows.append((dim * node[:, None] + np.arange(dim)).ravel())
+            columns.append(np.repeat(number[node, k], dim))
+            entries.append(complement.ravel())
+    shape = (n * dim, int(free.sum()))
+    coo = (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns)))
+    basis = sparse.coo_matrix(coo, shape=shape).tocsr()
+    return FreeMotion(basis, offset.ravel(), None if len(turned) else rows[0])

@@ -1,0 +1,112 @@
+"""The sparse direct solvers behind one shape: a function that factors and returns the solve.
+
+Each takes the upper triangle of a symmetric matrix (csr, int32 indices, sorted, every diagonal
+entry stored) and whether it has to be positive definite, imports its library only then, and
+raises `BreakdownError` where it meets a pivot that it cannot use. The solve takes and returns
+columns (n, k); the factor's memory goes with the last reference to the solve.
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix, diags
+
+from solver.mechanics.linear import pardiso
+
+Solve = Callable[[np.ndarray], np.ndarray]
+
+
+class BreakdownError(Exception):
+    """The factorisation met a pivot that is zero, or not positive where it has to be."""
+
+
+@dataclass(frozen=True)
+class Backend:
+    """One library; `single`: a float32 triangle gives a factor in single precision."""
+
+    name: str
+    single: bool
+    available: Callable[[], bool]
+    factor: Callable[[csr_matrix, bool], Solve]
+
+
+def threads() -> int:
+    """Cores that this process may use; OMP_NUM_THREADS, where set, says fewer."""
+    allowed = len(os.sched_getaffinity(0))
+    wish = os.environ.get("OMP_NUM_THREADS", "")
+    return min(allowed, int(wish)) if wish.isdigit() and int(wish) else allowed
+
+
+def _pardiso(upper: csr_matrix, definite: bool) -> Solve:
+    kind = pardiso.POSITIVE_DEFINITE if definite else pardiso.INDEFINITE
+    try:
+        return pardiso.Pardiso(upper, kind).solve
+    except pardiso.PardisoError as error:
+        if error.code in (pardiso.ZERO_PIVOT, pardiso.SINGULAR_DIAGONAL):
+            raise BreakdownError from error
+        if error.code == pardiso.NO_MEMORY:
+            raise MemoryError("no room for the factor of the stiffness matrix") from error
+        raise
+
+
+def _rslab(upper: csr_matrix, definite: bool) -> Solve:
+    import rslab
+
+    # Read by columns, the rows of the upper triangle are the columns of the lower one.
+    lower = csc_matrix((upper.data, upper.indices, upper.indptr), shape=upper.shape)
+    try:
+        factor = rslab.ldlt(lower, threads=threads())
+    except RuntimeError as error:
+        raise BreakdownError from error
+    if definite and factor.inertia[0] != upper.shape[0]:
+        raise BreakdownError
+    return factor.solve_many
+
+
+def _cholmod(upper: csr_matrix, definite: bool) -> Solve:
+    from cvxopt import cholmod, matrix, spmatrix
+
+    if not definite:
+        raise ValueError("CHOLMOD factors positive definite matrices only")
+    columns = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
+    rows = upper.indices.astype(np.int64)
+    lower = spmatrix(matrix(upper.data), matrix(rows), matrix(columns), upper.shape)
+    factor = cholmod.symbolic(lower)
+    try:
+        cholmod.numeric(lower, factor)
+    except ArithmeticError as error:
+        raise BreakdownError from error
+
+    def solve(right: np.ndarray) -> np.ndarray:
+        solution = matrix(np.asfortranarray(right))
+        cholmod.solve(factor, solution)
+        return np.array(solution)
+
+    return solve
+
+
+def _superlu(upper: csr_matrix, definite: bool) -> Solve:
+    from scipy.sparse.linalg import splu
+
+    whole = csc_matrix(upper + upper.T - diags(upper.diagonal()))
+    try:
+        if not definite:
+            return splu(whole).solve
+        symmetric = {"SymmetricMode": True}
+        factor = splu(whole, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
+    except RuntimeError as error:
+        raise BreakdownError from error
+    if not (factor.U.diagonal() > 0).all():
+        raise BreakdownError
+    return factor.solve
+
+
+BACKENDS = {
+    "pardiso": Backend("PARDISO (MKL)", True, pardiso.available, _pardiso),
+    "rslab": Backend("rslab", True, lambda: find_spec("rslab") is not None, _rslab),
+    "cholmod": Backend("CHOLMOD", False, lambda: find_spec("cvxopt") is not None, _cholmod),
+    "superlu": Backend("SuperLU", False, lambda: True, _superlu),
+}

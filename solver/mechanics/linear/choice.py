@@ -1,0 +1,125 @@
+"""The linear solver that a positive definite system gets, by its size and dimension."""
+
+import logging
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from solver.mechanics.linear.backends import BACKENDS
+from solver.mechanics.linear.condensed_matrix import Symmetric
+from solver.mechanics.linear.direct import Factor, factorise, wanted
+from solver.mechanics.linear.krylov import EPSILON
+from solver.mechanics.linear.multigrid import Multigrid, Unknowns
+from solver.system.errors import SolveError
+
+_LOG = logging.getLogger(__name__)
+
+MULTIGRID = "multigrid"
+_ASKED = "as asked for"
+# Unknowns in space from which multigrid takes less time than a factor, and half the memory or less:
+# whether PARDISO makes the factor, whether cells are quadratic, which takes twice the iterations.
+_MULTIGRID_FROM = {
+    (True, False): 80_000,
+    (True, True): 200_000,
+    (False, False): 20_000,
+    (False, True): 100_000,
+}
+# From as many entries more than the matrix has, condensing is slower than a saddle point; a few
+# (the second figure) take no time.
+_FILL, _LEAST_FILL = 1.0, 1_000_000
+
+
+def multigrid_from(quadratic: bool) -> int:
+    """Unknowns in space from which multigrid is the quicker way, with what is installed here."""
+    return _MULTIGRID_FROM[BACKENDS["pardiso"].available(), quadratic]
+
+
+class Chosen:
+    """What solves one system, as often as wanted: `name`, and `why` it was chosen.
+
+    Multigrid gives way to a factor once it does not converge: thin cells, nearly incompressible
+    material. `gave_up` then says why; else it is empty.
+    """
+
+    def __init__(self, matrix: Symmetric, dim: int, solver: Factor | Multigrid, why: str):
+        self._matrix, self._dim, self._solver, self.why = matrix, dim, solver, why
+        self.gave_up = ""
+
+    @property
+    def name(self) -> str:
+        """By what."""
+        return self._solver.name
+
+    @property
+    def iterations(self) -> int:
+        """The most that one solution took so far; 0 by a factor alone."""
+        return self._solver.iterations
+
+    def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
+        """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that, or better.
+
+        Raises SolveError where the solution is not finite or the iterations do not converge.
+        """
+        try:
+            return self._solver.solve(right, accuracy)
+        except SolveError as error:
+            if not isinstance(self._solver, Multigrid):
+                raise
+            self.why = self.gave_up = _instead(error)
+            _LOG.info("%s", self.why)
+        self._solver.close()
+        self._solver = factorise(self._matrix.tocsr(), dim=self._dim)
+        return self._solver.solve(right, accuracy)
+
+
+def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> Chosen:
+    """Make ready to solve with a symmetric positive definite `matrix` (n, n).
+
+    `gave_up`: why multigrid did on a matrix like it; then it is not tried again. Raises SolveError
+    where the matrix is not positive definite or singular to working precision; a singular matrix
+    that multigrid solves for a consistent right-hand side goes unnoticed.
+    """
+    dim, size = unknowns.dim, matrix.shape[0]
+    against = gave_up or _against_multigrid(size, unknowns)
+    _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
+    if not against:
+        least = multigrid_from(unknowns.quadratic)
+        why = f"{least} unknowns or more in space: quicker and smaller than a factor"
+        try:
+            solver = Multigrid(matrix, unknowns)
+            return Chosen(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
+        except SolveError as error:
+            # A factor decides whether the matrix is to blame.
+            against = gave_up = _instead(error)
+            _LOG.info("%s", against)
+    chosen = Chosen(matrix, dim, factorise(matrix.tocsr(), dim=dim), against)
+    chosen.gave_up = gave_up
+    return chosen
+
+
+def _against_multigrid(size: int, unknowns: Unknowns) -> str:
+    """Why a system of that size is factored; empty where it is not."""
+    if wanted() != "auto":
+        return "" if wanted() == MULTIGRID else _ASKED
+    if unknowns.dim == 2:
+        return "in the plane a factor is small"
+    least = multigrid_from(unknowns.quadratic)
+    return f"fewer than {least} unknowns: a factor is quicker than multigrid" * (size < least)
+
+
+def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
+    """Why `matrix` (n, n) had better not be condensed by `constraints` (m, n), but factored.
+
+    Empty where it had. A constraint over w unknowns leaves a block of w² entries in the condensed
+    system. Only PARDISO factors saddle points in space well.
+    """
+    widths = np.diff(constraints.indptr).astype(float)
+    filled = float((widths**2).sum())
+    few = filled <= max(_FILL * matrix.nnz, _LEAST_FILL)
+    if few or wanted() != "auto" or not BACKENDS["pardiso"].available():
+        return ""
+    return f"a condensed system would fill in: one constraint holds {widths.max():.0f} unknowns"
+
+
+def _instead(error: SolveError) -> str:
+    return f"multigrid does not serve here: {error}"

@@ -1,0 +1,274 @@
+"""Elasticity under closed contact constraints, condensed to a positive definite system.
+
+Each closed macro-element owns a degree of freedom that no other constraint sees. It is expressed by
+the others through the constraint, x = Z v + c, and the multiplier follows from the equilibrium of
+that degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
+"""
+
+import logging
+from dataclasses import dataclass
+from typing import Protocol, Self, TypeVar
+
+import numpy as np
+from scipy import sparse
+
+from solver.mechanics.linear.choice import Chosen, prepare
+from solver.mechanics.linear.condensed_matrix import CondensedMatrix, Symmetric
+from solver.mechanics.linear.direct import Factor, factorise_indefinite
+from solver.mechanics.linear.krylov import EPSILON, ROUGH
+from solver.mechanics.linear.multigrid import Unknowns
+from solver.system.errors import SolveError
+
+_LOG = logging.getLogger(__name__)
+
+# Each refinement must at least halve the residual, or it has reached round-off.
+_MIN_GAIN = 0.5
+_MAX_REFINEMENTS = 6
+# A residual below this multiple of the machine precision, relative to the forces, is round-off.
+ROUND_OFF = 8 * np.finfo(float).eps
+# A refinement aims at this share of round-off, and at no smaller a gain.
+_WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
+# A macro-element's own coefficient must not be smaller than this share of its row's largest.
+_SMALLEST_PIVOT = 1e-6
+
+
+AnyIterate = TypeVar("AnyIterate", bound="Iterate")
+
+
+class Constrained(Protocol):
+    """A factored system K x = f + Gᵀ p under constraints G x = b."""
+
+    @property
+    def factor(self) -> Chosen | Factor:
+        """What solves the system."""
+
+    @property
+    def why(self) -> str:
+        """Why that was chosen."""
+
+    def correction(
+        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
+    ) -> np.ndarray:
+        """The change of x (n,) that removes f − K x = `force` and b − G x = `violation`.
+
+        What is left of the forces may be `accuracy` of them, where another correction follows.
+        """
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """The multipliers p (m,) that balance f − K x = `force`."""
+
+    def imbalance(self, force: np.ndarray) -> float:
+        """The largest force that no multiplier can balance."""
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """x = Z v + shift · b for constraints G x = b, and the factor of ZᵀKZ.
+
+    `pivot` (m,) the eliminated unknowns, `kept` (n − m,) the others, `coefficient` (m,) of the
+    pivots in G; `coupling` (m, n) the rows of K that belong to them.
+    """
+
+    expansion: sparse.csr_matrix
+    pivot: np.ndarray
+    coefficient: np.ndarray
+    factor: Chosen
+    coupling: sparse.csr_matrix
+
+    @property
+    def why(self) -> str:
+        """Why that was chosen."""
+        return self.factor.why
+
+    def correction(
+        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
+    ) -> np.ndarray:
+        """The pivots alone meet the constraints; the others then restore equilibrium."""
+        change = np.zeros(self.expansion.shape[0])
+        change[self.pivot] = violation / self.coefficient
+        moved = force - self.coupling.T @ change[self.pivot]
+        return change + self.expansion @ self.factor.solve(self.expansion.T @ moved, accuracy)
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """From the equilibrium of the pivots, which one multiplier each acts on."""
+        return -force[self.pivot] / self.coefficient
+
+    def imbalance(self, force: np.ndarray) -> float:
+        """The largest force left on the unknowns v."""
+        return float(np.abs(self.expansion.T @ force).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class Saddle:
+    """The system with the multipliers as unknowns.
+
+    `scaled` are the constraints with rows of unit size; the matrix is K + `weight` Ĝᵀ Ĝ, which
+    changes no solution. With a weight it is positive definite, and filled in by wide constraints;
+    without, it is K alone, singular where contact holds a body.
+    """
+
+    constraints: sparse.csr_matrix
+    scaled: sparse.csr_matrix
+    size: np.ndarray
+    weight: float
+    factor: Factor
+    why: str
+
+    def correction(
+        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
+    ) -> np.ndarray:
+        """Solved for x and p together."""
+        wanted = violation / self.size
+        pulled = force + self.weight * (self.scaled.T @ wanted)
+        return self.factor.solve(np.concatenate([pulled, -wanted]), accuracy)[: len(force)]
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """The multipliers of the same system with nothing violated."""
+        right = np.concatenate([force, np.zeros(self.constraints.shape[0])])
+        return self.factor.solve(right)[len(force) :] / self.size
+
+    def imbalance(self, force: np.ndarray) -> float:
+        """The largest force left with the multipliers acting."""
+        left = force + self.constraints.T @ self.multiplier(force)
+        return float(np.abs(left).max(initial=0.0))
+
+
+def saddle_point(
+    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, why: str, weighted: bool = True
+) -> Saddle:
+    """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular.
+
+    `weighted`: K made definite by the constraints, which any order of elimination takes.
+    """
+    size = np.sqrt(np.asarray(constraints.multiply(constraints).sum(axis=1)).ravel())
+    scaled = (sparse.diags(1 / size) @ constraints).tocsr()
+    weight = float(matrix.diagonal().max(initial=0.0)) if weighted else 0.0
+    upper = matrix + weight * (scaled.T @ scaled) if weighted else matrix
+    factor = factorise_indefinite(sparse.bmat([[upper, -scaled.T], [-scaled, None]], format="csr"))
+    return Saddle(constraints, scaled, size, weight, factor, why)
+
+
+def choose_pivots(
+    constraints: sparse.csr_matrix, own: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For each row the largest entry in a column that is its own: pivot, coefficient, found (m,).
+
+    `own` (n,) marks the columns that may serve (unknowns of slave nodes). Rows without one, or with
+    a negligible one, have found = False.
+    """
+    m, n = constraints.shape
+    seen = np.bincount(constraints.indices, minlength=n)
+    rows = np.repeat(np.arange(m), np.diff(constraints.indptr))
+    size = np.abs(constraints.data)
+    usable = np.flatnonzero(own[constraints.indices] & (seen[constraints.indices] == 1))
+    # Sorted by row, then size: the last of each row is its largest.
+    order = usable[np.lexsort((size[usable], rows[usable]))]
+    last = np.flatnonzero(np.diff(rows[order], append=m + 1))
+    best = order[last]
+    found, pivot, coefficient = np.zeros(m, dtype=bool), np.zeros(m, dtype=int), np.zeros(m)
+    largest = np.zeros(m)
+    np.maximum.at(largest, rows, size)
+    row = rows[best]
+    found[row] = size[best] > _SMALLEST_PIVOT * largest[row]
+    pivot[row], coefficient[row] = constraints.indices[best], constraints.data[best]
+    return pivot, coefficient, found
+
+
+def condense(
+    matrix: sparse.csr_matrix,
+    constraints: sparse.csr_matrix,
+    own: np.ndarray,
+    unknowns: Unknowns,
+    gave_up: str = "",
+) -> Condensed:
+    """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
+
+    `own` (n,) marks what may be eliminated, `unknowns` tells what each is, `gave_up` why multigrid
+    is not tried again (see `prepare`).
+
+    Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
+    """
+    n = matrix.shape[0]
+    pivot, coefficient, found = choose_pivots(constraints, own)
+    if not found.all():
+        raise SolveError(
+            f"{int((~found).sum())} closed macro-elements have no unknown of their own to condense"
+        )
+    kept = np.ones(n, dtype=bool)
+    kept[pivot] = False
+    kept_columns, coupling = np.flatnonzero(kept), matrix[pivot]
+    rest = constraints[:, kept_columns]
+    follow = (sparse.diags(-1 / coefficient) @ rest).tocsr() if len(pivot) else rest
+    expansion = _expansion(n, kept_columns, pivot, follow)
+    condensed: Symmetric = matrix
+    if len(pivot):
+        pulled = (coupling[:, kept_columns].T @ follow).tocsr()
+        added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
+        condensed = CondensedMatrix(matrix, kept_columns, added.tocsr())
+    factor = prepare(condensed, unknowns.of(kept_columns), gave_up)
+    return Condensed(expansion, pivot, coefficient, factor, coupling)
+
+
+def _expansion(
+    n: int, kept: np.ndarray, pivot: np.ndarray, follow: sparse.csr_matrix
+) -> sparse.csr_matrix:
+    identity = sparse.csr_matrix(
+        (np.ones(len(kept)), (kept, np.arange(len(kept)))), shape=(n, len(kept))
+    )
+    place = sparse.csr_matrix(
+        (np.ones(len(pivot)), (pivot, np.arange(len(pivot)))), shape=(n, len(pivot))
+    )
+    return (identity + place @ follow).tocsr()
+
+
+class Iterate(Protocol):
+    """An approximate solution x of K x = f + Gᵀ p, G x = b, kept as exactly as its owner can."""
+
+    def residual(self) -> np.ndarray:
+        """The forces f − K x (n,)."""
+
+    def condensed(self, force: np.ndarray) -> np.ndarray:
+        """The forces (n,) that a correction has to balance, for residual forces (n,).
+
+        They differ where other unknowns, with residuals of their own, were eliminated from K.
+        """
+
+    def violation(self) -> np.ndarray:
+        """The gaps b − G x (m,)."""
+
+    def advanced(self, change: np.ndarray) -> Self:
+        """The iterate at x + change (n,)."""
+
+
+def solve(
+    system: Constrained,
+    iterate: AnyIterate,
+    scale: float,
+    refine: bool = True,
+    round_off: float = ROUND_OFF,
+) -> tuple[AnyIterate, np.ndarray, float]:
+    """Solve from an iterate; return the last one, multipliers (m,) and the relative residual.
+
+    `scale` is the size of the forces. Newton's method with a fixed factor: one step solves, further
+    ones refine until the residual no longer falls (Higham, Accuracy and Stability of Numerical
+    Algorithms, §12), or is less than `round_off` of the forces. Raises SolveError where the
+    solution is not finite.
+    """
+    force, last, accuracy = iterate.residual(), np.inf, ROUGH if refine else EPSILON
+    for step in range(_MAX_REFINEMENTS if refine else 1):
+        correction = system.correction(iterate.condensed(force), iterate.violation(), accuracy)
+        following = iterate.advanced(correction)
+        following_force = following.residual()
+        size = system.imbalance(following_force) / scale
+        if not np.isfinite(size):
+            raise SolveError("the solution is not finite")
+        _LOG.info("solution %d: residual %.1e", step + 1, size)
+        if size < last:
+            iterate, force = following, following_force
+        enough = size <= round_off or size > _MIN_GAIN * last
+        last = min(size, last)
+        if enough:
+            break
+        # No more than it takes from here to well below round-off.
+        accuracy = min(max(_WELL_BELOW * round_off / last, ROUGH), _LEAST_GAIN)
+    return iterate, system.multiplier(force), last

@@ -1,0 +1,315 @@
+"""Algebraic multigrid for large 3D elasticity: smoothed aggregation within conjugate gradients.
+
+Nodes are gathered into aggregates, the rigid motions of which are what is unknown on the next level
+(Vanek, Mandel, Brezina, Computing 56 (1996) 179). Every level is scaled to a diagonal of at most
+one and kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes,
+Numer. Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in
+double precision take the solution to round-off.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh_tridiagonal
+from scipy.sparse import bsr_matrix, csr_matrix
+
+from solver.mechanics.linear.condensed_matrix import Symmetric
+from solver.mechanics.linear.krylov import EPSILON, conjugate_gradients, in_single
+from solver.system.errors import SolveError
+
+COARSEST = 600
+"""Unknowns at which the hierarchy ends: that level is inverted as a dense matrix."""
+LARGEST_DENSE = 4_000
+"""More unknowns than this where the aggregates no longer grow: multigrid is of no use."""
+MOST_NEIGHBOURS = 50
+"""More aggregates than this, on the mean, that some node feels together with one; 20 to 35 do as a
+rule. Contact couples all that lies on one face: of hundreds of faces, coarse levels fill in."""
+MAX_ITERATIONS = 150
+_ROWS_AT_ONCE = 30_000  # whole nodes
+_BLOCKS_AT_ONCE = 100_000
+_PARTS = 8  # of a product of matrices that is formed in parts
+# Lottes' optimised weights of the polynomial of degree two.
+_FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
+# The iteration approaches the largest eigenvalue from below.
+_SAFETY = 1.05
+_SMOOTHED = 4 / 3
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """What the unknowns of a system stand for, in a space of `dim` dimensions.
+
+    `node` (n,): the node that each belongs to, at most `dim` to a node; `motions` (n, 3 or 6): the
+    rigid motions, in these unknowns; `body` (n,): the number of the body. Bodies that slide on each
+    other share no aggregate. `quadratic`: some of their cells are.
+    """
+
+    dim: int
+    node: np.ndarray
+    motions: np.ndarray
+    body: np.ndarray
+    quadratic: bool = False
+
+    def of(self, chosen: np.ndarray) -> "Unknowns":
+        """What some of them stand for."""
+        arrays = self.node[chosen], self.motions[chosen], self.body[chosen]
+        return Unknowns(self.dim, *arrays, self.quadratic)
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level: scaled matrix, bound of its eigenvalues, and the ways to and from the next."""
+
+    matrix: bsr_matrix
+    bound: np.float32
+    prolongation: bsr_matrix
+    restriction: bsr_matrix
+
+    def smooth(self, residual: np.ndarray) -> np.ndarray:
+        """The correction that the polynomial in the matrix makes of a residual (n, k)."""
+        step = residual * (np.float32(4 / 3) / self.bound)
+        residual = residual - self.matrix @ step
+        change = _FIRST * step
+        step *= np.float32(1 / 5)
+        step += residual * (np.float32(12 / 5) / self.bound)
+        return change + _SECOND * step
+
+
+class Multigrid:
+    """A hierarchy for one matrix. `iterations`: the most that a solve has taken so far."""
+
+    def __init__(self, matrix: Symmetric, unknowns: Unknowns):
+        """Set up for a symmetric positive definite `matrix` (n, n).
+
+        Raises SolveError where the diagonal is not positive, nothing coarsens, or coarse levels
+        would fill in.
+        """
+        diagonal = matrix.diagonal()
+        if not (diagonal > 0).all():
+            raise SolveError("the matrix is not positive definite: its diagonal is not positive")
+        self.iterations = 0
+        self._matrix = matrix
+        self._scale = 1 / np.sqrt(diagonal)[:, None]
+        self._place, body = _places(unknowns)
+        motions = np.zeros((3 * len(body), unknowns.motions.shape[1]))
+        motions[self._place] = unknowns.motions / self._scale
+        blocks = _in_blocks(matrix, self._scale[:, 0], self._place, 3 * len(body))
+        blocks, motions, scale = _scaled(blocks, motions)
+        self._scale *= scale[self._place, None]
+        self._levels, self._coarsest = _hierarchy(blocks, motions, body)
+        self._padded = 3 * len(body)
+        self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
+
+    def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
+        """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
+
+        In 2-norms of the system scaled to a diagonal of at most one. Raises SolveError where
+        `MAX_ITERATIONS` do not lead there, or will not, and where the solution is not finite.
+        """
+        columns = np.asarray(right, dtype=float)
+        columns = columns if columns.ndim == 2 else columns[:, None]
+        solution, iterations = conjugate_gradients(
+            lambda x: self._scale * (self._matrix @ (self._scale * x)),
+            in_single(self._cycle),
+            self._scale * columns,
+            accuracy,
+            MAX_ITERATIONS,
+        )
+        if not np.isfinite(solution).all():
+            raise SolveError(f"the solution by {self.name} is not finite")
+        self.iterations = max(self.iterations, iterations)
+        return (self._scale * solution).reshape(np.shape(right))
+
+    def close(self) -> None:
+        """Release the hierarchy; it solves no more."""
+        self._levels = []
+
+    def _cycle(self, residual: np.ndarray) -> np.ndarray:
+        padded = np.zeros((self._padded, residual.shape[1]), dtype=np.float32)
+        padded[self._place] = residual
+        return self._descend(0, padded)[self._place]
+
+    def _descend(self, depth: int, residual: np.ndarray) -> np.ndarray:
+        """One V-cycle from a level down."""
+        if depth == len(self._levels):
+            return self._coarsest @ residual
+        level = self._levels[depth]
+        change = level.smooth(residual)
+        coarse = level.restriction @ (residual - level.matrix @ change)
+        change += level.prolongation @ self._descend(depth + 1, coarse)
+        change += level.smooth(residual - level.matrix @ change)
+        return change
+
+
+def _places(unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
+    """Row (n,) of each unknown when every node has three, and the body of each such node."""
+    _, first, number, count = np.unique(
+        unknowns.node, return_index=True, return_inverse=True, return_counts=True
+    )
+    order = np.argsort(number, kind="stable")
+    rank = np.empty(len(number), dtype=int)
+    rank[order] = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
+    return 3 * number + rank, unknowns.body[first]
+
+
+def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
+    """The scaled matrix in single precision and blocks of three; rows without unknown are zero.
+
+    Row and column i go to `place` (n,) i of `size`. Some rows at a time: no copy in double
+    precision is made of the whole.
+    """
+    order, place = np.argsort(place), place.astype(np.int32)
+    rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
+    blocks, columns = np.empty((0, 3, 3), dtype=np.float32), np.empty(0, dtype=np.int32)
+    for first in range(0, size, _ROWS_AT_ONCE):
+        last = min(first + _ROWS_AT_ONCE, size)
+        low, high = np.searchsorted(rows, (first, last))
+        some, counts = matrix[order[low:high]], np.zeros(last - first, dtype=int)
+        counts[rows[low:high] - first] = np.diff(some.indptr)
+        values = some.data * np.repeat(scale[order[low:high]], np.diff(some.indptr))
+        values *= scale[some.indices]
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        arrays = values.astype(np.float32), place[some.indices], starts
+        part = csr_matrix(arrays, shape=(last - first, size)).tobsr((3, 3))
+        before, after = len(columns), len(columns) + len(part.indices)
+        # The system moves pages where an array grows: at no time are there two of it.
+        blocks.resize((after, 3, 3), refcheck=False)
+        columns.resize(after, refcheck=False)
+        blocks[before:], columns[before:] = part.data, part.indices
+        lengths.append(np.diff(part.indptr))
+    return bsr_matrix((blocks, columns, np.cumsum(np.concatenate(lengths))), shape=(size, size))
+
+
+def _hierarchy(
+    matrix: bsr_matrix, motions: np.ndarray, body: np.ndarray
+) -> tuple[list[Level], np.ndarray]:
+    """The levels below a scaled matrix, and the inverse of the last."""
+    levels: list[Level] = []
+    while matrix.shape[0] > COARSEST:
+        bound = np.float32(_SAFETY * _largest_eigenvalue(matrix))
+        tentative, coarse_motions, coarse_body = _aggregate(matrix, motions, body)
+        if tentative.nnz == 0 or 2 * tentative.shape[1] > matrix.shape[0]:
+            break
+        smoothed = matrix @ tentative
+        smoothed.data *= -np.float32(_SMOOTHED / bound)
+        height, width = tentative.blocksize
+        smoothed = (tentative + smoothed).tobsr((height, width))
+        _refuse_fill(smoothed)
+        restriction = smoothed.T.tobsr((width, height))
+        coarse = _coarse(matrix, smoothed)
+        coarse, motions, scale = _scaled(coarse, coarse_motions)
+        _scale_blocks(smoothed, np.ones(smoothed.shape[0]), scale)
+        _scale_blocks(restriction, scale, np.ones(smoothed.shape[0]))
+        levels.append(Level(matrix, bound, smoothed, restriction))
+        matrix, body = coarse, coarse_body
+    if matrix.shape[0] > LARGEST_DENSE:
+        raise SolveError(f"its levels end at {matrix.shape[0]} unknowns: nothing coarsens further")
+    dense = matrix.toarray().astype(float)
+    inverse = np.linalg.pinv((dense + dense.T) / 2, rcond=1e-7, hermitian=True)
+    return levels, inverse.astype(np.float32)
+
+
+def _refuse_fill(prolongation: bsr_matrix) -> None:
+    """Raise SolveError where the next level will have too many neighbours, before it is formed."""
+    height, width = prolongation.blocksize
+    shape = prolongation.shape[0] // height, prolongation.shape[1] // width
+    ones = np.ones(len(prolongation.indices), dtype=np.float32)
+    felt = csr_matrix((ones, prolongation.indices, prolongation.indptr), shape=shape)
+    near = (felt.T @ felt).nnz / shape[1]
+    if near > MOST_NEIGHBOURS:
+        raise SolveError(f"its coarse levels would fill in, to {near:.0f} neighbours or more")
+
+
+def _coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
+    """Pᵀ A P, some rows of A at a time: A P is large."""
+    height, width = prolongation.blocksize
+    count, size = matrix.shape[0] // height, prolongation.shape[1]
+    total = bsr_matrix((size, size), dtype=np.float32, blocksize=(width, width))
+    step = -(-count // _PARTS)
+    for first in range(0, count, step):
+        some, fine = (_rows(each, first, first + step) for each in (matrix, prolongation))
+        total = total + (fine.T @ (some @ prolongation)).tobsr((width, width))
+    return total
+
+
+def _rows(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
+    """Some rows of blocks."""
+    starts = matrix.indptr[first : last + 1]
+    chosen = slice(starts[0], starts[-1])
+    arrays = matrix.data[chosen], matrix.indices[chosen], starts - starts[0]
+    return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
+
+
+def _aggregate(
+    matrix: bsr_matrix, motions: np.ndarray, body: np.ndarray
+) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
+    """Tentative prolongation, and the motions and body of the aggregates.
+
+    Its columns are the motions of each aggregate, orthonormalised.
+    """
+    from pyamg.aggregation import (
+        fit_candidates,
+        standard_aggregation,
+    )
+
+    count = len(body)
+    rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
+    within = body[rows] == body[matrix.indices]
+    starts = np.zeros(count + 1, dtype=np.int32)
+    np.cumsum(np.bincount(rows[within], minlength=count), out=starts[1:])
+    columns = matrix.indices[within].astype(np.int32)
+    graph = csr_matrix((np.ones(len(columns)), columns, starts), shape=(count, count))
+    aggregates, _ = standard_aggregation(graph)
+    tentative, coarse = fit_candidates(aggregates, motions)
+    members = aggregates.tocoo()
+    coarse_body = np.zeros(aggregates.shape[1], dtype=body.dtype)
+    coarse_body[members.col] = body[members.row]
+    return bsr_matrix(tentative, dtype=np.float32), coarse, coarse_body
+
+
+def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
+    """Matrix and motions scaled to a diagonal of at most one, and the scale (n,).
+
+    Rows whose entries add up to more than the typical sum are scaled down further: otherwise the
+    few at a contact surface would set the bound of the eigenvalues for all. Zero rows, unknowns
+    that are not there, stay zero.
+    """
+    size = matrix.blocksize[0]
+    diagonal = matrix.diagonal().astype(float)
+    there = diagonal > 0
+    scale = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
+    weights = scale.astype(np.float32).reshape(-1, size)
+    inner = np.empty(matrix.data.shape[:2], dtype=np.float32)
+    for first in range(0, len(inner), _BLOCKS_AT_ONCE):
+        some = slice(first, first + _BLOCKS_AT_ONCE)
+        columns = weights[matrix.indices[some], :, None]
+        inner[some] = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
+    sums = scale * np.add.reduceat(inner, matrix.indptr[:-1], axis=0).ravel()
+    scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
+    _scale_blocks(matrix, scale, scale)
+    return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
+
+
+def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> None:
+    """Multiply rows and columns, in place."""
+    height, width = matrix.blocksize
+    rows = np.repeat(left.astype(np.float32).reshape(-1, height), np.diff(matrix.indptr), axis=0)
+    matrix.data *= rows[:, :, None]
+    matrix.data *= right.astype(np.float32).reshape(-1, width)[matrix.indices][:, None, :]
+
+
+def _largest_eigenvalue(matrix: bsr_matrix, steps: int = 10) -> float:
+    """Largest eigenvalue by Lanczos' iteration, from below."""
+    vector = np.random.default_rng(0).uniform(-1, 1, matrix.shape[0]).astype(np.float32)
+    vector /= np.linalg.norm(vector)
+    previous = np.zeros_like(vector)
+    diagonal, beside = [], [np.float32(0)]
+    for _ in range(steps):
+        image = matrix @ vector - beside[-1] * previous
+        diagonal.append(np.float32(vector @ image))
+        image -= diagonal[-1] * vector
+        beside.append(np.float32(np.linalg.norm(image)))
+        if beside[-1] < 1e-5:
+            break
+        previous, vector = vector, image / beside[-1]
+    return float(eigh_tridiagonal(diagonal, beside[1 : len(diagonal)], eigvals_only=True)[-1])

@@ -1,0 +1,195 @@
+"""Faces as the mortar module sees them: frames, sizes, shape, and points found along a line."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.mechanics.fem import shape_functions
+from solver.mechanics.fem.faces import area_vectors, nodal_normals
+from solver.mechanics.fem.small_matrices import invert
+from solver.mesh.catalogue import CellType
+from solver.system.errors import SolveError
+
+# Below these shares of a face's size, its bending and the skew of its map are round-off.
+_FLAT = 1e-9
+_AFFINE = 1e-12
+# Newton's method stops at steps below the first (in parts of a face) and accepts the second.
+_CONVERGED, _ACCEPTED = 1e-13, 1e-8
+_NEWTON_STEPS = 30
+
+
+@dataclass(frozen=True)
+class Facets:
+    """Faces of one type with what the pairing and the intersections need, per face.
+
+    `nodes` (n, n_nodes); `number` (n,) the caller's number; `corner` (n, n_nodes, dim) coordinates;
+    `centre` (n, dim); `radius` (n,); `normal` (n, dim) outward at the centre; `tangents`
+    (n, dim − 1, dim) completing it to a right-handed frame; `flat` (n,): planar; `straight` (n,):
+    planar with straight edges; `affine` (n,): straight, and the image of the reference face under
+    an affine map; `directions` (n, n_nodes, dim): the unit normals along which a slave face meets
+    its master, at its nodes. None: those of the face itself.
+    """
+
+    type: CellType
+    nodes: np.ndarray
+    number: np.ndarray
+    corner: np.ndarray
+    centre: np.ndarray
+    radius: np.ndarray
+    normal: np.ndarray
+    tangents: np.ndarray
+    flat: np.ndarray
+    straight: np.ndarray
+    affine: np.ndarray
+    directions: np.ndarray | None = None
+
+
+def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]:
+    """The faces of one surface, with the mean normals at its nodes as their directions.
+
+    On a plane these are the face's own, and the faces stay as they are. Source: Yang, Laursen,
+    Meng, Two dimensional mortar contact methods for large deformation frictional sliding, Int. J.
+    Numer. Meth. Engng 62 (2005) 1183–1225, §3.
+    """
+    normals = nodal_normals(points, [(block.type.name, block.nodes) for block in blocks])
+    differ = max(np.abs(normals[b.nodes] - b.normal[:, None]).max(initial=0.0) for b in blocks)
+    if differ <= _FLAT:
+        return blocks
+    return [replace(block, directions=normals[block.nodes]) for block in blocks]
+
+
+def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.ndarray) -> Facets:
+    """Faces of one type from points (n_points, dim) and node numbers (n, n_nodes).
+
+    Raises SolveError for faces of no size, as beside a node that lies beyond all measure.
+    """
+    corner = points[nodes]
+    centre = corner[:, : kind.n_vertices].mean(axis=1)
+    radius = np.linalg.norm(corner - centre[:, None], axis=2).max(axis=1)
+    middle = kind.nodes[: kind.n_vertices].mean(axis=0)
+    slope = shape_functions(kind.name).gradients(middle[None])
+    normal = area_vectors(points, nodes, slope)[:, 0]
+    size = np.linalg.norm(normal, axis=1)
+    if not (size > 0).all():
+        lost = int((~(size > 0)).sum())
+        raise SolveError(f"{lost} {kind.name} faces have no size left in the precision of the mesh")
+    normal /= size[:, None]
+    shape = _shape(kind, corner - centre[:, None], radius, normal)
+    return Facets(
+        kind,
+        nodes,
+        number,
+        corner,
+        centre,
+        radius,
+        normal,
+        _tangents(normal),
+        *shape,
+    )
+
+
+def _tangents(normal: np.ndarray) -> np.ndarray:
+    if normal.shape[1] == 2:
+        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
+    axis = np.zeros_like(normal)
+    axis[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
+    first = np.cross(axis, normal)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def _shape(
+    kind: CellType, corner: np.ndarray, radius: np.ndarray, normal: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which faces are flat, which straight-edged as well, and which affine images."""
+    bend = np.abs(np.einsum("fad,fd->fa", corner, normal)).max(axis=1)
+    flat = bend <= _FLAT * radius
+    n, edges = kind.n_vertices, np.array(kind.edges)
+    if kind.order == 2 and kind.dim == 2:
+        ends = corner[:, edges]
+        chord = ends[:, :, 1] - ends[:, :, 0]
+        offset = corner[:, n : n + len(edges)] - ends.mean(axis=2)
+        across = np.einsum("fed,fed->fe", offset, chord) / np.einsum("fed,fed->fe", chord, chord)
+        sideways = np.linalg.norm(offset - across[..., None] * chord, axis=2).max(axis=1)
+        bend = np.maximum(bend, sideways)
+    first = corner[:, :1]
+    sides = corner[:, [1, n - 1]] - first if kind.dim == 2 else corner[:, [1]] - first
+    image = first + np.einsum("ar,frd->fad", kind.nodes - kind.nodes[0], sides)
+    skew = np.linalg.norm(image - corner, axis=2).max(axis=1)
+    straight = bend <= _FLAT * radius
+    return flat, straight, straight & (skew <= _AFFINE * radius)
+
+
+def shift(face: Facets, chosen: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    """Node coordinates (c, n_nodes, dim) of the chosen faces, seen from origins (c, dim)."""
+    return face.corner[chosen] - origin[:, None]
+
+
+def surface_vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
+    """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`."""
+    n, n_nodes, dim = block.corner.shape
+    nodes = np.arange(n * n_nodes).reshape(n, n_nodes)
+    return area_vectors(block.corner.reshape(-1, dim), nodes, slopes)
+
+
+def locate(
+    kind: CellType,
+    corner: np.ndarray,
+    target: np.ndarray,
+    direction: np.ndarray,
+    outline: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where lines through points meet faces: reference points (f, q, dim − 1), distances (f, q).
+
+    One face `corner` (f, n_nodes, dim) for each row of `target` (f, q, dim) and unit `direction`
+    (f, q, dim); the meeting point is target + distance · direction. Newton from the affine face
+    through the vertices, which is exact at once for affine faces. Raises SolveError where it does
+    not converge; points of an `outline` around the face then keep their place on the affine face
+    (they lie outside the face, and all that matters is that neighbours agree on them).
+    """
+    start, distance = _on_affine_face(kind, corner, target, direction)
+    place = start
+    for _ in range(_NEWTON_STEPS):
+        step = _newton_step(kind, corner, target, direction, place, distance)
+        place, distance = place - step[..., :-1], distance - step[..., -1]
+        size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+        if not (size > _CONVERGED).any():
+            break
+    lost = ~(size <= _ACCEPTED)
+    if outline:
+        return np.where(lost[..., None], start, place), distance
+    if lost.any():
+        raise SolveError(f"{int(lost.sum())} points could not be projected onto {kind.name} faces")
+    return place, distance
+
+
+def _on_affine_face(
+    kind: CellType, corner: np.ndarray, target: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for the affine faces through the first vertices."""
+    n = kind.n_vertices
+    sides = corner[:, [1, n - 1]] if kind.dim == 2 else corner[:, [1]]
+    sides = np.swapaxes(sides - corner[:, :1], 1, 2)[:, None]
+    sides = np.broadcast_to(sides, (*target.shape[:2], *sides.shape[2:]))
+    _, inverse = invert(np.concatenate([sides, -direction[..., None]], axis=-1))
+    found = np.einsum("fqij,fqj->fqi", inverse, target - corner[:, :1])
+    return found[..., :-1], found[..., -1]
+
+
+def _newton_step(
+    kind: CellType,
+    corner: np.ndarray,
+    target: np.ndarray,
+    direction: np.ndarray,
+    place: np.ndarray,
+    distance: np.ndarray,
+) -> np.ndarray:
+    """Step (f, q, dim) of place and distance, at most one face length at a time."""
+    values, slopes = shape_functions(kind.name).both(place)
+    error = np.einsum("fqa,fad->fqd", values, corner) - target - distance[..., None] * direction
+    tangent = np.einsum("fad,fqat->fqdt", corner, slopes, optimize=True)
+    _, inverse = invert(np.concatenate([tangent, -direction[..., None]], axis=-1))
+    step = np.einsum("fqij,fqj->fqi", inverse, error)
+    # Far outside a bent face the full step may overshoot.
+    length = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+    return step / np.maximum(length, 1.0)[..., None]

@@ -1,0 +1,86 @@
+"""Multipliers of a slave surface: what each constraint averages the gap over.
+
+The contact pressure is Σ pᵢ φᵢ, with φᵢ = Σₐ Cₐᵢ Nₐ on each slave face. The LAC method has one
+multiplier for each macro-element, φ = 1 there.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from solver.mechanics.mortar.facets import Facets
+from solver.mechanics.mortar.segments import Segments
+from solver.mechanics.mortar.surface_points import Samples
+
+Found = Sequence[tuple[int, int, Segments]]
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """`count` multipliers on blocks of slave faces, k of them on each face.
+
+    By block: `number` (n, k) which; `coefficients` (n or 1, n_nodes, k) of the functions φ that the
+    gap is weighted with; `shapes` (n_nodes, k) of the functions that interpolate the pressure, the
+    same unless `dual`. `nodes` (count,): the nodes they belong to, None for those of
+    macro-elements.
+    """
+
+    count: int
+    number: list[np.ndarray]
+    coefficients: list[np.ndarray]
+    shapes: list[np.ndarray]
+    nodes: np.ndarray | None = None
+    dual: bool = False
+
+    def at(self, block: int, face: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """φ (s, q, k) where shape functions of the faces (s,) have the values (s, q, n_nodes)."""
+        coefficients = self.coefficients[block]
+        return values @ (coefficients if len(coefficients) == 1 else coefficients[face])
+
+    def averages(self, samples: list[Samples], macro: list[np.ndarray], n_macro: int) -> "Averages":
+        """Integrals of the interpolating functions over whole macro-elements, `macro` by block."""
+        rows, columns, values = [], [], []
+        for sample, number, shape, owner in zip(
+            samples, self.number, self.shapes, macro, strict=True
+        ):
+            part = sample.weight @ (sample.values @ shape)
+            rows.append(np.repeat(owner, part.shape[1]))
+            columns.append(number.ravel())
+            values.append(part.ravel())
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        shares = sparse.coo_matrix(entries, shape=(n_macro, self.count)).tocsr()
+        area = np.asarray(shares.sum(axis=0)).ravel()
+        if self.nodes is None:
+            return Averages(area, sparse.identity(n_macro, format="csr"))
+        whole = np.asarray(shares.sum(axis=1)).ravel()
+        return Averages(area, (sparse.diags(1 / whole) @ shares).tocsr())
+
+
+@dataclass(frozen=True)
+class Averages:
+    """`area` (count,): ∫ φ of each multiplier; `mean` (m, count): averages over macro-elements."""
+
+    area: np.ndarray
+    mean: sparse.csr_matrix
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """What multipliers may depend on: slave faces by block, points on them, what they meet."""
+
+    slaves: list[Facets]
+    samples: list[Samples]
+    found: Found
+    n_macro: int
+
+
+Space = Callable[[Meeting], Multipliers]
+
+
+def constants(at: Meeting) -> Multipliers:
+    """One multiplier for each macro-element, constant on it."""
+    ones = [np.ones((block.type.n_nodes, 1)) for block in at.slaves]
+    number = [block.number[:, None] for block in at.slaves]
+    return Multipliers(at.n_macro, number, [one[None] for one in ones], ones)

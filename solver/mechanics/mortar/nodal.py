@@ -1,0 +1,56 @@
+"""Standard mortar: multipliers at the slave vertices, standard or dual, on exact segments.
+
+On quadratic faces the pressure is linear between the vertices. Multipliers of the faces' own
+quadratic functions are no use for contact: their integrals, which weight the gap, are zero at the
+vertices of TRIA6 and negative at those of QUAD8, so that a sign says nothing about contact; and the
+linear ones are stable. Sources: Puso, Laursen, A mortar segment-to-segment contact method for large
+deformation solid mechanics, CMAME 193 (2004) 601–629; Puso, Laursen, Solberg, A segment-to-segment
+mortar contact method for quadratic elements and large deformations, CMAME 197 (2008) 555–566.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.mechanics.fem import shape_functions
+from solver.mechanics.mortar.multipliers import Meeting, Multipliers
+
+# Of a face covered by less than this share, dual functions are those of the whole face: those of
+# so small a part would be lost in round-off.
+_FEW = 0.01
+
+
+def linear(at: Meeting) -> Multipliers:
+    """A multiplier at each slave vertex, its function the linear hat."""
+    vertices = [block.nodes[:, : block.type.n_vertices] for block in at.slaves]
+    nodes = np.unique(np.concatenate([v.ravel() for v in vertices]))
+    number = [np.searchsorted(nodes, v) for v in vertices]
+    hats = [shape_functions(b.type.skeleton).values(b.type.nodes) for b in at.slaves]
+    return Multipliers(len(nodes), number, [hat[None] for hat in hats], hats, nodes)
+
+
+def dual(at: Meeting) -> Multipliers:
+    """A multiplier at each node of linear faces, its function orthogonal to all other hats.
+
+    φᵢ = Σⱼ Aᵢⱼ Nⱼ on each face with A = D M⁻¹, M = ∫ N Nᵀ, D = diag ∫ N, integrals over the part of
+    the face that the master covers. Sources: Wohlmuth, A mortar finite element method using dual
+    spaces for the Lagrange multiplier, SIAM J. Numer. Anal. 38 (2000) 989–1012; on the covered
+    part: Cichosz, Bischoff, Consistent treatment of boundaries with mortar contact formulations
+    using dual Lagrange multipliers, CMAME 200 (2011) 1317–1332.
+    """
+    plain = linear(at)
+    coefficients = []
+    for a, (block, sample) in enumerate(zip(at.slaves, at.samples, strict=True)):
+        whole = np.einsum("fq,qi,qj->fij", sample.weight, sample.values, sample.values)
+        mass = np.zeros_like(whole)
+        for b, _, segments in at.found:
+            if b == a:
+                values = segments.slave_values
+                part = np.einsum("sq,sqi,sqj->sij", segments.weight, values, values)
+                np.add.at(mass, segments.slave, part)
+        few = mass.sum(axis=(1, 2)) < _FEW * whole.sum(axis=(1, 2))
+        mass[few] = whole[few]
+        # Rows of M sum to ∫ N, since the functions sum to one.
+        diagonal = np.eye(block.type.n_nodes) * mass.sum(axis=2)[:, None]
+        coefficients.append(np.linalg.solve(mass, diagonal))
+    return replace(plain, coefficients=coefficients, dual=True)

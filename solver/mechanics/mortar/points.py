@@ -1,0 +1,176 @@
+"""Points of the slave surface projected to the master: no intersections.
+
+Each point belongs to the one master face that the slave's normal through it meets. With Gauss
+points this is segment-free (element-based) integration of the mortar integrals: Fischer, Wriggers,
+Frictionless 2D contact formulations for finite deformations based on the mortar method, Comput.
+Mech. 36 (2005) 226–244; Farah, Popp, Wall, Segment-based vs. element-based integration for mortar
+methods, Comput. Mech. 55 (2015) 209–228. With the slave nodes, each weighted with its tributary
+area, it is the node-to-segment method: Hughes, Taylor, Sackman, Curnier, Kanoknukulchai, A finite
+element method for a class of contact-impact problems, CMAME 8 (1976) 249–276; Wriggers,
+Computational Contact Mechanics, 2006, §9.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from solver.mechanics.fem import shape_functions
+from solver.mechanics.fem.faces import nodal_normals
+from solver.mechanics.fem.gauss import gauss_rule
+from solver.mechanics.mortar.facets import Facets, locate, shift
+from solver.mechanics.mortar.multipliers import Meeting, Multipliers
+from solver.mechanics.mortar.segments import Segments, facing_pairs
+from solver.mechanics.mortar.surface_points import Samples, face_samples, sampled
+from solver.mesh.catalogue import CellType
+
+# A point this far outside a face, in parts of its reference face, is on its edge.
+_EDGE = 1e-9
+# A line is looked at where it passes a face's centre within this many radii.
+_MARGIN = 1.1
+# Pairs of a point and a master face that are looked at together.
+_CHUNK = 1 << 20
+
+
+def gauss(slaves: list[Facets], n: int) -> list[Samples]:
+    """Gauss points, n each way on each face, collapsed ones on triangles: degree 2 n − 1."""
+    return [sampled(block, gauss_rule(block.type.name, n)) for block in slaves]
+
+
+def at_nodes(slaves: list[Facets]) -> list[Samples]:
+    """The nodes, weighted with ∫ N over each face, their normals the mean around them."""
+    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slaves]))
+    places = np.empty((len(nodes), slaves[0].centre.shape[1]))
+    numbers = [np.searchsorted(nodes, block.nodes) for block in slaves]
+    for block, number in zip(slaves, numbers, strict=True):
+        places[number] = block.corner
+    faces = [(block.type.name, number) for block, number in zip(slaves, numbers, strict=True)]
+    normal = nodal_normals(places, faces)
+    return [
+        Samples(np.eye(block.type.n_nodes), whole.weight @ whole.values, normal[number])
+        for block, number, whole in zip(slaves, numbers, face_samples(slaves), strict=True)
+    ]
+
+
+def one_each(at: Meeting) -> Multipliers:
+    """A multiplier at each slave node: its pressure is the node's force over tributary area."""
+    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in at.slaves]))
+    number = [np.searchsorted(nodes, block.nodes) for block in at.slaves]
+    shapes = [np.eye(block.type.n_nodes) for block in at.slaves]
+    return Multipliers(len(nodes), number, [shape[None] for shape in shapes], shapes, nodes)
+
+
+def meet_at_points(
+    slaves: list[Facets],
+    samples: list[Samples],
+    masters: list[Facets],
+    reach: float,
+    beyond: float = _EDGE,
+) -> list[tuple[int, int, Segments]]:
+    """Each point with its master face, as segments of one point: (slave, master block, segments).
+
+    A point that no face holds goes to one that it misses by at most `beyond`, in parts of the
+    face's reference face: slave nodes at the end of a bent surface look past the master's end.
+    """
+    found = []
+    for a, (slave, sample) in enumerate(zip(slaves, samples, strict=True)):
+        hits = [_hits(slave, sample, master, reach, beyond) for master in masters]
+        block = np.repeat(np.arange(len(masters)), [len(hit.point) for hit in hits])
+        chosen = _nearest(hits)
+        for b, (master, hit) in enumerate(zip(masters, hits, strict=True)):
+            mine = hit.of(chosen[block == b])
+            if len(mine.point):
+                found.append((a, b, _segments(sample, master, mine)))
+    return found
+
+
+@dataclass(frozen=True)
+class _Hits:
+    """Points on faces of one master block: `point` counts them face by face.
+
+    `face` (h,) the master's, `place` (h, dim − 1) in it, `gap` (h,) along the normal, `outside`
+    (h,) how far beyond its edges.
+    """
+
+    point: np.ndarray
+    face: np.ndarray
+    place: np.ndarray
+    gap: np.ndarray
+    outside: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> Self:
+        return type(self)(*(values[chosen] for values in vars(self).values()))
+
+
+def _hits(slave: Facets, sample: Samples, master: Facets, reach: float, beyond: float) -> _Hits:
+    """Every meeting of a point's normal with a face, within `reach` and `beyond` its edges."""
+    places = np.einsum("qa,fad->fqd", sample.values, slave.corner)
+    count = places.shape[1]
+    step = max(1, _CHUNK // count)
+    i, j = facing_pairs(slave, master, reach)
+    parts = []
+    for start in range(0, len(i), step):
+        pair = slice(start, start + step)
+        which, q = _near_line(places[i[pair]], sample.normal[i[pair]], master, j[pair], reach)
+        face, partner = i[pair][which], j[pair][which]
+        target, normal = places[face, q][:, None], sample.normal[face, q][:, None]
+        # Seen from the point itself, where no digits are lost.
+        corner = shift(master, partner, target[:, 0])
+        place, gap = locate(master.type, corner, 0 * target, normal, outline=True)
+        outside = _outside(master.type, place[:, 0])
+        near = (outside <= beyond) & (np.abs(gap[:, 0]) <= reach)
+        hit = _Hits(face * count + q, partner, place[:, 0], gap[:, 0], outside)
+        parts.append(hit.of(near))
+    if not parts:
+        none = np.empty(0, dtype=int)
+        return _Hits(none, none, np.empty((0, master.type.dim)), np.empty(0), np.empty(0))
+    columns = zip(*(vars(part).values() for part in parts), strict=True)
+    return _Hits(*map(np.concatenate, columns))
+
+
+def _near_line(
+    places: np.ndarray, normal: np.ndarray, master: Facets, j: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which lines (p, q) through places along normals (p, q, dim) pass by the master faces j."""
+    offset = master.centre[j][:, None] - places
+    along = np.einsum("pqd,pqd->pq", offset, normal)
+    across = np.einsum("pqd,pqd->pq", offset, offset) - along**2
+    radius = master.radius[j][:, None] * _MARGIN
+    pair, place = np.nonzero((across <= radius**2) & (np.abs(along) <= reach + radius))
+    return pair, place
+
+
+def _outside(kind: CellType, place: np.ndarray) -> np.ndarray:
+    """How far (h,) places in the reference face lie beyond its edges, at most: < 0 inside."""
+    beyond = [-place.min(axis=1)]
+    beyond.append(place.sum(axis=1) - 1 if kind.n_vertices == 3 else place.max(axis=1) - 1)
+    return np.maximum(*beyond)
+
+
+def _nearest(hits: list[_Hits]) -> np.ndarray:
+    """Which of all hits are the first choice of their points, as a mask.
+
+    A hit inside a face goes before one beyond its edge, then a near one before a far one.
+    """
+    point, gap, outside = (
+        np.concatenate([getattr(hit, key) for hit in hits]) for key in ("point", "gap", "outside")
+    )
+    order = np.lexsort((np.abs(gap), np.maximum(outside, _EDGE), point))
+    first = order[np.flatnonzero(np.diff(point[order], prepend=-1))]
+    chosen = np.zeros(len(point), dtype=bool)
+    chosen[first] = True
+    return chosen
+
+
+def _segments(sample: Samples, master: Facets, hit: _Hits) -> Segments:
+    face, q = np.divmod(hit.point, len(sample.values))
+    return Segments(
+        face,
+        hit.face,
+        sample.values[q][:, None],
+        shape_functions(master.type.name).values(hit.place)[:, None],
+        sample.weight[face, q][:, None],
+        sample.normal[face, q][:, None],
+        hit.gap[:, None],
+        np.zeros(len(face), dtype=bool),
+    )

@@ -1,0 +1,44 @@
+"""Quadrature points on whole slave faces, with their share of the surface and their normals."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from solver.mechanics.fem import face_rule, shape_functions
+from solver.mechanics.fem.quadrature import Rule
+from solver.mechanics.mortar.facets import Facets, surface_vectors
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Points on the n faces of one block, the same q places on each.
+
+    `values` (q, n_nodes) shape functions; `weight` (n, q) surface measure × quadrature weight;
+    `normal` (n, q, dim) the unit normals along which the faces meet the master.
+    """
+
+    values: np.ndarray
+    weight: np.ndarray
+    normal: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> Self:
+        """Those of some of the faces."""
+        return type(self)(self.values, self.weight[chosen], self.normal[chosen])
+
+
+def face_samples(slaves: list[Facets]) -> list[Samples]:
+    """Points that integrate shape functions over whole planar faces exactly, by block."""
+    return [sampled(block, face_rule(block.type.name)) for block in slaves]
+
+
+def sampled(block: Facets, rule: Rule) -> Samples:
+    """The points of a rule on the reference face."""
+    places, weights = rule
+    values, slopes = shape_functions(block.type.name).both(places)
+    vectors = surface_vectors(block, slopes)
+    measure = np.linalg.norm(vectors, axis=2)
+    if block.directions is not None:
+        vectors = np.einsum("qa,fad->fqd", values, block.directions)
+    normal = vectors / np.linalg.norm(vectors, axis=2, keepdims=True)
+    return Samples(values, measure * weights, normal)

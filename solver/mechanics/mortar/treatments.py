@@ -1,0 +1,83 @@
+"""Treatments of the interface: how the gap is weighted and integrated, by the case file's name.
+
+They share everything else: pairing, segments, gap operator, active set, solve, checks, results.
+`docs/treatments.md` has the formulas.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+from solver.mechanics.mortar.nodal import dual, linear
+from solver.mechanics.mortar.operator import LAC, Scheme, meet_in_segments
+from solver.mechanics.mortar.points import at_nodes, gauss, meet_at_points, one_each
+
+DEFAULT_POINTS = 4
+# Slave nodes at the end of a bent surface may look past the master's by this part of a face.
+_BEYOND = 0.05
+_LINEAR = ("SEG2", "TRIA3", "QUAD4")
+_ALL = (*_LINEAR, "SEG3", "TRIA6", "QUAD8", "QUAD9")
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """One treatment.
+
+    `cut`: whether slave faces are cut, so that each macro-element owns an unknown; `scheme` the
+    integration, given the number of points; `faces` the slave faces that it exists for, and `why`
+    not for others; `what` it is, in words. `joins`: whether multipliers of held nodes join those of
+    their neighbours.
+    """
+
+    what: str
+    cut: bool
+    scheme: Callable[[int], Scheme]
+    faces: tuple[str, ...] = _ALL
+    why: str = ""
+    joins: bool = False
+
+
+def _quadrature(points: int) -> Scheme:
+    return Scheme(sample=partial(gauss, n=points), meet=meet_at_points, closure=False)
+
+
+_NODES = Scheme(at_nodes, partial(meet_at_points, beyond=_BEYOND), one_each, closure=False)
+_NODAL = Scheme(meet=partial(meet_in_segments, weighted=True), space=linear)
+
+TREATMENTS: dict[str, Treatment] = {
+    "lac": Treatment("one pressure for each macro-element, exact segments", True, lambda _: LAC),
+    "uncut": Treatment("one pressure for each slave face, not cut", False, lambda _: LAC),
+    "quadrature": Treatment(
+        "one pressure for each macro-element, points projected to the master", True, _quadrature
+    ),
+    "node_to_segment": Treatment(
+        "a force at each slave node, which meets one master face",
+        False,
+        lambda _: _NODES,
+        (*_LINEAR, "SEG3", "QUAD9"),
+        "forces of a uniform pressure are zero at vertices of TRIA6, negative at those of QUAD8",
+    ),
+    "nodal": Treatment(
+        "mortar: pressure linear between slave vertices, exact segments",
+        False,
+        lambda _: _NODAL,
+        joins=True,
+    ),
+    "nodal_dual": Treatment(
+        "mortar: dual multipliers at slave nodes, exact segments",
+        False,
+        lambda _: replace(_NODAL, space=dual),
+        _LINEAR,
+        "it is built of linear shape functions; quadratic ones ask for a change of their basis",
+        joins=True,
+    ),
+}
+
+
+SEGMENTED = tuple(name for name, t in TREATMENTS.items() if t.scheme(DEFAULT_POINTS).closure)
+"""Those that integrate over the intersections of faces."""
+
+
+def scheme_of(name: str, points: int | None) -> Scheme:
+    """The integration of a treatment, by as many points each way where it has them."""
+    return TREATMENTS[name].scheme(points or DEFAULT_POINTS)

@@ -1,0 +1,1 @@
+"""Changes of a mesh: transforms, parts, moved nodes."""

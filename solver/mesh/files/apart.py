@@ -1,0 +1,69 @@
+"""Readers of foreign files in a process of their own: what kills them does not kill the solve.
+
+gmsh and HDF5 are libraries in C++ and C that some damaged files bring down, or keep busy for ever.
+"""
+
+import os
+import pickle
+import signal
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import meshio
+
+from solver.system.errors import InputError
+
+# Processor time that a reader may take: fixed, and for each megabyte.
+_SECONDS, _SECONDS_PER_MB = 8.0, 5.0
+
+Reader = Callable[[Path], meshio.Mesh]
+
+
+def read_apart(reader: Reader, path: Path) -> meshio.Mesh:
+    """What `reader(path)` gives; raises InputError for whatever keeps it from an end."""
+    inward, outward = os.pipe()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # threads: none holds a lock here
+        child = os.fork()
+    if child == 0:
+        os.close(inward)
+        _answer(reader, path, outward)
+    os.close(outward)
+    with os.fdopen(inward, "rb") as stream:
+        answer = stream.read()
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if status:
+        long = "takes too long to read" if status == -signal.SIGPROF else "the reader died of it"
+        raise InputError(path, "mesh", None, f"cannot be read ({long}: damaged?)")
+    mesh, refusal = pickle.loads(answer)
+    if refusal:
+        raise InputError(*refusal)
+    return mesh
+
+
+def _answer(reader: Reader, path: Path, outward: int) -> None:
+    """Write the mesh or the refusal, and end the process without any of its parent's endings."""
+    allowed_time = _SECONDS + _SECONDS_PER_MB * path.stat().st_size / 1e6
+    signal.setitimer(signal.ITIMER_PROF, allowed_time)  # its signal ends the process
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)
+    status = 1
+    try:
+        found = _attempt(reader, path)
+        with os.fdopen(outward, "wb") as stream:
+            pickle.dump(found, stream)
+        status = 0
+    finally:
+        os._exit(status)
+
+
+def _attempt(
+    reader: Reader, path: Path
+) -> tuple[meshio.Mesh | None, tuple[str, str, object, str] | None]:
+    try:
+        return reader(path), None
+    except InputError as error:
+        return None, (error.where, error.key, error.value, error.allowed)
+    except BaseException as error:  # noqa: BLE001 -- whatever the reader trips over is in the file
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        return None, (str(path), "mesh", None, f"cannot be read ({reason})")

@@ -1,0 +1,43 @@
+"""Mesh files, by their extension.
+
+| extension | read by | groups |
+|---|---|---|
+| .med, .mmed | `med` | of cells and of nodes |
+| .msh, versions 2 and 4 | gmsh | physical groups; those of points become groups of nodes |
+| .inp | `abaqus` | *ELSET, *SURFACE, *NSET |
+| .vtu | meshio | each integer array of 0 and 1 on cells or points is a group of its name |
+| .vtkhdf | `vtkhdf` | as this program writes them |
+"""
+
+from importlib import import_module
+from pathlib import Path
+
+import meshio
+
+from solver.mesh.files.apart import read_apart
+from solver.mesh.tidy import tidy
+from solver.system.errors import InputError
+
+# Modules with a function `read(path)` that gives the mesh as it stands in the file.
+_READERS = {
+    ".med": "solver.mesh.files.med",
+    ".mmed": "solver.mesh.files.med",
+    ".msh": "solver.mesh.files.msh",
+    ".inp": "solver.mesh.files.abaqus",
+    ".vtu": "solver.mesh.files.vtu",
+    ".vtkhdf": "solver.mesh.files.vtkhdf",
+}
+
+
+def read(path: Path) -> meshio.Mesh:
+    """The mesh of a file, tidied. Raises InputError for whatever keeps it from being read."""
+    suffix = path.suffix.lower()
+    if suffix not in _READERS:
+        raise InputError(path, "extension", path.suffix, f"allowed: {', '.join(_READERS)}")
+    if not path.is_file():
+        raise InputError(path, "mesh", None, "no such file")
+    reader = import_module(_READERS[suffix])
+    mesh = read_apart(lambda file: tidy(reader.read(file), file), path)
+    if not mesh.cell_sets:
+        raise InputError(path, "groups", None, "the mesh must have named groups of cells or faces")
+    return mesh

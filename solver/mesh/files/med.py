@@ -1,0 +1,111 @@
+"""MED files, read with plain h5py: a MED file is an HDF5 file of a documented layout.
+
+Read here and not by gmsh, which leaves the groups of nodes out and pads the names of the others.
+"""
+
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+
+from solver.mesh.catalogue import BY_NAME
+from solver.system.errors import InputError
+
+_TYPES = {
+    "SE2": "SEG2", "SE3": "SEG3", "TR3": "TRIA3", "TR6": "TRIA6",
+    "QU4": "QUAD4", "QU8": "QUAD8", "QU9": "QUAD9", "TE4": "TETRA4", "T10": "TETRA10",
+    "HE8": "HEXA8", "H20": "HEXA20", "H27": "HEXA27", "PE6": "PENTA6", "P15": "PENTA15",
+    "PY5": "PYRA5", "P13": "PYRA13",
+}  # fmt: skip
+# MED's node order is the catalogue's with the orientation reversed, which `tidy` puts right; only
+# the face centres of HEXA27 have an order of their own.
+_HEXA27 = [*range(20), 24, 22, 21, 23, 20, 25, 26]
+
+
+def read(path: Path) -> meshio.Mesh:
+    """The mesh of a MED file (version 3 or later), as it stands there.
+
+    Raises InputError for what has no meaning here: several meshes in one file, another kind of
+    coordinates than Cartesian, cell types that are not in the catalogue.
+    """
+    if not h5py.is_hdf5(path):
+        raise InputError(path, "mesh", None, "no MED file (MED files are HDF5 files)")
+    with h5py.File(path, "r") as file:
+        name, step = _mesh_of(file, path)
+        nodes = step["NOE"]
+        points = nodes["COO"][()].reshape(-1, int(nodes["COO"].attrs["NBR"])).T
+        node_groups = _members(nodes, _families(file, name, "NOEUD"))
+        of_family = _families(file, name, "ELEME")
+        cells, numbers, members = [], [], []
+        for kind, entry in step["MAI"].items() if "MAI" in step else ():
+            cells.append((_meshio_type(kind, path), _connectivity(entry, kind)))
+            numbers.append(_numbers(entry, len(cells[-1][1])))
+            members.append(_members(entry, of_family))
+    names = sorted({name for groups in members for name in groups})
+    none = np.arange(0)
+    return meshio.Mesh(
+        points,
+        cells,
+        cell_data={"number": numbers},
+        cell_sets={name: [groups.get(name, none) for groups in members] for name in names},
+        point_sets=node_groups,
+    )
+
+
+def _mesh_of(file: h5py.File, path: Path) -> tuple[str, h5py.Group]:
+    meshes = file.get("ENS_MAA", {})
+    if len(meshes) != 1:
+        names = f": {', '.join(meshes)}" if len(meshes) else ""
+        raise InputError(path, "meshes", len(meshes), f"the file must hold one mesh{names}")
+    name, mesh = next(iter(meshes.items()))
+    if int(mesh.attrs.get("REP", 0)) != 0:
+        raise InputError(path, "coordinates", None, "must be Cartesian")
+    steps = [entry for entry in mesh.values() if isinstance(entry, h5py.Group) and "NOE" in entry]
+    if not steps:
+        raise InputError(path, "mesh", name, "no nodes in the layout of MED 3 or later")
+    return name, steps[0]
+
+
+def _families(file: h5py.File, mesh: str, entity: str) -> dict[int, list[str]]:
+    """The group names of each family number."""
+    folder = file.get(f"FAS/{mesh}/{entity}", {})
+    return {
+        int(family.attrs["NUM"]): [_text(row) for row in family["GRO/NOM"][()]]
+        for family in folder.values()
+        if "GRO" in family
+    }
+
+
+def _text(row: np.ndarray) -> str:
+    return row.tobytes().split(b"\0")[0].decode(errors="replace").strip()
+
+
+def _members(entry: h5py.Group, families: dict[int, list[str]]) -> dict[str, np.ndarray]:
+    """The members of each group among the nodes, or the cells of one type."""
+    if "FAM" not in entry:
+        return {}
+    of_each = entry["FAM"][()]
+    masks: dict[str, np.ndarray] = {}
+    for number in np.unique(of_each):
+        for name in families.get(int(number), ()):
+            masks[name] = masks.get(name, False) | (of_each == number)
+    return {name: np.flatnonzero(mask) for name, mask in masks.items()}
+
+
+def _meshio_type(kind: str, path: Path) -> str:
+    if kind == "PO1":
+        return "vertex"
+    if kind not in _TYPES:
+        raise InputError(path, "cell type", kind, f"allowed: {', '.join(_TYPES.values())}")
+    return BY_NAME[_TYPES[kind]].meshio
+
+
+def _connectivity(entry: h5py.Group, kind: str) -> np.ndarray:
+    count = int(entry["NOD"].attrs["NBR"])
+    nodes = entry["NOD"][()].reshape(-1, count).T - 1
+    return nodes[:, _HEXA27] if kind == "H27" else nodes
+
+
+def _numbers(entry: h5py.Group, count: int) -> np.ndarray:
+    return entry["NUM"][()] if "NUM" in entry else np.arange(1, count + 1)

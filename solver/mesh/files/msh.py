@@ -1,0 +1,24 @@
+"""Mesh files of gmsh, versions 2 and 4, read by gmsh."""
+
+from pathlib import Path
+
+import gmsh
+import meshio
+
+from solver.mesh.catalogue import BY_NAME
+from solver.mesh.recipes.gmsh_session import current_model, foreign_types, session
+from solver.system.errors import InputError
+
+
+def read(path: Path) -> meshio.Mesh:
+    """The mesh of a .msh file; physical groups are its groups."""
+    # Handed anything else, gmsh runs it as a script.
+    with path.open("rb") as file:
+        if not file.read(4096).lstrip().startswith(b"$"):
+            raise InputError(path, "mesh", None, "no gmsh mesh: it must start with $MeshFormat")
+    with session():
+        gmsh.merge(str(path))
+        if foreign := foreign_types():
+            allowed = f"allowed: {', '.join(BY_NAME)}"
+            raise InputError(path, "cell type", ", ".join(foreign), allowed)
+        return current_model()

@@ -1,0 +1,128 @@
+"""VTKHDF UnstructuredGrid 2.0, with plain h5py: what ParaView and PyVista open, and our groups.
+
+Beside the grid lies `mesh_groups`: `cells/<name>` and `nodes/<name>` hold the numbers of a group's
+cells and nodes in the grid. The same mesh gives the same bytes.
+"""
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+
+from solver.mesh.catalogue import BY_NAME, cell_type
+from solver.system.errors import InputError
+from solver.system.files import is_sealed, seal
+from solver.system.hdf5 import new_file
+
+_BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
+_GROUPS = "mesh_groups"
+
+
+def write_grid(
+    group: h5py.Group,
+    mesh: meshio.Mesh,
+    point_data: Mapping[str, np.ndarray],
+    cell_data: Mapping[str, np.ndarray],
+) -> None:
+    """Write the grid into `group` (named VTKHDF for ParaView), its groups beside it.
+
+    point_data (n_points, …) and cell_data (n_cells, …), cells counted block after block. Points of
+    a 2D mesh get z = 0; the attribute `Dimension` tells.
+    """
+    group.attrs["Version"] = np.array([2, 0], dtype=np.int64)
+    grid = b"UnstructuredGrid"
+    group.attrs.create("Type", grid, dtype=h5py.string_dtype("ascii", len(grid)))
+    dim = mesh.points.shape[1]
+    group.attrs["Dimension"] = dim
+    cells = [(cell_type(block.type), block.data) for block in mesh.cells]
+    sizes = np.repeat([cell.n_nodes for cell, _ in cells], [len(nodes) for _, nodes in cells])
+    flat = [nodes.ravel() for _, nodes in cells]
+    points = np.zeros((len(mesh.points), 3))
+    points[:, :dim] = mesh.points
+    arrays = {
+        "NumberOfPoints": np.array([len(points)]),
+        "NumberOfCells": np.array([len(sizes)]),
+        "NumberOfConnectivityIds": np.array([sizes.sum()]),
+        "Points": points,
+        "Connectivity": np.concatenate(flat).astype(np.int64),
+        "Offsets": np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        "Types": np.repeat([c.vtk for c, _ in cells], [len(n) for _, n in cells]).astype(np.uint8),
+    }
+    for name, array in arrays.items():
+        group.create_dataset(name, data=array)
+    for kind, data in (("PointData", point_data), ("CellData", cell_data)):
+        folder = group.create_group(kind)
+        for name, array in data.items():
+            folder.create_dataset(name, data=array)
+    _write_groups(group.parent.create_group(_GROUPS), mesh)
+
+
+def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
+    """The mesh of a grid that `write_grid` wrote, its point data and its cell data."""
+    dim = int(group.attrs["Dimension"])
+    offsets, types = group["Offsets"][()], group["Types"][()]
+    connectivity = group["Connectivity"][()]
+    breaks = np.flatnonzero(np.diff(types)) + 1
+    bounds = list(pairwise([0, *breaks.tolist(), len(types)]))
+    cells = []
+    for start, stop in bounds:
+        cell = _BY_VTK[int(types[start])]
+        nodes = connectivity[offsets[start] : offsets[stop]].reshape(-1, cell.n_nodes)
+        cells.append((cell.meshio, nodes))
+    cell_sets, point_sets = {}, {}
+    groups = group.parent[_GROUPS]
+    for name, numbers in groups["cells"].items():
+        ids = numbers[()]
+        cell_sets[_plain(name)] = [
+            ids[(ids >= start) & (ids < stop)] - start for start, stop in bounds
+        ]
+    for name, ids in groups["nodes"].items():
+        point_sets[_plain(name)] = ids[()]
+    mesh = meshio.Mesh(group["Points"][:, :dim], cells, cell_sets=cell_sets, point_sets=point_sets)
+    data = ({n: d[()] for n, d in group[kind].items()} for kind in ("PointData", "CellData"))
+    return mesh, *data
+
+
+def write(mesh: meshio.Mesh, path: Path) -> None:
+    """Write the mesh alone into a new file."""
+    with new_file(path) as file:
+        write_grid(file.create_group("VTKHDF"), mesh, {}, {})
+    seal(path)
+
+
+def read(path: Path) -> meshio.Mesh:
+    """The mesh of a file that `write` or the solver wrote.
+
+    Raises InputError; where the file is a line of text instead, with that line.
+    """
+    if not h5py.is_hdf5(path):
+        lines = path.read_text(errors="replace")[:2000].splitlines()
+        raise InputError(path, "mesh", None, lines[0] if lines else "the file is empty")
+    if not is_sealed(path):
+        raise InputError(path, "mesh", None, "damaged, or no mesh that this program wrote")
+    with h5py.File(path, "r") as file:
+        if "VTKHDF" not in file or _GROUPS not in file:
+            raise InputError(path, "mesh", None, "no mesh that this program wrote")
+        return read_grid(file["VTKHDF"])[0]
+
+
+def _write_groups(folder: h5py.Group, mesh: meshio.Mesh) -> None:
+    cells, nodes = folder.create_group("cells"), folder.create_group("nodes")
+    starts = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    for name, ids in mesh.cell_sets.items():
+        numbers = [start + np.asarray(i, np.int64) for start, i in zip(starts, ids, strict=False)]
+        cells.create_dataset(_escaped(name), data=np.concatenate(numbers))
+    for name, ids in mesh.point_sets.items():
+        nodes.create_dataset(_escaped(name), data=np.asarray(ids, np.int64))
+
+
+# HDF5 takes a slash, and a name of nothing but a dot, for a path.
+def _escaped(name: str) -> str:
+    return name.replace("%", "%25").replace("/", "%2F").replace(".", "%2E")
+
+
+def _plain(name: str) -> str:
+    return name.replace("%2E", ".").replace("%2F", "/").replace("%25", "%")

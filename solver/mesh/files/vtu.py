@@ -1,0 +1,42 @@
+"""VTU files, read by meshio."""
+
+import re
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from solver.mesh.catalogue import BY_NAME
+from solver.system.errors import InputError
+
+_COMPRESSORS = ("vtkZLibDataCompressor", "vtkLZMADataCompressor")
+
+
+def read(path: Path) -> meshio.Mesh:
+    """The mesh of a .vtu file; integer arrays of 0 and 1 on cells or points are its groups.
+
+    Raises InputError for a compression that meshio does not know, and where it would leave cells
+    out whose type it does not know.
+    """
+    header = path.read_bytes()
+    compressor = re.search(rb'<VTKFile[^>]*\scompressor="(\w*)"', header)
+    if compressor and compressor[1].decode() not in ("", *_COMPRESSORS):
+        allowed = f"allowed: none, {', '.join(_COMPRESSORS)}"
+        raise InputError(path, "compressor", compressor[1].decode(), allowed)
+    mesh = meshio.vtu.read(path)
+    told = sum(map(int, re.findall(rb'<Piece[^>]*\sNumberOfCells="\s*(\d+)', header)))
+    known = sum(len(block.data) for block in mesh.cells)
+    if known != told:
+        left_out = f"{told - known} of {told} cells are of other types"
+        raise InputError(path, "cell type", None, f"{left_out}; allowed: {', '.join(BY_NAME)}")
+    cells = {
+        name: [np.flatnonzero(array) for array in arrays]
+        for name, arrays in mesh.cell_data.items()
+        if all(map(_is_mask, arrays))
+    }
+    nodes = {n: np.flatnonzero(array) for n, array in mesh.point_data.items() if _is_mask(array)}
+    return meshio.Mesh(mesh.points, mesh.cells, cell_sets=cells, point_sets=nodes)
+
+
+def _is_mask(array: np.ndarray) -> bool:
+    return array.ndim == 1 and array.dtype.kind in "iub" and bool(np.isin(array, (0, 1)).all())

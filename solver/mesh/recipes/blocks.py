@@ -1,0 +1,196 @@
+"""The recipe `blocks`: two rectangular blocks, one on the other, each meshed in its own way.
+
+    recipe: blocks
+    size: [50, 50]         # of each block along x, y (and z in 3D); one number for a cube
+    bottom: {cells: QUAD4, divisions: [12, 12]}
+    top: {cells: TRIA3, divisions: [10, 8], far: 6, inner: 1.2, algorithm: frontal}
+
+`cells` is the cell type, in both blocks of the same dimension. `divisions` says how many pieces
+the edges have along each axis; blocks of QUAD and HEXA cells are regular grids. Blocks of TRIA and
+TETRA cells are unstructured inside; there `far` (divisions of the lateral edges on the side away
+from the interface, by default as on it), `inner` (size of the inner cells, as a share of what the
+edges suggest) and `algorithm` (for the surfaces) shape the mesh.
+Blocks of PENTA and PYRA cells are boxes cut in pieces (see `hybrid`).
+
+The interface lies in y = 0 (2D) or z = 0 (3D), the corner of both blocks at x = 0 (and y = 0).
+Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (the lower side of the
+bottom block), `press` (the upper side of the top block), `symx` (x = 0) and `symy` (y = 0, 3D) of
+both blocks, `farx` and `fary` opposite to them. `refine` multiplies all divisions (1).
+"""
+
+from itertools import pairwise
+
+import gmsh
+import meshio
+import numpy as np
+
+from solver.mesh.catalogue import BY_NAME, CellType
+from solver.mesh.keys import Keys
+from solver.mesh.recipes.gmsh_session import current_model, session
+from solver.mesh.recipes.sides import side_name
+
+# gmsh's algorithms for surfaces, in the words of the recipe.
+_ALGORITHMS = {"frontal": 6, "delaunay": 5, "meshadapt": 1}
+_CELLS = [name for name, cell in BY_NAME.items() if cell.dim > 1]
+
+
+def blocks(keys: Keys) -> meshio.Mesh:
+    """Both blocks, which share no nodes."""
+    mesh = stacked(keys, None)
+    keys.finish()
+    return mesh
+
+
+def stacked(keys: Keys, size: float | None) -> meshio.Mesh:
+    """Both blocks, each of edge `size`, or of the key `size`; the caller finishes the keys."""
+    sections = {name: keys.section(name) for name in ("bottom", "top")}
+    types = {name: BY_NAME[section.choice("cells", _CELLS)] for name, section in sections.items()}
+    dim = types["bottom"].dim
+    if types["top"].dim != dim:
+        raise keys.refuse("top.cells", types["top"].name, f"must be of dimension {dim} as bottom")
+    edges = np.array(keys.numbers("size", dim) if size is None else [size] * dim)
+    refine = keys.integers("refine", 1, [1])[0]
+    return _joined([_block(n, types[n], edges, sections[n], refine) for n in sections])
+
+
+def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys, refine: int) -> meshio.Mesh:
+    origin = np.zeros(cell.dim)
+    if name == "bottom":
+        origin[-1] = -size[-1]
+    if cell.name.startswith(("PENTA", "PYRA")):
+        from solver.mesh.recipes.hybrid import cube
+
+        return cube(name, cell, origin, size, keys, refine)
+    return _Block(name, cell, origin, size, keys, refine).mesh()
+
+
+class _Block:
+    """One block: a rectangle or a box, its corners and sides those of QUAD4 or HEXA8."""
+
+    def __init__(
+        self,
+        name: str,
+        cell: CellType,
+        origin: np.ndarray,
+        size: np.ndarray,
+        keys: Keys,
+        refine: int,
+    ):
+        self.name, self.cell, self.origin, self.size = name, cell, origin, size
+        self.solid = BY_NAME["QUAD4" if cell.dim == 2 else "HEXA8"]
+        self.regular = cell.name.startswith(("QUAD", "HEXA"))
+        self.divisions = [refine * n for n in keys.integers("divisions", cell.dim)]
+        self.far = self.divisions[:-1]
+        options: dict[str, float] = {}
+        if not self.regular:
+            if keys.given("far"):
+                self.far = [refine * n for n in keys.integers("far", cell.dim - 1)]
+            options["Mesh__Algorithm"] = _ALGORITHMS[
+                keys.choice("algorithm", _ALGORITHMS, "frontal")
+            ]
+            if keys.given("inner"):
+                options["Mesh__MeshSizeExtendFromBoundary"] = 0
+                options["Mesh__MeshSizeMax"] = keys.numbers("inner", 1)[0] / refine
+        self.options = options
+        keys.finish()
+
+    def mesh(self) -> meshio.Mesh:
+        """The block's mesh, with its groups."""
+        complete = self.cell.name in ("QUAD9", "HEXA27")
+        with session(Mesh__SecondOrderIncomplete=not complete, **self.options):
+            edges = self._edges(self._corners())
+            self._volume(self._surfaces(edges))
+            gmsh.model.mesh.generate(self.cell.dim)
+            # Gmsh measures curves numerically, which leaves their nodes 1e-12 of the size away.
+            if not self.regular:
+                self._divide_edges_evenly()
+            gmsh.model.mesh.setOrder(self.cell.order)
+            mesh = current_model(unnamed=False)
+        if self.regular:
+            steps = np.array(self.divisions) * self.cell.order
+            mesh.points[:, : self.cell.dim] = self._snapped(mesh.points, steps)
+        return mesh
+
+    def _corners(self) -> list[int]:
+        places = np.zeros((self.solid.n_nodes, 3))
+        places[:, : self.cell.dim] = self.origin + self.solid.nodes * self.size
+        return [gmsh.model.geo.addPoint(*place) for place in places]
+
+    def _edges(self, corners: list[int]) -> list[int]:
+        edges = []
+        for start, end in self.solid.edges:
+            edge = gmsh.model.geo.addLine(corners[start], corners[end])
+            axis = int(np.abs(self.solid.nodes[end] - self.solid.nodes[start]).argmax())
+            height = self.solid.nodes[[start, end], -1].mean()
+            is_far = height == (0 if self.name == "bottom" else 1)
+            count = self.far[axis] if is_far else self.divisions[axis]
+            gmsh.model.geo.mesh.setTransfiniteCurve(edge, count + 1)
+            edges.append(edge)
+        return edges
+
+    def _surfaces(self, edges: list[int]) -> list[int]:
+        """The sides in 3D, with their groups; the edges themselves in 2D."""
+        numbers = {}
+        for edge, (a, b) in zip(edges, self.solid.edges, strict=True):
+            numbers[a, b], numbers[b, a] = edge, -edge
+        sides = []
+        for face in self.solid.faces:
+            rim = [numbers[pair] for pair in pairwise((*face.nodes, face.nodes[0]))]
+            sides.append(rim[0] if self.cell.dim == 2 else self._surface(rim))
+        return sides
+
+    def _surface(self, rim: list[int]) -> int:
+        surface = gmsh.model.geo.addPlaneSurface([gmsh.model.geo.addCurveLoop(rim)])
+        if self.regular:
+            gmsh.model.geo.mesh.setTransfiniteSurface(surface)
+            gmsh.model.geo.mesh.setRecombine(2, surface)
+        return surface
+
+    def _volume(self, sides: list[int]) -> None:
+        dim = self.cell.dim
+        if dim == 2:
+            volume = self._surface(sides)
+        else:
+            volume = gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(sides)])
+            if self.regular:
+                gmsh.model.geo.mesh.setTransfiniteVolume(volume)
+        gmsh.model.geo.synchronize()
+        gmsh.model.addPhysicalGroup(dim, [volume], name=self.name)
+        for side, face in zip(sides, self.solid.faces, strict=True):
+            name = side_name(self.name, self.solid.nodes[list(face.nodes)])
+            if name:
+                gmsh.model.addPhysicalGroup(dim - 1, [abs(side)], name=name)
+
+    def _divide_edges_evenly(self) -> None:
+        far_end = 0 if self.name == "bottom" else 1
+        for dim, edge in gmsh.model.getEntities(1):
+            tags, flat, _ = gmsh.model.mesh.getNodes(dim, edge)
+            for tag, place in zip(tags, flat.reshape(-1, 3), strict=True):
+                height = (place[self.cell.dim - 1] - self.origin[-1]) / self.size[-1]
+                lateral = self.far if abs(height - far_end) < 1e-9 else self.divisions[:-1]
+                steps = np.array([*lateral, self.divisions[-1]])
+                place[: self.cell.dim] = self._snapped(place, steps)
+                gmsh.model.mesh.setNode(tag, place, [])
+
+    def _snapped(self, places: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Places (…, dim) moved to the nearest node of a lattice of so many steps each way."""
+        share = (places[..., : self.cell.dim] - self.origin) / self.size
+        return self.origin + np.round(share * steps) * self.size / steps
+
+
+def _joined(meshes: list[meshio.Mesh]) -> meshio.Mesh:
+    """The meshes side by side in one; groups of the same name become one."""
+    offsets = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    cells = [
+        (block.type, block.data + offset)
+        for mesh, offset in zip(meshes, offsets, strict=False)
+        for block in mesh.cells
+    ]
+    sets = {}
+    for name in sorted({name for mesh in meshes for name in mesh.cell_sets}):
+        sets[name] = [
+            ids
+            for mesh in meshes
+            for ids in mesh.cell_sets.get(name, [np.arange(0)] * len(mesh.cells))
+        ]
+    return meshio.Mesh(np.concatenate([mesh.points for mesh in meshes]), cells, cell_sets=sets)

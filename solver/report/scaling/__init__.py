@@ -1,1 +1,0 @@
-"""The page of growth with size: figures, exponents, numbers beside the goals."""

@@ -1,0 +1,263 @@
+"""What a case gives to groups of the mesh, on the cut mesh: materials, supports, loads."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import Protocol
+
+import meshio
+import numpy as np
+
+from solver.case.expressions import evaluate
+from solver.case.reader import Case, Exact, Load, Material, Scalar, Support
+from solver.case.solutions import ExactSolution
+from solver.mechanics.fem import has_straight_edges
+from solver.mechanics.fem.bodies import body_numbers
+from solver.mechanics.fem.elasticity import Block, lame_parameters
+from solver.mechanics.fem.faces import FaceBlock, boundary_faces, nodal_normals, volume_cells
+from solver.mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
+from solver.mechanics.fem.mixed import MeanStress, in_mixed_form, split
+from solver.mechanics.fem.supports import Fixed, FreeMotion, free_motion
+from solver.mechanics.mortar.cut import CutMesh, SubFaces
+from solver.mesh.catalogue import BY_MESHIO, BY_NAME
+from solver.simulation.exact import node_parts
+from solver.simulation.groups import ALL
+
+
+class CutZone(Protocol):
+    """A contact zone: its slave faces as meshed, and their sub-faces after the cut."""
+
+    @property
+    def slave_faces(self) -> list[FaceBlock]:
+        """As meshed."""
+
+    @property
+    def sub_faces(self) -> list[SubFaces]:
+        """After the cut, macro-elements counted within the zone."""
+
+
+class Attributes:
+    """The groups of the mesh file carried over to the cut mesh, and what the case gives them.
+
+    Points are counted from `origin` (dim,), as in the scene.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        mesh: meshio.Mesh,
+        cut_mesh: CutMesh,
+        zones: Sequence[CutZone],
+        origin: np.ndarray,
+    ):
+        self.case, self.mesh, self.cut = case, mesh, cut_mesh
+        self.points, self.origin, self.zones = cut_mesh.points, origin, zones
+
+    def whole_cell_mask(self, group: str) -> dict[str, np.ndarray]:
+        """Which volume cells (n,) of each type, as meshed, belong to a group."""
+        whole = {name: np.zeros(len(c), bool) for name, c in volume_cells(self.mesh).items()}
+        for block, members in zip(self.mesh.cells, self.mesh.cell_sets.get(group, []), strict=True):
+            name = _type_name(block.type)
+            if name in whole and members is not None:
+                whole[name][np.asarray(members, dtype=int)] = True
+        return whole
+
+    def cell_mask(self, group: str) -> dict[str, np.ndarray]:
+        """Which cells (n,) of each type of the cut mesh belong to a group of volume cells."""
+        whole = self.whole_cell_mask(group)
+        return {name: self.cut.members(name, whole) for name in self.cut.cells}
+
+    def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
+        """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
+        found: list[tuple[str, np.ndarray]] = []
+        for block in boundary_faces(self.mesh, group, self.case.path, key):
+            plain = np.ones(len(block.nodes), dtype=bool)
+            for zone in self.zones:
+                plain &= ~self._swap_sub_faces(block, zone, found)
+            found.append((block.type.name, block.nodes[plain]))
+        return [(name, nodes) for name, nodes in found if len(nodes)]
+
+    @staticmethod
+    def _swap_sub_faces(
+        block: FaceBlock, zone: CutZone, found: list[tuple[str, np.ndarray]]
+    ) -> np.ndarray:
+        """Mark the faces that are cut slave faces of the zone; append their sub-faces."""
+        hit = np.zeros(len(block.nodes), dtype=bool)
+        for slave in zone.slave_faces:
+            if slave.owner_type is block.owner_type and slave.type is block.type:
+                mine, theirs = (10 * b.owner + b.local for b in (block, slave))
+                hit |= np.isin(mine, theirs)
+                macro = slave.number[np.isin(theirs, mine)]
+                found += [
+                    (sub.type.name, sub.nodes[np.isin(sub.macro, macro)]) for sub in zone.sub_faces
+                ]
+        return hit
+
+    def nodes(self, group: str, key: str) -> np.ndarray:
+        """All nodes of a group: of its volume cells, faces, edges and points."""
+        dim = self.points.shape[1]
+        parts = [np.asarray(self.mesh.point_sets.get(group, []), dtype=int)]
+        if group in self.mesh.cell_sets:
+            mask = self.cell_mask(group)
+            parts += [self.cut.cells[name][mask[name]].ravel() for name in mask]
+            dims = set()
+            for block, members in zip(self.mesh.cells, self.mesh.cell_sets[group], strict=True):
+                if members is not None and len(members):
+                    dims.add(BY_NAME[_type_name(block.type)].dim)
+                    parts.append(block.data[np.asarray(members, dtype=int)].ravel())
+            if dim - 1 in dims:
+                parts += [nodes.ravel() for _, nodes in self.faces(group, key)]
+        return np.unique(np.concatenate(parts))
+
+    def field(self, values: Scalar | tuple[Scalar, ...]) -> Field:
+        """A case's number, expression or vector as a function of the local coordinates."""
+
+        def value(local: np.ndarray) -> np.ndarray:
+            place = local + self.origin
+            if isinstance(values, tuple):
+                return np.stack([evaluate(v, place) for v in values], axis=1)
+            return evaluate(values, place)
+
+        return value
+
+    @cached_property
+    def exact_part(self) -> np.ndarray:
+        """The part (n,) of the case's exact solution that each node belongs to."""
+        points = self.points + self.origin
+        return node_parts(self._exact, points, body_numbers(len(points), self.cut.cells))
+
+    @property
+    def _exact(self) -> ExactSolution:
+        if self.case.solution is None:
+            raise AssertionError("a value is taken from a solution that the case does not name")
+        return self.case.solution
+
+    def by_part(self, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+        """Cells or faces (n, n_nodes) by the part of the exact solution in which they lie."""
+        part = self.exact_part[nodes[:, 0]]
+        for number in np.unique(part).tolist():
+            yield number, nodes[part == number]
+
+    def elasticity(
+        self, mixed_form: bool = True, plain: bool = True
+    ) -> tuple[list[Block], MeanStress]:
+        """Cells with their materials, and the mean stress of those in mixed form.
+
+        Cells of rigid bodies, which need no material, get a unit one. Without `mixed_form` none is
+        in it, whatever the case says; `plain`: cells with straight edges have plain quadrature.
+        """
+        young = self._by_material(lambda m: m.young, 1.0)
+        poisson = self._by_material(lambda m: m.poisson, 0.0)
+        mixed = self._by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
+        blocks = [
+            Block(
+                BY_NAME[name],
+                cells,
+                *lame_parameters(young[name], poisson[name]),
+                plain and bool(has_straight_edges(BY_NAME[name], self.points[cells]).all()),
+            )
+            for name, cells in self.cut.cells.items()
+        ]
+        meshed, number = {}, 0
+        for name, cells in volume_cells(self.mesh).items():
+            meshed[name] = number + np.arange(len(cells))
+            number += len(cells)
+        return split(
+            self.points,
+            blocks,
+            [(mixed[name] > 0) & mixed_form for name in self.cut.cells],
+            [self.cut.members(name, meshed) for name in self.cut.cells],
+        )
+
+    def _by_material(
+        self, value: Callable[[Material], float], otherwise: float
+    ) -> dict[str, np.ndarray]:
+        """A value of the material of each cell (n,) by type; a group's own goes before `all`."""
+        materials = self.case.materials
+        start = value(materials[ALL]) if ALL in materials else otherwise
+        values = {name: np.full(len(c), float(start)) for name, c in self.cut.cells.items()}
+        for group in (g for g in materials if g != ALL):
+            for name, mask in self.cell_mask(group).items():
+                values[name][mask] = value(materials[group])
+        return values
+
+    def supports(self) -> FreeMotion:
+        """What supports and rigid bodies leave free."""
+        fixed = [
+            self._fixed(i, support, direction)
+            for i, support in enumerate(self.case.supports)
+            for direction in support.fix
+        ]
+        dim = self.points.shape[1]
+        for group in sorted(self.case.rigid):
+            nodes = self.nodes(group, f"bodies.{group}")
+            for axis in np.eye(dim):
+                directions = np.tile(axis, (len(nodes), 1))
+                fixed.append(Fixed(f"bodies.{group}", nodes, directions, np.zeros(len(nodes))))
+        return free_motion(len(self.points), dim, fixed, self.case.path)
+
+    def _fixed(self, i: int, support: Support, direction: str) -> Fixed:
+        key = f"supports[{i}].fix.{direction}"
+        nodes = self.nodes(support.group, f"supports[{i}].group")
+        if direction == "normal":
+            directions = self._normals(support.group, nodes, key)
+        else:
+            axis = np.eye(self.points.shape[1])["xyz".index(direction)]
+            directions = np.tile(axis, (len(nodes), 1))
+        value = support.fix[direction]
+        if isinstance(value, Exact):
+            place = self.points[nodes] + self.origin
+            whole = self._exact.displacement(place, self.exact_part[nodes])
+            return Fixed(key, nodes, directions, np.einsum("nd,nd->n", whole, directions))
+        return Fixed(key, nodes, directions, self.field(value)(self.points[nodes]))
+
+    def _normals(self, group: str, nodes: np.ndarray, key: str) -> np.ndarray:
+        """Unit normals (n, dim) of a group's faces at its nodes, the mean over the faces there."""
+        return nodal_normals(self.points, self.faces(group, key))[nodes]
+
+    def forces(self) -> np.ndarray:
+        """Nodal forces (n, dim) of all loads at load factor 1."""
+        total = np.zeros_like(self.points)
+        for i, load in enumerate(self.case.loads):
+            total += self._force(load, f"loads[{i}].group")
+        return total
+
+    def _force(self, load: Load, key: str) -> np.ndarray:
+        total = np.zeros_like(self.points)
+        for name, nodes in self._loaded(load, key):
+            if isinstance(load.value, Exact):
+                for part, mine in self.by_part(nodes):
+                    total += self._exact_force(load.kind, name, mine, part)
+            elif load.kind == "body_force":
+                total += body_forces(self.points, nodes, name, self.field(load.value))
+            else:
+                pressure = load.kind == "pressure"
+                total += face_forces(self.points, nodes, name, self.field(load.value), pressure)
+        return total
+
+    def _loaded(self, load: Load, key: str) -> list[tuple[str, np.ndarray]]:
+        """The cells or faces that a load acts on: (type, nodes)."""
+        if load.kind != "body_force":
+            return self.faces(load.group, key)
+        if load.group == ALL:
+            return list(self.cut.cells.items())
+        mask = self.cell_mask(load.group)
+        return [(name, cells[mask[name]]) for name, cells in self.cut.cells.items()]
+
+    def _exact_force(self, kind: str, name: str, nodes: np.ndarray, part: int) -> np.ndarray:
+        """Forces (n, dim) of the exact solution's body force or stress on cells or faces."""
+        exact, origin = self._exact, self.origin
+        if kind == "body_force":
+            return body_forces(
+                self.points, nodes, name, lambda local: exact.body_force(local + origin, part)
+            )
+        return stress_forces(
+            self.points,
+            nodes,
+            name,
+            lambda local: exact.stress(local + origin, part),
+            kind == "pressure",
+        )
+
+
+def _type_name(meshio_name: str) -> str:
+    return BY_MESHIO[meshio_name].name

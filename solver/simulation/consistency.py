@@ -1,0 +1,106 @@
+"""Whether the fields of a solution fit one another: shapes, numbers of nodes, finite values.
+
+Checks compare what a case gives a reference for; what they do not look at must be sound all the
+same, in a solve as in a file read back.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from solver.simulation.solution import NodalContact, Solution, ZoneResult
+
+Shape = tuple[int | None, ...]
+
+
+def inconsistency(solution: Solution) -> str:
+    """The first thing wrong with the fields of a solution, in words; empty where nothing is."""
+    return next(_all(solution), "")
+
+
+def _all(solution: Solution) -> Iterator[str]:
+    points = solution.mesh.points
+    n, dim = points.shape
+    yield from _values("nodes", points, (n, dim))
+    for block in solution.mesh.cells:
+        yield from _numbers(f"cells {block.type}", block.data, (len(block.data), None), n)
+    yield from _values("displacement", solution.displacement, (n, dim))
+    yield from _values("stress", solution.stress, (n, 6))
+    yield from _values("normal_stress", solution.nodal_normal_stress, (n,))
+    if solution.body.shape != (n,) or solution.body.dtype.kind not in "iu":
+        yield "body is not a whole number for each node"
+    known = [solution.length, solution.load_scale, *solution.balance.values()]
+    known += solution.seconds.values()
+    yield from _values("the solve's own numbers", np.array(known), (len(known),))
+    if {zone.name for zone in solution.zones} != {zone.name for zone in solution.case.zones}:
+        yield "the contact zones are not those of the case"
+    yield from _steps(solution)
+    for zone in solution.zones:
+        for fault in _zone(zone, n, dim):
+            yield f"zone {zone.name}: {fault}"
+
+
+def _steps(solution: Solution) -> Iterator[str]:
+    sizes = {zone.name: len(zone.multiplier) for zone in solution.zones}
+    wanted = [item.zone for item in solution.case.observe]
+    if [step.factor for step in solution.steps] != list(solution.case.steps):
+        yield "the load steps are not those of the case"
+    for step in solution.steps:
+        seen = step.observations
+        if [item["zone"] for item in seen] != wanted:
+            yield "the places observed are not those of the case"
+        for item in seen:
+            number = np.array([item["macro_element"]])
+            yield from _numbers("observed macro-element", number, (1,), sizes[item["zone"]])
+        known = [step.residual, *(item[k] for item in seen for k in ("pressure", "gap"))]
+        yield from _values("steps", np.array(known), (len(known),))
+
+
+def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
+    m = len(zone.multiplier)
+    for name in ("centre", "normal"):
+        yield from _values(name, getattr(zone, name), (m, dim))
+    for name in ("area", "multiplier", "gap", "coverage"):
+        yield from _values(name, getattr(zone, name), (m,))
+    yield from _flags(zone.closed, m)
+    for side in ("slave", "master"):
+        nodes = getattr(zone, f"{side}_nodes")
+        yield from _numbers(f"{side}_nodes", nodes, (len(nodes),), n)
+        yield from _values(f"stress_{side}", getattr(zone, f"stress_{side}"), (len(nodes),))
+    for kind, faces, owner in zone.faces:
+        yield from _numbers(f"slave faces {kind}", faces, (len(owner), None), n)
+        yield from _numbers(f"macro-elements of {kind}", owner, (len(owner),), m)
+    for kind, faces in zone.master_faces:
+        yield from _numbers(f"master faces {kind}", faces, (len(faces), None), n)
+    if zone.nodal:
+        yield from _nodal(zone.nodal, n)
+
+
+def _nodal(nodal: NodalContact, n: int) -> Iterator[str]:
+    k = len(nodal.nodes)
+    yield from _numbers("multiplier nodes", nodal.nodes, (k,), n)
+    for name in ("multiplier", "gap"):
+        yield from _values(f"{name} at nodes", getattr(nodal, name), (k,))
+    yield from _flags(nodal.closed, k)
+
+
+def _values(name: str, values: np.ndarray, shape: Shape) -> Iterator[str]:
+    if values.dtype.kind != "f" or values.shape != shape:
+        yield f"{name} holds {values.dtype} {values.shape} in place of numbers {shape}"
+    elif not np.isfinite(values).all():
+        yield f"{name} holds values that are not finite numbers"
+
+
+def _numbers(name: str, numbers: np.ndarray, shape: Shape, end: int) -> Iterator[str]:
+    fits = len(numbers.shape) == len(shape) and all(
+        wanted in (None, there) for wanted, there in zip(shape, numbers.shape, strict=True)
+    )
+    if numbers.dtype.kind not in "iu" or not fits:
+        yield f"{name} holds {numbers.dtype} {numbers.shape} in place of whole numbers"
+    elif numbers.size and not 0 <= numbers.min() <= numbers.max() < end:
+        yield f"{name} holds numbers outside 0 … {end - 1}"
+
+
+def _flags(closed: np.ndarray, count: int) -> Iterator[str]:
+    if closed.dtype.kind != "b" or closed.shape != (count,):
+        yield f"status holds {closed.dtype} {closed.shape} in place of {count} truth values"

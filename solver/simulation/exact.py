@@ -1,0 +1,108 @@
+"""A case's exact solution on the mesh of a solve: parts, and values at nodes and macro-elements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from solver.case.solutions import ExactSolution
+from solver.mechanics.fem import shape_functions
+from solver.mechanics.fem.faces import FACE_POINTS, nodal_normals, surface_points
+from solver.mechanics.fem.gauss import gauss_rule
+from solver.mechanics.fem.stress import normal_stress
+from solver.mesh.catalogue import cell_type
+from solver.simulation.solution import Solution, ZoneResult
+
+
+def node_parts(exact: ExactSolution, points: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """The part (n,) of the solution that each node belongs to, the same for all of a body."""
+    part = np.zeros(len(points), dtype=int)
+    for number in np.unique(body):
+        part[body == number] = exact.body_part(points[body == number])
+    return part
+
+
+def deformable(solution: Solution) -> np.ndarray:
+    """Which nodes (n,) belong to bodies that are not rigid."""
+    nodes = solution.body >= 0
+    for group in solution.case.rigid:
+        for block, members in zip(
+            solution.mesh.cells, solution.mesh.cell_sets.get(group, []), strict=False
+        ):
+            nodes[block.data[np.asarray(members, dtype=int)].ravel()] = False
+    return nodes
+
+
+def computed_pressure(zone: ZoneResult) -> np.ndarray:
+    """The computed pressure (k,) at the `surface_points` of a zone.
+
+    That of each macro-element, or, between multipliers at nodes, linear (or what the shape
+    functions make of it where all nodes of a face have one).
+    """
+    parts = []
+    for name, nodes, owner in zone.faces:
+        kind = cell_type(name)
+        reference, weights = gauss_rule(kind.name, FACE_POINTS)
+        if zone.nodal is None:
+            parts.append(np.repeat(zone.multiplier[owner], len(weights)))
+            continue
+        at_all = np.isin(nodes, zone.nodal.nodes).all()
+        shape = kind.name if at_all else kind.skeleton
+        own = nodes if at_all else nodes[:, : kind.n_vertices]
+        pressure = zone.nodal.multiplier[np.searchsorted(zone.nodal.nodes, own)]
+        parts.append((pressure @ shape_functions(shape).values(reference).T).ravel())
+    return np.concatenate(parts)
+
+
+class ExactValues:
+    """The values that stand for `solution` under a key of the reference, on one solve's mesh."""
+
+    def __init__(self, solution: Solution, exact: ExactSolution):
+        self.solution, self.exact = solution, exact
+
+    @cached_property
+    def part(self) -> np.ndarray:
+        """The part (n,) of each node."""
+        return node_parts(self.exact, self.solution.mesh.points, self.solution.body)
+
+    def displacement(self, nodes: np.ndarray) -> np.ndarray:
+        """Displacement (k, dim) at nodes."""
+        return self.exact.displacement(self.solution.mesh.points[nodes], self.part[nodes])
+
+    def stress(self, nodes: np.ndarray) -> np.ndarray:
+        """Stress (k, 6) at nodes."""
+        return self.exact.stress(self.solution.mesh.points[nodes], self.part[nodes])
+
+    def stress_along_contact(self, nodes: np.ndarray) -> np.ndarray:
+        """d·σ·d (k,) at nodes, d being the mean slave normal of the first zone."""
+        if not self.solution.zones:
+            direction = np.eye(self.solution.mesh.points.shape[1])[-1]
+        else:
+            zone = self.solution.zones[0]
+            direction = zone.area @ zone.normal
+        return normal_stress(self.stress(nodes), direction / np.linalg.norm(direction))
+
+    def surface_stress(
+        self, nodes: np.ndarray, faces: Sequence[tuple[str, np.ndarray]]
+    ) -> np.ndarray:
+        """n·σ·n (k,) at nodes of a surface, n being its normals on the mesh."""
+        normals = nodal_normals(self.solution.mesh.points, list(faces))[nodes]
+        return normal_stress(self.stress(nodes), normals)
+
+    def pressure(self, zone: ZoneResult) -> np.ndarray:
+        """The mean contact pressure (m,) of each macro-element."""
+        at = surface_points(self.solution.mesh.points, zone.faces)
+        return at.means(self.exact.contact_pressure(at.place))
+
+    def gap(self, zone: ZoneResult) -> np.ndarray:
+        """The mean gap (m,) of each macro-element."""
+        at = surface_points(self.solution.mesh.points, zone.faces)
+        return at.means(self.exact.gap(at.place))
+
+    def ends_within(self, zone: ZoneResult) -> np.ndarray:
+        """Which macro-elements (m,) the contact area covers in part only."""
+        at = surface_points(self.solution.mesh.points, zone.faces)
+        share = at.means((self.exact.contact_pressure(at.place) > 0).astype(float))
+        return (share > 0) & (share < 1 - 1e-9)

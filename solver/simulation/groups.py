@@ -1,0 +1,199 @@
+"""A case held against its mesh: groups, dimension, materials, contact surfaces.
+
+Every refusal is an `InputError` that names the case file, the key and the groups that are there.
+"""
+
+from collections.abc import Iterable
+
+import meshio
+import numpy as np
+
+from solver.case.reader import Case, Zone
+from solver.case.rules import check_dimension
+from solver.case.schemas import hint
+from solver.mesh.catalogue import BY_MESHIO
+from solver.system.errors import InputError
+
+ALL = "all"
+
+
+def check_groups(case: Case, mesh: meshio.Mesh, swapped: bool = False) -> None:
+    """Raise `InputError` where the case does not fit the mesh."""
+    dim = mesh.points.shape[1]
+    if dim == 2 and case.plane is None:
+        raise InputError(case.path, "plane", None, "this key is needed (strain): the mesh is plane")
+    if dim == 3 and case.plane is not None:
+        allowed = "only for plane meshes; this one has three dimensions"
+        raise InputError(case.path, "plane", case.plane, allowed)
+    check_dimension(case, dim)
+    groups = _Groups(case, mesh)
+    groups.check_materials()
+    groups.check_supports()
+    groups.check_loads()
+    groups.check_bodies()
+    for i, zone in enumerate(case.zones):
+        groups.check_zone(f"contact[{i}]", zone, swapped)
+
+
+def named_parts(case: Case, mesh: meshio.Mesh) -> tuple[meshio.Mesh, tuple[int, int]]:
+    """The mesh without what the case does not name: how many groups, how many faces and edges.
+
+    Groups of volume cells stay: bodies have their names. `check_groups` comes first.
+    """
+    dims = [BY_MESHIO[block.type].dim for block in mesh.cells]
+    volume = [dim == mesh.points.shape[1] for dim in dims]
+    named = _named(case)
+    sets = {
+        name: members
+        for name, members in mesh.cell_sets.items()
+        if name in named or any(len(m) for m, v in zip(members, volume, strict=True) if v)
+    }
+    points = {name: nodes for name, nodes in mesh.point_sets.items() if name in named}
+    left = len(mesh.cell_sets) - len(sets) + len(mesh.point_sets) - len(points)
+    members: dict[str, list[np.ndarray]] = {name: [] for name in sets}
+    cells, count = [], 0
+    for i, (block, whole) in enumerate(zip(mesh.cells, volume, strict=True)):
+        kept = np.full(len(block.data), whole)
+        for parts in sets.values():
+            kept[np.asarray(parts[i], dtype=int)] = True
+        place = np.cumsum(kept) - 1
+        for name, parts in sets.items():
+            members[name].append(place[np.asarray(parts[i], dtype=int)])
+        cells.append((block.type, block.data[kept]))
+        count += int((~kept).sum())
+    if not left and not count:
+        return mesh, (0, 0)
+    return meshio.Mesh(mesh.points, cells, cell_sets=members, point_sets=points), (left, count)
+
+
+def _named(case: Case) -> set[str]:
+    """All groups that a case names."""
+    sides = [side for zone in case.zones for side in (zone.slave, zone.master)]
+    held = [support.group for support in case.supports]
+    loaded = [load.group for load in case.loads]
+    return {*case.materials, *case.rigid, *case.counts, *sides, *held, *loaded}
+
+
+class _Groups:
+    """The groups of one mesh, asked for by the keys of one case."""
+
+    def __init__(self, case: Case, mesh: meshio.Mesh):
+        self.case, self.mesh = case, mesh
+        self.dim = mesh.points.shape[1]
+        self.block_dims = [BY_MESHIO[block.type].dim for block in mesh.cells]
+
+    def cells(self, key: str, group: str, dim: int) -> list[np.ndarray]:
+        """The group's cells of that dimension, by block; refuses a group that has none."""
+        self.require(key, group)
+        kind = "volume cells" if dim == self.dim else "faces"
+        if group not in self.mesh.cell_sets:
+            raise self.error(key, group, f"is a group of nodes; a group of {kind} is needed")
+        chosen = self.mesh.cell_sets[group]
+        parts = [
+            np.asarray(part, dtype=int) if block_dim == dim else np.empty(0, dtype=int)
+            for part, block_dim in zip(chosen, self.block_dims, strict=True)
+        ]
+        if not any(map(len, parts)):
+            held = [
+                f"{len(part)} {BY_MESHIO[block.type].name}"
+                for part, block in zip(chosen, self.mesh.cells, strict=True)
+                if len(part)
+            ]
+            shown = f"holds {', '.join(held)} but no {kind}" if held else "is empty"
+            raise self.error(key, group, f"{shown}; a group of {kind} is needed")
+        return parts
+
+    def nodes(self, parts: list[np.ndarray]) -> np.ndarray:
+        """The nodes of cells given by block."""
+        touched = [
+            block.data[part].ravel() for block, part in zip(self.mesh.cells, parts, strict=True)
+        ]
+        return np.unique(np.concatenate(touched))
+
+    def shared(self, one: list[np.ndarray], other: list[np.ndarray]) -> int:
+        """How many cells of the two selections stand on the same nodes."""
+        count = 0
+        for block, *parts in zip(self.mesh.cells, one, other, strict=True):
+            first, second = (np.unique(np.sort(block.data[p], axis=1), axis=0) for p in parts)
+            together = np.unique(np.concatenate([first, second]), axis=0)
+            count += len(first) + len(second) - len(together)
+        return count
+
+    def require(self, key: str, group: str) -> None:
+        names = {*self.mesh.cell_sets, *self.mesh.point_sets}
+        if group not in names:
+            raise self.error(key, group, f"no such group in the mesh; {hint(group, names)}")
+
+    def error(self, key: str, value: object, allowed: str) -> InputError:
+        return InputError(self.case.path, key, value, allowed)
+
+    def check_materials(self) -> None:
+        """Every volume cell has exactly one material; cells of rigid bodies need none."""
+        named = [group for group in self.case.materials if group != ALL]
+        given = self.covering("materials", named)
+        shown = list(self.case.materials)
+        if np.any(given > 1):
+            allowed = f"{np.count_nonzero(given > 1)} cells have more than one material"
+            raise self.error("materials", shown, allowed)
+        if ALL in self.case.materials:
+            return
+        bare = np.count_nonzero(given + self.covering("bodies", self.case.rigid) == 0)
+        if bare:
+            allowed = f"{bare} of {len(given)} volume cells have no material"
+            raise self.error("materials", shown, f"{allowed}; name their group, or `{ALL}`")
+
+    def covering(self, key: str, groups: Iterable[str]) -> np.ndarray:
+        """How many of the groups hold each volume cell."""
+        counts = [np.zeros(len(block.data), dtype=int) for block in self.mesh.cells]
+        for group in groups:
+            parts = self.cells(f"{key}.{group}", group, self.dim)
+            for count, part in zip(counts, parts, strict=True):
+                count[part] += 1
+        volume = [c for c, dim in zip(counts, self.block_dims, strict=True) if dim == self.dim]
+        return np.concatenate([np.empty(0, dtype=int), *volume])
+
+    def check_supports(self) -> None:
+        for i, support in enumerate(self.case.supports):
+            key = f"supports[{i}].group"
+            self.require(key, support.group)
+            if "normal" in support.fix:
+                self.cells(key, support.group, self.dim - 1)
+            cells = self.mesh.cell_sets.get(support.group, [])
+            if not sum(map(len, [*cells, self.mesh.point_sets.get(support.group, [])])):
+                raise self.error(key, support.group, "is empty")
+
+    def check_loads(self) -> None:
+        for i, load in enumerate(self.case.loads):
+            on_volume = load.kind == "body_force"
+            if not (on_volume and load.group == ALL):
+                dim = self.dim if on_volume else self.dim - 1
+                self.cells(f"loads[{i}].group", load.group, dim)
+
+    def check_bodies(self) -> None:
+        for group in self.case.rigid:
+            self.cells(f"bodies.{group}", group, self.dim)
+        for group in self.case.counts:
+            self.cells(f"counts.{group}", group, self.dim)
+
+    def check_zone(self, key: str, zone: Zone, swapped: bool) -> None:
+        """Two surfaces without a common face, the slave's not on a rigid body."""
+        slave, master = (
+            self.cells(f"{key}.{side}", getattr(zone, side), self.dim - 1)
+            for side in ("slave", "master")
+        )
+        common = self.shared(slave, master)
+        if common:
+            allowed = f"{common} of its faces are slave faces too; a slave cannot be its own master"
+            raise self.error(f"{key}.master", zone.master, allowed)
+        sides = {"slave": slave} if not swapped else {"master": master}
+        if self.case.directions == "both":
+            sides = {"slave": slave, "master": master}
+        for side, parts in sides.items():
+            self.check_deformable(f"{key}.{side}", getattr(zone, side), parts)
+
+    def check_deformable(self, key: str, group: str, parts: list[np.ndarray]) -> None:
+        for rigid in self.case.rigid:
+            body = self.cells(f"bodies.{rigid}", rigid, self.dim)
+            if np.isin(self.nodes(parts), self.nodes(body)).any():
+                allowed = f"lies on the rigid body {rigid}; a rigid side is always the master"
+                raise self.error(key, group, f"{allowed}, so directions must be `first`")

@@ -1,0 +1,323 @@
+"""From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+
+import meshio
+import numpy as np
+
+from solver.case.expressions import evaluate
+from solver.case.reader import Case, Zone
+from solver.mechanics.fem.bodies import body_numbers
+from solver.mechanics.fem.elasticity import Block
+from solver.mechanics.fem.faces import FaceBlock, boundary_faces, surface_points, volume_cells
+from solver.mechanics.fem.mixed import MeanStress
+from solver.mechanics.fem.supports import FreeMotion
+from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
+from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
+from solver.mechanics.mortar.held import joined
+from solver.mechanics.mortar.operator import GapOperator, gap_operator
+from solver.mechanics.mortar.treatments import SEGMENTED, TREATMENTS, Treatment, scheme_of
+from solver.mesh.catalogue import BY_NAME
+from solver.simulation.attributes import Attributes
+from solver.simulation.cures import ALL, Cures
+from solver.simulation.groups import check_groups, named_parts
+from solver.simulation.skips import NEEDED, Skips
+from solver.system.clock import Clock
+from solver.system.errors import InputError
+
+# An average initial gap below this many roundings of the coordinates is none.
+_GAP_ROUND_OFF = 8
+
+
+@dataclass(frozen=True)
+class ZoneScene:
+    """One zone: the zone as solved (swapped or not), its multipliers' numbers and its faces.
+
+    `slave_faces`, `master_faces` as meshed, `sub_faces` after the cut (their `macro` counts from 0
+    within the zone). `count` macro-elements; the zone's multipliers, of which a treatment may have
+    others than one for each of these, start at `first` among all.
+    """
+
+    zone: Zone
+    first: int
+    count: int
+    slave_faces: list[FaceBlock]
+    master_faces: list[FaceBlock]
+    sub_faces: list[SubFaces]
+    operator: GapOperator
+
+    @property
+    def treatment(self) -> Treatment:
+        """How the interface is treated."""
+        return TREATMENTS[self.zone.treatment]
+
+    @property
+    def numbers(self) -> slice:
+        """The zone's multipliers among all."""
+        return slice(self.first, self.first + len(self.operator.initial))
+
+    def at_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Values (k,) of all multipliers at the nodes (n,) that the zone's ones belong to."""
+        mine, nodes = values[self.numbers], self.operator.at_nodes
+        return mine if nodes is None else nodes @ mine
+
+    def by_macro_element(self, values: np.ndarray) -> np.ndarray:
+        """Values (k,) of all multipliers averaged over each macro-element of the zone (m,)."""
+        return np.asarray(self.operator.mean @ values[self.numbers])
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The discrete problem.
+
+    `points` (n, dim) are counted from `origin` (dim,), the mean of the mesh's nodes: far from the
+    origin of the coordinates, differences would lose digits. `force` (n, dim) and `free.offset` are
+    for load factor 1. `blocks` of cells in mixed form have λ = 0; `mean` makes up for it. `meshed`:
+    the volume cells before the cut, by type, and `volume_groups` which of them each named group
+    holds. `rounding`: how well the coordinates are known (a length). `unnamed`: how many groups of
+    the mesh, and of its faces and edges, the case does not name. `asleep` (b,) bodies and `resting`
+    (k,) multipliers are left out since nothing moves them, and the cells of `held` (b,) bodies (see
+    `solver.simulation.unloaded`): `blocks` and `free` are without them.
+    """
+
+    case: Case
+    points: np.ndarray
+    origin: np.ndarray
+    mesh: CutMesh
+    blocks: list[Block]
+    mean: MeanStress
+    body: np.ndarray
+    free: FreeMotion
+    force: np.ndarray
+    zones: list[ZoneScene]
+    length: float
+    meshed: dict[str, np.ndarray]
+    volume_groups: dict[str, dict[str, np.ndarray]]
+    rounding: float
+    cures: Cures
+    skips: Skips
+    unnamed: tuple[int, int]
+    asleep: np.ndarray
+    held: np.ndarray
+    resting: np.ndarray
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of degrees of freedom, held ones included."""
+        return self.points.size
+
+
+def build_scene(
+    case: Case,
+    mesh: meshio.Mesh,
+    swapped: bool,
+    hexahedra: str | None,
+    clock: Clock,
+    cures: Cures = ALL,
+    skips: Skips = NEEDED,
+) -> Scene:
+    """The discrete problem of a case; raises InputError where case and mesh do not fit."""
+    check_groups(case, mesh, swapped)
+    mesh, unnamed = named_parts(case, mesh)
+    origin = mesh.points.mean(axis=0) * cures.local_coordinates
+    local = replace_points(mesh, mesh.points - origin)
+    length = float(np.ptp(local.points, axis=0).max())
+    zones = [_as_solved(zone, swapped, hexahedra) for zone in case.zones]
+    with clock.stage("cut"):
+        surfaces = _surfaces(case, local, zones, swapped)
+        cut_mesh, sub_faces = _cut(local, zones, surfaces, skips)
+    points = cut_mesh.points
+    rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
+    scenes = []
+    with clock.stage("pairing"):
+        for zone, (slave, master), faces in zip(zones, surfaces, sub_faces, strict=True):
+            count = sum(len(block.nodes) for block in slave)
+            operator = _operator(points, zone, faces, master, count, cures, skips)
+            noise = _GAP_ROUND_OFF * rounding * cures.gap_threshold
+            initial = _initial_gaps(zone, operator, points, faces, origin, noise)
+            operator = replace(operator, initial=initial)
+            scenes.append(ZoneScene(zone, 0, count, slave, master, faces, operator))
+    groups = Attributes(case, local, cut_mesh, scenes, origin)
+    with clock.stage("assembly"):
+        blocks, mean = groups.elasticity(cures.mixed, plain=skips.quadrature)
+        free = groups.supports()
+        force = groups.forces()
+        scenes = _without_held(scenes, free)
+    body = body_numbers(len(points), cut_mesh.cells)
+    return Scene(
+        case=case,
+        points=points,
+        origin=origin,
+        mesh=cut_mesh,
+        blocks=blocks,
+        mean=mean,
+        body=body,
+        free=free,
+        force=force,
+        zones=scenes,
+        length=length,
+        meshed=volume_cells(mesh),
+        volume_groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
+        rounding=rounding,
+        cures=cures,
+        skips=skips,
+        unnamed=unnamed,
+        asleep=np.zeros(int(body.max()) + 1, dtype=bool),
+        held=np.zeros(int(body.max()) + 1, dtype=bool),
+        resting=np.zeros(sum(len(zone.operator.initial) for zone in scenes), dtype=bool),
+    )
+
+
+def _without_held(zones: list[ZoneScene], free: FreeMotion) -> list[ZoneScene]:
+    """The zones, multipliers of held nodes joined to others where the treatment does so."""
+    found, first = [], 0
+    for zone in zones:
+        operator = zone.operator
+        if zone.treatment.joins:
+            operator = joined(operator, free.basis)
+        found.append(replace(zone, first=first, operator=operator))
+        first += len(operator.initial)
+    return found
+
+
+def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndarray:
+    """Values (n, dim) at the nodes of the mesh, interpolated at those of the scene's cut mesh."""
+    surfaces = [(zone.slave_faces, zone.master_faces) for zone in scene.zones]
+    zones = [zone.zone for zone in scene.zones]
+    return _cut(replace_points(mesh, values), zones, surfaces, scene.skips)[0].points
+
+
+def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
+    """The same cells and groups on other points."""
+    return meshio.Mesh(points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets)
+
+
+def _as_solved(zone: Zone, swapped: bool, hexahedra: str | None) -> Zone:
+    if swapped:
+        zone = replace(zone, slave=zone.master, master=zone.slave)
+    return replace(zone, hexahedra=hexahedra or zone.hexahedra)
+
+
+def _surfaces(
+    case: Case, mesh: meshio.Mesh, zones: list[Zone], swapped: bool
+) -> list[tuple[list[FaceBlock], list[FaceBlock]]]:
+    """Slave and master faces of each zone; refuses slave nodes shared by two zones."""
+    slave_key, master_key = ("master", "slave") if swapped else ("slave", "master")
+    owner: dict[int, str] = {}
+    surfaces = []
+    for i, zone in enumerate(zones):
+        slave = boundary_faces(mesh, zone.slave, case.path, f"contact[{i}].{slave_key}")
+        master = boundary_faces(mesh, zone.master, case.path, f"contact[{i}].{master_key}")
+        _refuse_untreated(case, i, zone, slave)
+        nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave])).tolist()
+        shared = [n for n in nodes if n in owner]
+        if shared:
+            raise InputError(
+                case.path,
+                f"contact[{i}].{slave_key}",
+                zone.slave,
+                f"{len(shared)} of its nodes are slave nodes of zone {owner[shared[0]]} too; "
+                "a node may be a slave in one zone only",
+            )
+        owner |= dict.fromkeys(nodes, zone.name)
+        surfaces.append((slave, master))
+    return surfaces
+
+
+def _refuse_untreated(case: Case, i: int, zone: Zone, slave: list[FaceBlock]) -> None:
+    treatment = TREATMENTS[zone.treatment]
+    for block in slave:
+        if block.type.name not in treatment.faces:
+            others = [name for name, t in TREATMENTS.items() if block.type.name in t.faces]
+            allowed = (
+                f"does not exist for slave faces {block.type.name} of {block.owner_type.name}: "
+                f"{treatment.why}; allowed there: {', '.join(others)}"
+            )
+            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
+
+
+def _cut(
+    mesh: meshio.Mesh,
+    zones: list[Zone],
+    surfaces: list[tuple[list[FaceBlock], list[FaceBlock]]],
+    skips: Skips,
+) -> tuple[CutMesh, list[list[SubFaces]]]:
+    """The cut mesh, and each zone's sub-faces with macro-elements counted within the zone."""
+    faces, macro, into_hexahedra, uncut, first = [], [], [], [], [0]
+    for zone, (slave, _) in zip(zones, surfaces, strict=True):
+        for block in slave:
+            faces.append(block)
+            macro.append(first[-1] + block.number)
+            into_hexahedra.append(zone.hexahedra == "hexahedra")
+            uncut.append(not TREATMENTS[zone.treatment].cut)
+        first.append(first[-1] + sum(len(block.nodes) for block in slave))
+    cells = volume_cells(mesh)
+    cut_mesh = cut(mesh.points, cells, faces, macro, into_hexahedra, uncut, not skips.cut)
+    sub_faces = []
+    for low, high in pairwise(first):
+        mine = [(f, (f.macro >= low) & (f.macro < high)) for f in cut_mesh.sub_faces]
+        sub_faces.append(
+            [SubFaces(f.type, f.nodes[m], f.macro[m] - low) for f, m in mine if m.any()]
+        )
+    return cut_mesh, sub_faces
+
+
+def _operator(
+    points: np.ndarray,
+    zone: Zone,
+    sub_faces: list[SubFaces],
+    master_faces: list[FaceBlock],
+    count: int,
+    cures: Cures,
+    skips: Skips,
+) -> GapOperator:
+    slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
+    if zone.normal == "nodal":
+        slaves = with_nodal_normals(slaves, points)
+    masters = _master_facets(points, master_faces)
+    corners = np.concatenate([f.centre for f in [*slaves, *masters]])
+    search = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    search += max(f.radius.max() for f in [*slaves, *masters])
+    if not skips.quadrature:
+        slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
+    scheme = scheme_of(zone.treatment, zone.points)
+    if not skips.clipping and zone.treatment in SEGMENTED:
+        scheme = replace(scheme, meet=partial(scheme.meet, clip_all=True))
+    scheme = replace(scheme, closure=scheme.closure and cures.closure)
+    return gap_operator(slaves, masters, count, len(points), search, scheme)
+
+
+def _as_bent(block: Facets) -> Facets:
+    """The faces treated as no affine images of their reference face."""
+    return replace(block, affine=np.zeros(len(block.affine), dtype=bool))
+
+
+def _initial_gaps(
+    zone: Zone,
+    operator: GapOperator,
+    points: np.ndarray,
+    sub_faces: list[SubFaces],
+    origin: np.ndarray,
+    noise: float,
+) -> np.ndarray:
+    """∫ φ gap (k,) at the start: as meshed, without those below `noise`, or as the case says."""
+    if zone.clearance is None:
+        meshed = operator.initial
+        initial = np.where(np.abs(meshed) <= noise * operator.covered, 0.0, meshed)
+    else:
+        at = surface_points(points, [(f.type.name, f.nodes, f.macro) for f in sub_faces])
+        means = at.means(evaluate(zone.clearance, at.place + origin))
+        whole = operator.mean.T @ (operator.surface.area * means)
+        initial = whole * operator.covered / operator.area
+    return initial - zone.interference * operator.covered
+
+
+def _master_facets(points: np.ndarray, faces: list[FaceBlock]) -> list[Facets]:
+    """Master faces, those of one type together whatever cell is behind them."""
+    merged = []
+    for name in dict.fromkeys(block.type.name for block in faces):
+        nodes = np.concatenate([block.nodes for block in faces if block.type.name == name])
+        merged.append(facets(points, BY_NAME[name], nodes, np.arange(len(nodes))))
+    return merged

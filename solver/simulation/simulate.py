@@ -1,0 +1,262 @@
+"""Solve a case on a mesh: from case and mesh to a Solution."""
+
+import logging
+import resource
+from collections.abc import Callable
+from typing import Any
+
+import meshio
+import numpy as np
+
+from solver.case.reader import Case
+from solver.mechanics.fem.elasticity import nodal_stress
+from solver.mechanics.fem.faces import nodal_normals
+from solver.mechanics.fem.stress import normal_stress
+from solver.mesh.catalogue import BY_NAME
+from solver.simulation.balance import imbalances
+from solver.simulation.consistency import inconsistency
+from solver.simulation.cures import ALL, Cures
+from solver.simulation.geometry import check_geometry
+from solver.simulation.naming import body_infos
+from solver.simulation.plan import decided, noted
+from solver.simulation.problem import ContactProblem, Equilibrium
+from solver.simulation.scene import Scene, ZoneScene, build_scene
+from solver.simulation.skips import NEEDED, Skips
+from solver.simulation.solution import Line, NodalContact, Solution, StepResult, ZoneResult
+from solver.simulation.unloaded import without_unloaded
+from solver.system.clock import Clock, processor_time
+from solver.system.errors import SolveError
+from solver.system.memory import peak_mb
+
+Log = Callable[[str], Any]
+
+_LOG = logging.getLogger(__name__)
+# Half, but for round-off.
+_HALF = 0.5 - 1e-9
+
+
+def simulate(
+    case: Case,
+    mesh: meshio.Mesh,
+    swapped: bool = False,
+    hexahedra: str | None = None,
+    log: Log = lambda _: None,
+    cures: Cures = ALL,
+    clock: Clock | None = None,
+    skips: Skips = NEEDED,
+) -> Solution:
+    """Solve a case on its mesh.
+
+    `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
+    `cures` turns what keeps the digits off, to show what it does, and `skips` what is left out
+    where the scene does not need it. The time of every stage is added to `clock`, where one is
+    given. Raises InputError where the case and its mesh do not fit,
+    SolveError where no solution is found.
+    """
+    started = processor_time()
+    clock = Clock() if clock is None else clock
+    scene = build_scene(case, mesh, swapped, hexahedra, clock, cures, skips)
+    check_geometry(scene)
+    if skips.unloaded:
+        with clock.stage("assembly"):
+            scene = without_unloaded(scene)
+    log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
+    with clock.stage("assembly"):
+        problem = ContactProblem(scene)
+    solution = solve_problem(problem, clock, swapped, hexahedra, log)
+    solution.cpu_seconds = processor_time() - started
+    solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
+    return solution
+
+
+def solve_problem(
+    problem: ContactProblem,
+    clock: Clock,
+    swapped: bool = False,
+    hexahedra: str | None = None,
+    log: Log = lambda _: None,
+) -> Solution:
+    """Solve an assembled problem at all load factors; how it was assembled goes on record."""
+    plan = list(decided(problem))
+    for line in plan:
+        _LOG.info("plan: %s (%s)", line.what, line.why)
+    with clock.stage("solve"):
+        states = _walk(problem, problem.scene.case.steps, log)
+    plan += noted(problem, states)
+    with clock.stage("recovery"):
+        solution = _recover(problem, states, plan, swapped, hexahedra)
+    solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
+    if fault := inconsistency(solution):
+        raise SolveError(f"the solve came to no sound end: {fault}")
+    return solution
+
+
+def _walk(problem: ContactProblem, steps: tuple[float, ...], log: Log) -> list[Equilibrium]:
+    """Solve the load factors in turn, each from the status of the one before."""
+    states: list[Equilibrium] = []
+    for factor in steps:
+        start = states[-1].status.closed if states else None
+        state = problem.solve(factor, start)
+        states.append(state)
+        log(
+            f"load factor {factor:g}: {state.status.iterations} iterations, "
+            f"{int(state.status.closed.sum())} closed, residual {state.residual:.1e}"
+        )
+    return states
+
+
+def _recover(
+    problem: ContactProblem,
+    states: list[Equilibrium],
+    plan: list[Line],
+    swapped: bool,
+    hexahedra: str | None,
+) -> Solution:
+    scene = problem.scene
+    last = states[-1]
+    stress = nodal_stress(scene.points, scene.blocks, last.straining, last.extended)
+    stress += scene.mean.nodal_stress(last.mean_stress, scene.blocks)
+    scale = _stress_scale(scene, stress)
+    zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
+    return Solution(
+        case=scene.case,
+        swapped=swapped,
+        hexahedra=hexahedra,
+        mesh=_output_mesh(scene),
+        displacement=last.displacement,
+        stress=stress,
+        body=scene.body,
+        bodies=body_infos(scene),
+        zones=zones,
+        nodal_normal_stress=normal_stress(stress, _contact_direction(scene)),
+        balance=imbalances(scene, last),
+        steps=_step_results(scene, states, scale),
+        length=scene.length,
+        load_scale=scale,
+        dofs=scene.n_dofs,
+        macro_elements=sum(zone.count for zone in scene.zones),
+        iterations=sum(state.status.iterations for state in states),
+        linear_solver=problem.linear_solver,
+        linear_iterations=problem.linear_iterations,
+        matrix_entries=problem.matrix.nnz,
+        plan=plan,
+        accuracy=last.accuracy.causes,
+        mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),
+    )
+
+
+def _output_mesh(scene: Scene) -> meshio.Mesh:
+    cells = [(_meshio_name(name), data) for name, data in scene.mesh.cells.items()]
+    sets = {
+        group: [np.flatnonzero(scene.mesh.members(name, mask)) for name in scene.mesh.cells]
+        for group, mask in scene.volume_groups.items()
+        if any(m.any() for m in mask.values())
+    }
+    return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)
+
+
+def _meshio_name(name: str) -> str:
+    return BY_NAME[name].meshio
+
+
+def _contact_direction(scene: Scene) -> np.ndarray:
+    """Unit mean normal of the first zone's slave surface; the last axis where there is no zone."""
+    dim = scene.points.shape[1]
+    if not scene.zones:
+        return np.eye(dim)[-1]
+    surface = scene.zones[0].operator.surface
+    mean = surface.area @ surface.normal
+    return mean / np.linalg.norm(mean)
+
+
+def _zone_result(
+    scene: Scene, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
+) -> ZoneResult:
+    surface = zone.operator.surface
+    slave_nodes, slave_normal = _nodal_normals(
+        scene, [(f.type.name, f.nodes) for f in zone.sub_faces]
+    )
+    master = [(b.type.name, b.nodes) for b in zone.master_faces]
+    master_nodes, master_normal = _nodal_normals(scene, master)
+    return ZoneResult(
+        name=zone.zone.name,
+        faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
+        master_faces=master,
+        centre=surface.centre + scene.origin,
+        normal=surface.normal,
+        area=surface.area,
+        multiplier=zone.by_macro_element(state.pressure),
+        gap=zone.by_macro_element(state.gap),
+        closed=_closed(zone, state),
+        coverage=surface.covered / surface.area,
+        stress_slave=normal_stress(stress[slave_nodes], slave_normal),
+        stress_master=normal_stress(stress[master_nodes], master_normal),
+        slave_nodes=slave_nodes,
+        master_nodes=master_nodes,
+        nodal=_nodal_contact(zone, state),
+    )
+
+
+def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
+    nodes = zone.operator.nodes
+    if nodes is None:
+        return None
+    closed = zone.at_nodes(state.status.closed.astype(float)) >= _HALF
+    return NodalContact(nodes, zone.at_nodes(state.pressure), zone.at_nodes(state.gap), closed)
+
+
+def _closed(zone: ZoneScene, state: Equilibrium) -> np.ndarray:
+    """The macro-elements (m,) of which the closed multipliers have at least half."""
+    return zone.by_macro_element(state.status.closed.astype(float)) >= _HALF
+
+
+def _nodal_normals(
+    scene: Scene, faces: list[tuple[str, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The nodes of a surface and its unit normals there, the mean over the faces around each."""
+    total = nodal_normals(scene.points, faces)
+    nodes = np.unique(np.concatenate([nodes.ravel() for _, nodes in faces]))
+    return nodes, total[nodes]
+
+
+def _step_results(scene: Scene, states: list[Equilibrium], scale: float) -> list[StepResult]:
+    results = []
+    for factor, state in zip(scene.case.steps, states, strict=True):
+        seen = []
+        for wanted in scene.case.observe:
+            zone = next(z for z in scene.zones if z.zone.name == wanted.zone)
+            surface = zone.operator.surface
+            offset = surface.centre + scene.origin - np.array(wanted.nearest)
+            local = int(np.linalg.norm(offset, axis=1).argmin())
+            seen.append(
+                {
+                    "zone": wanted.zone,
+                    "macro_element": local,
+                    "pressure": float(zone.by_macro_element(state.pressure)[local]),
+                    "gap": float(zone.by_macro_element(state.gap)[local]),
+                    "status": int(_closed(zone, state)[local]),
+                    "coverage": float(surface.covered[local] / surface.area[local]),
+                }
+            )
+        product = float(np.abs(state.pressure * state.gap).max(initial=0.0))
+        results.append(
+            StepResult(
+                factor=factor,
+                iterations=state.status.iterations,
+                status_changes=sum(state.status.changes),
+                residual=state.residual,
+                complementarity=product / (scale * scene.length),
+                observations=seen,
+            )
+        )
+    return results
+
+
+def _stress_scale(scene: Scene, stress: np.ndarray) -> float:
+    """The largest pressure among the loads (as a number), else the largest stress, else 1."""
+    values = [
+        abs(load.value)
+        for load in scene.case.loads
+        if load.kind == "pressure" and isinstance(load.value, float)
+    ]
+    return max(values, default=0.0) or float(np.abs(stress).max(initial=0.0)) or 1.0

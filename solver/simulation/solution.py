@@ -1,0 +1,164 @@
+"""What a simulation hands on: fields, contact state, balance and cost of one solve.
+
+Lengths, forces and stresses are in the case's own units. `n` counts the nodes of the cut mesh, `m`
+the macro-elements of a zone. Contact pressure is positive in compression, gaps are positive when
+open, stress is positive in tension.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import meshio
+
+    from solver.case.reader import Case
+
+
+def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
+    """The name of one solve of a case: direction and variant, where they are not the case's own."""
+    return "-".join([name, *(["swapped"] if swapped else []), *([hexahedra] if hexahedra else [])])
+
+
+class Line(NamedTuple):
+    """A line of the plan: what was left out or decided, and why; `skip` is its switch in `Skips`.
+
+    Empty where it has none.
+    """
+
+    what: str
+    why: str
+    skip: str = ""
+
+
+@dataclass
+class BodyInfo:
+    """One body as it was meshed, before any cut.
+
+    `cells` maps cell type to number of cells; `faces` counts its faces on contact surfaces; `role`
+    is slave, master, both or none.
+    """
+
+    name: str
+    cells: dict[str, int]
+    faces: int
+    role: str
+
+
+@dataclass
+class NodalContact:
+    """Contact by node, where the treatment of the interface has its multipliers there.
+
+    `nodes` (k,) into the mesh's points; `multiplier` (pressure ≥ 0), the average `gap` that it sees
+    and `closed` (bool), all (k,).
+    """
+
+    nodes: np.ndarray
+    multiplier: np.ndarray
+    gap: np.ndarray
+    closed: np.ndarray
+
+
+@dataclass
+class ZoneResult:
+    """The contact state of one zone, by macro-element, and the stress on both surfaces.
+
+    `faces`: the slave sub-faces by cell type: (type, connectivity (s, nodes) into the mesh's
+    points, macro-element number (s,)); `master_faces`: (type, connectivity). `centre` and `normal`
+    (m, dim), `area`, `multiplier` (pressure ≥ 0), `gap`, `closed` (bool) and `coverage`
+    (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
+    `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
+    belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
+    """
+
+    name: str
+    faces: list[tuple[str, np.ndarray, np.ndarray]]
+    master_faces: list[tuple[str, np.ndarray]]
+    centre: np.ndarray
+    normal: np.ndarray
+    area: np.ndarray
+    multiplier: np.ndarray
+    gap: np.ndarray
+    closed: np.ndarray
+    coverage: np.ndarray
+    stress_slave: np.ndarray
+    stress_master: np.ndarray
+    slave_nodes: np.ndarray
+    master_nodes: np.ndarray
+    nodal: NodalContact | None = None
+
+
+@dataclass
+class StepResult:
+    """One load step: load factor, cost of the status iteration, and what was observed.
+
+    `residual` is relative to the forces; `complementarity` is the largest size of p ḡ on a
+    macro-element, relative to the scale of stress times the model's length.
+
+    `observations` holds one mapping per observed macro-element, in the order of the case file:
+    zone, macro_element (number), pressure, gap, status (0 or 1), coverage.
+    """
+
+    factor: float
+    iterations: int
+    status_changes: int
+    residual: float
+    complementarity: float
+    observations: list[dict[str, Any]]
+
+
+@dataclass
+class Solution:
+    """One solve, complete: everything the result file, the checks and the report need.
+
+    `mesh` is the cut mesh (volume cells only; slave sub-faces are in the zones). `displacement` (n,
+    dim), `stress` (n, 6) in the order of `solver.mechanics.fem.stress` and averaged per body,
+    `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
+    `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
+    the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
+    largest stress. `accuracy` are the relative errors that rounding alone may cause, by cause (see
+    `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
+    form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
+    `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
+    `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
+    the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
+    `stage_cpu_seconds` are wall and processor time by stage, `peak_memory_mb` the process's largest
+    resident size.
+    """
+
+    case: Case
+    swapped: bool
+    hexahedra: str | None
+    mesh: meshio.Mesh
+    displacement: np.ndarray
+    stress: np.ndarray
+    body: np.ndarray
+    bodies: list[BodyInfo]
+    zones: list[ZoneResult]
+    nodal_normal_stress: np.ndarray
+    balance: dict[str, float]
+    steps: list[StepResult]
+    length: float
+    load_scale: float
+    dofs: int
+    macro_elements: int
+    iterations: int
+    linear_solver: str
+    plan: list[Line]
+    matrix_entries: int = 0
+    linear_iterations: int = 0
+    accuracy: dict[str, float] = field(default_factory=dict)
+    mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
+    cpu_seconds: float = float("nan")
+    peak_memory_mb: float = float("nan")
+
+    @property
+    def job(self) -> str:
+        """The name of this solve, as of its folder and its file of accepted values."""
+        return job_name(self.case.name, self.swapped, self.hexahedra)

@@ -1,0 +1,86 @@
+"""Groups of bodies that nothing moves are left out of a solve: their answer is zero.
+
+Bodies belong together where a multiplier moves free unknowns of both. Without load, displacement
+imposed and initial overlap, u = 0 and p = 0 fulfil equilibrium, p ≥ 0, ḡ ≥ 0 and p ḡ = 0, whatever
+the status of their contact; ḡ stays the initial gap. A body that supports or its rigidity hold all
+over, where it is, has neither strain nor a free unknown: its stiffness is not needed, whatever
+presses on it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+
+from solver.mechanics.fem.bodies import (
+    joined_bodies,
+    nodes_of_unknowns,
+    rigid_motions,
+    unheld_motion,
+)
+from solver.mechanics.fem.supports import FreeMotion
+from solver.simulation.scene import Scene
+
+
+def without_unloaded(scene: Scene) -> Scene:
+    """The scene without the cells and unknowns of such groups, and the cells of bodies held.
+
+    No group is left out where a body could move freely (a solve refuses it by name), and nothing
+    where there would be nothing to solve.
+    """
+    gaps, free = _gaps(scene), scene.free
+    acting = (gaps @ free.basis).tocsr()
+    bodies = scene.body[nodes_of_unknowns(free.basis, scene.points.shape[1])]
+    asleep, held = _unloaded(scene, gaps, acting, bodies)
+    if asleep.any() and _moves_freely(scene, gaps):
+        asleep[:] = False
+    kept = ~asleep[bodies]
+    if not (asleep | held).any() or not kept.any():
+        return scene
+    selection = None if free.selection is None else free.selection[kept]
+    out = (asleep | held)[scene.body]
+    blocks = (block.of(~out[block.cells[:, 0]]) for block in scene.blocks)
+    return replace(
+        scene,
+        asleep=asleep,
+        held=held,
+        resting=np.asarray(abs(acting) @ (~kept).astype(float)) > 0,
+        blocks=[block for block in blocks if len(block.cells)],
+        free=FreeMotion(free.basis[:, np.flatnonzero(kept)], free.offset, selection),
+    )
+
+
+def _unloaded(
+    scene: Scene, gaps: sparse.csr_matrix, acting: sparse.csr_matrix, bodies: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which bodies (b,) nothing moves: those with free unknowns, and those without.
+
+    `gaps` (k, n_dofs) on all unknowns, `acting` (k, n_free) on free ones, those of `bodies`.
+    """
+    n_bodies = len(scene.asleep)
+    group = joined_bodies(acting, bodies, n_bodies)
+    offset = scene.free.offset
+    awake, imposed = np.zeros((2, n_bodies), dtype=bool)
+    imposed[scene.body[(offset.reshape(scene.force.shape) != 0).any(axis=1)]] = True
+    awake[scene.body[(scene.force != 0).any(axis=1)]] = True
+    awake |= imposed
+    initial = np.concatenate([np.empty(0), *(zone.operator.initial for zone in scene.zones)])
+    pushed = np.flatnonzero((initial < 0) | (gaps @ offset != 0))
+    awake[bodies[acting[pushed].indices]] = True
+    of_group = np.zeros(n_bodies, dtype=bool)
+    of_group[group[awake]] = True
+    with_unknowns = np.isin(np.arange(n_bodies), bodies)
+    return with_unknowns & ~of_group[group], ~with_unknowns & ~imposed
+
+
+def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:
+    covered = np.concatenate([zone.operator.covered for zone in scene.zones] or [np.empty(0)])
+    there = covered > 0
+    per_area = sparse.diags(1 / covered[there]) @ gaps[there]
+    motions = rigid_motions(scene.points, scene.body)
+    return unheld_motion(motions, scene.free.basis, per_area, len(scene.asleep)) is not None
+
+
+def _gaps(scene: Scene) -> sparse.csr_matrix:
+    empty = sparse.csr_matrix((0, scene.n_dofs))
+    return sparse.vstack([empty, *(zone.operator.matrix for zone in scene.zones)]).tocsr()

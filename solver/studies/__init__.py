@@ -1,0 +1,1 @@
+"""Studies that measure the program, each with its description, measurement and page."""

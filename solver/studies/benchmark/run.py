@@ -1,0 +1,187 @@
+"""Runs the benchmark: each way in a process of its own, one after the other, nothing beside it."""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from solver.studies.benchmark import calculix
+from solver.studies.benchmark.description import Batch, Benchmark, Comparison, Way
+from solver.studies.scaling.description import Point
+from solver.studies.scaling.point import SOLVED, measure_point
+from solver.system.clock import now
+from solver.system.errors import SolveError
+from solver.system.process import cores_for, run_apart
+
+Record = dict[str, Any]
+Log = Callable[[str], Any]
+
+_OFTEN = 5
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Where processes run: pinned to `cores`, for `limit` seconds at most, files in `folder`."""
+
+    folder: Path
+    cores: Sequence[int]
+    limit: float
+
+    def work(self, kind: str, **job: Any) -> Record:
+        """What a worker found; outcome and reason where it died."""
+        output = self.folder / "found.json"
+        output.unlink(missing_ok=True)
+        job |= {"kind": kind, "output": str(output), "started": now()}
+        command = [sys.executable, "-m", "solver.studies.benchmark.worker", json.dumps(job)]
+        done = run_apart(command, self.cores, self.limit)
+        if done.status == 0:
+            return json.loads(output.read_text(encoding="utf-8"))
+        return {"outcome": "crashed", "reason": done.reason}
+
+    def often(self, *arguments: object) -> Record:
+        """What a short command took: of a few times the one in the middle, by processor time."""
+        times = [self.command(*arguments) for _ in range(_OFTEN)]
+        return sorted(times, key=lambda took: took["cpu"])[_OFTEN // 2]
+
+    def command(self, *arguments: object) -> Record:
+        """What a command of the program took."""
+        command = [sys.executable, "-m", "solver", *map(str, arguments)]
+        done = run_apart(command, self.cores, self.limit)
+        return done.used | {"status": done.status}
+
+    def mesh(self, case: Path, name: str) -> Path:
+        """The mesh file of a case. Raises SolveError where it cannot be made."""
+        mesh = self.folder / f"{name}.vtkhdf"
+        if self.command("mesh", case, "-o", mesh)["status"] != 0:
+            raise SolveError(f"{case}: no mesh")
+        return mesh
+
+
+@contextmanager
+def bench(benchmark: Benchmark) -> Iterator[Bench]:
+    """A place to run processes in, removed in the end."""
+    with TemporaryDirectory(prefix="benchmark-") as folder:
+        yield Bench(Path(folder), cores_for(benchmark.threads), benchmark.limit)
+
+
+def run_benchmark(benchmark: Benchmark, log: Log) -> Record:
+    """Run all of it, logging what is about to be measured; the record (see `words`).
+
+    Raises SolveError where a mesh cannot be made.
+    """
+    from solver.system.provenance import gather
+
+    started, load = now(), os.getloadavg()[0]
+    with bench(benchmark) as place:
+        record: Record = {
+            "title": benchmark.title,
+            "threads": len(place.cores),
+            "cores": list(place.cores),
+            "load": round(load, 2),
+            "machine": gather(benchmark.path, None),
+            "calculix": calculix.version(),
+            "comparisons": [],
+        }
+        for comparison in benchmark.comparisons:
+            log(f"measuring: {comparison.title}")
+            record["comparisons"].append(_compare(place, comparison))
+        log(f"measuring: {benchmark.batch.title}")
+        record["batch"] = _batch(place, benchmark.batch)
+        log("measuring: start of the program")
+        record["start"] = _start(place, benchmark.batch.cases[0])
+        log("measuring: growth")
+        record["growth"] = _growth(place, benchmark)
+    return record | {"whole": now() - started}
+
+
+def _compare(place: Bench, comparison: Comparison) -> Record:
+    """All ways to solve one mesh."""
+    case = place.folder / "case.yaml"
+    case.write_text(comparison.point.source(), encoding="utf-8")
+    mesh = place.mesh(case, "mesh")
+    ways = [
+        {"way": way.title} | _solve(place, comparison, way, case, mesh) for way in comparison.ways
+    ]
+    return {
+        "title": comparison.title,
+        "series": comparison.point.series.title,
+        "size": comparison.point.size,
+        "divisions": list(comparison.point.divisions),
+        "repetitions": comparison.repetitions,
+        "ways": ways,
+    }
+
+
+def _solve(place: Bench, comparison: Comparison, way: Way, case: Path, mesh: Path) -> Record:
+    if way.program:
+        return _other(place, comparison.point, mesh)
+    return place.work(
+        "solve",
+        case=str(case),
+        mesh=str(mesh),
+        repetitions=comparison.repetitions,
+        solver=way.solver,
+        free=way.free,
+        treatment=way.treatment,
+        cures=way.cures,
+        everything=way.everything,
+    )
+
+
+def _other(place: Bench, point: Point, mesh: Path) -> Record:
+    """The same problem on the same mesh by CalculiX, where it is installed."""
+    from solver.mesh import read_mesh
+
+    if not calculix.version():
+        return {"outcome": "missing", "reason": f"{calculix.PROGRAM} is not installed"}
+    case = point.parsed(place.folder / "case.yaml")
+    [pressure] = [load.value for load in case.loads if isinstance(load.value, float)]
+    try:
+        found = calculix.solve(case, read_mesh(mesh), place.folder, place.cores, place.limit)
+    except SolveError as error:
+        return {"outcome": "failed", "reason": str(error)}
+    return {
+        "outcome": SOLVED,
+        "reason": "",
+        "process": found.process.used,
+        "times": {},
+        "linear_solver": "its own",
+        "pressure_max": float(abs(found.pressure / pressure - 1).max()),
+        "resolved": calculix.resolution(pressure),
+    }
+
+
+def _batch(place: Bench, batch: Batch) -> Record:
+    """Cases in a process each, then in one process twice."""
+    jobs = []
+    for number, case in enumerate(batch.cases):
+        jobs.append((str(case), str(place.mesh(case, f"batch-{number}"))))
+    each = [
+        {"case": case} | place.command("solve", case, "--mesh", mesh, "-o", f"{mesh}.r.vtkhdf")
+        for case, mesh in jobs
+    ]
+    together = place.work("batch", cases=jobs, folder=str(place.folder))
+    return {"title": batch.title, "most": batch.most, "each": each, "together": together}
+
+
+def _start(place: Bench, case: Path) -> Record:
+    """The program's own start, and a case so small that it is most of its time."""
+    mesh = place.mesh(case, "start")
+    plane = place.often("solve", case, "--mesh", mesh, "-o", f"{mesh}.r.vtkhdf")
+    return {"help": place.often("--help"), "plane": {"case": str(case)} | plane}
+
+
+def _growth(place: Bench, benchmark: Benchmark) -> list[Record]:
+    """The points of each series, as the scaling family measures them."""
+    found = []
+    for series in benchmark.growth:
+        for size in series.sizes:
+            record = place.folder / "point.json"
+            measure_point(benchmark.scaling, Point(series, size), record)
+            found.append(json.loads(record.read_text(encoding="utf-8")))
+    return found

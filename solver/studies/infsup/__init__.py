@@ -1,0 +1,1 @@
+"""The inf-sup test of the contact pressure."""

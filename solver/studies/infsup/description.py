@@ -1,0 +1,197 @@
+"""Ladders of the numerical inf-sup test: β_h on finer and finer meshes, for the record.
+
+    levels: {plane: [4, 8, 16, 32], space: [2, 4, 6, 8]}  # slave divisions of the interface's edge
+    quick: {plane: [8, 16], space: [4, 8]}                # those of the quick version, which takes
+                                                          # the last `coarser`, clamped
+    coarser: {plane: [1, 4], space: [1, 2]}               # slave over master divisions
+    cells:
+      - {cells: QUAD4}
+      - {cells: HEXA8, hexahedra: hexahedra}              # how they are cut, where that is chosen
+      - {cells: PENTA6, contact: QUAD4}                   # the faces on the interface, likewise
+      - {cells: QUAD9, cut: false}                        # of those that need no cut
+      - {cells: HEXA20, levels: [2, 4, 6, 8]}             # its own, but for the quick version
+
+Two unit blocks of the same cells lie on each other, the lower one slave. `clamped`, the sides
+opposite to the interface are held all over; `floating`, the upper block is free to move up and
+down. Each ladder is run with the cut and, where there is one, without.
+"""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+
+from solver.case.reader import parse_case
+from solver.case.schemas import INFSUP_SCHEMA
+from solver.case.yaml import read_mapping
+from solver.mesh import generate
+from solver.mesh.catalogue import BY_NAME
+from solver.simulation.scene import build_scene
+from solver.studies.infsup.constant import inf_sup_constant
+from solver.system.clock import Clock
+from solver.system.errors import InputError, SolveError
+
+LEVEL = 0.4
+"""β_h falls with the size of the faces to this power at most, where it is said to level off."""
+ZERO = 1e-6
+"""β_h below is zero but for round-off."""
+Log = Callable[[str], Any]
+
+
+@dataclass
+class Ladder:
+    """One family of meshes; the lists hold a value a level, coarsest first.
+
+    `coarser`: slave divisions over master divisions. `cut`: with the cut, or as meshed where the
+    cells need none; `contact` and `hexahedra` are empty where there is no choice.
+    """
+
+    cells: str
+    cut: bool
+    clamped: bool
+    coarser: int
+    contact: str = ""
+    hexahedra: str = ""
+    needs_cut: bool = True
+    levels: list[int] = field(default_factory=list)
+    constants: list[float] = field(default_factory=list)
+    macro_elements: list[int] = field(default_factory=list)
+    unknowns: list[int] = field(default_factory=list)
+    reason: str = ""
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        face = f" on {self.contact}" if self.contact else ""
+        cut = f", {self.hexahedra}" if self.hexahedra and self.cut else ""
+        cut = cut if self.cut else ", uncut"
+        held = "clamped" if self.clamped else "floating"
+        return f"{self.cells}{face}{cut}, {held}, master {self.coarser} times as coarse"
+
+    @property
+    def kind(self) -> tuple[str, bool]:
+        """Its cells, and whether this is the method (with the cut, where they need one)."""
+        return self.cells, self.cut
+
+    @property
+    def way(self) -> str:
+        """How the cells are cut, in a word."""
+        if not self.cut:
+            return "uncut"
+        return self.hexahedra or ("yes" if self.needs_cut else "needs none")
+
+    @property
+    def verdict(self) -> str:
+        """What the levels tell, in words."""
+        if self.reason:
+            return self.reason
+        if self.constants[-1] < ZERO:
+            return "zero"
+        return "levels off" if self.levels_off else "falls"
+
+    @property
+    def dim(self) -> int:
+        """Of the mesh."""
+        return BY_NAME[self.cells].dim
+
+    @property
+    def order(self) -> float:
+        """The power of the face size with which β_h falls over the last two levels.
+
+        Not a number where it is zero: some multiplier acts on no displacement at all.
+        """
+        if len(self.constants) < 2 or min(self.constants[-2:]) < ZERO:
+            return np.nan
+        before, last = self.constants[-2:]
+        return float(np.log(before / last) / np.log(self.levels[-1] / self.levels[-2]))
+
+    @property
+    def levels_off(self) -> bool:
+        """Whether β_h stays above zero, as far as these levels tell."""
+        return not self.reason and bool(self.order <= LEVEL)
+
+
+def read_ladders(path: Path, quick: bool = False) -> list[Ladder]:
+    """The ladders that a file asks for, none of them run; InputError says what is refused."""
+    content = read_mapping(path, INFSUP_SCHEMA)
+    return list(_ladders(content, quick))
+
+
+def _ladders(content: dict[str, Any], quick: bool) -> Iterator[Ladder]:
+    uncut: set[tuple[str, str]] = set()
+    for item in content["cells"]:
+        space = "plane" if BY_NAME[item["cells"]].dim == 2 else "space"
+        levels = content["quick" if quick else "levels"][space]
+        levels = levels if quick else item.get("levels", levels)
+        chosen = {key: item[key] for key in ("cells", "contact", "hexahedra") if key in item}
+        ways = [True]
+        kind = (item["cells"], item.get("contact", ""))
+        if item.get("cut", True) and kind not in uncut:
+            uncut.add(kind)
+            ways.append(False)
+        masters = content["coarser"][space]
+        for coarser in masters[-1:] if quick else masters:
+            for clamped in (True,) if quick else (True, False):
+                for cut in ways:
+                    ladder = Ladder(**chosen, cut=cut, clamped=clamped, coarser=coarser)
+                    ladder.needs_cut = item.get("cut", True)
+                    ladder.levels = list(levels)
+                    yield ladder
+
+
+def run(ladder: Ladder, log: Log) -> Ladder:
+    """Fill in every level; where one fails, its reason is kept and the rest left out."""
+    for n in ladder.levels:
+        try:
+            _add_level(ladder, n)
+        except (InputError, SolveError) as error:
+            ladder.reason = str(error)
+            break
+    shown = " ".join(f"{constant:.3f}" for constant in ladder.constants)
+    log(f"{ladder.name}: {shown or ladder.reason}")
+    return ladder
+
+
+def _add_level(ladder: Ladder, n: int) -> None:
+    mesh = _mesh(ladder.cells, ladder.contact, n, max(1, n // ladder.coarser))
+    case = parse_case(json.dumps(_case(ladder)), Path("infsup.yaml"))
+    scene = build_scene(case, mesh, False, None, Clock())
+    ladder.constants.append(inf_sup_constant(scene))
+    ladder.macro_elements.append(sum(zone.count for zone in scene.zones))
+    ladder.unknowns.append(scene.n_dofs)
+
+
+@lru_cache(maxsize=4)
+def _mesh(cells: str, contact: str, slave: int, master: int) -> meshio.Mesh:
+    dim = BY_NAME[cells].dim
+    recipe: dict[str, Any] = {"recipe": "blocks", "size": 1.0}
+    for name, n in (("bottom", slave), ("top", master)):
+        recipe[name] = {"cells": cells, "divisions": [n] * dim}
+        if contact:
+            recipe[name]["contact"] = contact
+    return generate(recipe, "inf-sup test")
+
+
+def _case(ladder: Ladder) -> dict[str, Any]:
+    axes = "xyz"[: ladder.dim]
+    sides: dict[str, list[str]] = {f"sym{axis}": [axis] for axis in axes[:-1]}
+    outer: dict[str, list[str]] = {"base": [axes[-1]]}
+    if ladder.clamped:
+        outer = {"base": list(axes), "press": list(axes)}
+    zone = {"name": "interface", "slave": "bottom_contact", "master": "top_contact"}
+    zone["treatment"] = "lac" if ladder.cut else "uncut"
+    if ladder.hexahedra:
+        zone["hexahedra"] = ladder.hexahedra
+    return {
+        "name": "infsup",
+        "mesh": {"recipe": "blocks"},
+        **({"plane": "strain"} if ladder.dim == 2 else {}),
+        "materials": {"all": {"young": 1.0, "poisson": 0.3}},
+        "supports": [{"group": g, "fix": fix} for g, fix in (sides | outer).items()],
+        "contact": [zone],
+    }

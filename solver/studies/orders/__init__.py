@@ -1,0 +1,1 @@
+"""Orders of convergence on ladders of meshes."""

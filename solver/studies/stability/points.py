@@ -1,0 +1,188 @@
+"""The points of a sweep: each solved with all cures and with none, measured, and put on record.
+
+A point that is refused, or whose solve fails, is on record with its reason. Errors are relative to
+the pressure, or, for the gap, to the size of the model. A point holds when its pressure and stress
+are within 1e-10, or twenty times their floor where that is more. Beyond the end of a sweep it holds
+as well when it is refused or fails with a reason, or when its own estimate of its accuracy bounds
+its errors: there it must only know what it does not know.
+"""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+from scipy import sparse
+
+from solver.case.reader import Case
+from solver.mechanics.linear.condensation import Condensed
+from solver.mesh import generate, transform
+from solver.simulation.cures import ALL, Cures
+from solver.simulation.problem import ContactProblem
+from solver.simulation.scene import build_scene
+from solver.simulation.simulate import solve_problem
+from solver.studies.stability.floor import floor, stress_error
+from solver.studies.stability.states import State, exact_state
+from solver.studies.stability.sweeps import Series, Sweep, Value
+from solver.system.clock import Clock
+from solver.system.errors import InputError, SolveError
+from solver.system.files import write_text
+from solver.verification.verdict import FAILED, PASSED, REFUSED, UNRELIABLE, of_solution, to_json
+
+GOAL, FLOORS = 1e-10, 20.0
+"""What a point has to reach: the first, or so many times its floor."""
+SMALL = 1500
+"""Unknowns up to which all eigenvalues of the system are found."""
+Log = Callable[[str], Any]
+
+
+class _Meshes:
+    """Meshes of recipes as generated, each made once."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, meshio.Mesh] = {}
+
+    def raw(self, case: Case) -> meshio.Mesh:
+        key = json.dumps(case.mesh, sort_keys=True, default=str)
+        if key not in self._made:
+            self._made[key] = generate(case.mesh, str(case.path))
+        return self._made[key]
+
+
+@dataclass(frozen=True)
+class _Point:
+    sweep: Sweep
+    series: Series
+    value: Value
+    label: str
+
+
+def run_sweep(sweep: Sweep, output: Path, log: Log) -> dict[str, Any]:
+    """Solve all points of a sweep in this process and write the record, whole or not at all."""
+    started, meshes = time.process_time(), _Meshes()
+    points = [_record(point, meshes) for point in _points(sweep)]
+    record = {
+        "sweep": sweep.name,
+        "title": sweep.title,
+        "breaks": sweep.breaks,
+        "order": sweep.order,
+        "values": list(sweep.labels),
+        "points": points,
+        "cpu_seconds": time.process_time() - started,
+    }
+    write_text(output, to_json(record) + "\n")
+    held = sum(point["holds"] for point in points)
+    log(f"{sweep.name}: {held} of {len(points)} points hold, {record['cpu_seconds']:.1f} s")
+    return record
+
+
+def _points(sweep: Sweep) -> Iterator[_Point]:
+    for series in sweep.series:
+        for value, label in zip(sweep.values, sweep.labels, strict=True):
+            yield _Point(sweep, series, value, label)
+
+
+def _record(point: _Point, meshes: _Meshes) -> dict[str, Any]:
+    """One point: identity, floor, measures with all cures and with none, whether it holds."""
+    cured = _attempt(point, meshes, ALL)
+    beyond = point.value in point.sweep.beyond
+    return {
+        "series": point.series.name,
+        "label": point.label,
+        "value": point.value,
+        "beyond": beyond,
+        "holds": _within(cured) or (beyond and _known_to_itself(cured)),
+        **cured,
+        "uncured": _attempt(point, meshes, Cures.none()),
+    }
+
+
+def _within(measured: dict[str, Any]) -> bool:
+    return measured["word"] in (PASSED, UNRELIABLE) and all(
+        measured[name] <= max(GOAL, FLOORS * measured[f"floor_{name}"])
+        for name in ("pressure", "stress")
+    )
+
+
+def _known_to_itself(measured: dict[str, Any]) -> bool:
+    if measured["word"] in (REFUSED, FAILED):
+        return True
+    return max(measured["pressure"], measured["stress"]) <= measured["attainable"]
+
+
+def _attempt(point: _Point, meshes: _Meshes, cures: Cures) -> dict[str, Any]:
+    """What came of the point: measures, or the reason why there are none."""
+    try:
+        return _measured(point, meshes, cures)
+    except InputError as error:
+        return {"word": REFUSED, "reason": f"{error.key}: {error.allowed}"}
+    except SolveError as error:
+        return {"word": FAILED, "reason": str(error)}
+
+
+def _measured(point: _Point, meshes: _Meshes, cures: Cures) -> dict[str, Any]:
+    case = point.sweep.case(point.series.mesh, point.value)
+    raw = meshes.raw(case)
+    mesh = transform(raw, case.transform, str(case.path)) if case.transform else raw
+    state = exact_state(case, point.sweep.state, raw)
+    clock = Clock()
+    scene = build_scene(case, mesh, point.series.swapped, None, clock, cures)
+    problem = ContactProblem(scene)
+    solution = solve_problem(problem, clock, point.series.swapped)
+    zones = solution.zones
+    balance = solution.balance
+    verdict = of_solution(solution, [])
+    measures: dict[str, Any] = {
+        "word": verdict["verdict"],
+        "reason": verdict["reason"],
+        "pressure": max(np.abs(z.multiplier / state.pressure - 1).max() for z in zones),
+        "stress": stress_error(solution.stress, scene, state),
+        "gap": max(np.abs(z.gap).max() for z in zones) / scene.length,
+        "force": max(v for k, v in balance.items() if k.endswith("force")),
+        "moment": max(v for k, v in balance.items() if k.endswith("moment")),
+        "residual": solution.steps[-1].residual,
+        "iterations": solution.iterations,
+        "unknowns": solution.dofs,
+        "attainable": verdict["attainable"],
+    }
+    if cures == ALL:
+        measures |= _known(problem, raw, mesh, state)
+    return measures
+
+
+def _known(
+    problem: ContactProblem, raw: meshio.Mesh, mesh: meshio.Mesh, state: State
+) -> dict[str, Any]:
+    """What the exact answer says of the point, and what the system solved is like."""
+    pressure, stress = floor(problem, raw, mesh, state)
+    known: dict[str, Any] = {"floor_pressure": pressure, "floor_stress": stress}
+    system = problem.system
+    if isinstance(system, Condensed) and problem.scene.points.shape[1] == 2:
+        known |= _spectrum(system, problem.matrix)
+    return known
+
+
+def _spectrum(system: Condensed, stiffness: sparse.csr_matrix) -> dict[str, Any]:
+    """Condition number and inertia of the condensed system, scaled to a diagonal of one.
+
+    By all its eigenvalues where it is small, in full precision; else the inertia alone, which is
+    known from the factor: Cholesky's succeeds only where all eigenvalues are positive.
+    """
+    expansion = system.expansion
+    matrix = (expansion.T @ stiffness @ expansion).tocsr()
+    size = matrix.shape[0]
+    if size > SMALL:
+        return {"condition": None, "inertia": [size, 0, 0], "inertia_by": "factor"}
+    scale = sparse.diags(1 / np.sqrt(matrix.diagonal()))
+    values = np.linalg.eigvalsh((scale @ matrix @ scale).toarray())
+    least = size * np.finfo(float).eps * np.abs(values).max()
+    inertia = [int((values > least).sum()), int((values < -least).sum())]
+    return {
+        "condition": float(np.abs(values).max() / np.abs(values).min()),
+        "inertia": [*inertia, size - sum(inertia)],
+        "inertia_by": "eigenvalues",
+    }

@@ -1,0 +1,192 @@
+"""The figure of a panel: log–log error against time, a plot for each pair, a line per treatment."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from markupsafe import Markup
+
+from solver.report.axes import (
+    EPSILON,
+    FLOOR,
+    Scale,
+    draw_axes,
+    draw_floor,
+    draw_level,
+    round_off,
+)
+from solver.report.marks import MARKS, draw_marks
+from solver.report.svg import INK, MUTED, RED, Drawing, Style
+from solver.studies.work_precision.records import ERRORS, Line, Measured, Panel, shown
+
+PLOT, HEIGHT, LEFT, RIGHT, APART = 268, 340, 58, 112, 14
+# A row of the legend, about the width of a letter in it, the height of a label.
+_ROW, _LETTER, _LABEL = 18, 5.5, 13
+# The strip under a plot that does not reach down to round-off.
+_STRIP = 16
+_BOTTOM = HEIGHT - 48
+_NEAR = 1e-11
+LIMIT = 1e-3
+# Okabe and Ito's colours; yellow is left out, which paper does not show.
+_COLORS = ("#0072b2", "#d55e00", "#cc79a7", "#000000", "#009e73", "#e69f00", "#56b4e9")
+_DASHES: tuple[tuple[float, ...], ...] = ((), (6, 3), (1.5, 3), (7, 2, 1.5, 2))
+
+
+class Looks:
+    """Colour, mark and dashes of every line: one colour a kind of treatment, one mark a line."""
+
+    def __init__(self, lines: Sequence[Line]):
+        self._looks: dict[str, tuple[str, str, int]] = {}
+        kinds: dict[str, int] = {}
+        for line in lines:
+            if line.title not in self._looks:
+                kind = self._kind(line)
+                variant = kinds[kind] = kinds.get(kind, -1) + 1
+                color = _COLORS[list(kinds).index(kind) % len(_COLORS)]
+                mark = MARKS[len(self._looks) % len(MARKS)]
+                self._looks[line.title] = color, mark, variant
+
+    @staticmethod
+    def _kind(line: Line) -> str:
+        """What lines of one colour have in common."""
+        return f"{line.treatment.zone.get('treatment')} {line.linear_solver}"
+
+    def line(self, title: str) -> dict[str, Style]:
+        """The style of a treatment's line."""
+        color, _, variant = self._looks[title]
+        dashes = _DASHES[variant % len(_DASHES)]
+        style: dict[str, Style] = {"stroke": color, "stroke_width": 1.7}
+        return style | {"stroke_dasharray": dashes} if dashes else style
+
+    def draw_marks(self, drawing: Drawing, title: str, at: np.ndarray, size: float = 3.5) -> None:
+        """Draw the marks of a treatment."""
+        color, mark, variant = self._looks[title]
+        draw_marks(drawing, mark, at, color, filled=not variant, size=size)
+
+    def draw_key(self, drawing: Drawing, title: str, x: float, y: float) -> None:
+        """Draw a piece of a treatment's line with its mark, 38 pixels long, and its name."""
+        drawing.line(x, y, x + 38, y, **self.line(title))
+        self.draw_marks(drawing, title, np.array([[x + 19.0, y]]))
+        drawing.text(x + 44, y + 4, title, color=INK)
+
+
+def draw_figure(panel: Panel, looks: Looks) -> Markup:
+    """All pairs of a panel side by side, with the same scales."""
+    pairs = panel.pairs
+    width = LEFT + len(pairs) * (PLOT + APART) - APART + RIGHT
+    name = ERRORS[panel.error]
+    legend = _legend(panel, width)
+    drawing = Drawing(
+        width,
+        HEIGHT + _ROW * (1 + legend[-1][2]),
+        f"{panel.problem.title}: error of {name}, against run time",
+    )
+    drawing.text(LEFT, HEIGHT + 10, panel.problem.title, weight="bold")
+    for title, at, row in legend:
+        looks.draw_key(drawing, title, at, HEIGHT + 6 + _ROW * row)
+    points = [m for line in panel.lines for m in line.having(panel.error)]
+    times = np.array([[m.time.low, m.time.high] for m in points])
+    errors = np.array([shown(m.error(panel.error) or 0) for m in points])
+    values = np.append(errors, panel.uncertainty or errors[0])
+    unknowns = max(m.record["dofs"] for m in points)
+    low, high = times.min() / 1.3, times.max() * 1.3
+    for number, pair in enumerate(pairs):
+        start = LEFT + number * (PLOT + APART)
+        x = Scale(low, high, start, start + PLOT, log=True)
+        last = number == len(pairs) - 1
+        y = _heights(drawing, x, values, unknowns, last)
+        label = f"relative error: {name}" if number == 0 else ""
+        draw_axes(drawing, x, y, "time of a warm solve, s", label, number == 0, _BOTTOM)
+        draw_level(drawing, x, y, LIMIT, "0.1 %" if last else "", RED)
+        if panel.uncertainty:
+            label = "reference ±" if last else ""
+            # Its label keeps off that of the limit.
+            below = float(y(panel.uncertainty) - y(LIMIT))
+            lowered = math.copysign(max(0.0, _LABEL - abs(below)), below)
+            draw_level(drawing, x, y, panel.uncertainty, label, MUTED, (6, 4), lowered)
+        drawing.text(start + PLOT, 14, pair, "end", color=INK, weight="bold")
+        for line in panel.lines:
+            if line.pair == pair:
+                _draw_line(drawing, x, y, line, panel.error, looks)
+    return drawing.svg()
+
+
+def _legend(panel: Panel, width: float) -> list[tuple[str, float, int]]:
+    """The treatments' places under the plots, behind the problem's name: title, x, row."""
+    at, row, places = LEFT + 24 + 1.2 * _LETTER * len(panel.problem.title), 0, []
+    for title in panel.titles:
+        length = 60 + _LETTER * len(title)
+        if at + length > width:
+            at, row = float(LEFT), row + 1
+        places.append((title, at, row))
+        at += length
+    return places
+
+
+def _heights(
+    drawing: Drawing, x: Scale, errors: np.ndarray, unknowns: int, labelled: bool
+) -> Scale:
+    """The scale of errors, the round-off floor drawn.
+
+    Where no error comes near round-off, the axis is broken above the floor: the plot would be empty
+    for the most part.
+    """
+    top, bottom = max(1.0, 2 * errors.max()), _BOTTOM
+    if errors.min() < _NEAR:
+        y = Scale(EPSILON / 8, top, bottom, 42, log=True)
+        draw_floor(drawing, x, y, unknowns, labelled)
+        return y
+    drawing.rectangle(x.start, bottom - _STRIP + 6, x.end - x.start, _STRIP - 6, fill=FLOOR)
+    for at in (x.start - 4, x.end - 4):
+        slashes = np.array([[[0, 3], [8, -1]], [[0, 7], [8, 3]]]) + np.array([at, bottom - _STRIP])
+        drawing.polygons(slashes, closed=False, stroke=MUTED, stroke_width=1)
+    if labelled:
+        floor = f"ε√N = {round_off(unknowns)[1]:.0e}"
+        drawing.text(x.end + 8, bottom - 1, floor, color=MUTED)
+    low = min(LIMIT, errors.min()) / 2
+    return Scale(low, top, bottom - _STRIP, 42, log=True)
+
+
+def _draw_line(drawing: Drawing, x: Scale, y: Scale, line: Line, error: str, looks: Looks) -> None:
+    """A line through its levels; across each mark the range of times, larger marks on finer ones.
+
+    The line is broken where a level between has no solve.
+    """
+    style = looks.line(line.title)
+    for run in _unbroken(line, error):
+        times = np.array([[m.time.low, m.time.median, m.time.high] for m in run])
+        heights = y([shown(m.error(error) or 0) for m in run])
+        at = np.column_stack([x(times[:, 1]), heights])
+        drawing.polygons(at[None], closed=False, **style)
+        ends = np.stack([x(times[:, [0, 2]]), np.repeat(heights[:, None], 2, axis=1)], axis=2)
+        drawing.polygons(ends, closed=False, stroke=style["stroke"], stroke_width=1)
+        for m, place in zip(run, at, strict=True):
+            rank = line.levels.index(m)
+            drawing.open_link("#", _tip(line, m, error))
+            looks.draw_marks(drawing, line.title, place[None], 2.3 + 0.6 * rank)
+            drawing.close_link()
+
+
+def _tip(line: Line, m: Measured, error: str) -> str:
+    return (
+        f"{line.title}, {m.label}: error {m.error(error):.2g}, {m.time.median:.3g} s "
+        f"({m.time.low:.3g} … {m.time.high:.3g} s), {m.record['dofs']} unknowns"
+    )
+
+
+def _unbroken(line: Line, error: str) -> list[list[Measured]]:
+    """Runs of neighbouring levels that have this error."""
+    having = line.having(error)
+    runs: list[list[Measured]] = [[]]
+    for m in line.levels:
+        if m in having:
+            runs[-1].append(m)
+        elif runs[-1]:
+            runs.append([])
+    return [run for run in runs if run]
+
+
+def draw_note(panel: Panel) -> str:
+    """How the marks tell the levels, in words."""
+    levels = ", ".join(map(str, panel.problem.levels))
+    return f"Marks grow with the level: {levels} times the divisions of the coarsest mesh."

@@ -1,0 +1,1 @@
+"""The machine: errors, files, HDF5, time, memory, processes, provenance."""

@@ -1,0 +1,116 @@
+"""A command as a process of its own: pinned to cores, stopped at a limit, and what it took."""
+
+import os
+import resource
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event, Timer
+
+from solver.commands.options import THREADS
+from solver.system.clock import now, processor_time
+from solver.system.memory import peak_mb
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a process ended: exit status (negative: by that signal), None where it was stopped.
+
+    That is after `limit` seconds. `output` is what it printed; wall and processor seconds of it and
+    its children, and the largest resident memory of any of them, MB.
+    """
+
+    status: int | None
+    output: str
+    wall: float
+    cpu: float
+    peak_memory_mb: float
+    limit: float
+
+    @property
+    def used(self) -> dict[str, float]:
+        """What it took, as `used_since` tells it."""
+        return {"wall": self.wall, "cpu": self.cpu, "peak_memory_mb": self.peak_memory_mb}
+
+    @property
+    def reason(self) -> str:
+        """How it died and its last words, or that it was stopped; not for one that ended well."""
+        if self.status is None:
+            return f"no end within {self.limit:g} s"
+        lines = [line for line in self.output.splitlines() if line.strip()]
+        last = lines[-1].strip() if lines else "no word"
+        return f"the process died with exit status {self.status}: {last}"
+
+
+def used_since(started: float) -> dict[str, float]:
+    """What this process took: wall seconds since `started`, processor seconds, peak memory, MB."""
+    return {
+        "wall": now() - started,
+        "cpu": processor_time(),
+        "peak_memory_mb": peak_mb(resource.getrusage(resource.RUSAGE_SELF)),
+    }
+
+
+def cores_for(threads: int) -> list[int]:
+    """The cores that a process of so many threads is pinned to: fewer where there are not as many.
+
+    The last ones: what else the machine does begins with the first.
+    """
+    return sorted(os.sched_getaffinity(0))[-threads:]
+
+
+def run_apart(
+    command: Sequence[str],
+    cores: Sequence[int],
+    limit: float,
+    memory: float = float("inf"),
+    environment: Mapping[str, str] | None = None,
+    folder: Path | None = None,
+) -> Ended:
+    """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
+
+    `memory` (bytes) is the most that it may ask for, `folder` where it runs if not here. It reads
+    nothing; what it prints is kept.
+    """
+
+    def prepare() -> None:
+        os.sched_setaffinity(0, cores)
+        if memory < float("inf"):
+            resource.setrlimit(resource.RLIMIT_DATA, (int(memory), int(memory)))
+
+    threads = dict.fromkeys(THREADS, str(len(cores)))
+    with tempfile.TemporaryFile() as output:
+        started = now()
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env={**os.environ, **threads, **(environment or {})},
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            preexec_fn=prepare,  # noqa: PLW1509 -- it calls the system alone
+        )
+        over = Event()
+
+        def stop() -> None:
+            over.set()
+            process.kill()
+
+        timer = Timer(limit, stop)
+        timer.start()
+        try:
+            _, status, used = os.wait4(process.pid, 0)
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            timer.cancel()
+        wall = now() - started
+        process.returncode = os.waitstatus_to_exitcode(status)
+        output.seek(0)
+        text = output.read().decode(errors="replace")
+    cpu = used.ru_utime + used.ru_stime
+    ending = None if over.is_set() else process.returncode
+    return Ended(ending, text, wall, cpu, peak_mb(used), limit)

@@ -1,0 +1,262 @@
+"""The checks of a solve against its reference: one table, one small function per quantity.
+
+A check compares values with the reference at the places where they live: macro-element centres,
+nodes, or load steps. `error` is the largest deviation over the check's scale: the largest magnitude
+of the reference, or, where the reference is zero everywhere, the quantity's own measure (load for
+stresses, load / stiffness × size for displacements). A gap is always measured against the block
+size, status, coverage and balance against one. A value that is not a number fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.case.reader import Exact
+from solver.case.solutions import ERRORS
+from solver.simulation.exact import ExactValues
+from solver.simulation.solution import Solution, ZoneResult
+from solver.verification import samples
+
+RELATIVE = 1e-3
+GAP = 2e-5
+ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """The last accepted extremes of a check, kept apart from its reference."""
+
+    minimum: float
+    maximum: float
+
+
+@dataclass(frozen=True)
+class Regression:
+    """How far a check's extremes lie from the accepted ones, over the check's scale."""
+
+    minimum: float
+    maximum: float
+    change: float
+    tolerance: float
+    passed: bool
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """One check of one zone (None: of the whole solve).
+
+    `value` and `reference` are those of the place `where` the deviation is largest; `regression` is
+    None while no value has been accepted. `passed` asks that the error be within the tolerance and
+    that no accepted value has changed.
+    """
+
+    name: str
+    alias: str | None
+    zone: str | None
+    norm: str
+    minimum: float
+    maximum: float
+    value: float
+    reference: float
+    where: str
+    scale: float
+    error: float
+    tolerance: float
+    regression: Regression | None
+    passed: bool
+
+    @property
+    def title(self) -> str:
+        """The check's name with its zone, the key of its accepted values."""
+        return f"{self.name} {self.zone}" if self.zone else self.name
+
+    @property
+    def reason(self) -> str:
+        """Why the check failed, in one line; empty where it holds."""
+        if not self.error <= self.tolerance:
+            return (
+                f"{self.title}: {self.value:.9g} at {self.where}, reference {self.reference:.9g}: "
+                f"error {self.error:.2e}, tolerance {self.tolerance:.1e}"
+            )
+        if self.regression and not self.regression.passed:
+            old = self.regression
+            return (
+                f"{self.title}: {self.minimum:.12g} … {self.maximum:.12g}, accepted "
+                f"{old.minimum:.12g} … {old.maximum:.12g}: change {old.change:.2e}, tolerance "
+                f"{old.tolerance:.1e}"
+            )
+        return ""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One row of the table.
+
+    `alias` is the reference code's name, `key` the reference that feeds the check (None: always
+    run), `tolerance` the default one (None: the relative one, which a case's single `tolerance`
+    replaces), `scale` the measure of the quantity, `fixed` whether that measure holds even where
+    the reference is not zero, `accepted` the tolerance against the accepted value.
+    """
+
+    name: str
+    alias: str | None
+    key: str | None
+    sample: samples.Sampler
+    scale: Callable[[Solution], float]
+    tolerance: float | None = None
+    fixed: bool = False
+    by_zone: bool = True
+    accepted: float = ROUND_OFF
+    norm: str = "max"
+
+    def tolerance_in(self, overrides: Mapping[str, float]) -> float:
+        """The tolerance under a case's overrides: by check, or `all` for the relative ones."""
+        if self.name in overrides:
+            return overrides[self.name]
+        return overrides.get("all", RELATIVE) if self.tolerance is None else self.tolerance
+
+
+def block_size(solution: Solution) -> float:
+    """The extent of the smallest body."""
+    bodies = [solution.mesh.points[solution.body == b] for b in range(len(solution.bodies))]
+    return min(float(np.ptp(points, axis=0).max()) for points in bodies if len(points))
+
+
+def _load(solution: Solution) -> float:
+    """The load."""
+    return float(solution.load_scale)
+
+
+def _elongation(solution: Solution) -> float:
+    """Load / stiffness × size."""
+    stiffness = min(m.young for m in solution.case.materials.values())
+    return float(solution.load_scale / stiffness * block_size(solution))
+
+
+def _unit(_: Solution) -> float:
+    """One."""
+    return 1.0
+
+
+_PRESSURE, _STRESS = "contact_pressure", "normal_stress"
+CHECKS: tuple[Check, ...] = (
+    Check("multiplier", "LAGS_C", _PRESSURE, samples.pressure, _load),
+    Check("nodal_stress", "SIEF_NOEU", _STRESS, samples.nodal_stress, _load, by_zone=False),
+    Check("surface_stress_slave", None, _STRESS, samples.surface_stress("slave"), _load),
+    Check("surface_stress_master", None, _STRESS, samples.surface_stress("master"), _load),
+    Check("element_pressure", "CONT_ELEM/PRES", _PRESSURE, samples.pressure, _load),
+    Check("element_gap", "CONT_ELEM/JEU", "gap", samples.gap, block_size, GAP, fixed=True),
+    Check("element_status", "CONT_ELEM/CONT", _PRESSURE, samples.status, _unit, 0.0, fixed=True),
+    Check("coverage", "CONT_ELEM/COEFSURF", _PRESSURE, samples.coverage, _unit, 1e-6, fixed=True),
+    Check(
+        "covered_pressure",
+        "CONT_ELEM/PRESCOOR",
+        _PRESSURE,
+        samples.covered_pressure,
+        _load,
+        accepted=1e-6,
+    ),
+    Check("displacement", "DEPL", "displacement", samples.displacement, _elongation, by_zone=False),
+    Check("stress_components", None, "stress", samples.stress_components, _load, by_zone=False),
+    Check("balance", None, None, samples.balance, _unit, 1e-10, fixed=True, by_zone=False),
+    Check("observation", "OBSERVATION/PRES", _PRESSURE, samples.observed("pressure"), _load),
+    Check(
+        "observation_gap",
+        "OBSERVATION/JEU",
+        "gap",
+        samples.observed("gap"),
+        block_size,
+        GAP,
+        fixed=True,
+    ),
+    *(
+        Check(name, None, None, samples.norm(name), _unit, fixed=True, by_zone=False, norm="error")
+        for name in ERRORS
+    ),
+)
+
+
+def run_checks(
+    solution: Solution, accepted: Mapping[str, Accepted] | None = None
+) -> list[CheckResult]:
+    """Run every check of the table whose reference the case gives, zone by zone.
+
+    `accepted` maps check titles to the accepted extremes. Raises `InputError` when a reference
+    expression has no finite value at one of the places.
+    """
+    accepted = accepted or {}
+    exact = solution.case.solution and ExactValues(solution, solution.case.solution)
+    results = []
+    for check in CHECKS:
+        reference: samples.Reference = solution.case.reference.get(check.key) if check.key else 0.0
+        if reference is None:
+            continue
+        if isinstance(reference, Exact):
+            reference = exact
+        for zone in solution.zones if check.by_zone else [None]:
+            sample = check.sample(solution, zone, reference)
+            if sample is not None:
+                results.append(_judge(check, solution, zone, sample, accepted))
+    return results
+
+
+def _judge(
+    check: Check,
+    solution: Solution,
+    zone: ZoneResult | None,
+    sample: samples.Sample,
+    accepted: Mapping[str, Accepted],
+) -> CheckResult:
+    name = zone.name if zone else None
+    magnitude = float(np.abs(sample.reference).max(initial=0.0))
+    scale = check.scale(solution) if check.fixed or magnitude == 0 else magnitude
+    deviation = np.abs(sample.values - sample.reference)
+    if deviation.size:
+        worst = int(np.argmax(deviation))  # the first that is not a number, if there is one
+        error = _over(deviation[worst], scale)
+        extremes = float(sample.values.min()), float(sample.values.max())
+        value, reference = float(sample.values[worst]), float(sample.reference[worst])
+        where = sample.place(worst)
+    else:
+        error = value = reference = float("nan")
+        extremes, where = (value, value), "no place at all"
+    old = accepted.get(f"{check.name} {name}" if name else check.name)
+    regression = None if old is None else _compare(extremes, old, scale, check.accepted)
+    tolerance = check.tolerance_in(solution.case.tolerance)
+    return CheckResult(
+        name=check.name,
+        alias=check.alias,
+        zone=name,
+        norm=check.norm,
+        minimum=extremes[0],
+        maximum=extremes[1],
+        value=value,
+        reference=reference,
+        where=where,
+        scale=scale,
+        error=error,
+        tolerance=tolerance,
+        regression=regression,
+        passed=error <= tolerance and (regression is None or regression.passed),
+    )
+
+
+def _compare(
+    extremes: tuple[float, float], old: Accepted, scale: float, tolerance: float
+) -> Regression:
+    changes = [
+        _over(abs(new - was), scale)
+        for new, was in zip(extremes, (old.minimum, old.maximum), strict=True)
+    ]
+    change = float(np.max(changes))
+    return Regression(old.minimum, old.maximum, change, tolerance, change <= tolerance)
+
+
+def _over(deviation: float, scale: float) -> float:
+    """The deviation over the scale; with no scale at all only no deviation is none."""
+    if scale == 0:
+        return 0.0 if deviation == 0 else float("inf") if deviation > 0 else float("nan")
+    return float(deviation / scale)

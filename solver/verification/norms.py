@@ -1,0 +1,192 @@
+"""Errors of a solve against the exact solution that its case names.
+
+With u, σ, p exact, u_h, σ_h, p_h computed, σ_h by Hooke's law from u_h (and from the mean stress
+in cells in mixed form):
+
+    displacement_l2       ‖u_h − u‖ / ‖u‖                    ‖·‖: root of ∫ over deformable bodies
+    displacement_h1       ‖∇u_h − ∇u‖ / ‖∇u‖
+    stress_l2             ‖σ_h − σ‖ / ‖σ‖
+    stress_max            largest component of σ_h − σ at nodes, σ_h averaged there, over that of σ
+    pressure_l2           |p_h − p| / |p|                    |·|: root of ∫ over the slave surface,
+                                                             weighted by each element's coverage
+    pressure_max          largest |p_h − p| / largest p      where p is smooth
+    pressure_means        |p_h − p̄| / |p̄|                    p̄: mean of p over each macro-element
+    pressure_oscillation  largest |e₋ − 2 e + e₊| / largest p   e = p_h − p̄ of neighbours where p is
+                                                             smooth; of nodal multipliers p_h − p
+                                                             at nodes (see `oscillation`)
+    half_width, peak      of the half ellipse fitted to p_h (Hertz), relative
+
+In the first two of the pressure p_h is the field that the treatment of the interface solves for:
+constant on each macro-element, or, with multipliers at nodes, interpolated between these; in the
+others its mean over each macro-element.
+
+Volume integrals use Gauss points two more each way than the degree of the cell, so that the
+quadrature is no part of what is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from solver.case.solutions import ElasticSolution, ExactSolution
+from solver.case.solutions.base import lame_of
+from solver.case.solutions.hertz import Hertz
+from solver.mechanics.fem import shape_functions
+from solver.mechanics.fem.elasticity import physical_gradients
+from solver.mechanics.fem.faces import surface_points
+from solver.mechanics.fem.gauss import gauss_rule
+from solver.mesh.catalogue import cell_type
+from solver.simulation.exact import ExactValues, computed_pressure, deformable
+from solver.simulation.solution import Solution, ZoneResult
+from solver.verification.oscillation import oscillation
+
+# Numbers of gradients handled at once: small enough to stay in the processor's cache.
+_CHUNK = 1 << 17
+_TWICE = np.array([1, 1, 1, 2, 2, 2])  # off-diagonal components stand for two
+
+
+def errors(solution: Solution, exact: ExactSolution | None = None) -> dict[str, float]:
+    """The errors of a solve by name, against `exact` or the exact solution that its case names.
+
+    Empty where there is neither.
+    """
+    exact = exact or solution.case.solution
+    if exact is None:
+        return {}
+    found: dict[str, float] = {}
+    if isinstance(exact, ElasticSolution):
+        found |= _field_errors(solution, exact)
+    if solution.zones:
+        found |= _pressure_errors(solution, exact)
+    return found
+
+
+# Displacement and stress
+
+
+def _field_errors(solution: Solution, exact: ElasticSolution) -> dict[str, float]:
+    squares = sum(_squares(solution, exact), np.zeros((3, 2)))
+    names = ("displacement_l2", "displacement_h1", "stress_l2")
+    found = {name: _root(*pair) for name, pair in zip(names, squares, strict=True)}
+    nodes = np.flatnonzero(deformable(solution))
+    expected = ExactValues(solution, exact).stress(nodes)
+    deviation = np.abs(solution.stress[nodes] - expected).max()
+    return found | {"stress_max": _over(deviation, np.abs(expected).max())}
+
+
+def _squares(solution: Solution, exact: ElasticSolution) -> Iterator[np.ndarray]:
+    """By chunk of cells (3, 2): ∫ of squares of error and exact value, for u, ∇u, σ."""
+    points, parts = solution.mesh.points, ExactValues(solution, exact).part
+    moving = deformable(solution)
+    for block in solution.mesh.cells:
+        kind = cell_type(block.type)
+        reference, weights = gauss_rule(kind.name, kind.order + 2)
+        values = shape_functions(kind.name).values(reference)
+        deforming = moving[block.data].all(axis=1)
+        cells = block.data[deforming]
+        mixed = solution.mean_stress.get(kind.name)
+        own = None if mixed is None else mixed[deforming]
+        step = max(1, _CHUNK // (len(weights) * kind.n_nodes * kind.dim))
+        for start in range(0, len(cells), step):
+            chunk = cells[start : start + step]
+            gradient, determinant = physical_gradients(points, chunk, kind, reference)
+            nodal = solution.displacement[chunk]
+            place, found = values @ points[chunk], values @ nodal
+            apart = np.swapaxes(nodal - nodal[:, :1], 1, 2)
+            slope = apart[:, None] @ gradient
+            part = np.repeat(parts[chunk[:, 0]], len(weights))
+            flat = place.reshape(-1, kind.dim)
+            slope = slope.reshape(len(flat), kind.dim, kind.dim)
+            mean = None if own is None else (own[start : start + step] @ values.T).ravel()
+            stress = _hooke(exact, slope, part, mean)
+            pairs = _with_exact(exact, flat, part, found.reshape(flat.shape), slope, stress)
+            weight = (determinant * weights).ravel()
+            yield np.array([[_integral(weight, error), _integral(weight, u)] for error, u in pairs])
+
+
+def _hooke(
+    exact: ElasticSolution, slope: np.ndarray, part: np.ndarray, mean: np.ndarray | None
+) -> np.ndarray:
+    """Stress (n, 6) by Hooke's law; where there is a mean stress (n,), it stands for λ div u."""
+    stress = exact.hooke(slope, part)
+    if mean is None:
+        return stress
+    lame = np.array([lame_of(material)[0] for material in exact.materials])[part]
+    stress[:, :3] += np.nan_to_num(mean - lame * np.einsum("nii->n", slope))[:, None]
+    return stress
+
+
+def _with_exact(
+    exact: ElasticSolution,
+    x: np.ndarray,
+    part: np.ndarray,
+    found: np.ndarray,
+    slope: np.ndarray,
+    stress_found: np.ndarray,
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Error and exact value (n, …) of displacement, gradient and stress at points."""
+    u, gradient = exact.displacement(x, part), exact.gradient(x, part)
+    whole = np.sqrt(_TWICE)
+    stress = exact.hooke(gradient, part) * whole
+    return [
+        (found - u, u),
+        (slope - gradient, gradient),
+        (stress_found * whole - stress, stress),
+    ]
+
+
+def _integral(weight: np.ndarray, values: np.ndarray) -> float:
+    flat = values.reshape(len(weight), -1)
+    return float((weight * np.einsum("ij,ij->i", flat, flat)).sum())
+
+
+# Pressure
+
+
+def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, float]:
+    squares, means = np.zeros(2), np.zeros(2)
+    largest, highest, second = 0.0, 0.0, 0.0
+    for zone in solution.zones:
+        at = surface_points(solution.mesh.points, zone.faces)
+        pressure = exact.contact_pressure(at.place)
+        error = computed_pressure(zone) - pressure
+        covered = (zone.coverage > 0)[at.macro] & exact.regular(at.place)
+        weight = at.weight * zone.coverage[at.macro]
+        squares += _integral(weight, error), _integral(weight, pressure)
+        mean = at.means(pressure)
+        weight = zone.area * zone.coverage
+        means += _integral(weight, zone.multiplier - mean), _integral(weight, mean)
+        largest = max(largest, np.abs(error[covered]).max(initial=0.0))
+        highest = max(highest, pressure.max())
+        second = max(second, oscillation(solution.mesh.points, zone, exact, mean))
+    found = {
+        "pressure_l2": _root(*squares),
+        "pressure_max": _over(largest, highest),
+        "pressure_means": _root(*means),
+        "pressure_oscillation": _over(second, highest),
+    }
+    if isinstance(exact, Hertz):
+        found |= _ellipse_errors(solution.zones, exact)
+    return found
+
+
+def _ellipse_errors(zones: list[ZoneResult], exact: Hertz) -> dict[str, float]:
+    centre = np.concatenate([zone.centre for zone in zones])
+    if np.count_nonzero(exact.regular(centre)) < 3:
+        return {}
+    pressure = np.concatenate([zone.multiplier for zone in zones])
+    half_width, peak = exact.fitted(centre, pressure)
+    return {
+        "half_width": abs(half_width / exact.half_width - 1),
+        "peak": abs(peak / exact.peak - 1),
+    }
+
+
+def _root(error: float, whole: float) -> float:
+    return _over(np.sqrt(error), np.sqrt(whole))
+
+
+def _over(error: float, whole: float) -> float:
+    return float(error / whole) if whole > 0 else float(error)

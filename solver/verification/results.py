@@ -1,0 +1,395 @@
+"""The result file: one HDF5 file that is also a VTKHDF grid, written whole or not at all.
+
+`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; beside it lies everything that
+the checks need again, so that a file can be judged without solving:
+
+    /case          source text, name, family, path, swapped, hexahedra
+    /solve         lengths, sizes, cost and the linear solver of the solve
+    /accuracy      what rounding alone may change, relative, by cause
+    /errors        norms of the error against the case's exact solution, if it names one
+    /mean_stress   by cell type, that of cells in mixed form at their nodes
+    /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces; in `nodal` those
+                   of nodes where the treatment has its multipliers there
+    /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
+    /provenance    versions, revision, hashes, machine
+
+Where the case names its units, fields have them as their attribute `unit`, and the grid lists them.
+Its last line is the hash of all before it: a file that was damaged is refused before HDF5 sees it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+import h5py
+import meshio
+import numpy as np
+
+from solver.case.reader import Case, parse_case
+from solver.mesh.catalogue import cell_type
+from solver.mesh.files.vtkhdf import read_grid, write_grid
+from solver.simulation.consistency import inconsistency
+from solver.simulation.solution import (
+    BodyInfo,
+    Line,
+    NodalContact,
+    Solution,
+    StepResult,
+    ZoneResult,
+)
+from solver.system.errors import InputError
+from solver.system.files import is_sealed, replacing, seal
+from solver.system.hdf5 import column, new_file, read_table, write_table
+from solver.verification.checks import CheckResult
+from solver.verification.units import label_fields
+
+GRID = "VTKHDF"
+_SCALARS = (
+    "length",
+    "load_scale",
+    "dofs",
+    "macro_elements",
+    "iterations",
+    "linear_solver",
+    "linear_iterations",
+    "matrix_entries",
+    "cpu_seconds",
+    "peak_memory_mb",
+)
+_BY_MACRO_ELEMENT = {  # data set: attribute of ZoneResult
+    "centre": "centre",
+    "normal": "normal",
+    "area": "area",
+    "multiplier": "multiplier",
+    "gap": "gap",
+    "status": "closed",
+    "coverage": "coverage",
+}
+_BY_NODE = ("stress_slave", "stress_master", "slave_nodes", "master_nodes")
+_AT_MULTIPLIER_NODES = {
+    "nodes": "nodes",
+    "multiplier": "multiplier",
+    "gap": "gap",
+    "status": "closed",
+}
+_ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
+_OBSERVED = ("pressure", "gap", "status", "coverage")
+
+
+@dataclass
+class Result:
+    """What a result file gives back: the solution, and where it came from."""
+
+    solution: Solution
+    provenance: dict[str, Any]
+
+
+def write_result(
+    path: str | Path,
+    solution: Solution,
+    checks: Iterable[CheckResult],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Write a solution, its checks and its provenance to a `.vtkhdf` file."""
+    with replacing(path) as temporary:
+        with new_file(temporary) as file:
+            _write(file, solution, checks, provenance)
+        seal(temporary)
+
+
+def _write(
+    file: h5py.File,
+    solution: Solution,
+    checks: Iterable[CheckResult],
+    provenance: Mapping[str, Any],
+) -> None:
+    _write_grid(file.create_group(GRID), solution)
+    _write_case(file.create_group("case"), solution)
+    file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
+    file.create_group("accuracy").attrs.update(solution.accuracy)
+    file.create_group("errors").attrs.update(solution.errors)
+    mean_stress = file.create_group("mean_stress")
+    for kind, values in solution.mean_stress.items():
+        mean_stress[kind] = values
+    contact = file.create_group("contact")
+    for number, zone in enumerate(solution.zones):
+        _write_zone(contact.create_group(zone.name), zone, number)
+    _write_bodies(file.create_group("bodies"), solution.bodies)
+    _write_steps(file, solution.steps)
+    write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
+    write_table(file.create_group("timings"), _timings(solution))
+    write_table(file.create_group("plan"), [line._asdict() for line in solution.plan])
+    write_table(file.create_group("checks"), [_flat(check) for check in checks])
+    file.create_group("provenance").attrs.update(provenance)
+    label_fields(file[GRID], contact, solution.case.units)
+
+
+def read_result(path: str | Path) -> Result:
+    """Read a result file back; `InputError` for a file that is none, or not as it was written."""
+    if not is_sealed(path):
+        raise _no_result(path, "damaged, of another version, or none at all")
+    try:
+        with h5py.File(path) as file:
+            file.visititems(_refuse_complex)
+            result = Result(_read_solution(file), _plain(file["provenance"].attrs))
+        fault = inconsistency(result.solution)
+    except InputError:
+        raise
+    except Exception as error:
+        # Whatever the reader trips over lies in the file, as where another version wrote it.
+        fault = " ".join(f"{type(error).__name__}: {error}".split())
+        raise _no_result(path, fault) from error
+    if fault:
+        raise _no_result(path, fault)
+    return result
+
+
+def _refuse_complex(name: str, item: h5py.HLObject) -> None:
+    """Numpy makes real numbers of complex ones with a warning only."""
+    if isinstance(item, h5py.Dataset) and item.dtype.kind == "c":
+        raise TypeError(f"{name} holds complex numbers")
+
+
+def _no_result(path: str | Path, fault: str) -> InputError:
+    allowed = f"must be a result written by `solve` ({fault}): solve again"
+    return InputError(path, "file", None, allowed)
+
+
+def _read_solution(file: h5py.File) -> Solution:
+    grid, point_data, cell_data = read_grid(file[GRID])
+    names = sorted(file["contact"], key=lambda name: file["contact"][name].attrs["number"])
+    volumes = [i for i, block in enumerate(grid.cells) if block.dim == grid.points.shape[1]]
+    case = file["case"]
+    return Solution(
+        case=_read_case(case),
+        swapped=bool(case.attrs["swapped"]),
+        hexahedra=case.attrs["hexahedra"] or None,
+        mesh=meshio.Mesh(
+            grid.points,
+            [grid.cells[i] for i in volumes],
+            cell_sets={k: [sets[i] for i in volumes] for k, sets in grid.cell_sets.items()},
+        ),
+        displacement=point_data["displacement"][:, : grid.points.shape[1]],
+        stress=point_data["stress"],
+        body=point_data["body"],
+        bodies=_read_bodies(file["bodies"]),
+        zones=[
+            _read_zone(file["contact"][name], name, _sub_faces(grid, cell_data, number))
+            for number, name in enumerate(names)
+        ],
+        nodal_normal_stress=point_data["normal_stress"],
+        balance=dict(_read_pairs(file["balance"], "name", "value")),
+        steps=_read_steps(file),
+        plan=[Line(**row) for row in read_table(file["plan"])],
+        accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
+        mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
+        errors=_plain(file["errors"].attrs) if "errors" in file else {},
+        seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
+        stage_cpu_seconds=dict(_read_pairs(file["timings"], "stage", "cpu_seconds")),
+        **{key: _plain(file["solve"].attrs)[key] for key in _SCALARS},
+    )
+
+
+# The grid
+
+
+def _write_grid(group: h5py.Group, solution: Solution) -> None:
+    """The volume cells, then the sub-faces of all zones, one block for each cell type."""
+    mesh, dim = solution.mesh, solution.mesh.points.shape[1]
+    volumes = [i for i, block in enumerate(mesh.cells) if block.dim == dim]
+    faces, cell_data = _face_blocks(solution)
+    cells = [(mesh.cells[i].type, mesh.cells[i].data) for i in volumes]
+    n_volumes = sum(len(data) for _, data in cells)
+    for name, values in cell_data.items():
+        nothing = np.nan if values.dtype.kind == "f" else -1
+        cell_data[name] = np.concatenate([np.full(n_volumes, nothing), values])
+    none = [np.empty(0, dtype=int)] * len(faces)
+    sets = {name: [of[i] for i in volumes] + none for name, of in mesh.cell_sets.items()}
+    point_data = {
+        "displacement": np.pad(solution.displacement, ((0, 0), (0, 3 - dim))),
+        "stress": solution.stress,
+        "normal_stress": solution.nodal_normal_stress,
+        "body": solution.body,
+    }
+    write_grid(
+        group, meshio.Mesh(mesh.points, cells + faces, cell_sets=sets), point_data, cell_data
+    )
+
+
+def _face_blocks(
+    solution: Solution,
+) -> tuple[list[tuple[str, np.ndarray]], dict[str, np.ndarray]]:
+    """The sub-faces of all zones, a block for each cell type, and the data of these cells."""
+    parts = [
+        (kind, connectivity, owner, number)
+        for number, zone in enumerate(solution.zones)
+        for kind, connectivity, owner in zone.faces
+    ]
+    parts.sort(key=itemgetter(0))  # stable: the zones of a block stay in their order
+    blocks = [
+        (cell_type(kind).meshio, np.concatenate([part[1] for part in same]))
+        for kind, same in groupby(parts, key=itemgetter(0))
+    ]
+    none = np.empty(0, dtype=int)
+    data = {
+        "macro_element": np.concatenate([none, *(owner for _, _, owner, _ in parts)]),
+        "zone": np.concatenate([none, *(np.full(len(o), number) for _, _, o, number in parts)]),
+    }
+    for name, attribute in _ON_FACES.items():
+        values = [getattr(solution.zones[n], attribute)[owner] for _, _, owner, n in parts]
+        data[name] = np.concatenate([np.empty(0), *values]).astype(float)
+    return blocks, data
+
+
+def _sub_faces(
+    grid: meshio.Mesh, cell_data: Mapping[str, np.ndarray], zone: int
+) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    faces, start = [], 0
+    for block in grid.cells:
+        rows = slice(start, start := start + len(block.data))
+        mine = cell_data["zone"][rows] == zone
+        if mine.any():
+            owner = cell_data["macro_element"][rows][mine]
+            faces.append((cell_type(block.type).name, block.data[mine], owner))
+    return faces
+
+
+# Case, zones, bodies, steps
+
+
+def _write_case(group: h5py.Group, solution: Solution) -> None:
+    case = solution.case
+    group["source"] = case.source
+    group.attrs.update(
+        name=case.name,
+        family=case.family,
+        path=str(case.path.resolve()),
+        swapped=solution.swapped,
+        hexahedra=solution.hexahedra or "",
+    )
+
+
+def _read_case(group: h5py.Group) -> Case:
+    return parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+
+
+def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
+    group.attrs["number"] = number
+    for name, attribute in _BY_MACRO_ELEMENT.items():
+        group[name] = getattr(zone, attribute)
+    for name in _BY_NODE:
+        group[name] = getattr(zone, name)
+    faces = group.create_group("master_faces")
+    for kind, connectivity in zone.master_faces:
+        faces[kind] = connectivity
+    if zone.nodal:
+        nodal = group.create_group("nodal")
+        for name, attribute in _AT_MULTIPLIER_NODES.items():
+            nodal[name] = getattr(zone.nodal, attribute)
+
+
+def _read_zone(
+    group: h5py.Group, name: str, faces: list[tuple[str, np.ndarray, np.ndarray]]
+) -> ZoneResult:
+    return ZoneResult(
+        name=name,
+        faces=faces,
+        master_faces=[(kind, data[()]) for kind, data in group["master_faces"].items()],
+        **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
+        **{key: group[key][()] for key in _BY_NODE},
+        nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
+    )
+
+
+def _read_nodal(group: h5py.Group) -> NodalContact:
+    return NodalContact(**{a: group[name][()] for name, a in _AT_MULTIPLIER_NODES.items()})
+
+
+def _write_bodies(group: h5py.Group, bodies: Sequence[BodyInfo]) -> None:
+    write_table(group, [{"name": b.name, "role": b.role, "faces": b.faces} for b in bodies])
+    cells = [
+        {"body": number, "type": kind, "count": count}
+        for number, body in enumerate(bodies)
+        for kind, count in body.cells.items()
+    ]
+    write_table(group.create_group("cells"), cells)
+
+
+def _read_bodies(group: h5py.Group) -> list[BodyInfo]:
+    cells = read_table(group["cells"])
+    return [
+        BodyInfo(
+            name=row["name"],
+            role=row["role"],
+            faces=row["faces"],
+            cells={cell["type"]: cell["count"] for cell in cells if cell["body"] == number},
+        )
+        for number, row in enumerate(read_table(group))
+    ]
+
+
+def _write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
+    """The cost of every step, and what was observed as arrays (steps, observed places)."""
+    rows = [asdict(step) for step in steps]
+    observed = [row.pop("observations") for row in rows]
+    write_table(file.create_group("steps"), rows)
+    group = file.create_group("observation")
+    group["factor"] = [step.factor for step in steps]
+    first = observed[0] if observed else []
+    group["zone"] = column([o["zone"] for o in first])
+    group["macro_element"] = np.array([o["macro_element"] for o in first], dtype=int)
+    for name in _OBSERVED:
+        values = [[float(o[name]) for o in row] for row in observed]
+        group[name] = np.reshape(values, (len(steps), len(first)))
+
+
+def _read_steps(file: h5py.File) -> list[StepResult]:
+    group = file["observation"]
+    zones, elements = group["zone"].asstr()[()], group["macro_element"][()].tolist()
+    values = {name: group[name][()] for name in _OBSERVED}
+    return [
+        StepResult(
+            **row,
+            observations=[
+                {"zone": zone, "macro_element": element}
+                | {name: float(values[name][i, j]) for name in _OBSERVED}
+                for j, (zone, element) in enumerate(zip(zones, elements, strict=True))
+            ],
+        )
+        for i, row in enumerate(read_table(file["steps"]))
+    ]
+
+
+# Tables: a group with one data set for each column
+
+
+def _flat(check: CheckResult) -> dict[str, Any]:
+    row = asdict(check)
+    accepted = row.pop("regression") or {}
+    return row | {f"accepted_{key}": accepted.get(key) for key in ("minimum", "maximum")}
+
+
+def _timings(solution: Solution) -> list[dict[str, Any]]:
+    cpu = solution.stage_cpu_seconds
+    return [
+        {"stage": stage, "seconds": seconds, "cpu_seconds": cpu.get(stage)}
+        for stage, seconds in solution.seconds.items()
+    ]
+
+
+def _pairs(key: str, value: str, pairs: Iterable[tuple[str, Any]]) -> list[dict[str, Any]]:
+    return [{key: k, value: v} for k, v in pairs]
+
+
+def _read_pairs(group: h5py.Group, key: str, value: str) -> list[tuple[str, Any]]:
+    return [(row[key], row[value]) for row in read_table(group)]
+
+
+def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes as plain Python values."""
+    return {k: v.item() if isinstance(v, np.generic) else v for k, v in attributes.items()}

@@ -1,0 +1,200 @@
+"""One job from case file to verdict: mesh, solve, checks, result file, verdict."""
+
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import meshio
+
+from solver.case.reader import Case, check_mesh_file, load_case
+from solver.mesh import generate, read_mesh, transform
+from solver.simulation.simulate import simulate
+from solver.simulation.skips import EVERYTHING, NEEDED, Skips
+from solver.simulation.solution import Solution
+from solver.system.clock import Clock, processor_time
+from solver.system.errors import InputError, MachineError, SolveError, of_machine
+from solver.system.files import last_line
+from solver.system.memory import check_memory
+from solver.system.provenance import gather
+from solver.verification.checks import CheckResult, run_checks
+from solver.verification.norms import errors
+from solver.verification.regression import accepted_values
+from solver.verification.results import read_result, write_result
+from solver.verification.verdict import (
+    CRASHED,
+    FAILED,
+    REFUSED,
+    of_solution,
+    without_result,
+    write_verdict,
+)
+
+Log = Callable[[str], Any]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One solve of a case: which mesh, which direction, which way to cut hexahedra.
+
+    `mesh` is a mesh file taken as it is; None means the case's own, its transform applied.
+    `refine` multiplies the divisions of the case's recipe. `memory_check`: refused where its memory
+    exceeds the machine's. `everything`: what the scene does not need is done all the same.
+    """
+
+    case: Path
+    mesh: Path | None = None
+    swapped: bool = False
+    hexahedra: str | None = None
+    refine: int = 1
+    memory_check: bool = True
+    everything: bool = False
+
+
+def refined(case: Case, factor: int) -> Case:
+    """The case with the divisions of its recipe multiplied by `factor`."""
+    if factor == 1:
+        return case
+    if "path" in case.mesh:
+        allowed = "cannot be refined: only the mesh of a recipe can"
+        raise InputError(case.path, "mesh.file", str(case.mesh["path"]), allowed)
+    return replace(case, mesh={**case.mesh, "refine": factor * case.mesh.get("refine", 1)})
+
+
+def mesh_of(case: Case) -> meshio.Mesh:
+    """The case's mesh, read or generated, its transform applied."""
+    if "path" in case.mesh:
+        check_mesh_file(case)
+        mesh = read_mesh(case.mesh["path"])
+    else:
+        mesh = generate(case.mesh, str(case.path))
+    return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
+
+
+def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> dict[str, Any]:
+    """Solve, check, write the result; the verdict, also written to `verdict_file` if given.
+
+    Where there is no result, the verdict that says why is written all the same, and the exception
+    goes on: InputError, SolveError, or whatever shows an error of the program.
+    """
+    case: Case | None = None
+    try:
+        case = refined(load_case(job.case), job.refine)
+        verdict = _solve(job, case, output, verdict_file or output, log)
+    except Exception as error:
+        if verdict_file:
+            word, reason, transient = _ending(error)
+            ended = without_result(
+                word, reason, case or job.case, job.swapped, job.hexahedra, transient
+            )
+            write_verdict(verdict_file, ended)
+        raise
+    if verdict_file:
+        write_verdict(verdict_file, verdict)
+    log(summary(verdict))
+    return verdict
+
+
+def solve_checked(
+    case: Case,
+    mesh: meshio.Mesh,
+    swapped: bool = False,
+    hexahedra: str | None = None,
+    log: Log = lambda _: None,
+    accepted: bool = True,
+    clock: Clock | None = None,
+    skips: Skips = NEEDED,
+) -> tuple[Solution, list[CheckResult]]:
+    """Solve a case on its mesh and run its checks, those of `accepted` values too if asked.
+
+    The time of every stage is added to `clock`, where one is given.
+    """
+    clock = Clock() if clock is None else clock
+    solution = simulate(case, mesh, swapped, hexahedra, log, clock=clock, skips=skips)
+    with clock.stage("checks"):
+        solution.errors = errors(solution)
+        checks = run_checks(solution, accepted_values(solution) if accepted else {})
+    return solution, checks
+
+
+def check(result_file: Path) -> dict[str, Any]:
+    """The verdict of a stored result, its checks run again on the stored fields."""
+    result = read_result(result_file)
+    result.solution.errors = errors(result.solution)
+    checks = run_checks(result.solution, accepted_values(result.solution))
+    return of_solution(result.solution, checks, result_file.name, result.provenance)
+
+
+def record_crash(
+    job: Job, verdict_file: Path, log_file: Path | None, status: int | None = None
+) -> dict[str, Any]:
+    """Write the verdict of a solve whose process died, and return it.
+
+    The reason is its exit status, as far as known, and the last line of the log.
+    """
+    try:
+        case: Case | Path = load_case(job.case)
+    except InputError:
+        case = job.case
+    said = last_line(log_file)
+    if status:
+        reason = _death(status) + (f"; last words: {said}" if said else "")
+    else:
+        reason = said or "the process died without a word"
+    verdict = without_result(CRASHED, reason, case, job.swapped, job.hexahedra, transient=True)
+    write_verdict(verdict_file, verdict)
+    return verdict
+
+
+def _death(status: int) -> str:
+    """What an exit status says of how a process ended; shells add 128 to a signal's number."""
+    told = f"died with exit status {status}"
+    names = {128 + number: number.name for number in signal.Signals}
+    if status not in names:
+        return told
+    hint = ", as a system does that runs out of memory" * (names[status] == "SIGKILL")
+    return f"{told}, ended by {names[status]}{hint}"
+
+
+def summary(verdict: dict[str, Any]) -> str:
+    """The verdict in one line: job, word, reason or worst error, time."""
+    line = f"{verdict['job']}: {verdict['verdict']}"
+    if verdict["reason"]:
+        return f"{line}: {verdict['reason']}"
+    worst = verdict["worst"]
+    error = f", worst error {worst['error']:.1e} ({worst['name']})" if worst else ""
+    return f"{line}{error}, {verdict['seconds']['total']:.2f} s"
+
+
+def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[str, Any]:
+    """The verdict of a solve that comes to its end; `beside` lies where the verdict will."""
+    started, clock = processor_time(), Clock()
+    output.parent.mkdir(parents=True, exist_ok=True)  # better refused now than after the solve
+    with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
+        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
+    if job.memory_check:
+        check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
+    # What was accepted is a result on the case's own mesh.
+    accepted = job.refine == 1
+    skips = EVERYTHING if job.everything else NEEDED
+    solution, checks = solve_checked(
+        case, mesh, job.swapped, job.hexahedra, log, accepted, clock, skips
+    )
+    solution.cpu_seconds = processor_time() - started
+    provenance = gather(job.case, job.mesh or case.mesh.get("path"))
+    with clock.stage("write"):
+        write_result(output, solution, checks, provenance)
+    return of_solution(solution, checks, os.path.relpath(output, beside.parent), provenance)
+
+
+def _ending(error: Exception) -> tuple[str, str, bool]:
+    """The verdict's word and reason for a solve that an exception ended; whether it may pass."""
+    if isinstance(error, InputError):
+        return REFUSED, str(error), isinstance(error, MachineError)
+    if isinstance(error, SolveError):
+        return FAILED, str(error), False
+    if reason := of_machine(error):
+        return REFUSED if isinstance(error, OSError) else CRASHED, reason, True
+    return CRASHED, f"{type(error).__name__}: {' '.join(str(error).split())}", False

@@ -1,0 +1,199 @@
+"""What the checks compare: values of a solve and their reference, at the places where they live.
+
+A reference is a scalar, a sequence (vectors) or a mapping (tensors) of scalars, or `ExactValues`,
+which know the case's exact solution. A sampler is called with the solution, the zone (None for the
+whole solve) and the reference; it gives None where there is nothing to compare.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.case.expressions import evaluate
+from solver.mechanics.fem.stress import COMPONENTS
+from solver.simulation.exact import ExactValues, deformable
+from solver.simulation.solution import Solution, ZoneResult
+
+Reference = Any
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Values (n,) and their reference (n,); `place` says in words where the i-th was taken."""
+
+    values: np.ndarray
+    reference: np.ndarray
+    place: Callable[[int], str]
+
+
+Sampler = Callable[[Solution, Any, Reference], Sample | None]
+
+
+def _at_macro_elements(values: np.ndarray, expected: np.ndarray) -> Sample:
+    return Sample(values, expected, "macro-element {}".format)
+
+
+def expected_pressure(zone: ZoneResult, reference: Reference) -> np.ndarray:
+    """The reference's pressure (m,) on every macro-element: its mean, or that at the centre."""
+    if isinstance(reference, ExactValues):
+        return reference.pressure(zone)
+    return evaluate(reference, zone.centre)
+
+
+def pressure(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+    """The multiplier of every macro-element."""
+    return _at_macro_elements(zone.multiplier, expected_pressure(zone, reference))
+
+
+def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+    """The average gap of every macro-element."""
+    if isinstance(reference, ExactValues):
+        return _at_macro_elements(zone.gap, reference.gap(zone))
+    return _at_macro_elements(zone.gap, evaluate(reference, zone.centre))
+
+
+def status(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+    """In contact wherever the reference presses; either will do where its contact area ends."""
+    found = zone.closed.astype(float)
+    expected = (expected_pressure(zone, reference) > 0).astype(float)
+    if isinstance(reference, ExactValues):
+        expected = np.where(reference.ends_within(zone), found, expected)
+    return _at_macro_elements(found, expected)
+
+
+def coverage(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+    """Covered in full wherever there is a pressure to compare."""
+    expected = np.ones(len(zone.coverage))
+    if isinstance(reference, ExactValues):
+        expected = np.where(reference.pressure(zone) > 0, 1.0, zone.coverage)
+    return _at_macro_elements(zone.coverage, expected)
+
+
+def covered_pressure(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+    """The multiplier times the coverage."""
+    expected = expected_pressure(zone, reference)
+    return _at_macro_elements(zone.coverage * zone.multiplier, expected)
+
+
+def _nodes(solution: Solution) -> np.ndarray:
+    """The nodes at which there is something to compare: those of bodies that are not rigid."""
+    return np.flatnonzero(deformable(solution))
+
+
+def _at_nodes(nodes: np.ndarray, values: np.ndarray, expected: np.ndarray) -> Sample:
+    return Sample(values, expected, lambda i: f"node {nodes[i]}")
+
+
+def surface_stress(side: str) -> Sampler:
+    """Sample the normal stress on one surface of a zone; None on a rigid body."""
+
+    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+        nodes, values = getattr(zone, f"{side}_nodes"), getattr(zone, f"stress_{side}")
+        if len(nodes) and not deformable(solution)[nodes].any():
+            return None
+        if isinstance(reference, ExactValues):
+            faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
+            return _at_nodes(nodes, values, reference.surface_stress(nodes, faces))
+        return _at_nodes(nodes, values, evaluate(reference, solution.mesh.points[nodes]))
+
+    return sample
+
+
+def nodal_stress(solution: Solution, _: None, reference: Reference) -> Sample:
+    """The stress along the direction of contact at all nodes."""
+    nodes = _nodes(solution)
+    values = solution.nodal_normal_stress[nodes]
+    if isinstance(reference, ExactValues):
+        return _at_nodes(nodes, values, reference.stress_along_contact(nodes))
+    return _at_nodes(nodes, values, evaluate(reference, solution.mesh.points[nodes]))
+
+
+def displacement(solution: Solution, _: None, reference: Reference) -> Sample:
+    """All components at all nodes."""
+    nodes, axes = _nodes(solution), "xyz"[: solution.displacement.shape[1]]
+    if isinstance(reference, ExactValues):
+        expected = dict(zip(axes, reference.displacement(nodes).T, strict=True))
+    else:
+        given = dict(zip(axes, reference, strict=True))
+        expected = _evaluated(solution, nodes, given)
+    return _by_component(nodes, solution.displacement, axes, expected)
+
+
+def stress_components(solution: Solution, _: None, reference: Reference) -> Sample:
+    """The given components at all nodes."""
+    nodes = _nodes(solution)
+    if isinstance(reference, ExactValues):
+        expected = dict(zip(COMPONENTS, reference.stress(nodes).T, strict=True))
+    else:
+        expected = _evaluated(solution, nodes, reference)
+    return _by_component(nodes, solution.stress, COMPONENTS, expected)
+
+
+def _evaluated(
+    solution: Solution, nodes: np.ndarray, given: Mapping[str, Any]
+) -> dict[str, np.ndarray]:
+    points = solution.mesh.points[nodes]
+    return {name: evaluate(value, points) for name, value in given.items()}
+
+
+def _by_component(
+    nodes: np.ndarray, values: np.ndarray, names: Sequence[str], expected: Mapping[str, np.ndarray]
+) -> Sample:
+    """The expected components of a nodal field one after the other: all on one scale."""
+    listed = list(expected)
+    return Sample(
+        np.concatenate([values[nodes, names.index(name)] for name in listed]),
+        np.concatenate([expected[name] for name in listed]),
+        lambda i: f"node {nodes[i % len(nodes)]} ({listed[i // len(nodes)]})",
+    )
+
+
+def norm(name: str) -> Sampler:
+    """Sample an error norm, where the case gives it a tolerance."""
+
+    def sample(solution: Solution, _: None, __: Reference) -> Sample | None:
+        if name not in solution.case.tolerance:
+            return None
+        value = solution.errors.get(name, float("nan"))
+        return Sample(np.array([value]), np.zeros(1), lambda _: "the whole solve")
+
+    return sample
+
+
+def balance(solution: Solution, _: None, __: Reference) -> Sample:
+    """Every imbalance, against none."""
+    names = list(solution.balance)
+    values = np.array(list(solution.balance.values()), dtype=float)
+    return Sample(values, np.zeros(len(values)), lambda i: f"the balance of {names[i]}")
+
+
+def observed(quantity: str) -> Sampler:
+    """Sample what was observed in a zone at every step; pressure grows with the load factor."""
+
+    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+        rows = [
+            (step.factor, o["macro_element"], float(o[quantity]))
+            for step in solution.steps
+            for o in step.observations
+            if o["zone"] == zone.name
+        ]
+        if isinstance(reference, ExactValues):  # of the whole load
+            rows = [row for row in rows if row[0] == 1.0]
+        if not rows:
+            return None
+        factors, elements, values = (np.array(column) for column in zip(*rows, strict=True))
+        if isinstance(reference, ExactValues):
+            expected = getattr(reference, quantity)(zone)[elements]
+        else:
+            expected = evaluate(reference, zone.centre[elements])
+            if quantity == "pressure":
+                expected = expected * factors
+        return Sample(
+            values, expected, lambda i: f"macro-element {elements[i]}, load factor {factors[i]:g}"
+        )
+
+    return sample

@@ -1,0 +1,236 @@
+"""Solutions known in the interior: gradient, equilibrium, and the conditions of contact."""
+
+import numpy as np
+import pytest
+
+from solver.case.reader import Material
+from solver.case.solutions.base import ElasticSolution, ParameterError
+from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
+from solver.case.solutions.nested import NestedCylinders, NestedSpheres
+from solver.case.solutions.uniform import Hydrostatic, UniformCompression
+from solver.mechanics.fem.stress import traction
+
+SOFT, HARD = Material(2000.0, 0.3), Material(70000.0, 0.2)
+RADII = (20.0, 30.0, 40.0)
+
+
+def nested(cls, inner=SOFT, outer=HARD, pressure=25.0, interference=0.01):
+    return cls(radii=RADII, inner=inner, outer=outer, pressure=pressure, interference=interference)
+
+
+ALL = [
+    UniformCompression(pressure=25.0, base=-50.0, lower=SOFT, upper=HARD, dim=2, interface=1.0),
+    UniformCompression(pressure=25.0, base=-50.0, lower=SOFT, upper=HARD, dim=3, interface=1.0),
+    Hydrostatic(pressure=25.0, material=SOFT, dim=2),
+    Hydrostatic(pressure=25.0, material=SOFT, dim=3),
+    nested(NestedCylinders),
+    nested(NestedSpheres),
+    Parabola2d(material=Material(3.0, 0.0)),
+    Paraboloid3d(material=Material(3.0, 0.0)),
+]
+
+
+def names(solution):
+    return f"{solution.name}-{solution.dim}d"
+
+
+def points_of(solution: ElasticSolution, part: int) -> np.ndarray:
+    """Points (n, dim) inside a part."""
+    random = np.random.default_rng(part)
+    x = random.uniform(0.1, 0.9, (20, solution.dim))
+    if isinstance(solution, NestedCylinders):
+        low, high = RADII[part : part + 2]
+        radius = random.uniform(low, high, (20, 1))
+        return x / np.linalg.norm(x, axis=1, keepdims=True) * radius
+    if isinstance(solution, UniformCompression):
+        x[:, -1] += 1.0 if part else -1.0
+    return x
+
+
+def interface_of(solution: ElasticSolution) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, dim) of the interface and its normals there, out of the first part."""
+    x = np.random.default_rng(5).uniform(0.1, 0.9, (20, solution.dim))
+    if isinstance(solution, NestedCylinders):
+        normal = x / np.linalg.norm(x, axis=1, keepdims=True)
+        return RADII[1] * normal, normal
+    if isinstance(solution, Hydrostatic):  # any surface will do
+        return x, x / np.linalg.norm(x, axis=1, keepdims=True)
+    x[:, -1] = getattr(solution, "interface", 0.0)
+    sign = -1.0 if isinstance(solution, Parabola2d) else 1.0
+    return x, np.tile(sign * np.eye(solution.dim)[-1], (len(x), 1))
+
+
+def derivative(function, x: np.ndarray, step: float) -> np.ndarray:
+    """∂f_i/∂x_j (n, …, dim) by central differences."""
+    columns = [
+        (function(x + step * axis) - function(x - step * axis)) / (2 * step)
+        for axis in np.eye(x.shape[1])
+    ]
+    return np.stack(columns, axis=-1)
+
+
+def parts_of(solution: ElasticSolution) -> range:
+    return range(len(solution.parts))
+
+
+@pytest.mark.parametrize("solution", ALL, ids=names)
+def test_the_gradient_is_that_of_the_displacement(solution):
+    for part in parts_of(solution):
+        x = points_of(solution, part)
+        step = 1e-5 * np.abs(x).max()
+        found = derivative(lambda y, part=part: solution.displacement(y, part), x, step)
+        expected = solution.gradient(x, part)
+        np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("solution", ALL, ids=names)
+def test_the_stress_balances_the_body_force(solution):
+    for part in parts_of(solution):
+        x = points_of(solution, part)
+        step = 1e-5 * np.abs(x).max()
+
+        def tensor(y, part=part):
+            s = solution.stress(y, part)
+            full = s[:, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(-1, 3, 3)
+            return full[:, : solution.dim, : solution.dim]
+
+        divergence = np.einsum("nijj->ni", derivative(tensor, x, step))
+        scale = np.abs(tensor(x)).max() / np.abs(x).max()
+        np.testing.assert_allclose(-divergence, solution.body_force(x, part), atol=1e-8 * scale)
+
+
+@pytest.mark.parametrize("solution", ALL, ids=names)
+def test_the_parts_touch_and_press_without_friction(solution):
+    x, normal = interface_of(solution)
+    pressure = solution.contact_pressure(x)
+    assert (pressure > 0).all()
+    assert (solution.gap(x) == 0).all()
+    for part in parts_of(solution):
+        force = traction(solution.stress(x, part), normal)
+        if not isinstance(solution, Parabola2d):  # there a tangential traction is applied
+            np.testing.assert_allclose(force, -pressure[:, None] * normal, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(np.einsum("ni,ni->n", force, normal), -pressure, rtol=1e-12)
+    if len(solution.parts) == 2:
+        jump = solution.displacement(x, 1) - solution.displacement(x, 0)
+        opening = np.einsum("ni,ni->n", jump, normal)
+        np.testing.assert_allclose(opening, getattr(solution, "interference", 0.0), atol=1e-14)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_patch_test(dim):
+    """The displacement that the blocks of 50 have in closed form."""
+    solution = UniformCompression(pressure=25.0, base=-50.0, lower=SOFT, upper=SOFT, dim=dim)
+    x = np.random.default_rng(0).uniform(-50, 50, (9, dim))
+    lateral, axial = (0.004875, -0.011375) if dim == 2 else (0.00375, -0.0125)
+    expected = np.c_[lateral * x[:, :-1], axial * (x[:, -1] + 50)]
+    np.testing.assert_allclose(solution.displacement(x), expected, rtol=1e-12, atol=1e-15)
+    stress = [0, -25, -7.5, 0, 0, 0] if dim == 2 else [0, 0, -25, 0, 0, 0]
+    np.testing.assert_allclose(solution.stress(x), np.tile(stress, (9, 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_hydrostatic_traction_is_the_pressure_on_any_surface(dim):
+    solution = Hydrostatic(pressure=3.0, material=SOFT, dim=dim, centre=(1.0, 2.0, 3.0))
+    x, normal = interface_of(solution)
+    np.testing.assert_allclose(traction(solution.stress(x), normal), -3 * normal, atol=1e-14)
+    at_centre = solution.displacement(np.array([[1.0, 2.0, 3.0]])[:, :dim])
+    np.testing.assert_array_equal(at_centre, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("cls", "expected"), [(NestedCylinders, 6.4814815), (NestedSpheres, 4.8941799)]
+)
+def test_the_published_contact_pressure(cls, expected):
+    solution = nested(cls, SOFT, SOFT, interference=0.0)
+    assert solution.contact_pressure(np.ones((1, solution.dim)))[0] == pytest.approx(
+        expected, abs=5e-8
+    )
+
+
+@pytest.mark.parametrize("cls", [NestedCylinders, NestedSpheres])
+def test_equal_materials_without_interference_are_one_shell(cls):
+    """Nested or not, the stress is that of the one shell from 20 to 40 (Lamé)."""
+    solution = nested(cls, SOFT, SOFT, interference=0.0)
+    dim, (a, _, c) = solution.dim, RADII
+    for part in (0, 1):
+        x = points_of(solution, part)
+        r = np.linalg.norm(x, axis=1)
+        normal = x / r[:, None]
+        radial = np.einsum("ni,ni->n", traction(solution.stress(x, part), normal), normal)
+        lame = -25.0 * ((c / r) ** dim - 1) / ((c / a) ** dim - 1)
+        np.testing.assert_allclose(radial, lame, rtol=1e-12)
+
+
+@pytest.mark.parametrize("cls", [NestedCylinders, NestedSpheres])
+def test_the_walls_are_loaded_as_asked(cls):
+    solution = nested(cls)
+    directions = np.eye(solution.dim)
+    for part, radius, pressure in ((0, RADII[0], 25.0), (1, RADII[2], 0.0)):
+        force = traction(solution.stress(radius * directions, part), directions)
+        np.testing.assert_allclose(force, -pressure * directions, atol=1e-11)
+
+
+def test_press_fit_by_the_textbook():
+    """p = δ / (b [ (ν_o + (c²+b²)/(c²−b²))/E_o + ((b²+a²)/(b²−a²) − ν_i)/E_i ]) in plane stress;
+    in plane strain with E/(1−ν²) and ν/(1−ν)."""
+    a, b, c = RADII
+    (e_i, n_i), (e_o, n_o) = (
+        (m.young / (1 - m.poisson**2), m.poisson / (1 - m.poisson)) for m in (SOFT, HARD)
+    )
+    outer = ((c**2 + b**2) / (c**2 - b**2) + n_o) / e_o
+    inner = ((b**2 + a**2) / (b**2 - a**2) - n_i) / e_i
+    solution = nested(NestedCylinders, pressure=0.0, interference=0.02)
+    found = solution.contact_pressure(np.ones((1, 2)))[0]
+    assert found == pytest.approx(0.02 / (b * (outer + inner)), rel=1e-12)
+
+
+@pytest.mark.parametrize("cls", [NestedCylinders, NestedSpheres])
+def test_an_outer_part_that_cannot_give_way_takes_it_all(cls):
+    """Against a hard outer part and with nothing inside, the interference is all the inner's."""
+    rigid = Material(1e16, 0.3)
+    solution = nested(cls, SOFT, rigid, pressure=0.0, interference=0.02)
+    x, normal = interface_of(solution)
+    np.testing.assert_allclose(solution.displacement(x, 0), -0.02 * normal, rtol=1e-9)
+
+
+@pytest.mark.parametrize("cls", [NestedCylinders, NestedSpheres])
+def test_a_gap_that_does_not_close_leaves_no_pressure(cls):
+    solution = nested(cls, pressure=1.0, interference=-1.0)
+    x, normal = interface_of(solution)
+    assert (solution.contact_pressure(x) == 0).all()
+    jump = np.einsum("ni,ni->n", solution.displacement(x, 1) - solution.displacement(x, 0), normal)
+    np.testing.assert_allclose(solution.gap(x), jump + 1.0, rtol=1e-12)
+    assert (solution.gap(x) > 0.9).all()
+    assert (solution.displacement(x, 1) == 0).all()
+
+
+def test_a_point_is_taken_by_its_place_unless_its_part_is_given():
+    solution = nested(NestedCylinders)
+    inside, outside = np.array([[25.0, 0.0]]), np.array([[35.0, 0.0]])
+    assert (solution.displacement(inside) == solution.displacement(inside, 0)).all()
+    assert (solution.displacement(outside) == solution.displacement(outside, 1)).all()
+    both = np.vstack([inside, inside])
+    given = solution.displacement(both, np.array([0, 1]))
+    assert (given[0] == solution.displacement(inside, 0)[0]).all()
+    assert (given[1] == solution.displacement(inside, 1)[0]).all()
+    ring = np.array([[30 - 1e-9, 0.0], [35.0, 0.0], [0.0, 30 - 1e-9], [0.0, 40.0]])
+    assert solution.body_part(ring) == 1
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: nested(NestedCylinders, interference=0.0).__class__(
+            radii=(30.0, 20.0, 40.0), inner=SOFT, outer=SOFT
+        ),
+        lambda: NestedSpheres(radii=(20.0, 30.0), inner=SOFT, outer=SOFT),
+        lambda: Parabola2d(material=SOFT),
+        lambda: Parabola2d(material=Material(1.0, 0.0), strain=-0.01),
+        lambda: Hydrostatic(pressure=-1.0, material=SOFT, dim=2),
+        lambda: Hydrostatic(pressure=1.0, material=SOFT, dim=4),
+        lambda: UniformCompression(pressure=1.0, base=1.0, lower=SOFT, upper=SOFT, dim=2),
+    ],
+)
+def test_parameters_are_validated(make):
+    with pytest.raises(ParameterError):
+        make()

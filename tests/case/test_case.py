@@ -1,0 +1,479 @@
+"""The case file: what it becomes, its defaults, and one clear line for whatever is wrong."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from solver.case.expressions import Expression
+from solver.case.reader import (
+    Case,
+    Load,
+    Material,
+    Observation,
+    Support,
+    Zone,
+    load_case,
+    parse_case,
+)
+from solver.case.schemas import CASE_SCHEMA
+from solver.case.solutions.uniform import Hydrostatic
+from solver.case.yaml import parse_mapping
+from solver.system.errors import InputError
+from solver.verification.checks import CHECKS
+
+PATH = Path("family/c.yaml")
+FULL = """\
+name: ssnp170-c
+title: A title
+description: What it shows.
+mesh: {file: meshes/c.med}
+transform: {scale: 2.0}
+plane: strain
+materials:
+  lower: {young: 2000, poisson: 0.3}
+  upper: {young: 1e3, poisson: -0.5}
+supports:
+  - {group: Sym, fix: [x]}
+  - {group: Base, fix: {y: 0.0, x: 1e-3*x}}
+  - {group: Slope, fix: [normal]}
+loads:
+  - {group: Top, pressure: 25}
+  - {group: Side, traction: [0.0, 2*y]}
+  - {group: all, body_force: [0, -1]}
+bodies: {die: {rigid: true}, soft: {rigid: false}}
+contact:
+  - name: interface
+    slave: S
+    master: M
+    hexahedra: hexahedra
+    treatment: lac
+    normal: element
+    interference: 1
+  - {name: second, slave: S2, master: M2}
+directions: first
+steps: [0.5, 1]
+observe: [{zone: interface, nearest: [25, 0]}]
+reference:
+  kind: analytical
+  solution: {name: hydrostatic, pressure: 25, material: lower}
+  contact_pressure: 25
+  gap: x*0
+  displacement: [0.0, -0.1*y]
+  stress: {yy: -25, zz: -7.5*x/x}
+tolerance: {multiplier: 1e-6}
+counts: {lower: {cells: 144, faces: 12}}
+"""
+MINIMAL = """\
+name: block
+mesh: {recipe: blocks, size: 1.0}
+materials: {all: {young: 1.0, poisson: 0.0}}
+supports: [{group: base, fix: [x, y, z]}]
+"""
+CONTACT = "contact: [{name: a, slave: S, master: M}]\n"
+
+
+def test_every_key_arrives():
+    case = parse_case(FULL, PATH)
+    assert case == Case(
+        name="ssnp170-c",
+        family="family",
+        path=PATH,
+        title="A title",
+        source=FULL,
+        mesh={"path": Path("family/meshes/c.med")},
+        materials={"lower": Material(2000.0, 0.3), "upper": Material(1000.0, -0.5)},
+        supports=(
+            Support("Sym", {"x": 0.0}),
+            Support("Base", {"y": 0.0, "x": Expression("1e-3*x")}),
+            Support("Slope", {"normal": 0.0}),
+        ),
+        loads=(
+            Load("Top", "pressure", 25.0),
+            Load("Side", "traction", (0.0, Expression("2*y"))),
+            Load("all", "body_force", (0.0, -1.0)),
+        ),
+        zones=(
+            Zone("S", "M", "interface", "hexahedra", "lac", "element", 1.0),
+            Zone("S2", "M2", "second"),
+        ),
+        rigid=frozenset({"die"}),
+        transform={"scale": 2.0},
+        plane="strain",
+        directions="first",
+        steps=(0.5, 1.0),
+        observe=(Observation("interface", (25.0, 0.0)),),
+        reference={
+            "contact_pressure": 25.0,
+            "gap": Expression("x*0"),
+            "displacement": (0.0, Expression("-0.1*y")),
+            "stress": {"yy": -25.0, "zz": Expression("-7.5*x/x")},
+        },
+        reference_kind="analytical",
+        solution=Hydrostatic(pressure=25.0, material=Material(2000.0, 0.3), dim=2),
+        tolerance={"multiplier": 1e-6},
+        counts={"lower": {"cells": 144, "faces": 12}},
+    )
+
+
+def test_where_a_reference_comes_from_arrives():
+    origin = "reference: {kind: %s, gap: 0, remark: as told}\n"
+    refined = parse_case(MINIMAL + origin % "refined, uncertainty: 2.0e-3", PATH)
+    assert (refined.reference_kind, refined.reference_uncertainty) == ("refined", 2e-3)
+    assert (refined.reference_code, refined.reference_remark) == (None, "as told")
+    other = parse_case(MINIMAL + origin % "other_code, code: {name: solver, version: '14'}", PATH)
+    assert other.reference_code == {"name": "solver", "version": "14"}
+    assert other.reference == {"gap": 0.0}
+
+
+def test_defaults_are_those_of_the_contract():
+    case = parse_case(MINIMAL + "contact: [{slave: S, master: M}]\n", PATH)
+    zone = case.zones[0]
+    assert (zone.hexahedra, zone.treatment, zone.normal) == ("pyramids", "lac", "element")
+    assert zone.interference == 0.0
+    assert (case.directions, case.steps, case.loads, case.tolerance) == ("first", (1.0,), (), {})
+    assert (case.plane, case.transform, case.title, case.reference) == (None, None, "", {})
+    assert case.mesh == {"recipe": "blocks", "size": 1.0}
+
+
+def test_one_tolerance_stands_for_all():
+    assert parse_case(MINIMAL + "tolerance: 1e-3", PATH).tolerance == {"all": 1e-3}
+
+
+def test_numbers_are_floats():
+    case = parse_case(FULL, PATH)
+    assert all(type(m.young) is float for m in case.materials.values())
+    assert all(type(factor) is float for factor in case.steps)
+    assert type(case.zones[0].interference) is float
+
+
+def test_load_case_reads_the_file(tmp_path):
+    file = tmp_path / "c.yaml"
+    file.write_text(MINIMAL)
+    case = load_case(str(file))
+    assert (case.path, case.family, case.source) == (file, tmp_path.name, MINIMAL)
+
+
+@pytest.mark.parametrize("key", ["name", "mesh", "materials", "supports"])
+def test_needed_keys(key):
+    lines = [line for line in MINIMAL.splitlines() if not line.startswith(key)]
+    with pytest.raises(InputError, match=f"^family/c.yaml: {key}: this key is needed$"):
+        parse_case("\n".join(lines), PATH)
+
+
+REFUSED = [
+    # unknown keys, with the nearest allowed one
+    ('"a\\nb": 1', "'a\\nb' = 1: unknown key; allowed: "),
+    ("suports: []", "suports = []: unknown key; did you mean supports?"),
+    ("plane: stress", "plane = 'stress': must be strain"),
+    ("transform: {rotation: 1}", "transform.rotation = 1: unknown key; did you mean rotate?"),
+    ("transform: {scale: 0}", "transform.scale = 0: must be a positive number"),
+    ("transform: {stretch: [1, 0]}", "transform.stretch[1] = 0: must be a positive number"),
+    ("transform: {rotate: left}", "transform.rotate = 'left': must be an angle in degrees"),
+    ("transform: {rotate: {angle: 3}}", "transform.rotate.axis: this key is needed"),
+    (
+        "transform: {rotate: {axis: [0, 0, 1], angel: 3, angle: 3}}",
+        "transform.rotate.angel = 3: unknown key; did you mean angle?",
+    ),
+    ("transform: {perturb: -0.1}", "transform.perturb = -0.1: must be a positive share"),
+    ("transform: {perturb: {seed: 1}}", "transform.perturb.amplitude: this key is needed"),
+    ("transform: {renumber: 1.5}", "transform.renumber = 1.5: must be a seed"),
+    ("transform: {renumber: {seed: -1}}", "transform.renumber.seed = -1: must be a whole number"),
+    (
+        "contact: [{name: a, slave: S, master: M, normals: element}]",
+        "contact[0].normals = 'element': unknown key; did you mean normal?",
+    ),
+    ("bodies: {die: {stiff: true}}", "bodies.die.stiff = True: unknown key; allowed: rigid"),
+    ("bodies: {die: {rigid: 1}}", "bodies.die.rigid = 1: must be true or false"),
+    # values out of a list
+    (
+        "contact: [{slave: S, master: M, hexahedra: prisms}]",
+        "contact[0].hexahedra = 'prisms': must be pyramids or hexahedra",
+    ),
+    (
+        "contact: [{slave: S, master: M, treatment: penalty}]",
+        (
+            "contact[0].treatment = 'penalty': must be lac, uncut, quadrature, "
+            "node_to_segment, nodal or nodal_dual"
+        ),
+    ),
+    (
+        "contact: [{slave: S, master: M, treatment: node_to_segment, normal: nodal}]",
+        (
+            "contact[0].normal = 'nodal': the treatment node_to_segment has normals of its own; "
+            "allowed: element"
+        ),
+    ),
+    (
+        "contact: [{slave: S, master: M, points: 4}]",
+        "contact[0].points = 4: only the treatment quadrature has points",
+    ),
+    (
+        "contact: [{slave: S, master: M, treatment: quadrature, points: 0}]",
+        "contact[0].points = 0: must be a number from 1 to 16",
+    ),
+    (
+        "contact: [{slave: S, master: M, normal: smooth}]",
+        "contact[0].normal = 'smooth': must be element",
+    ),
+    ("directions: second", "directions = 'second': must be first or both"),
+    # contact
+    ("contact: [{master: M}]", "contact[0].slave: this key is needed"),
+    (
+        "contact: [{slave: S, master: S}]",
+        "contact[0].master = 'S': the slave is its own master: they must be two groups",
+    ),
+    (
+        "contact: [{name: a, slave: S, master: M}, {name: a, slave: T, master: M}]",
+        "contact[1].name = 'a': the name is given to two zones",
+    ),
+    (
+        "contact: [{name: a/b, slave: S, master: M}]",
+        "contact[0].name = 'a/b': must be a name of letters, digits",
+    ),
+    (
+        "contact: [{slave: 3, master: M}]",
+        "contact[0].slave = 3: must be the name of a group of the mesh (in quotes",
+    ),
+    (
+        "contact: [{slave: S, master: M, interference: small}]",
+        "contact[0].interference = 'small': must be a number",
+    ),
+    # loads
+    (
+        "loads: [{group: Top}]",
+        "loads[0] = {'group': 'Top'}: must be {group, and exactly one of pressure, traction",
+    ),
+    (
+        "loads: [{group: Top, pressure: 1, traction: [0, 0, 1]}]",
+        "must be {group, and exactly one of pressure, traction, body_force}",
+    ),
+    ("loads: [{pressure: 1}]", "loads[0].group: this key is needed"),
+    ("loads: [{group: Top, pressure: true}]", "loads[0].pressure = True: must be a number or"),
+    ("loads: [{group: Top, pressure: [1]}]", "loads[0].pressure = [1]: must be a number or an"),
+    ("loads: [{group: Top, traction: 1}]", "loads[0].traction = 1: must be a list of two (plane)"),
+    (
+        "loads: [{group: Top, pressure: 25*t}]",
+        "loads[0].pressure = '25*t': `t` is not allowed in it; it must be a number or an expr",
+    ),
+    (
+        "loads: [{group: Top, traction: [0, 0, open]}]",
+        "loads[0].traction[2] = 'open': `open` is not allowed in it",
+    ),
+    (
+        "loads: [{group: Top, pressure: 1}, {group: Top, pressure: 2}]",
+        "loads[1].group = 'Top': the group is listed twice with pressure",
+    ),
+    # steps, observations, references, tolerances, counts
+    ("steps: []", "steps = []: must be a list of increasing positive load factors"),
+    ("steps: [1, 0.5]", "steps = [1.0, 0.5]: load factors must increase"),
+    ("steps: [1, 1]", "steps = [1.0, 1.0]: load factors must increase"),
+    ("steps: [0, 1]", "steps[0] = 0: must be a positive number"),
+    ("steps: 1", "steps = 1: must be a list of increasing positive load factors"),
+    (
+        CONTACT + "observe: [{zone: b, nearest: [0, 0]}]",
+        "observe[0].zone = 'b': no such zone; allowed: a",
+    ),
+    (
+        CONTACT + "observe: [{zone: a, nearest: [0]}]",
+        "observe[0].nearest = [0]: must be a list of two (plane) or three numbers",
+    ),
+    ("reference: {gap: 0}", "reference.kind: this key is needed"),
+    ("reference: {kind: guess}", "reference.kind = 'guess': must be analytical, manufactured"),
+    ("reference: {kind: refined, gap: 0}", "reference.uncertainty: this key is needed"),
+    (
+        "reference: {kind: refined, uncertainty: 0}",
+        "reference.uncertainty = 0: must be a positive number: how far the reference may be off",
+    ),
+    ("reference: {kind: other_code, gap: 0}", "reference.code: this key is needed"),
+    (
+        "reference: {kind: other_code, code: {name: solver}}",
+        "reference.code.version: this key is needed",
+    ),
+    (
+        "reference: {kind: other_code, code: {name: solver, version: 14.6}}",
+        "reference.code.version = 14.6: must be text (in quotes if it is a number)",
+    ),
+    (
+        "reference: {kind: analytical, code: {name: solver, version: '14'}}",
+        "must be left out: only the kind other_code has one",
+    ),
+    (
+        "reference: {kind: analytical, pressure: 1}",
+        "reference.pressure = 1: unknown key; did you mean contact_pressure?",
+    ),
+    ("tolerance: 0", "tolerance = 0: must be a positive number, or a mapping of checks"),
+    ("tolerance: {multiplier: -1}", "tolerance.multiplier = -1: must be a positive number"),
+    (
+        "tolerance: {multipliers: 1}",
+        "tolerance.multipliers = 1: unknown key; did you mean multiplier?",
+    ),
+    ("counts: {top: {cells: 1.5}}", "counts.top.cells = 1.5: must be a whole number"),
+    # what the reader of the text refuses
+    ("name: again", "name: the key is given twice (line 5)"),
+]
+
+
+@pytest.mark.parametrize(("lines", "message"), REFUSED, ids=[line for line, _ in REFUSED])
+def test_refusals(lines, message):
+    with pytest.raises(InputError, match="^family/c.yaml: .*" + re.escape(message)) as refusal:
+        parse_case(MINIMAL + lines, PATH)
+    assert "\n" not in str(refusal.value)
+
+
+CHANGED = [
+    ("name: block", "name: ../block", "name = '../block': must be a name of letters"),
+    ("name: block", 'name: "block\\n"', "name = 'block\\n': must be a name of letters"),
+    ("name: block", "name: 3", "name = 3: must be a name of letters"),
+    ("name: block", "name: a-swapped", "name = 'a-swapped': must not end in -swapped"),
+    ("young: 1.0", "young: 0.0", "materials.all.young = 0.0: must be a positive number"),
+    ("young: 1.0", "young: -1", "materials.all.young = -1: must be a positive number"),
+    ("young: 1.0", "young: stiff", "materials.all.young = 'stiff': must be a positive number"),
+    ("young: 1.0, ", "", "materials.all.young: this key is needed"),
+    ("young: 1.0, ", "young: 1.0, rho: 1, ", "materials.all.rho = 1: unknown key; allowed: "),
+    ("poisson: 0.0", "poisson: 0.5", "materials.all.poisson = 0.5: must be a number greater"),
+    ("poisson: 0.0", "poisson: -1", "poisson = -1: must be a number greater than -1 and less"),
+    ("poisson: 0.0", "poisson: .nan", "materials.all.poisson = '.nan': must be a number"),
+    ("{all: {young: 1.0, poisson: 0.0}}", "{}", "materials = {}: must be a mapping of cell"),
+    ("[{group: base, fix: [x, y, z]}]", "[]", "supports = []: must be a list of {group, fix}"),
+    ("[x, y, z]", "[]", "supports[0].fix = []: must be a list of x, y, z, normal, or a mapping"),
+    ("[x, y, z]", "{}", "supports[0].fix = {}: must be a list of x, y, z, normal, or a mapping"),
+    ("[x, y, z]", "[x, x]", "supports[0].fix = ['x', 'x']: must be a list of x, y, z, normal"),
+    ("[x, y, z]", "[w]", "supports[0].fix[0] = 'w': must be x, y, z or normal"),
+    ("[x, y, z]", "{w: 1}", "supports[0].fix.w = 1: unknown key; allowed: normal, x, y, z"),
+    ("[x, y, z]", "{x: 1/}", "supports[0].fix.x = '1/': must be a number or an expression"),
+    ("z]}]", "z]}, {group: base, fix: [z]}]", "supports[1].group = 'base': the group is listed"),
+    ("recipe: blocks, size: 1.0", "size: 1.0", "mesh = {'size': 1.0}: must be {file: MESH}"),
+    ("recipe: blocks, ", "recipe: blocks, file: a.med, ", "must be {file: MESH} alone, or {rec"),
+    ("recipe: blocks, ", "file: a.med, ", "must be {file: MESH} alone, or {recipe: NAME, …}"),
+    ("{recipe: blocks, size: 1.0}", "a.med", "mesh = 'a.med': must be {file: MESH} alone, or"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), CHANGED, ids=[f"{c[1]}" for c in CHANGED])
+def test_refusals_of_needed_keys(old, new, message):
+    assert MINIMAL.count(old) == 1
+    with pytest.raises(InputError, match="^family/c.yaml: .*" + re.escape(message)):
+        parse_case(MINIMAL.replace(old, new), PATH)
+
+
+PLANE = [
+    ("fix: [normal]", "fix: [z]", "supports[2].fix = 'z': z in a plane case; allowed are x, y an"),
+    ("1e-3*x", "1e-3*z", "supports[1].fix.x = '1e-3*z': z in a plane case; allowed are x, y and r"),
+    ("[0.0, 2*y]", "[0.0, 0.0, 2*y]", "loads[1].traction = [0.0, 0.0, '2*y']: must have 2 comp"),
+    ("[25, 0]", "[25, 0, 0]", "observe[0].nearest = [25.0, 0.0, 0.0]: must have 2 components"),
+    ("-7.5*x/x", "z", "reference.stress.zz = 'z': z in a plane case; allowed are x, y and r"),
+    ("-0.1*y]", "-0.1*y, 0]", "reference.displacement = [0.0, '-0.1*y', 0.0]: must have 2 comp"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), PLANE, ids=[f"{c[1]}" for c in PLANE])
+def test_a_plane_case_does_not_speak_of_z(old, new, message):
+    assert FULL.count(old) == 1
+    with pytest.raises(InputError, match="^family/c.yaml: " + re.escape(message)):
+        parse_case(FULL.replace(old, new), PATH)
+
+
+def test_every_check_may_have_its_tolerance():
+    schema = json.loads(CASE_SCHEMA.read_text())
+    names = set(schema["properties"]["tolerance"]["properties"])
+    assert names == {check.name for check in CHECKS}
+
+
+def test_every_value_of_the_schema_says_what_is_allowed():
+    def bare(schema, path):
+        if "$ref" not in schema and "description" not in schema:
+            yield path
+        for name, inner in schema.get("properties", {}).items():
+            yield from bare(inner, f"{path}.{name}")
+        for key in ("items", "additionalProperties"):
+            if isinstance(schema.get(key), dict):
+                yield from bare(schema[key], f"{path}.{key}")
+
+    schema = json.loads(CASE_SCHEMA.read_text())
+    assert not list(bare(schema, "case"))
+    assert all("description" in inner for inner in schema["$defs"].values())
+
+
+def test_snakemake_validates_by_the_same_schema():
+    validate = pytest.importorskip("snakemake.utils").validate
+    workflow_error = pytest.importorskip("snakemake.exceptions").WorkflowError
+    validate(dict(BASE), str(CASE_SCHEMA))
+    with pytest.raises(workflow_error, match="'stress' is not one of"):
+        validate({**BASE, "plane": "stress"}, str(CASE_SCHEMA))
+
+
+def _keys(schema):
+    for name, inner in schema.get("properties", {}).items():
+        yield name
+        yield from _keys(inner)
+
+
+KEYS = sorted({*_keys(json.loads(CASE_SCHEMA.read_text())), "all", "group", "fix", "file", "x"})
+WORDS = [*KEYS, "S", "M", "25*x", "strain", "both", "analytical", "1/", "", "../a"]
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers(-3, 3) | st.floats(-2, 2) | st.sampled_from(WORDS),
+    lambda v: st.lists(v, max_size=3) | st.dictionaries(st.sampled_from(KEYS), v, max_size=3),
+    max_leaves=6,
+)
+BASE = {
+    "name": "block",
+    "mesh": {"recipe": "blocks"},
+    "materials": {"all": {"young": 1.0, "poisson": 0.0}},
+    "supports": [{"group": "base", "fix": ["x"]}],
+}
+
+
+@given(st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=4))
+def test_any_mapping_is_a_case_or_refused(content):
+    for whole in (content, BASE | content):
+        line = _refusal_of(json.dumps(whole))
+        assert line is None or (line.startswith("family/c.yaml: ") and "\n" not in line)
+
+
+def _refusal_of(text):
+    try:
+        assert isinstance(parse_case(text, PATH), Case)
+    except InputError as refusal:
+        return str(refusal)
+    return None
+
+
+WRONG = [None, True, -1, 0, 0.5, 1e300, 10**300, "", "x y", "../../etc", "<b>&", "$(x)", "9**9**9",
+         "a" * 2000, "(" * 60 + "1" + ")" * 60, [], [[]], [None], {}, {"a": 1}]  # fmt: skip
+
+
+def places(content, path=()):
+    """The paths of everything in a mapping, whatever it holds."""
+    pairs = content.items() if isinstance(content, dict) else enumerate(content)
+    for key, value in pairs:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from places(value, (*path, key))
+
+
+def put(content, path, value):
+    """A copy of plain content with one thing replaced."""
+    copy = json.loads(json.dumps(content))
+    inner = copy
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = value
+    return copy
+
+
+WHOLE = parse_mapping(FULL, PATH)
+# Keys of which nearly everything that is text, or a number, is a value.
+FREE = {"title", "description", "remark", "seed"}
+
+
+@pytest.mark.parametrize("path", list(places(WHOLE)), ids=lambda p: ".".join(map(str, p)))
+def test_every_key_with_a_wrong_value_is_refused_in_one_line(path):
+    told = [_refusal_of(json.dumps(put(WHOLE, path, value))) for value in WRONG]
+    refused = [line for line in told if line is not None]
+    assert all("\n" not in line and len(line) < 1500 for line in refused)
+    # At least what is neither text, number, list nor mapping, or is text of no meaning.
+    assert len(refused) >= (5 if path[-1] in FREE else 9)

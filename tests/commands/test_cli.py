@@ -1,0 +1,273 @@
+"""The command line: exit statuses, one clear line for bad input, and a verdict in every case."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import solver.verification.run
+from solver.case.reader import load_case
+from solver.commands.cli import main
+from solver.system.errors import SolveError
+
+PLANE = """\
+name: small
+mesh:
+  recipe: blocks
+  size: 50.0
+  bottom: {cells: QUAD4, divisions: 3}
+  top: {cells: QUAD4, divisions: 2}
+plane: strain
+materials: {all: {young: 2000.0, poisson: 0.3}}
+supports:
+  - {group: symx, fix: [x]}
+  - {group: base, fix: [y]}
+loads: [{group: press, pressure: 25.0}]
+contact: [{name: interface, slave: bottom_contact, master: top_contact}]
+reference:
+  kind: analytical
+  contact_pressure: 25.0
+  normal_stress: -25.0
+  gap: 0.0
+"""
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A folder with a small case; results go into `out`."""
+    (tmp_path / "c.yaml").write_text(PLANE)
+    return tmp_path
+
+
+def solve(folder, *options, case="c.yaml"):
+    """The exit status of a solve and its verdict."""
+    out = folder / "out"
+    arguments = ["solve", folder / case, "-o", out / "r.vtkhdf", "--verdict", out / "v.json"]
+    status = main([*map(str, arguments), *options])
+    return status, json.loads((out / "v.json").read_text())
+
+
+def change(folder, old, new):
+    assert PLANE.count(old) == 1
+    (folder / "c.yaml").write_text(PLANE.replace(old, new))
+
+
+def test_passed_is_0(small, capsys):
+    status, verdict = solve(small)
+    assert (status, verdict["verdict"], verdict["passed"]) == (0, "passed", True)
+    assert (verdict["case"], verdict["result"]) == ("small", "r.vtkhdf")
+    assert {"mesh", "solve", "checks", "write", "total"} <= verdict["seconds"].keys()
+    assert verdict["stage_cpu_seconds"].keys() == verdict["seconds"].keys() - {"total"}
+    assert verdict["matrix_entries"] > verdict["dofs"]
+    assert verdict["macro_elements"] == 3
+    assert (small / "out/r.vtkhdf").is_file()
+    assert capsys.readouterr().out.splitlines()[-1].startswith("small: passed, worst error ")
+
+
+def test_a_failed_check_is_1_and_leaves_its_result(small):
+    change(small, "contact_pressure: 25.0", "contact_pressure: 26.0")
+    status, verdict = solve(small)
+    assert (status, verdict["verdict"], verdict["passed"]) == (1, "failed", False)
+    assert verdict["reason"].startswith("multiplier interface: 25")
+    assert (small / "out/r.vtkhdf").is_file()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("young: 2000.0", "young: -1.0", "materials.all.young = -1.0: must be a positive number"),
+        ("master: top_contact", "master: top_contakt", "did you mean top_contact?"),
+        ("recipe: blocks", "file: no.msh", "mesh = {"),
+        ("cells: QUAD4, divisions: 3", "cells: QUAD5, divisions: 3", "mesh.bottom.cells = 'QUAD5'"),
+    ],
+)
+def test_refused_input_is_2_with_one_line(small, capsys, old, new, message):
+    change(small, old, new)
+    status, verdict = solve(small)
+    assert (status, verdict["verdict"], verdict["passed"]) == (2, "refused", False)
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert printed == verdict["reason"] + "\n"
+    assert printed.startswith(f"{small / 'c.yaml'}: ")
+    assert [file.name for file in (small / "out").iterdir()] == ["v.json"]
+
+
+def _raising(error):
+    def simulate(*_, **__):
+        raise error
+
+    return simulate
+
+
+def test_a_file_that_cannot_be_written_is_2_with_one_line(small, capsys, monkeypatch):
+    monkeypatch.setattr(
+        solver.verification.run, "simulate", _raising(AssertionError("solved for nothing"))
+    )
+    for command in ("mesh", "solve"):
+        output = small / "c.yaml" / "r.vtkhdf"
+        assert main([command, str(small / "c.yaml"), "-o", str(output)]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_a_solve_that_fails_is_3_with_one_line(small, capsys, monkeypatch):
+    monkeypatch.setattr(solver.verification.run, "simulate", _raising(SolveError("no convergence")))
+    status, verdict = solve(small)
+    assert (status, verdict["verdict"], verdict["reason"]) == (3, "failed", "no convergence")
+    assert capsys.readouterr().err == "no convergence\n"
+    assert [file.name for file in (small / "out").iterdir()] == ["v.json"]
+
+
+def test_a_bug_is_70_with_a_traceback(small, capsys, monkeypatch):
+    monkeypatch.setattr(
+        solver.verification.run, "simulate", _raising(ZeroDivisionError("of\nnothing"))
+    )
+    status, verdict = solve(small)
+    assert (status, verdict["verdict"]) == (70, "crashed")
+    assert verdict["reason"] == "ZeroDivisionError: of nothing"
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_an_interruption_is_130_and_quiet(small, capsys, monkeypatch):
+    monkeypatch.setattr(solver.verification.run, "simulate", _raising(KeyboardInterrupt()))
+    assert main(["solve", str(small / "c.yaml"), "-o", str(small / "r.vtkhdf")]) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_process_that_died_gets_its_verdict(small):
+    (small / "log").write_text("started\nSegmentation fault\n\n")
+    verdict = small / "v.json"
+    arguments = ["crashed", str(small / "c.yaml"), "--swap", "--verdict", str(verdict)]
+    assert main([*arguments, "--log", str(small / "log")]) == 0
+    told = json.loads(verdict.read_text())
+    assert (told["verdict"], told["reason"]) == ("crashed", "Segmentation fault")
+    assert (told["case"], told["swapped"]) == ("small", True)
+    (small / "c.yaml").write_text("[")
+    assert main(arguments) == 0
+    told = json.loads(verdict.read_text())
+    assert (told["case"], told["reason"]) == ("c", "the process died without a word")
+
+
+def test_mesh_is_written_once_for_both_directions(small):
+    mesh = small / "m.vtkhdf"
+    assert main(["mesh", str(small / "c.yaml"), "-o", str(mesh)]) == 0
+    for options, slaves in ((), 3), (("--swap",), 2):
+        status, verdict = solve(small, "--mesh", str(mesh), *options)
+        assert (status, verdict["macro_elements"]) == (0, slaves)
+    assert verdict["swapped"]
+    assert "read" in verdict["seconds"]
+    mesh.write_text("c.yaml: mesh.bottom: no such thing\n")
+    status, verdict = solve(small, "--mesh", str(mesh))
+    assert (status, verdict["verdict"]) == (2, "refused")
+    assert "c.yaml: mesh.bottom: no such thing" in verdict["reason"]
+
+
+def test_check_judges_a_stored_result_again(small, capsys):
+    _, verdict = solve(small)
+    capsys.readouterr()
+    result = str(small / "out/r.vtkhdf")
+    assert main(["check", result, result, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [again["checks"] for again in told] == [verdict["checks"]] * 2
+    assert main(["check", result]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("small: passed")
+    assert len(lines) == 1 + len(verdict["checks"])
+    assert main(["check", str(small / "c.yaml")]) == 2
+    assert "must be a result written by `solve`" in capsys.readouterr().err
+
+
+def test_accept_shows_the_difference_and_check_holds_it(small, capsys):
+    solve(small)
+    result = str(small / "out/r.vtkhdf")
+    capsys.readouterr()
+    assert main(["accept", result]) == 0
+    assert "multiplier interface: none → 25 … 25" in capsys.readouterr().out
+    assert main(["accept", result]) == 0
+    assert capsys.readouterr().out.startswith("small: 0 values accepted anew of ")
+    change(small, "pressure: 25.0}]", "pressure: 25.0001}]")
+    status, verdict = solve(small)
+    assert status == 1
+    assert "accepted 25 … 25" in verdict["reason"]
+
+
+def test_report_takes_verdicts_by_name_or_by_folder(small, capsys):
+    solve(small)
+    assert main(["report", str(small / "out/v.json"), "-o", str(small / "one")]) == 0
+    (small / "out/v.json").rename(small / "out/verdict.json")
+    assert main(["report", "--results", str(small), "-o", str(small / "two")]) == 0
+    for folder in ("one", "two"):
+        (told,) = json.loads((small / folder / "summary.json").read_text())
+        assert (told["case"], told["passed"]) == ("small", True)
+    capsys.readouterr()
+    assert main(["report", "-o", str(small / "three")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_new_writes_a_case_that_is_valid_and_passes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "mine"]) == 0
+    assert load_case("mine.yaml").name == "mine"
+    assert main(["validate", "--mesh", "mine.yaml"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "mine.yaml: valid"
+    status, verdict = solve(tmp_path, case="mine.yaml")
+    assert (status, verdict["reason"]) == (0, "")
+    assert main(["new", "mine"]) == 2
+    assert capsys.readouterr().err == "mine.yaml: file: is there already; choose another with -o\n"
+    assert main(["new"]) == main(["new", "-o", "yours.yaml"]) == 0
+    assert [load_case(f"{name}.yaml").name for name in ("new-case", "yours")] == [
+        "new-case",
+        "yours",
+    ]
+    assert main(["new", "../mine", "-o", "x.yaml"]) == 2
+    assert not Path("x.yaml").exists()
+
+
+def test_validate_goes_through_all_files(small, capsys):
+    (small / "bad.yaml").write_text(PLANE.replace("small", "a/b"))
+    (small / "lost.yaml").write_text(re.sub("mesh:\n(  .*\n)+", "mesh: {file: lost.msh}\n", PLANE))
+    paths = [str(small / name) for name in ("bad.yaml", "c.yaml", "lost.yaml", "none.yaml")]
+    assert main(["validate", *paths]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == f"{paths[1]}: valid\n"
+    assert "lost.yaml: mesh.file = " in printed.err
+    assert len(printed.err.splitlines()) == 3
+
+
+def test_wrong_usage_is_2():
+    for arguments in ([], ["solve"], ["solves", "c.yaml"], ["solve", "c.yaml", "--hexahedra", "x"]):
+        with pytest.raises(SystemExit) as stop:
+            main(arguments)
+        assert stop.value.code == 2
+
+
+def test_quiet_prints_nothing(small, capsys):
+    assert solve(small, "--quiet")[0] == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_threads_yield_to_the_environment(small, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(name, "")  # so that what the command sets goes with the test
+        monkeypatch.delenv(name)
+    assert solve(small, "--threads", "1")[0] == 0
+    assert os.environ["OMP_NUM_THREADS"] == "2"
+    assert os.environ["OPENBLAS_NUM_THREADS"] == os.environ["MKL_NUM_THREADS"] == "1"
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys; from solver.commands.cli import main\n"
+        "try: main(['solve', '--help'])\n"
+        "except SystemExit: pass\n"
+        "print(sorted({'numpy', 'yaml', 'meshio', 'gmsh', 'skfem', 'h5py'} & set(sys.modules)))"
+    )
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[]"

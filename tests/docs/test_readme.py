@@ -1,0 +1,144 @@
+"""The README's commands, run from top to bottom as a newcomer would.
+
+They run as they stand, in a copy of the project where long ones are short: `cases/` holds only the
+case that the README names, a study and a scaling family of one point each, and `tests/` a single
+test. The installation is left out: the copy borrows this environment.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCKS = FENCE.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+LEFT_OUT = {".git", ".venv", ".snakemake", "cases", "results", "tests"}
+
+
+def write_part(case: dict, path: Path) -> None:
+    """Two unit cubes on each other as a MED file, with the groups that a case names."""
+    import gmsh
+
+    gmsh.initialize()
+    try:
+        gmsh.option.set_number("General.Terminal", 0)
+        z = {}
+        for name, bottom in zip(case["materials"], (0, 1), strict=True):
+            box = gmsh.model.occ.add_box(0, 0, bottom, 1, 1, 1)
+            gmsh.model.occ.synchronize()
+            gmsh.model.set_physical_name(3, gmsh.model.add_physical_group(3, [box]), name)
+            for _, face in gmsh.model.get_boundary([(3, box)], oriented=False):
+                z[name, round(gmsh.model.occ.get_center_of_mass(2, face)[2], 6)] = face
+        (lower, upper), [zone] = case["materials"], case["contact"]
+        faces = {
+            case["supports"][0]["group"]: z[lower, 0.0],
+            zone["slave"]: z[lower, 1.0],
+            zone["master"]: z[upper, 1.0],
+            case["loads"][0]["group"]: z[upper, 2.0],
+        }
+        for name, face in faces.items():
+            gmsh.model.set_physical_name(2, gmsh.model.add_physical_group(2, [face]), name)
+        gmsh.option.set_number("Mesh.MeshSizeMax", 0.5)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+
+
+def write_study(folder: Path) -> None:
+    """The project's study with a single point in its quick part."""
+    shutil.copytree(ROOT / "cases" / "study", folder)
+    study = yaml.safe_load((folder / "study.yaml").read_text())
+    pair = study["problems"][0]["pairs"][0]
+    study["treatments"] = study["treatments"][:1]
+    study["quick"] = {
+        "repetitions": 1,
+        "levels": 1,
+        "pairs": {study["problems"][0]["name"]: [list(pair)]},
+    }
+    (folder / "study.yaml").write_text(yaml.safe_dump(study))
+
+
+def write_scaling(folder: Path) -> None:
+    """The project's scaling family with a single small point, its benchmark with one comparison."""
+    shutil.copytree(ROOT / "cases" / "scaling", folder)
+    scaling = yaml.safe_load((folder / "scaling.yaml").read_text())
+    [plane] = [series for series in scaling["series"] if series["name"] == "quad4"]
+    scaling["series"], scaling["goals"] = [plane | {"sizes": [1000]}], []
+    scaling["quick"]["series"] = ["quad4"]
+    (folder / "scaling.yaml").write_text(yaml.safe_dump(scaling))
+    benchmark = yaml.safe_load((folder / "benchmark.yaml").read_text())
+    comparison = benchmark["comparisons"][0] | {"series": "quad4"}
+    benchmark["comparisons"] = [comparison | {"ways": comparison["ways"][:1]}]
+    benchmark["growth"] = []
+    benchmark["batch"]["cases"] = ["../ssnp170/e.yaml"]
+    (folder / "benchmark.yaml").write_text(yaml.safe_dump(benchmark))
+
+
+def write_sweep(folder: Path) -> None:
+    """One of the project's sweeps, with its base cases, and one ladder of the inf-sup test."""
+    shutil.copytree(ROOT / "cases" / "stability" / "base", folder / "base")
+    (folder / "sweeps").mkdir()
+    shutil.copy(ROOT / "cases" / "stability" / "sweeps" / "stiffness.yaml", folder / "sweeps")
+    ladders = yaml.safe_load((ROOT / "cases/stability/infsup/infsup.yaml").read_text())
+    ladders["cells"] = ladders["cells"][:1]
+    (folder / "infsup").mkdir()
+    (folder / "infsup" / "infsup.yaml").write_text(yaml.safe_dump(ladders))
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """The copy with little to do."""
+    for path in ROOT.iterdir():
+        if path.name not in LEFT_OUT and not path.name.startswith("."):
+            copy = shutil.copytree if path.is_dir() else shutil.copy
+            copy(path, tmp_path / path.name)
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    (tmp_path / "cases" / "ssnp170").mkdir(parents=True)
+    for name in ("e.yaml", "family.yaml"):
+        shutil.copy(ROOT / "cases" / "ssnp170" / name, tmp_path / "cases" / "ssnp170")
+    write_study(tmp_path / "cases" / "study")
+    write_scaling(tmp_path / "cases" / "scaling")
+    write_sweep(tmp_path / "cases" / "stability")
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "test_start.py").write_text(
+        "def test_start():\n    import solver.commands.cli\n"
+    )
+    (tmp_path / "my-cases").mkdir()
+    [text] = [text for language, text in BLOCKS if language == "yaml"]
+    (tmp_path / "my-cases" / "part.yaml").write_text(text)
+    case = yaml.safe_load(text)
+    write_part(case, tmp_path / "my-cases" / case["mesh"]["file"])
+    return tmp_path
+
+
+def test_every_command_works_in_its_order(project: Path):
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST")}
+    environment["MAKEFLAGS"] = "INSTALL=:"
+    for language, text in BLOCKS:
+        if language == "yaml":
+            continue
+        command = ["bash", "-ec"] if language == "sh" else [sys.executable, "-c"]
+        run = subprocess.run(
+            [*command, text],
+            cwd=project,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        assert run.returncode == 0, f"{text}\n{run.stdout}"
+    assert (project / "results" / "report" / "workflow.html").is_file()
+    assert (project / "results" / "my-cases" / "my-block" / "result.vtkhdf").is_file()
+
+
+def test_links_lead_to_files():
+    for target in re.findall(r"\]\(([^)#]+)\)", (ROOT / "README.md").read_text(encoding="utf-8")):
+        assert (ROOT / target).exists(), target

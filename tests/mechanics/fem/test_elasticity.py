@@ -1,0 +1,105 @@
+"""Stiffness and internal forces against scikit-fem's own assembly, and exact linear fields."""
+
+import numpy as np
+import pytest
+import skfem
+from skfem.models.elasticity import lame_parameters as skfem_lame
+from skfem.models.elasticity import linear_elasticity
+
+from solver.mechanics.fem import shape_functions, volume_rule
+from solver.mechanics.fem.elasticity import (
+    Block,
+    element_matrices,
+    internal_force,
+    lame_parameters,
+    nodal_stress,
+    stiffness,
+)
+from solver.mesh.catalogue import BY_NAME
+
+VOLUMES = [n for n, t in BY_NAME.items() if t.dim > 1]
+
+
+def one_cell(name, distortion=0.08, seed=0):
+    kind = BY_NAME[name]
+    rng = np.random.default_rng(seed)
+    points = kind.nodes + distortion * rng.uniform(-1, 1, kind.nodes.shape)
+    cells = np.arange(kind.n_nodes)[None]
+    return points, Block(kind, cells, np.array([1.5]), np.array([0.7]), straight=False)
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_rigid_motions_cost_no_force(name):
+    points, block = one_cell(name)
+    matrix = element_matrices(points, block)[0]
+    dim = points.shape[1]
+    turn = np.zeros((dim, dim))
+    turn[0, 1], turn[1, 0] = -1.0, 1.0
+    for motion in (np.ones_like(points), points @ turn.T):
+        assert np.abs(matrix @ motion.ravel()).max() < 1e-13 * np.abs(matrix).max() * 10
+    assert np.allclose(matrix, matrix.T, atol=1e-14 * np.abs(matrix).max())
+    eigenvalues = np.linalg.eigvalsh(matrix)
+    rigid = 3 if dim == 2 else 6
+    assert (eigenvalues[rigid:] > 1e-6 * eigenvalues[-1]).all()
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_internal_force_is_the_product_with_the_matrix(name):
+    points, block = one_cell(name)
+    field = np.random.default_rng(1).normal(size=points.shape)
+    product = stiffness(points, [block])[0] @ field.ravel()
+    assert internal_force(points, [block], field).ravel() == pytest.approx(product, rel=1e-11)
+
+
+def test_a_large_translation_costs_no_digits():
+    points, block = one_cell("HEXA8")
+    field = np.random.default_rng(1).normal(size=points.shape)
+    force = internal_force(points, [block], field)
+    far = internal_force(points, [block], field + 2.0**20)
+    assert np.abs(far - force).max() < 2.0**20 * 4e-16 * 20 * np.abs(force).max()
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_stress_of_a_linear_field_is_exact_at_every_node(name):
+    points, block = one_cell(name)
+    dim = points.shape[1]
+    slope = np.random.default_rng(4).normal(size=(dim, dim))
+    stress = nodal_stress(points, [block], points @ slope.T)
+    strain = (slope + slope.T) / 2
+    exact = 1.5 * np.trace(strain) * np.eye(3)
+    exact[:dim, :dim] += 2 * 0.7 * strain
+    wanted = exact[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    assert stress == pytest.approx(np.tile(wanted, (len(points), 1)), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "mesh", "element"),
+    [
+        ("TRIA3", skfem.MeshTri(), skfem.ElementTriP1()),
+        ("QUAD4", skfem.MeshQuad(), skfem.ElementQuad1()),
+        ("TETRA4", skfem.MeshTet(), skfem.ElementTetP1()),
+        ("HEXA8", skfem.MeshHex(), skfem.ElementHex1()),
+    ],
+)
+def test_the_matrix_is_the_one_of_scikit_fem(name, mesh, element):
+    mesh = mesh.refined(1)
+    kind = BY_NAME[name]
+    lame, shear = lame_parameters(np.array([2000.0]), np.array([0.3]))
+    assert (lame[0], shear[0]) == pytest.approx(skfem_lame(2000.0, 0.3))
+    points, weights = volume_rule(name)
+    basis = skfem.CellBasis(mesh, skfem.ElementVector(element), quadrature=(points.T, weights))
+    theirs = linear_elasticity(lame[0], shear[0]).assemble(basis)
+    # scikit-fem numbers the vertices of a cell in its own order; match them by their place.
+    local = element.doflocs
+    order = [int(np.abs(local - node).sum(axis=1).argmin()) for node in kind.nodes]
+    cells = mesh.t.T[:, order]
+    # and cells that scikit-fem made left-handed are mirrored, which moves no node
+    corner = mesh.p.T[cells]
+    middle = shape_functions(name).gradients(kind.nodes.mean(axis=0))
+    left_handed = np.linalg.det(np.einsum("cai,aj->cij", corner, middle)) < 0
+    cells[left_handed] = cells[left_handed][:, kind.mirror]
+    n = len(cells)
+    block = Block(kind, cells, np.repeat(lame, n), np.repeat(shear, n))
+    ours, _ = stiffness(mesh.p.T.copy(), [block])
+    dofs = basis.nodal_dofs.T.ravel()
+    assert np.abs(ours - theirs[dofs][:, dofs]).max() < 1e-12 * np.abs(ours).max()

@@ -1,0 +1,116 @@
+"""Which way a constrained system is solved, and that every way gives the same answer."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from solver.mechanics.linear.backends import BACKENDS
+from solver.mechanics.linear.choice import against_condensation
+from solver.mechanics.linear.condensation import condense, saddle_point
+from solver.mechanics.linear.condensed_matrix import CondensedMatrix
+from solver.mechanics.linear.direct import standing_for_auto
+from solver.mechanics.linear.multigrid import Unknowns
+
+needs_pardiso = pytest.mark.skipif(
+    not BACKENDS["pardiso"].available(), reason="MKL PARDISO is not installed"
+)
+
+
+def chain_over_floor(count):
+    """A chain of springs that floats, and one held unknown that is the mean of all of it."""
+    line = sparse.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(count, count)).tolil()
+    line[0, 0] = line[-1, -1] = 1.0
+    matrix = sparse.block_diag([[[3.0]], line]).tocsr()
+    row = np.concatenate([[1.0], np.full(count, -1 / count)])[None]
+    return matrix, sparse.csr_matrix(row)
+
+
+def stands_for(matrix, dim=3):
+    n = matrix.shape[0]
+    return Unknowns(dim, np.arange(n), np.ones((n, 6)), np.zeros(n, dtype=int))
+
+
+@needs_pardiso
+@pytest.mark.parametrize("weighted", [True, False])
+def test_a_saddle_point_and_the_condensed_system_agree(weighted):
+    matrix, constraints = chain_over_floor(30)
+    force, violation = np.random.default_rng(0).standard_normal(31), np.array([0.2])
+    own = np.arange(31) == 0
+    condensed = condense(matrix, constraints, own, stands_for(matrix))
+    saddle = saddle_point(matrix, constraints, "tried", weighted)
+    found = [system.correction(force, violation) for system in (condensed, saddle)]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(constraints @ found[1], violation, rtol=1e-12)
+    left = force - matrix @ found[1]
+    np.testing.assert_allclose(condensed.multiplier(left), saddle.multiplier(left), rtol=1e-9)
+
+
+@needs_pardiso
+def test_wide_constraints_are_not_condensed():
+    matrix, constraints = chain_over_floor(1200)
+    why = against_condensation(matrix, constraints)
+    assert why == "a condensed system would fill in: one constraint holds 1201 unknowns"
+    with standing_for_auto("cholmod"):
+        assert not against_condensation(matrix, constraints)
+
+
+def test_narrow_constraints_are_condensed():
+    matrix, constraints = chain_over_floor(900)
+    assert not against_condensation(matrix, constraints)
+
+
+def test_without_pardiso_all_is_condensed(monkeypatch):
+    missing = replace(BACKENDS["pardiso"], available=lambda: False)
+    monkeypatch.setitem(BACKENDS, "pardiso", missing)
+    matrix, constraints = chain_over_floor(1200)
+    assert not against_condensation(matrix, constraints)
+
+
+@needs_pardiso
+@pytest.mark.parametrize("before", ["", "import gmsh"])
+def test_pardiso_has_the_same_threads_whatever_was_loaded_before(before):
+    """Else the last digits of a result depend on whether its mesh was made in the same process."""
+    script = f"""{before}
+import numpy as np
+from scipy.sparse import csr_matrix
+from solver.mechanics.linear.pardiso import Pardiso
+Pardiso(csr_matrix(np.eye(3))).solve(np.ones((3, 1)))
+print(open("/proc/self/maps").read())
+"""
+    command = [sys.executable, "-c", script]
+    loaded = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "libmkl_intel_thread" in loaded
+    assert "libmkl_gnu_thread" not in loaded
+
+
+def between_two_chains(count):
+    """Two chains, the facing ends of which stay together through three multipliers."""
+    line = sparse.diags([-1.0, 2.5, -1.0], [-1, 0, 1], shape=(count, count))
+    matrix = sparse.block_diag([line, 3 * line]).tocsr()
+    columns = [[0, count, count + 1], [1, count + 1, count + 2], [2, count + 2, count + 3]]
+    rows = np.repeat(np.arange(3), 3)
+    weights = np.tile([1.0, -0.3, -0.7], 3)
+    return matrix, sparse.csr_matrix((weights, (rows, np.ravel(columns))), shape=(3, 2 * count))
+
+
+def test_condensed_matrix_is_that_of_the_expansion():
+    matrix, constraints = between_two_chains(12)
+    own = np.arange(24) < 12
+    system = condense(matrix, constraints, own, stands_for(matrix, dim=2))
+    expected = (system.expansion.T @ matrix @ system.expansion).toarray()
+    np.testing.assert_allclose((constraints @ system.expansion).toarray(), 0, atol=1e-15)
+    kept = np.setdiff1d(np.arange(24), system.pivot)
+    added = sparse.csr_matrix(expected) - matrix[kept][:, kept]
+    condensed = CondensedMatrix(matrix, kept, added.tocsr())
+    x = np.random.default_rng(1).standard_normal((21, 2))
+    np.testing.assert_allclose(condensed @ x, expected @ x, atol=1e-14)
+    np.testing.assert_allclose(condensed.diagonal(), expected.diagonal(), atol=1e-15)
+    np.testing.assert_allclose(condensed.tocsr().toarray(), expected, atol=1e-15)
+    some = np.array([20, 3, 7])
+    np.testing.assert_allclose(condensed[some].toarray(), expected[some], atol=1e-15)
+    right = np.random.default_rng(2).standard_normal(21)
+    np.testing.assert_allclose(expected @ system.factor.solve(right), right, atol=1e-13)

@@ -1,0 +1,300 @@
+"""Multigrid on blocks of HEXA8: solutions known beforehand, iterations, and when it gives way."""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.sparse import block_array, block_diag, bsr_matrix, csr_matrix, eye, kron, random_array
+
+from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
+from solver.mechanics.linear import choice, multigrid
+from solver.mechanics.linear.backends import BACKENDS
+from solver.mechanics.linear.condensation import condense
+from solver.mechanics.linear.direct import standing_for_auto
+from solver.mechanics.linear.krylov import ROUGH
+from solver.mechanics.linear.multigrid import Multigrid, Unknowns
+from solver.mesh.catalogue import BY_NAME
+from solver.simulation.systems import Part, Systems
+from solver.system.errors import SolveError
+from tests.scenes import grid
+
+
+def block(count: int, stretch: float = 1.0, poisson: float = 0.3) -> tuple[np.ndarray, csr_matrix]:
+    """Points (n, 3) and stiffness of a unit cube of count³ cells, stretched along z."""
+    points, cells = grid(count)
+    lame, shear = lame_parameters(np.full(len(cells), 2000.0), np.full(len(cells), poisson))
+    points = points * [1.0, 1.0, stretch]
+    return points, stiffness(points, [Block(BY_NAME["HEXA8"], cells, lame, shear)])[0]
+
+
+def motions(points: np.ndarray) -> np.ndarray:
+    """Three translations and three rotations (3n, 6)."""
+    rotations = [np.cross(axis, points) for axis in np.eye(3)]
+    shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(3)]
+    return np.stack([m.ravel() for m in shifts + rotations], axis=1)
+
+
+def held(points: np.ndarray, matrix: csr_matrix, free: np.ndarray, body: np.ndarray):
+    """The system of the free unknowns, and what they stand for."""
+    kept = np.flatnonzero(free.ravel())
+    unknowns = Unknowns(3, kept // 3, motions(points)[kept], body[kept // 3])
+    return csr_matrix(matrix[kept][:, kept]), unknowns
+
+
+def clamped(count: int, **options: float):
+    points, matrix = block(count, **options)
+    free = np.repeat(points[:, 2:] > 0, 3, axis=1)
+    return held(points, matrix, free, np.zeros(len(points), dtype=int))
+
+
+def on_rollers(count: int):
+    """Three symmetry planes: nodes on them have one, two or no unknowns."""
+    points, matrix = block(count)
+    return held(points, matrix, points > 0, np.zeros(len(points), dtype=int))
+
+
+def two_blocks(count: int):
+    """One block sliding on another: their facing nodes share the vertical displacement."""
+    points, matrix = block(count)
+    n = len(points)
+    both, top = block_diag([matrix, matrix]).tocsr(), np.flatnonzero(points[:, 2] == 1)
+    bottom = n + np.flatnonzero(points[:, 2] == 0)
+    follow = eye(6 * n, format="lil")
+    follow[3 * bottom + 2, 3 * bottom + 2] = 0
+    follow[3 * bottom + 2, 3 * top + 2] = 1
+    follow = follow.tocsr()
+    free = np.concatenate([points > 0, points > [0, 0, -1]])
+    free[bottom, 2] = False
+    body = np.repeat([0, 1], n)
+    stacked = np.concatenate([points, points + np.array([0, 0, 1])])
+    return held(stacked, follow.T @ both @ follow, free, body)
+
+
+@pytest.mark.parametrize("system", [clamped, on_rollers, two_blocks])
+def test_manufactured_solution_in_few_iterations(system):
+    matrix, unknowns = system(8)
+    exact = np.random.default_rng(0).standard_normal((matrix.shape[0], 2))
+    solver = Multigrid(matrix, unknowns)
+    solution = solver.solve(matrix @ exact)
+    np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-11)
+    assert solver.iterations <= 40
+    single = solver.solve(matrix @ exact[:, 1])
+    np.testing.assert_allclose(single, exact[:, 1], rtol=0, atol=1e-11)
+
+
+def test_iterations_hardly_grow_with_the_mesh():
+    iterations = []
+    for count in (8, 16):
+        matrix, unknowns = clamped(count)
+        solver = Multigrid(matrix, unknowns)
+        solver.solve(np.ones(matrix.shape[0]))
+        iterations.append(solver.iterations)
+    assert iterations[1] <= iterations[0] + 8
+
+
+def test_bodies_that_slide_share_no_aggregate():
+    """Aggregates across the contact surface cannot slide: many more iterations."""
+    matrix, unknowns = two_blocks(8)
+    glued = Unknowns(3, unknowns.node, unknowns.motions, np.zeros_like(unknowns.body))
+    apart, across = Multigrid(matrix, unknowns), Multigrid(matrix, glued)
+    right = np.ones(matrix.shape[0])
+    np.testing.assert_allclose(apart.solve(right), across.solve(right), rtol=1e-10)
+    assert apart.iterations < across.iterations
+
+
+def test_order_and_units_of_the_unknowns_do_not_matter():
+    matrix, unknowns = on_rollers(8)
+    exact = np.random.default_rng(1).standard_normal(matrix.shape[0])
+    order = np.random.default_rng(2).permutation(matrix.shape[0])
+    shuffled = Unknowns(3, unknowns.node[order], unknowns.motions[order], unknowns.body[order])
+    solver = Multigrid(1e-12 * matrix[order][:, order], shuffled)
+    solution = solver.solve(1e-12 * (matrix @ exact)[order])
+    np.testing.assert_allclose(solution, exact[order], rtol=0, atol=1e-11)
+
+
+def test_zero_right_hand_side():
+    matrix, unknowns = clamped(6)
+    solver = Multigrid(matrix, unknowns)
+    np.testing.assert_array_equal(solver.solve(np.zeros(matrix.shape[0])), 0.0)
+
+
+def test_diagonal_that_is_not_positive_is_refused():
+    matrix, unknowns = clamped(6)
+    matrix[0, 0] = 0.0
+    with pytest.raises(SolveError, match="not positive definite"):
+        Multigrid(matrix, unknowns)
+
+
+def test_rough_solution_is_as_rough_as_promised():
+    matrix, unknowns = clamped(8)
+    right = np.random.default_rng(3).standard_normal(matrix.shape[0])
+    solver = Multigrid(matrix, unknowns)
+    rough, exact = solver.solve(right, ROUGH), solver.solve(right)
+    assert np.linalg.norm(rough - exact) < 1e-6 * np.linalg.norm(exact)
+    assert (rough != exact).any()
+
+
+def test_nodes_without_neighbours_do_not_coarsen():
+    count = 4500
+    node = np.arange(count) // 3
+    unknowns = Unknowns(3, node, np.ones((count, 6)), np.zeros(count, dtype=int))
+    with pytest.raises(SolveError, match="its levels end at 4500 unknowns: nothing coarsens"):
+        Multigrid(csr_matrix(eye(count)), unknowns)
+
+
+def test_right_hand_side_that_is_no_number():
+    matrix, unknowns = clamped(6)
+    with pytest.raises(SolveError, match=r"the solution by conjugate gradients .* is not finite"):
+        Multigrid(matrix, unknowns).solve(np.full(matrix.shape[0], np.nan))
+
+
+def test_choice_by_size_and_dimension(monkeypatch):
+    matrix, unknowns = clamped(6)
+    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: matrix.shape[0])
+    large = choice.prepare(matrix, unknowns)
+    assert "multigrid" in large.name
+    assert "unknowns or more in space" in large.why
+    plane = choice.prepare(matrix, replace(unknowns, dim=2))
+    assert "multigrid" not in plane.name
+    assert "plane" in plane.why
+    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: matrix.shape[0] + 1)
+    small = choice.prepare(matrix, unknowns)
+    assert "multigrid" not in small.name
+    assert "fewer than" in small.why
+
+
+def tied_to_one_node(count: int):
+    """A clamped cube, all nodes of which feel one free node of another body."""
+    matrix, unknowns = clamped(count)
+    n = matrix.shape[0]
+    link = csr_matrix(np.tile(np.eye(3), (n // 3, 1)))
+    tied = block_array([[matrix + eye(n), -link], [-link.T, n * eye(3)]]).tocsr()
+    node = np.append(unknowns.node, [unknowns.node.max() + 1] * 3)
+    body, shifts = np.repeat([0, 1], [n, 3]), np.hstack([np.eye(3), np.zeros((3, 3))])
+    return tied, Unknowns(3, node, np.vstack([unknowns.motions, shifts]), body)
+
+
+def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
+    def untouched(*_):
+        raise AssertionError("the coarse level is formed")
+
+    matrix, unknowns = tied_to_one_node(14)
+    monkeypatch.setattr(multigrid, "_coarse", untouched)
+    with pytest.raises(SolveError, match=r"its coarse levels would fill in, to \d+ neighbours"):
+        Multigrid(matrix, unknowns)
+    with standing_for_auto("multigrid"):
+        chosen = choice.prepare(matrix, unknowns)
+    assert "multigrid" not in chosen.name
+    assert chosen.gave_up == chosen.why
+
+
+def test_parts_of_a_setup_make_no_difference(monkeypatch):
+    matrix, unknowns = two_blocks(8)
+    right = np.random.default_rng(2).standard_normal(matrix.shape[0])
+    whole = Multigrid(matrix, unknowns).solve(right)
+    for name, few in (("_ROWS_AT_ONCE", 90), ("_BLOCKS_AT_ONCE", 500), ("_PARTS", 37)):
+        monkeypatch.setattr(multigrid, name, few)
+    found = Multigrid(matrix, unknowns).solve(right)
+    np.testing.assert_allclose(found, whole, rtol=0, atol=1e-12 * np.abs(whole).max())
+
+
+def test_coarse_matrix_is_that_of_the_prolongation():
+    rng = np.random.default_rng(3)
+    fine = random_array((40, 40), density=0.2, rng=rng, format="csr")
+    fine = csr_matrix((fine + fine.T + 20 * eye(40)), dtype=np.float32)
+    matrix = bsr_matrix(kron(fine, np.ones((3, 3))), blocksize=(3, 3), dtype=np.float32)
+    way = kron(random_array((40, 7), density=0.5, rng=rng), np.ones((3, 6)))
+    way = bsr_matrix(way, blocksize=(3, 6), dtype=np.float32)
+    exact = way.toarray().astype(float).T @ matrix.toarray() @ way.toarray()
+    found = multigrid._coarse(matrix, way).toarray()
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+
+
+def test_quadratic_cells_and_pardiso_put_multigrid_off(monkeypatch):
+    def sizes(pardiso):
+        there = replace(BACKENDS["pardiso"], available=lambda: pardiso)
+        monkeypatch.setitem(BACKENDS, "pardiso", there)
+        return [choice.multigrid_from(quadratic) for quadratic in (False, True)]
+
+    with_it, without = sizes(True), sizes(False)
+    assert with_it[0] < with_it[1]
+    assert without[0] < without[1]
+    assert without[0] < with_it[0]
+
+
+def test_choice_as_asked_for():
+    matrix, unknowns = clamped(6)
+    for kind, name in (("multigrid", "multigrid"), ("superlu", "SuperLU")):
+        with standing_for_auto(kind):
+            chosen = choice.prepare(matrix, unknowns)
+        assert name in chosen.name
+        assert chosen.why == "as asked for"
+
+
+@pytest.mark.parametrize("options", [{"poisson": 0.49999}, {"stretch": 100.0}])
+def test_a_factor_takes_over_where_multigrid_does_not_converge(options):
+    matrix, unknowns = clamped(8, **options)
+    with pytest.raises(SolveError, match="conjugate gradients leave a residual"):
+        Multigrid(matrix, unknowns).solve(np.ones(matrix.shape[0]))
+    exact = np.ones(matrix.shape[0])
+    with standing_for_auto("multigrid"):
+        chosen = choice.prepare(matrix, unknowns)
+        assert "multigrid" in chosen.name
+        np.testing.assert_allclose(chosen.solve(matrix @ exact), exact, rtol=1e-6)
+        assert "multigrid" not in chosen.name
+        assert "conjugate gradients leave a residual" in chosen.why
+        again = choice.prepare(matrix, unknowns, chosen.gave_up)
+        assert (again.name, again.why) == (chosen.name, chosen.why)
+
+
+def test_multigrid_that_gave_up_is_not_tried_for_another_status(monkeypatch):
+    tried = []
+
+    def give_up(self, right, accuracy):
+        tried.append(self)
+        raise SolveError("conjugate gradients leave a residual of 1e-02 in 50 iterations")
+
+    monkeypatch.setattr(Multigrid, "solve", give_up)
+    matrix, unknowns = clamped(4)
+    n = matrix.shape[0]
+    rows = csr_matrix(([1.0, -1.0, 1.0, -1.0], ([0, 0, 1, 1], [0, 90, 3, 93])), shape=(2, n))
+    own = np.isin(np.arange(n), [0, 3])
+    parts = [Part(np.ones(n, dtype=bool), np.ones(2, dtype=bool))]
+    systems = Systems(matrix, rows, own, unknowns, parts)
+    with standing_for_auto("multigrid"):
+        for closed in ([True, True], [True, False], [False, False]):
+            system = systems.closed(np.array(closed))
+            change = system.correction(np.ones(n), np.zeros(sum(closed)))
+            left = np.ones(n) - matrix @ change
+            assert system.imbalance(left) < 1e-9
+    assert len(tried) == 1
+
+
+def test_free_body_is_refused():
+    points, matrix = block(6)
+    everything = np.ones_like(points, dtype=bool)
+    matrix, unknowns = held(points, matrix, everything, np.zeros(len(points), dtype=int))
+    with (
+        standing_for_auto("multigrid"),
+        pytest.raises(SolveError, match=r"singular|not positive definite"),
+    ):
+        choice.prepare(matrix, unknowns).solve(np.ones(matrix.shape[0]))
+
+
+def test_memory_beside_the_stiffness_is_less_than_one_and_a_half_of_its_own(monkeypatch):
+    monkeypatch.setattr(multigrid, "_ROWS_AT_ONCE", 3_000)
+    monkeypatch.setattr(multigrid, "_BLOCKS_AT_ONCE", 10_000)
+    matrix, unknowns = clamped(24)
+    size = matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes
+    rows = csr_matrix(([1.0, -1.0], ([0, 0], [0, 90])), shape=(1, matrix.shape[0]))
+    own = np.arange(matrix.shape[0]) == 0
+    right = np.ones(matrix.shape[0])
+    with standing_for_auto("multigrid"):
+        tracemalloc.start()
+        system = condense(matrix, rows, own, unknowns)
+        system.correction(right, np.zeros(1))
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert "multigrid" in system.factor.name
+    assert peak < 1.5 * size

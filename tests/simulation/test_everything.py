@@ -1,0 +1,128 @@
+"""What is left out where a scene does not need it changes no result: --everything agrees."""
+
+import os
+import subprocess
+import sys
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.case.reader import load_case
+from solver.commands.cli import main
+from solver.simulation.simulate import simulate
+from solver.simulation.skips import EVERYTHING, NEEDED, Skips
+from solver.simulation.solution import Line
+from solver.verification.results import read_result
+from solver.verification.run import mesh_of
+from tests.scenes import block_case, block_mesh
+
+CASES = Path(__file__).parents[2] / "cases/ssnp170"
+PLANE = "abcdefghij"
+# Slaves: TETRA4, TETRA10, HEXA8, HEXA20, PENTA6 on triangles, PYRA5 on squares.
+SOLID = [("k", False), ("l", False), ("m", False), ("n", False), ("z1", True), ("z6", True)]
+AGREED = 1e-13  # pressure over the load, displacement over its largest
+
+
+def differences(one, other, n_nodes, pressure=25.0):
+    """Of pressure and displacement, at the nodes that a cut leaves alone."""
+    size = np.abs(one.displacement).max()
+    moved = np.abs(one.displacement[:n_nodes] - other.displacement[:n_nodes]).max() / size
+    zones = zip(one.zones, other.zones, strict=True)
+    return max(np.abs(a.multiplier - b.multiplier).max() for a, b in zones) / pressure, moved
+
+
+def assert_agreed(case, mesh, swapped=False, skips=EVERYTHING):
+    short, full = simulate(case, mesh, swapped), simulate(case, mesh, swapped, skips=skips)
+    assert max(differences(short, full, len(mesh.points))) < AGREED
+    return short, full
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("name", PLANE)
+def test_plane_solves_of_the_reference_problem(name, swapped):
+    case = load_case(CASES / f"{name}.yaml")
+    assert case.plane
+    _, full = assert_agreed(case, mesh_of(case), swapped)
+    assert full.plan[0].what == "everything is done"
+    assert not any(line.skip for line in full.plan)
+
+
+def test_these_are_all_its_plane_solves():
+    plane = {case.name for path in CASES.glob("*.yaml") if path.stem != "family"
+             for case in [load_case(path)] if case.plane}  # fmt: skip
+    assert plane == {f"ssnp170-{name}" for name in PLANE}
+
+
+@pytest.mark.parametrize(("name", "swapped"), SOLID)
+def test_solid_solves_of_the_reference_problem(name, swapped):
+    case = load_case(CASES / f"{name}.yaml")
+    assert not case.plane
+    assert_agreed(case, mesh_of(case), swapped)
+
+
+@pytest.mark.parametrize("skip", [field.name for field in fields(Skips)])
+@pytest.mark.parametrize("cells", ["QUAD9", "HEXA27"])
+def test_each_alone(skip, cells):
+    """Coincident meshes of cells that own inner nodes: most lines of the plan at once."""
+    mesh = block_mesh(cells, cells, (2, 2))
+    case = block_case(mesh.points.shape[1])
+    short, full = assert_agreed(case, mesh, skips=replace(NEEDED, **{skip: False}))
+    told, left = ({line.skip for line in solution.plan} for solution in (short, full))
+    assert skip not in left
+    assert left <= told
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_what_the_plan_says_of_coincident_meshes(dim):
+    cells = {2: "QUAD9", 3: "HEXA27"}[dim]
+    solution = simulate(block_case(dim), block_mesh(cells, cells, (2, 2)))
+    said = {line.skip: line.what for line in solution.plan}
+    wanted = {"cut", "quadrature", "status", "refinement"} | ({"clipping"} if dim == 3 else set())
+    assert {skip for skip in said if skip} == wanted
+    if dim == 3:
+        assert said["clipping"] == "interface: 8 of 8 segments not clipped"
+
+
+def test_everything_on_bent_faces_that_cannot_be_plain():
+    """Where nothing is plain there is less to leave out, and nothing is said to be."""
+    case = load_case(CASES.parent / "hydrostatic/wavy-quad8.yaml")
+    mesh = mesh_of(case)
+    said = {line.skip for line in simulate(case, mesh).plan}
+    assert "cut" in said
+    assert "quadrature" not in said
+
+
+def test_a_plane_solve_imports_nothing_of_three_dimensions(tmp_path):
+    code = (
+        "import sys; from pathlib import Path; from solver.verification.run import Job, solve\n"
+        f"solve(Job(Path({str(CASES / 'b.yaml')!r})), Path('r.vtkhdf'), None, print)\n"
+        "print(*sorted(sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True,
+        env=os.environ | {"PYTHONPATH": str(CASES.parents[1])},
+    )  # fmt: skip
+    loaded = set(done.stdout.split("\n")[-2].split())
+    assert "solver.mechanics.fem.shape" in loaded
+    of_space = {
+        "solver.mechanics.fem.extra_elements",
+        "solver.mesh.recipes.hybrid",
+        "solver.report.space",
+    }
+    assert not loaded & of_space
+    assert not any(name.startswith("solver.report") for name in loaded)
+
+
+def test_the_command_line_does_everything(tmp_path, capsys):
+    case = str(CASES / "c.yaml")
+    results = []
+    for options in ([], ["--everything"]):
+        result = tmp_path / "r.vtkhdf"
+        assert main(["solve", case, "-o", str(result), *options]) == 0
+        results.append(read_result(result).solution)
+    short, full = results
+    assert "no further refinement" in [line.what for line in short.plan]
+    assert full.plan[0] == Line("everything is done", "as asked for by --everything, needed or not")
+    assert max(differences(short, full, len(short.displacement))) < AGREED

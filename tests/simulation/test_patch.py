@@ -1,0 +1,141 @@
+"""The patch test, held to round-off over all pairs of cell types and whatever keeps it a patch."""
+
+import meshio
+import numpy as np
+import pytest
+
+from solver.mesh import generate
+from solver.mesh.catalogue import BY_NAME
+from solver.simulation.simulate import simulate
+from tests.scenes import block_case, block_mesh, errors, moved, straightened, with_points
+
+PLANE = ["TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9"]
+SOLID = [
+    "TETRA4",
+    "TETRA10",
+    "HEXA8",
+    "HEXA20",
+    "HEXA27",
+    "PENTA6",
+    "PENTA15",
+    "PYRA5",
+    "PYRA13",
+]
+ROUND_OFF = {
+    "pressure": 1e-12,
+    "stress": 1e-12,
+    "displacement": 1e-12,
+    "gap": 1e-14,
+    "coverage": 1e-12,
+    "balance": 1e-12,
+}
+
+
+def assert_exact(solution, size=1.0, **scaled):
+    found = errors(solution, size, **scaled)
+    assert {k: v for k, v in found.items() if not v < ROUND_OFF[k]} == {}
+    assert all(zone.closed.all() for zone in solution.zones)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("top", PLANE)
+@pytest.mark.parametrize("bottom", PLANE)
+def test_plane_pairs(bottom, top, swapped):
+    mesh = block_mesh(bottom, top, (4, 3))
+    assert_exact(simulate(block_case(2), mesh, swapped))
+
+
+@pytest.mark.parametrize("hexahedra", ["pyramids", "hexahedra"])
+@pytest.mark.parametrize("top", SOLID)
+@pytest.mark.parametrize("bottom", SOLID)
+def test_solid_pairs(bottom, top, hexahedra):
+    """Each pair stands twice in the table, once with either block below: the slave."""
+    mesh = block_mesh(bottom, top)
+    assert_exact(simulate(block_case(3), mesh, hexahedra=hexahedra))
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize(
+    ("cells", "contact"),
+    [("PENTA6", "QUAD4"), ("PENTA15", "TRIA6"), ("PYRA5", "TRIA3"), ("PYRA13", "QUAD8")],
+)
+def test_blocks_of_many_boxes_of_prisms_and_pyramids(cells, contact, swapped):
+    top = {"cells": cells, "contact": contact, "divisions": [2, 3, 2]}
+    bottom = {"cells": "HEXA8", "divisions": [3, 2, 1]}
+    mesh = generate({"recipe": "blocks", "size": 1.0, "bottom": bottom, "top": top}, "case.yaml")
+    assert_exact(simulate(block_case(3), mesh, swapped))
+
+
+@pytest.mark.parametrize("hexahedra", ["pyramids", "hexahedra"])
+@pytest.mark.parametrize("top", ["TETRA10", "HEXA8", "HEXA20", "HEXA27"])
+@pytest.mark.parametrize("bottom", ["TETRA4", "HEXA8", "HEXA20", "HEXA27"])
+@pytest.mark.parametrize("bent", [False, True])
+def test_moved_nodes(bottom, top, hexahedra, bent):
+    """Skew cells; with every node moved for itself, cells and faces with bent edges as well."""
+    mesh = moved(block_mesh(bottom, top), 0.02)
+    mesh = mesh if bent else straightened(mesh)
+    assert_exact(simulate(block_case(3), mesh, hexahedra=hexahedra))
+    assert_exact(simulate(block_case(3), mesh, True, hexahedra))
+
+
+@pytest.mark.parametrize("bottom", PLANE)
+def test_moved_nodes_in_the_plane(bottom):
+    mesh = moved(block_mesh(bottom, "QUAD8", (5, 4)), 0.02)
+    for swapped in (False, True):
+        assert_exact(simulate(block_case(2), mesh, swapped))
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-15, 1e-12, 1e-8, 1e-4])
+def test_coincident_and_nearly_coincident_meshes(shift):
+    """Slivers of every size between two meshes that all but match."""
+    mesh = block_mesh("HEXA8", "HEXA8", (3, 3))
+    points = mesh.points.copy()
+    inner = (points[:, 2] == 0) & (points[:, :2] > 0.1).all(axis=1) & (points < 0.9).all(axis=1)
+    inner[np.unique(mesh.cells[0].data[mesh.cell_sets["bottom"][0]])] = False
+    points[inner, :2] += shift * np.array([0.3, -0.7])
+    assert inner.sum() == 4
+    assert_exact(simulate(block_case(3), with_points(mesh, points)))
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e6])
+@pytest.mark.parametrize("types", [("TRIA3", "QUAD8"), ("HEXA8", "TETRA10")])
+def test_the_unit_of_length_does_not_matter(types, scale):
+    mesh = block_mesh(*types, size=1.0)
+    dim = BY_NAME[types[0]].dim
+    case = block_case(dim)
+    assert_exact(simulate(case, with_points(mesh, mesh.points * scale)), size=scale)
+
+
+def test_renumbering_changes_nothing_but_the_order():
+    mesh = block_mesh("TETRA10", "HEXA20")
+    rng = np.random.default_rng(2)
+    new = rng.permutation(len(mesh.points))
+    points = np.empty_like(mesh.points)
+    points[new] = mesh.points
+    cells = [(block.type, new[block.data]) for block in mesh.cells]
+    renumbered = meshio.Mesh(points, cells, cell_sets=mesh.cell_sets)
+    before = simulate(block_case(3), mesh)
+    after = simulate(block_case(3), renumbered)
+    assert_exact(after)
+    n = len(mesh.points)
+    assert after.displacement[new] == pytest.approx(before.displacement[:n], abs=1e-15)
+
+
+def test_two_steps_are_proportional():
+    case = block_case(3, "steps: [0.5, 1.0]\nobserve: [{zone: interface, nearest: [1, 1, 0]}]\n")
+    solution = simulate(case, block_mesh("TETRA4", "TETRA4"))
+    half, full = (step.observations[0] for step in solution.steps)
+    assert half["macro_element"] == full["macro_element"]
+    assert half["pressure"] == pytest.approx(12.5, rel=1e-12)
+    assert full["pressure"] == pytest.approx(25.0, rel=1e-12)
+    assert_exact(solution)
+
+
+def test_a_multiplier_without_the_cut_would_still_pass_but_the_master_must_be_whole():
+    """A master face taken away must be seen: coverage falls and the pressure is wrong."""
+    mesh = block_mesh("HEXA8", "HEXA8")
+    faces = mesh.cell_sets["top_contact"]
+    mesh.cell_sets["top_contact"] = [part[1:] for part in faces]
+    solution = simulate(block_case(3), mesh)
+    assert errors(solution)["coverage"] > 0.1
+    assert errors(solution)["pressure"] > 1e-3

@@ -1,0 +1,244 @@
+"""Contact beyond one patch: zones, starts, corners, and what must be refused by name."""
+
+import re
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from solver.case.reader import parse_case
+from solver.mesh.catalogue import BY_MESHIO, BY_NAME, cell_type
+from solver.simulation.problem import ContactProblem
+from solver.simulation.scene import build_scene
+from solver.simulation.simulate import simulate
+from solver.system.clock import Clock
+from solver.system.errors import InputError, SolveError
+from tests.scenes import block_case, block_mesh, errors, with_points
+
+
+def replaced(case_text_pairs, dim=2, **options):
+    """The patch case with parts of its text replaced."""
+    text = block_case(dim, **options).source
+    for old, new in case_text_pairs:
+        assert old in text
+        text = text.replace(old, new)
+    return parse_case(text, Path("patch.yaml"))
+
+
+def split_slave(mesh, apart=0.0):
+    """Of the slave surface two groups, `left` and `right` of x = 1/2, so far from it or more."""
+    for name, side in (("left", -1), ("right", 1)):
+        parts = []
+        for block, members in zip(mesh.cells, mesh.cell_sets["bottom_contact"], strict=True):
+            members = np.asarray(members, dtype=int)
+            x = mesh.points[block.data[members]].mean(axis=1)[:, 0] if len(members) else members
+            parts.append(members[side * (x - 0.5) > apart])
+        mesh.cell_sets[name] = parts
+    return mesh
+
+
+def test_both_starts_give_the_same_answer_where_the_bodies_are_held():
+    case = replaced(
+        [
+            (
+                "- {group: base, fix: [y]}",
+                "- {group: base, fix: [y]}\n  - {group: press, fix: {y: -0.01}}",
+            ),
+            ("loads:\n  - {group: press, pressure: 25.0}\n", ""),
+        ]
+    )
+    scene = build_scene(case, block_mesh("TRIA3", "QUAD4", (4, 3)), False, None, Clock())
+    problem = ContactProblem(scene)
+    closed = problem.solve(1.0)
+    opened = problem.solve(1.0, np.zeros(4, dtype=bool))
+    assert closed.status.closed.all()
+    assert opened.status.closed.all()
+    assert opened.status.iterations == 2
+    assert opened.pressure == pytest.approx(closed.pressure, rel=1e-12)
+    # half of the imposed shortening of 0.01 over two blocks in plane strain
+    assert closed.pressure == pytest.approx(np.full(4, 0.005 * 2000 / (1 - 0.3**2)), rel=1e-12)
+
+
+def test_pulled_apart_the_surfaces_open_and_carry_nothing():
+    case = replaced(
+        [
+            (
+                "- {group: base, fix: [y]}",
+                "- {group: base, fix: [y]}\n  - {group: press, fix: {y: 0.01}}",
+            ),
+            ("loads:\n  - {group: press, pressure: 25.0}\n", ""),
+        ]
+    )
+    solution = simulate(case, block_mesh("QUAD4", "QUAD8", (4, 3)))
+    zone = solution.zones[0]
+    assert not zone.closed.any()
+    assert (zone.multiplier == 0).all()
+    assert zone.gap == pytest.approx(np.full(4, 0.01), rel=1e-12)
+    assert np.abs(solution.stress).max() < 1e-9
+
+
+@pytest.mark.parametrize("overlap", [", interference: 0.01", ", clearance: -0.01"])
+def test_interference_presses_as_an_imposed_overlap_would(overlap):
+    case = replaced(
+        [
+            (
+                "- {group: base, fix: [y]}",
+                "- {group: base, fix: [y]}\n  - {group: press, fix: [y]}",
+            ),
+            ("loads:\n  - {group: press, pressure: 25.0}\n", ""),
+        ],
+        zone=overlap,
+    )
+    solution = simulate(case, block_mesh("TRIA6", "QUAD4", (4, 3)))
+    pressure = solution.zones[0].multiplier
+    assert pressure == pytest.approx(np.full(4, 0.005 * 2000 / (1 - 0.3**2)), rel=1e-12)
+
+
+def test_a_clearance_stands_for_the_gap_as_meshed():
+    """The mean of 0.01 x over each macro-element is its value at the centre."""
+    mesh = block_mesh("QUAD4", "TRIA3", (4, 3))
+    mesh.points[:, 0] += 7.0
+    case = replaced([], zone=", clearance: '0.01 * x', interference: 0.02")
+    zone = build_scene(case, mesh, False, None, Clock()).zones[0]
+    centre = 7.0 + (np.arange(4) + 0.5) / 4
+    mean = zone.operator.initial / zone.operator.covered
+    assert np.sort(mean) == pytest.approx(0.01 * centre - 0.02, rel=1e-12)
+
+
+def test_several_zones_carry_the_patch_together():
+    mesh = split_slave(block_mesh("HEXA8", "TETRA4", (4, 2)))
+    both = "contact:\n  - {name: a, slave: left, master: top_contact}\n"
+    both += "  - {name: b, slave: right, master: top_contact}\n"
+    one = "contact:\n  - {name: interface, slave: bottom_contact, master: top_contact}\n"
+    shared = replaced([(one, both)], dim=3)
+    with pytest.raises(InputError, match=r"contact\[1\].slave = 'right': 5 of its nodes are slave"):
+        simulate(shared, mesh)
+    # with two columns of faces left out between them, the zones share no node
+    solution = simulate(shared, split_slave(mesh, 0.25))
+    assert [zone.name for zone in solution.zones] == ["a", "b"]
+    carried = sum(zone.multiplier @ zone.area for zone in solution.zones)
+    assert carried == pytest.approx(25.0, rel=1e-12)
+    assert max(solution.balance.values()) < 1e-12
+
+
+@pytest.mark.parametrize("cells", ["HEXA8", "HEXA20", "TETRA10"])
+def test_a_contact_zone_around_an_edge_is_cut_conformingly(cells):
+    """Two sides of the lower block are slaves; some cells own faces of both; one meets nothing."""
+    mesh = with_side(block_mesh(cells, cells, (2, 2)), cells)
+    solution = simulate(block_case(3), mesh)
+    zone = solution.zones[0]
+    side = zone.normal[:, 0] > 0.5
+    assert side.any()
+    assert not zone.closed[side].any()
+    assert (zone.coverage[side] < 1e-12).all()
+    assert zone.multiplier[~side] == pytest.approx(np.full((~side).sum(), 25.0), rel=1e-12)
+    assert solution.stress[:, 2] == pytest.approx(np.full(len(solution.stress), -25.0), rel=1e-11)
+
+
+def with_side(mesh, cells):
+    """The faces at x = 1 of the lower block, added to the mesh and to the slave group."""
+    kind = BY_NAME[cells]
+    data = next(b.data for b in mesh.cells if b.type == kind.meshio)
+    faces = []
+    for face in kind.faces:
+        nodes = data[:, list(face.nodes)]
+        at = mesh.points[nodes]
+        faces.append(nodes[(np.abs(at[:, :, 0] - 1) < 1e-9).all(1) & (at[:, :, 2] < 1e-9).all(1)])
+    new = np.concatenate(faces)
+    blocks, sets = [], {k: [*map(np.asarray, v)] for k, v in mesh.cell_sets.items()}
+    for k, block in enumerate(mesh.cells):
+        both = block.data
+        if BY_MESHIO[block.type] is cell_type(kind.faces[0].type):
+            sets["bottom_contact"][k] = np.union1d(
+                sets["bottom_contact"][k], len(both) + np.arange(len(new))
+            ).astype(int)
+            both = np.vstack([both, new])
+        blocks.append((block.type, both))
+    return meshio.Mesh(mesh.points, blocks, cell_sets=sets)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            [("  - {group: symx, fix: [x]}\n", "")],
+            r"supports: nothing keeps (bottom|top) from a free motion .*; add a support",
+        ),
+        (
+            [
+                (
+                    "- {group: base, fix: [y]}",
+                    "- {group: bottom, fix: [y]}\n  - {group: bottom, fix: [x]}",
+                )
+            ],
+            r"supports: 4 macro-elements of zone interface .* have no free unknown of their own",
+        ),
+        (
+            [("slave: bottom_contact", "slave: base")],
+            r"contact\[0\].master = 'top_contact': does not lie over base",
+        ),
+        (
+            [
+                (
+                    "- {group: base, fix: [y]}",
+                    "- {group: base, fix: {y: 0.5}}\n  - {group: bottom, fix: [y]}",
+                )
+            ],
+            r"supports\[1\].fix.y = 0.0: .* another displacement",
+        ),
+    ],
+)
+def test_refusals_name_what_is_wrong(change, message):
+    with pytest.raises(InputError) as refusal:
+        simulate(replaced(change), block_mesh("QUAD4", "QUAD4", (4, 3)))
+    assert re.search(message, str(refusal.value)), str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert str(refusal.value).startswith("patch.yaml: ")
+
+
+def test_a_face_inside_a_body_is_refused():
+    mesh = block_mesh("QUAD4", "QUAD4", (4, 3))
+    inner = mesh.cells[0].data[0][[1, 2]]
+    other = np.flatnonzero(np.isin(mesh.cells[0].data, inner).sum(axis=1) == 2)
+    assert len(other) == 2
+    cells = [
+        (b.type, np.vstack([b.data, inner]) if b.type == "line" else b.data) for b in mesh.cells
+    ]
+    sets = dict(mesh.cell_sets)
+    sets["press"] = [
+        np.append(part, len(b.data)).astype(int) if b.type == "line" else part
+        for part, b in zip(sets["press"], mesh.cells, strict=True)
+    ]
+    bad = meshio.Mesh(mesh.points, cells, cell_sets=sets)
+    with pytest.raises(InputError, match="1 of its faces have a cell on both sides"):
+        simulate(block_case(2), bad)
+
+
+def test_a_body_that_only_tension_could_hold_is_a_failed_solve():
+    case = replaced([("pressure: 25.0", "pressure: -25.0")])
+    with pytest.raises(SolveError, match="nothing keeps top from a free motion"):
+        simulate(case, block_mesh("QUAD4", "QUAD4", (4, 3)))
+
+
+def test_a_symmetry_plane_of_any_direction_holds_as_an_axis_does():
+    mesh = block_mesh("HEXA8", "TETRA10")
+    axis = np.array([1.0, 2.0, 2.0]) / 3
+    angle = 0.7
+    cross = np.cross(np.eye(3), axis)
+    turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    case = replaced(
+        [(f"fix: [{a}]", "fix: [normal]") for a in "xyz"],
+        dim=3,
+    )
+    solution = simulate(case, with_points(mesh, mesh.points @ turn.T))
+    assert solution.zones[0].multiplier == pytest.approx(np.full(9, 25.0), rel=1e-12)
+    assert solution.nodal_normal_stress == pytest.approx(
+        np.full(len(solution.stress), -25.0), rel=1e-11
+    )
+
+
+def test_force_on_the_bodies_is_balanced():
+    solution = simulate(block_case(3), block_mesh("TETRA4", "HEXA27"))
+    assert set(solution.balance) >= {"zone interface: force", "reactions and loads: moment"}
+    assert errors(solution)["balance"] < 1e-13

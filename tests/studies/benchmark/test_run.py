@@ -1,0 +1,102 @@
+"""The benchmark on tiny meshes: every way gives its numbers, one without a solve its reason."""
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from solver.commands.cli import main
+from solver.studies.benchmark.description import read_benchmark
+from solver.studies.benchmark.words import ratios
+from solver.system.errors import InputError
+
+ROOT = Path(__file__).parents[3]
+FILE = ROOT / "cases/scaling/benchmark.yaml"
+
+
+@pytest.fixture
+def content():
+    """The project's benchmark with two plane comparisons and one case."""
+    content = yaml.safe_load(FILE.read_text())
+    content["scaling"] = str(FILE.with_name("scaling.yaml"))
+    ways = [
+        {"title": "first"},
+        {"title": "no cures", "cures": False},
+        {"title": "everything", "everything": True},
+        {"title": "odd", "treatment": "no-such-treatment"},
+        {"title": "solver", "solver": "superlu", "free": True},
+    ]
+    one = {"title": "Ways", "series": "quad4", "size": 500, "repetitions": 1, "ways": ways}
+    content["comparisons"] = [one]
+    content["growth"] = [{"series": "quad4", "sizes": [400, 800]}]
+    content["batch"]["cases"] = [str(ROOT / "cases/ssnp170/c.yaml")]
+    content["threads"] = 1
+    return content
+
+
+@pytest.fixture
+def file(tmp_path, content):
+    path = tmp_path / "benchmark.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def test_the_whole_of_it(file, tmp_path, capsys):
+    output = tmp_path / "out" / "record.json"
+    assert main(["benchmark", str(file), "-o", str(output)]) == 0
+    record = json.loads(output.read_text())
+    [comparison] = record["comparisons"]
+    ways = {way["way"]: way for way in comparison["ways"]}
+    assert ways["odd"]["outcome"] != "solved"
+    assert "no-such-treatment" in ways["odd"]["reason"]
+    assert ways["solver"]["linear_solver"] == "SuperLU"
+    assert [ratio is None for ratio in ratios(comparison["ways"])] == [
+        False,
+        False,
+        False,
+        True,
+        False,
+    ]
+    for name in ("first", "everything", "solver"):
+        assert ways[name]["pressure_max"] < 1e-10
+        assert 0 < ways[name]["times"]["total"]["cpu"][0] < ways[name]["process"]["cpu"]
+    assert [len(one) for one in record["batch"]["together"]["passes"]] == [2, 2]
+    assert record["start"]["help"]["status"] == 0
+    assert record["start"]["plane"]["status"] == 0
+    assert [point["size"] for point in record["growth"]] == [400, 800]
+    said = capsys.readouterr().out
+    assert "Ways (QUAD4, " in said
+    assert "Growth of QUAD4" in said
+
+
+def test_the_projects_own_is_valid_and_has_a_quick_version():
+    full, quick = (read_benchmark(FILE, size) for size in ("full", "quick"))
+    assert len(full.comparisons) == len(quick.comparisons) > 5
+    assert {c.point.size for c in quick.comparisons} == {1000}
+    assert max(size for series in quick.growth for size in series.sizes) == 1000
+    assert all(case.is_file() for case in full.batch.cases)
+    assert len(full.batch.cases) == 6
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda c: c["comparisons"][0].update(series="quad5"),
+            r"comparisons\[0\].series .* no such",
+        ),
+        (
+            lambda c: c["growth"][0].update(series="quad5"),
+            r"growth\[0\].series .* there is no such",
+        ),
+        (lambda c: c["batch"].update(cases=["no.yaml"]), r"batch.cases\[0\] .* no such file"),
+        (lambda c: c["comparisons"][0].update(repetitions=-1), "must be a whole number, 0 to 100"),
+    ],
+)
+def test_what_is_refused(content, tmp_path, change, message):
+    change(content)
+    path = tmp_path / "benchmark.yaml"
+    path.write_text(yaml.safe_dump(content))
+    with pytest.raises(InputError, match=message):
+        read_benchmark(path, "full")

@@ -1,0 +1,135 @@
+"""The page of growth with size, on records whose costs are chosen powers of the size."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from solver.studies.scaling.description import read_scaling
+from solver.studies.scaling.page import write_scaling
+from solver.studies.scaling.records import OTHER, failures, reached, read_lines
+from solver.studies.scaling.words import growing
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def scaling():
+    """Two series of the project's family; the second one meets a reason with markup in it."""
+    full = read_scaling(ROOT / "cases/scaling/scaling.yaml")
+    chosen = [s for s in full.series if s.name in ("hexa8", "quad4")]
+    return replace(full, series=tuple(chosen))
+
+
+def record(point, **more):
+    """Time grows with exponent 1.3, pairing with 1 over faces, memory in proportion."""
+    n, faces = point.size, round(point.size ** (2 / 3))
+    stages = {"read": 1e-6 * n, "pairing": 1e-4 * faces, "solve": 1e-6 * n**1.3}
+    process = {"wall": 1.0, "cpu": 2 * sum(stages.values()), "peak_memory_mb": 0.01 * n}
+    return {
+        "outcome": "solved",
+        "reason": "",
+        "verdict": "passed",
+        "dofs": n,
+        "faces": faces,
+        "macro_elements": faces // 2,
+        "matrix_entries": 80 * n,
+        "iterations": 1,
+        "linear_iterations": 40,
+        "linear_solver": "multigrid",
+        "seconds": stages,
+        "stage_cpu_seconds": stages,
+        "process": process,
+        "meshing": process,
+        "errors": {"pressure_max": 1e-12},
+        "threads": 2,
+        "load": 0.5,
+        "memory_free_gb": 20.0,
+        "machine": {"cpu": "A machine", "time_utc": "2026-01-02T03:04:05+00:00"},
+        **more,
+    }
+
+
+@pytest.fixture
+def results(scaling, tmp_path):
+    for point in scaling.points:
+        path = tmp_path / "records" / f"{point.name}.json"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lost = {"outcome": "refused", "reason": "memory: <more> & more", "process": {}}
+        last = point.name == "quad4/1000000"
+        path.write_text(json.dumps(record(point, **(lost if last else {}))))
+    return tmp_path / "records"
+
+
+def test_exponents_are_those_of_the_records(scaling, results):
+    hexa, quad = read_lines(scaling, results)
+    assert hexa.growth("solve").value == pytest.approx(1.3)
+    assert hexa.growth("pairing").value == pytest.approx(1.0, abs=1e-3)
+    assert hexa.memory_growth.value == pytest.approx(1.0)
+    assert (hexa.growth("whole").low, hexa.growth("whole").high) == (1e5, 1e6)
+    # What no stage tells is as much as all of them: it grows as the whole.
+    assert hexa.growth(OTHER).value == pytest.approx(hexa.growth("whole").value)
+    assert [m.point.size for m in quad.fitted] == [100_000, 300_000]
+
+
+def test_goals_are_held_against_what_was_measured(scaling, results):
+    lines = read_lines(scaling, results)
+    found = {(r.goal.series, r.goal.what, r.goal.size): r for r in reached(scaling, lines)}
+    memory = found["hexa8", "memory", 100_000]
+    assert (memory.value, memory.good) == (pytest.approx(1.0), True)
+    cpu = found["hexa8", "cpu", 1_000_000]
+    assert cpu.value == pytest.approx(2 * (1 + 1 + 1e-6 * 1e6**1.3))
+    assert not found["hexa8", "growth of whole", None].good
+    assert found["hexa8", "growth of pairing", None].good
+    assert found["fine-slave", "growth of pairing", None].value is None
+
+
+def test_an_exponent_of_small_sizes_answers_no_goal(scaling, results):
+    series = tuple(replace(s, sizes=s.sizes[:2]) for s in scaling.series)
+    small = replace(scaling, series=series)
+    growth = [r for r in reached(small, read_lines(small, results)) if "growth" in r.goal.what]
+    assert all(r.value is None for r in growth)
+
+
+def test_the_page_says_what_the_records_do(scaling, results, tmp_path):
+    logged = []
+    write_scaling(scaling, results, tmp_path / "page", logged.append)
+    page = (tmp_path / "page" / "scaling.html").read_text()
+    assert "9 of 10 points are solved. 1 have no solve" in page
+    assert "memory: &lt;more&gt; &amp; more" in page
+    assert "<more>" not in page
+    assert "HEXA8: 1,000,000 unknowns take" in page
+    assert "by multigrid (40 iterations)" in page
+    assert page.count("<svg") > 8
+    assert logged[-1].endswith("scaling.html")
+    with (tmp_path / "page" / "scaling.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(scaling.points)
+    assert [r["reason"] for r in rows if r["outcome"] != "solved"] == ["memory: <more> & more"]
+    with (tmp_path / "page" / "scaling-exponents.csv").open() as stream:
+        exponents = {(r["series"], r["cost"]): r for r in csv.DictReader(stream)}
+    assert float(exponents["hexa8", "solve"]["exponent"]) == pytest.approx(1.3)
+    assert exponents["hexa8", "pairing"]["over"] == "faces"
+
+
+def test_what_grows_faster_is_named(scaling, results):
+    text = growing(read_lines(scaling, results))
+    assert "HEXA8 (1.2" in text
+    assert "faster" in text
+
+
+def test_points_whose_checks_fail_are_listed(scaling, results):
+    path = results / "hexa8" / "10000.json"
+    path.write_text(
+        json.dumps(json.loads(path.read_text()) | {"verdict": "failed", "reason": "pressure"})
+    )
+    assert ("hexa8/10000", "failed: pressure") in failures(read_lines(scaling, results))
+
+
+def test_a_family_without_any_record_still_has_a_page(scaling, tmp_path):
+    write_scaling(scaling, tmp_path / "nothing", tmp_path, lambda line: None)
+    page = (tmp_path / "scaling.html").read_text()
+    assert "there is no record of this point" in page
+    assert "No goal can be judged" in page

@@ -1,0 +1,48 @@
+"""A process of its own: how it ended, and what it took."""
+
+import sys
+
+import pytest
+
+from solver.system.process import cores_for, run_apart
+
+
+def python(text, limit=60.0, **options):
+    return run_apart([sys.executable, "-c", text], cores_for(1), limit, **options)
+
+
+def test_what_a_process_took():
+    text = "import time; x = bytearray(80_000_000); t = time.process_time()\n"
+    ended = python(text + "while time.process_time() < t + 0.2: pass\ntime.sleep(0.1)")
+    assert ended.status == 0
+    assert ended.cpu > 0.2
+    assert ended.wall > 0.3
+    assert ended.peak_memory_mb > 80
+
+
+def test_it_is_pinned_with_as_many_threads_and_told_more():
+    told = "import os; print(len(os.sched_getaffinity(0)), os.environ['OMP_NUM_THREADS'])"
+    assert python(told).output.split() == ["1", "1"]
+    more = python("import os; print(os.environ['MORE'])", environment={"MORE": "yes"})
+    assert more.output == "yes\n"
+
+
+def test_how_it_died():
+    assert python("print('a'); raise SystemExit('b')").reason.endswith("exit status 1: b")
+    assert python("import os; os.kill(os.getpid(), 9)").reason.endswith("status -9: no word")
+
+
+def test_one_without_an_end_is_stopped():
+    ended = python("import time; time.sleep(60)", limit=0.3)
+    assert ended.status is None
+    assert 0.3 < ended.wall < 30
+
+
+def test_more_memory_than_allowed_is_not_to_be_had():
+    ended = python("bytearray(400_000_000)", memory=200e6)
+    assert "MemoryError" in ended.reason
+
+
+@pytest.mark.parametrize("threads", [1, 10_000])
+def test_no_more_cores_than_there_are(threads):
+    assert 1 <= len(cores_for(threads)) <= threads

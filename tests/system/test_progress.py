@@ -1,0 +1,90 @@
+"""What a solve tells while it works: lines with the time, where somebody may read them."""
+
+import logging
+import re
+import sys
+
+import pytest
+
+from solver.commands.cli import main
+from solver.system import progress
+from tests.commands.test_cli import PLANE
+
+LINE = re.compile(r"\d\d:\d\d:\d\d \S.*")
+
+
+@pytest.fixture
+def solve(tmp_path, capsys):
+    """Solve a small case with some options; what came to the standard error, line by line."""
+    (tmp_path / "c.yaml").write_text(PLANE)
+
+    def run(*options):
+        arguments = ["solve", str(tmp_path / "c.yaml"), "-o", str(tmp_path / "r.vtkhdf"), *options]
+        assert main(arguments) == 0
+        return capsys.readouterr().err.splitlines()
+
+    return run
+
+
+def terminal(monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+
+
+def test_stages_unknowns_iterations_and_residuals_with_the_time(solve):
+    lines = solve("--verbose")
+    assert all(LINE.fullmatch(line) for line in lines)
+    told = [line[9:] for line in lines]
+    stages = ["mesh", "cut", "pairing", "assembly", "solve", "recovery", "checks", "write"]
+    assert [line for line in told if line in stages] == stages
+    text = "\n".join(told)
+    assert re.search(r"^linear system of \d+ unknowns, by a factor$", text, re.MULTILINE)
+    assert re.search(r"^solution 1: residual \d\.\de-\d\d$", text, re.MULTILINE)
+    assert re.search(r"^contact status: iteration 1, 3 of 3 closed, 0 wrong$", text, re.MULTILINE)
+
+
+def test_nothing_where_nobody_asked(solve, monkeypatch):
+    assert solve() == []
+    terminal(monkeypatch)
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    assert solve("--quiet") == []
+    assert solve("--quiet", "--verbose") == []
+
+
+def test_on_a_terminal_only_what_takes_long_is_told(solve, monkeypatch):
+    terminal(monkeypatch)
+    monkeypatch.setattr(progress, "PATIENCE", 60.0)
+    assert solve() == []
+
+
+def test_what_was_held_back_is_told_once_it_takes_long(capsys, monkeypatch):
+    terminal(monkeypatch)
+    monkeypatch.setattr(progress, "PATIENCE", 60.0)
+    log = logging.getLogger("solver.any")
+    with progress.telling(verbose=False):
+        [held] = logging.getLogger("solver").handlers
+        log.info("first")
+        assert capsys.readouterr().err == ""
+        progress._release(held)
+        log.info("second")
+        lines = capsys.readouterr().err.splitlines()
+    assert [line[9:] for line in lines] == ["first", "second"]
+
+
+def test_the_logger_is_left_as_it_was(solve):
+    logger = logging.getLogger("solver")
+    before = logger.level, logger.propagate, list(logger.handlers)
+    solve("--verbose")
+    assert (logger.level, logger.propagate, list(logger.handlers)) == before
+
+
+def test_iterations_of_a_large_system_are_told(caplog):
+    import numpy as np
+
+    from solver.mechanics.linear.krylov import conjugate_gradients
+
+    values = np.linspace(1, 300, 400)[:, None]
+    with caplog.at_level(logging.INFO, "solver"):
+        conjugate_gradients(lambda x: values * x, lambda x: x.copy(), np.ones((400, 1)), 1e-8, 300)
+    told = [record.getMessage() for record in caplog.records]
+    assert len(told) > 3
+    assert re.fullmatch(r"conjugate gradients: iteration 10, residual \d\.\de-\d\d", told[0])
