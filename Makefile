@@ -126,6 +126,7 @@ lint: lint-environment ## check format, style and types of the sources
 	$(ALONE) ruff check .
 	.venv/bin/snakefmt --check Snakefile workflow
 	$(ALONE) mypy
+	.venv/bin/lint-imports --no-logo
 
 environment:
 	@$(INSTALL) run
@@ -172,7 +173,7 @@ lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrad
 
 clean: ## remove results and caches
 	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +
-	@rm -rf .snakemake .sphinx .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	@rm -rf .snakemake .sphinx .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
 	@find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
 clean-all: clean ## remove the environment too

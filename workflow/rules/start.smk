@@ -138,7 +138,7 @@ def keep_warm():
 
     It listens from now on and answers once it is warm; without it jobs start from nothing.
     """
-    from solver.commands.options import THREADS
+    from solver.system.process import THREADS
 
     folder = tempfile.TemporaryDirectory()
     with socket.socket(socket.AF_UNIX) as listener:
