@@ -118,7 +118,7 @@ def run_apart(
         process.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)
         complaint.seek(0)
-        told = [stream.read().decode(errors="replace") for stream in (output, complaint)]
+        said, complained = (s.read().decode(errors="replace") for s in (output, complaint))
     cpu = used.ru_utime + used.ru_stime
     ending = None if over.is_set() else process.returncode
-    return Ended(ending, *told, wall, cpu, peak_mb(used), limit)
+    return Ended(ending, said, complained, wall, cpu, peak_mb(used), limit)
