@@ -7,6 +7,18 @@ from typing import Any
 from markupsafe import Markup, escape
 
 NOTHING = "–"
+# Errors in the order in which they are shown, with what they are errors of.
+ERROR_LABELS = {
+    "displacement_l2": "displacement, L2",
+    "displacement_h1": "displacement, H1",
+    "stress_l2": "stress, L2",
+    "pressure_l2": "pressure, L2",
+    "pressure_max": "pressure, maximum",
+    "pressure_means": "pressure, macro-element means",
+    "pressure_oscillation": "pressure, second difference",
+    "half_width": "contact half-width",
+    "peak": "peak pressure",
+}
 
 
 def number(value: float | None) -> str:

@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from solver.report import PAGE, formats
 from solver.report.families import page_name, paragraphs
-from solver.studies.fits import ERRORS
+from solver.report.formats import ERROR_LABELS
 
 # What each check looks at, in the order of the table of checks.
 MEANING = {
@@ -28,7 +28,7 @@ MEANING = {
 }
 # Errors against exact solutions, which are checks where a case gives them a tolerance.
 NORMS = {
-    **ERRORS,
+    **ERROR_LABELS,
     "stress_max": "stress, largest at nodes",
     "pressure_oscillation": "pressure, second difference",
     "half_width": "half-width of contact",

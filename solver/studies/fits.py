@@ -14,18 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-# Errors in the order in which they are shown, with what they are errors of.
-ERRORS = {
-    "displacement_l2": "displacement, L2",
-    "displacement_h1": "displacement, H1",
-    "stress_l2": "stress, L2",
-    "pressure_l2": "pressure, L2",
-    "pressure_max": "pressure, maximum",
-    "pressure_means": "pressure, macro-element means",
-    "pressure_oscillation": "pressure, second difference",
-    "half_width": "contact half-width",
-    "peak": "peak pressure",
-}
 LAST = 3
 # Relative errors below are rounding: no slope is fitted to them.
 ROUND_OFF = 1e-11

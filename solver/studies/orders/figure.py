@@ -7,9 +7,9 @@ from markupsafe import Markup
 
 from solver.report import formats
 from solver.report.axes import EPSILON, Scale, draw_axes
+from solver.report.formats import ERROR_LABELS
 from solver.report.marks import LOOKS, draw_marks, look_of
 from solver.report.svg import INK, MUTED, Drawing, Style
-from solver.studies.fits import ERRORS
 from solver.studies.orders.records import Curve
 
 WIDTH, HEIGHT = 400, 330
@@ -19,13 +19,13 @@ _LOOKS = {"QUAD9": (INK, "cross"), "HEXA27": (INK, "cross"), **LOOKS}
 
 def draw_panel(error: str, curves: Sequence[Curve]) -> Markup:
     """One error of all curves, with the slopes that theory knows drawn beside."""
-    drawing = Drawing(WIDTH, HEIGHT, f"Error of {ERRORS[error]}, against macro-element size")
+    drawing = Drawing(WIDTH, HEIGHT, f"Error of {ERROR_LABELS[error]}, against macro-element size")
     shown = [curve for curve in curves if len(curve.errors(error)[0])]
     sizes = [curve.errors(error)[0] for curve in shown]
     errors = [np.maximum(curve.errors(error)[1], EPSILON / 4) for curve in shown]
     x = Scale(*_range(sizes, 1.12), 58, WIDTH - 14, log=True)
     y = Scale(*_range(errors, 1.6), HEIGHT - 48, 34, log=True)
-    draw_axes(drawing, x, y, "macro-element / interface", f"relative error: {ERRORS[error]}")
+    draw_axes(drawing, x, y, "macro-element / interface", f"relative error: {ERROR_LABELS[error]}")
     _draw_guides(drawing, x, y, _guides(error, curves))
     for curve, h, e in zip(shown, sizes, errors, strict=True):
         at = np.column_stack([x(h), y(e)])

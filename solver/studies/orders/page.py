@@ -6,9 +6,10 @@ from typing import Any
 
 from solver.report import formats
 from solver.report.families import FILE_NAME, read_family
+from solver.report.formats import ERROR_LABELS
 from solver.report.html import environment
 from solver.report.tables import as_csv
-from solver.studies.fits import DEGREES, ERRORS, LAST, Order
+from solver.studies.fits import DEGREES, LAST, Order
 from solver.studies.orders.description import Family
 from solver.studies.orders.figure import draw_key, draw_panel
 from solver.studies.orders.records import Curve, groups, read_curves, shown_errors
@@ -49,8 +50,8 @@ def write_orders(
 
 def outcome(curves: Sequence[Curve]) -> str:
     """How many slopes and errors at the finest levels were asked for and reached."""
-    slopes = [r for c in curves for e in ERRORS if (r := c.reached(e)) is not None]
-    finest = [r for c in curves for e in ERRORS if (r := c.kept(e)) is not None]
+    slopes = [r for c in curves for e in ERROR_LABELS if (r := c.reached(e)) is not None]
+    finest = [r for c in curves for e in ERROR_LABELS if (r := c.kept(e)) is not None]
     lost = sum(len(curve.rows) - len(curve.solved) for curve in curves)
     reached = f"{sum(slopes)} of {len(slopes)} slopes asked for are reached"
     text = f"{reached if slopes else 'No slope is asked for'}, on {len(curves)} ladders"
@@ -79,11 +80,11 @@ def sentence(curves: Sequence[Curve]) -> str:
 def below_theory(curves: Sequence[Curve]) -> list[str]:
     """The slopes that are less than theory guarantees, in words."""
     return [
-        f"{title}, {curve.label}: {ERRORS[error]} {slope.value:.2f} ± {slope.spread:.2f}, "
+        f"{title}, {curve.label}: {ERROR_LABELS[error]} {slope.value:.2f} ± {slope.spread:.2f}, "
         f"{theory_text(curve.theory(error))}"
         for title, members in groups(curves).items()
         for curve in members
-        for error in ERRORS
+        for error in ERROR_LABELS
         if curve.below_theory(error) and (slope := curve.slope(error))
     ]
 
@@ -106,7 +107,7 @@ def _to_html(families: Sequence[Family], curves: dict[str, list[Curve]]) -> str:
             sections=[_section(family, curves[family.name]) for family in families],
             outcome=outcome(every),
             complaints=[line for curve in every for line in curve.complaints],
-            names=ERRORS,
+            names=ERROR_LABELS,
             last=LAST,
             theory_text=theory_text,
             key=draw_key,
@@ -168,7 +169,7 @@ def _point_rows(curves: Sequence[Curve]) -> list[dict[str, Any]]:
             "unknowns": row.dofs,
             "macro_elements": row.macro_elements,
             "seconds": row.total,
-            **{error: (row.verdict.get("errors") or {}).get(error) for error in ERRORS},
+            **{error: (row.verdict.get("errors") or {}).get(error) for error in ERROR_LABELS},
         }
         for curve in curves
         for row in curve.rows

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from solver.mesh.catalogue import BY_NAME, CellType
+from solver.report.formats import ERROR_LABELS
 from solver.report.rows import Row, read_rows
 from solver.studies.fits import (
     DEGREES,
-    ERRORS,
     THEORY,
     Order,
     Slope,
@@ -137,18 +137,19 @@ class Curve:
     @cached_property
     def complaints(self) -> list[str]:
         """Levels without a result, slopes and finest errors that are not reached, one line each."""
-        lines = [f"{self.family.name}/{self.name}: {line}" for line in self.missing]
-        for error in ERRORS:
+        where = f"{self.family.name}/{self.name}"
+        lines = [f"{where}: {line}" for line in self.missing]
+        for error in ERROR_LABELS:
             if self.reached(error) is False:
                 slope = self.slope(error)
                 shown = f"{slope.value:.3f} ± {slope.spread:.3f}" if slope else "not known"
                 asked = f"at least {self.least(error):g} is asked for"
-                lines.append(f"{self.family.name}/{self.name}: {ERRORS[error]}: {shown}; {asked}")
+                lines.append(f"{where}: {ERROR_LABELS[error]}: {shown}; {asked}")
             if self.kept(error) is False:
                 found = self.at_finest(error)
                 shown = "not known" if found is None else f"{found:.1e}"
                 asked = f"at most {self.ladder.finest[error]:g} is asked for at the finest level"
-                lines.append(f"{self.family.name}/{self.name}: {ERRORS[error]}: {shown}; {asked}")
+                lines.append(f"{where}: {ERROR_LABELS[error]}: {shown}; {asked}")
         return lines
 
 
@@ -170,7 +171,7 @@ def read_curves(family: Family, results: Path) -> list[Curve]:
 
 
 def _errors(row: Row) -> Mapping[str, float | None]:
-    """Errors against the exact solution, by the names of `orders.ERRORS`."""
+    """Errors against the exact solution, by the names of `ERROR_LABELS`."""
     return row.verdict.get("errors") or {}
 
 
@@ -194,4 +195,4 @@ def groups(curves: Sequence[Curve]) -> dict[str, list[Curve]]:
 
 def shown_errors(curves: Sequence[Curve]) -> list[str]:
     """The errors that any of the curves has, in their order."""
-    return [error for error in ERRORS if any(len(curve.errors(error)[0]) for curve in curves)]
+    return [error for error in ERROR_LABELS if any(len(curve.errors(error)[0]) for curve in curves)]
