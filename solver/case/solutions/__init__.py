@@ -26,7 +26,9 @@ from solver.case.solutions.base import (
 from solver.case.solutions.hertz import HertzApproach, HertzCylinder, HertzSphere
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.nested import NestedCylinders, NestedSpheres
+from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
+from solver.case.solutions.waves import Waves2d, Waves3d
 from solver.system.errors import InputError
 
 __all__ = [
@@ -50,6 +52,10 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     HertzCylinder,
     HertzSphere,
     HertzApproach,
+    Waves2d,
+    Waves3d,
+    PolynomialPressure2d,
+    PolynomialPressure3d,
 )
 SOLUTIONS: dict[str, type[ExactSolution]] = {c.name: c for c in _CLASSES}
 _ALL, _RIGID = "all", "rigid"
