@@ -92,7 +92,7 @@ class Waves2d(ElasticSolution):
 
     @cached_property
     def _numbers(self) -> np.ndarray:
-        """k (dim − 1,) along each axis."""
+        """K (dim − 1,) along each axis."""
         return np.pi * np.array(self.half_waves) / self.size
 
     @cached_property
