@@ -1,9 +1,9 @@
-"""Waves in full contact: two elastic layers, one with a wavy surface, pressed until no gap is left.
+"""Waves in full contact: two elastic layers, one of them wavy, pressed until no gap is left.
 
-Both layers are as wide as they are high or not, their sides are symmetry planes, their far faces are
-held along the normal and slide freely. The initial gap is Δ (1 − φ) with φ = cos(kₓ x) cos(k_y y);
-in two dimensions k_y = 0. With k² = kₓ² + k_y², ζ the height above a layer's far face and H its
-height, the contact pressure p̄ + p₁ φ makes
+Their sides are symmetry planes; their far faces are held along the normal and slide freely. The
+initial gap is Δ (1 − φ) with φ = cos(kₓ x) cos(k_y y); in two dimensions k_y = 0. With
+k² = kₓ² + k_y², ζ the height above a layer's far face and H its height, the contact pressure
+p̄ + p₁ φ makes
 
     u_ζ = (A sinh kζ + B kζ cosh kζ) φ,    u_t = ((A + (3 − 4ν) B) cosh kζ + B kζ sinh kζ) ∂ₜφ / k
     B = p₁ sinh kH / (2 μ k (sinh kH cosh kH + kH)),    A = −B (2 (1 − ν) + kH coth kH)

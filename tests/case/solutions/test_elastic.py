@@ -7,6 +7,7 @@ from solver.case.reader import Material
 from solver.case.solutions.base import ElasticSolution, ParameterError
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.nested import NestedCylinders, NestedSpheres
+from solver.case.solutions.oval import OvalCylinders
 from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
 from solver.case.solutions.waves import Waves2d, Waves3d
@@ -28,6 +29,7 @@ ALL = [
     Hydrostatic(pressure=25.0, material=SOFT, dim=3),
     nested(NestedCylinders),
     nested(NestedSpheres),
+    OvalCylinders(radii=RADII, inner=SOFT, outer=HARD, pressure=25.0, interference=0.01, wave=3.0),
     Parabola2d(material=Material(3.0, 0.0)),
     Paraboloid3d(material=Material(3.0, 0.0)),
     *(cls(bottom=SOFT, top=HARD, size=1.0, **WAVE) for cls in (Waves2d, Waves3d)),
@@ -284,3 +286,15 @@ def test_a_point_is_taken_by_its_place_unless_its_part_is_given():
 def test_parameters_are_validated(make):
     with pytest.raises(ParameterError):
         make()
+
+
+def test_a_wave_of_pressure_leaves_bore_and_outside_as_they_have_to_be():
+    """The bore carries its pressure alone; the outside has no shear."""
+    solution = OvalCylinders(radii=RADII, inner=SOFT, outer=HARD, pressure=25.0, wave=3.0)
+    angle = np.linspace(0.1, 1.4, 7)
+    normal = np.column_stack([np.cos(angle), np.sin(angle)])
+    bore = traction(solution.stress(RADII[0] * normal, 0), normal)
+    np.testing.assert_allclose(bore, -25.0 * normal, atol=1e-11)
+    outside = traction(solution.stress(RADII[2] * normal, 1), normal)
+    along = outside[:, 0] * normal[:, 1] - outside[:, 1] * normal[:, 0]
+    np.testing.assert_allclose(along, 0.0, atol=1e-11)
