@@ -14,8 +14,7 @@ from dataclasses import MISSING, dataclass, fields
 from math import inf
 from typing import Any
 
-from solver.case.reader import Material
-from solver.case.schemas import hint
+from solver.case.material import Material
 from solver.case.solutions.base import (
     ERRORS,
     ElasticSolution,
@@ -30,7 +29,7 @@ from solver.case.solutions.oval import OvalCylinders
 from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
 from solver.case.solutions.waves import Waves2d, Waves3d
-from solver.system.errors import InputError
+from solver.system.errors import InputError, hint
 
 __all__ = [
     "ERRORS",

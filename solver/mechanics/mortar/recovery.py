@@ -8,12 +8,16 @@ by least squares over neighbours, each fitted in the mean. p* has the means p wh
 uniform pressure gives c = 0. The loads F with Fᵢₖ = ∫ ψᵢₖ (N_master − N_slave) n dS give the bodies
 what the constants withhold from them.
 
+On linear cells the means themselves scatter about the exact ones, on triangles of TETRA4 by more
+than they vary from one macro-element to the next. The form `smooth` therefore fits the own mean
+too, as one of the data: ψ has a constant as well, and the means of p* are not p.
+
 Sources: Barth, Frederickson, AIAA 90-0013 (1990), for the reconstruction; Stetter, Numer. Math. 29
 (1978) 425–443, for the deferred correction that applies it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -28,6 +32,34 @@ _SAME_SIDE = np.cos(np.radians(30))
 _RANK = 1 / 30
 _RINGS = 3
 _AT_ONCE = 4096
+
+
+@dataclass(frozen=True)
+class Form:
+    """A kind of reconstruction: its degree, whether it keeps the means, how often it is applied.
+
+    `sweeps`: solves with the loads that it adds; 0 where it only reads the means.
+    """
+
+    degree: int
+    keeps_means: bool
+    sweeps: int
+
+    def count(self, dim: int) -> int:
+        """The number of functions ψ on a macro-element in `dim` dimensions.
+
+        >>> [FORMS[name].count(3) for name in ("linear", "quadratic", "smooth")]
+        [2, 5, 3]
+        """
+        of_degree = dim - 1 if self.degree == 1 else (dim - 1) * (dim + 2) // 2
+        return of_degree + (not self.keeps_means)
+
+
+FORMS = {
+    "linear": Form(degree=1, keeps_means=True, sweeps=2),
+    "quadratic": Form(degree=2, keeps_means=True, sweeps=3),
+    "smooth": Form(degree=1, keeps_means=False, sweeps=0),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,35 +149,33 @@ def _frames(normal: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first)], axis=1)
 
 
-def n_shapes(dim: int, degree: int) -> int:
-    """The number of functions ψ on a macro-element in `dim` dimensions: 1 or 2 in 2D, 2 or 5."""
-    return dim - 1 if degree == 1 else (dim - 1) * (dim + 2) // 2
-
-
-def shapes(at: Moments, macro: np.ndarray, places: np.ndarray, degree: int) -> np.ndarray:
-    """ψ (s, q, k) of macro-elements (s,) at points (s, q, d): linear, for degree 2 squares too.
+def shapes(at: Moments, macro: np.ndarray, places: np.ndarray, form: Form) -> np.ndarray:
+    """ψ (s, q, k) of macro-elements (s,) at points (s, q, d): linear, squares, a constant.
 
     >>> one = Moments(measure=np.array([2.0]), share=np.ones(1), centre=np.zeros((1, 2)),
     ...               spread=np.diag([1 / 3, 0.0])[None], normal=np.array([[0.0, 1.0]]),
     ...               tangents=np.array([[[1.0, 0.0]]]))
-    >>> shapes(one, np.array([0]), np.array([[[1.0, 0.0]]]), 2).round(6).tolist()
+    >>> shapes(one, np.array([0]), np.array([[[1.0, 0.0]]]), FORMS["quadratic"]).round(6).tolist()
     [[[0.5, 0.166667]]]
 
     At its end y = 1/2, and y² less the mean of y² is 1/4 − 1/12.
     """
     y = at.along(places - at.centre[macro][:, None], macro)
-    return _powers(y, y[..., :, None] * y[..., None, :] - _own_spread(at, macro), degree)
+    return _powers(y, y[..., :, None] * y[..., None, :] - _own_spread(at, macro), form)
 
 
 def _own_spread(at: Moments, macro: np.ndarray) -> np.ndarray:
     return at.second(at.spread[macro], macro)[:, None]
 
 
-def _powers(linear: np.ndarray, squares: np.ndarray, degree: int) -> np.ndarray:
-    if degree == 1:
-        return linear
-    pairs = combinations_with_replacement(range(linear.shape[-1]), 2)
-    return np.concatenate([linear, *(squares[..., a, b][..., None] for a, b in pairs)], axis=-1)
+def _powers(linear: np.ndarray, squares: np.ndarray, form: Form) -> np.ndarray:
+    parts = [linear]
+    if form.degree == 2:
+        pairs = combinations_with_replacement(range(linear.shape[-1]), 2)
+        parts += [squares[..., a, b][..., None] for a, b in pairs]
+    if not form.keeps_means:
+        parts.append(np.ones((*linear.shape[:-1], 1)))
+    return np.concatenate(parts, axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +185,7 @@ class Reconstruction:
     A degree is 0 where a macro-element has too few neighbours for any fit.
     """
 
+    form: Form
     matrix: sparse.csr_matrix
     degree: np.ndarray
 
@@ -177,9 +208,9 @@ def vertex_neighbours(faces: Sequence[tuple[np.ndarray, np.ndarray]], m: int) ->
 
 
 def reconstruct(
-    at: Moments, near: sparse.csr_matrix, closed: np.ndarray, degree: int
+    at: Moments, near: sparse.csr_matrix, closed: np.ndarray, form: Form
 ) -> Reconstruction:
-    """The reconstruction of degree 1 or 2 among closed macro-elements (m,).
+    """The reconstruction among closed macro-elements (m,).
 
     `near` (m, m): which macro-elements share a vertex. Where no ring of neighbours determines a
     quadratic, a linear is fitted; where none determines that, c = 0.
@@ -191,33 +222,34 @@ def reconstruct(
     ...               spread=np.tile(np.diag([1 / 12, 0.0]), (3, 1, 1)),
     ...               normal=np.tile([0.0, 1.0], (3, 1)), tangents=np.tile([[1.0, 0.0]], (3, 1, 1)))
     >>> near = vertex_neighbours([(np.arange(3), np.array([[0, 1], [1, 2], [2, 3]]))], 3)
-    >>> (reconstruct(row, near, np.ones(3, dtype=bool), 1).matrix @ [9.0, 7.0, 5.0]).round(12)
+    >>> found = reconstruct(row, near, np.ones(3, dtype=bool), FORMS["linear"])
+    >>> (found.matrix @ [9.0, 7.0, 5.0]).round(12)
     array([-2., -2., -2.])
     """
     m, dim = at.centre.shape
-    k = n_shapes(dim, degree)
     useful = _useful(at, near, closed)
-    rows, columns, values = [], [], []
-    found = np.zeros(m, dtype=int)
-    for d in range(degree, 0, -1):
-        ring = useful
+    degree, parts = np.zeros(m, dtype=int), []
+    for lower in range(form.degree, 0, -1):
+        ring, tried = useful, replace(form, degree=lower)
         for number in range(1, _RINGS + 1):
             if number > 1:
                 ring = (ring @ useful + ring).astype(bool).tocsr()
-            # Within one ring of triangles a quadratic is determined badly.
-            if d == 2 and dim == 3 and number == 1:
+            # One ring of triangles determines a quadratic badly.
+            if lower == 2 and dim == 3 and number == 1:
                 continue
-            open_ones = np.flatnonzero(closed & (found == 0))
-            for start in range(0, len(open_ones), _AT_ONCE):
-                chosen = open_ones[start : start + _AT_ONCE]
-                solved, entries = _fit(at, ring[chosen], chosen, d)
-                found[chosen[solved]] = d
-                for store, part in zip((rows, columns, values), entries, strict=True):
-                    store.append(part)
-    macro, shape = (np.concatenate(rows).T if rows else np.empty((2, 0))).astype(int)
-    entries = (np.concatenate(values or [[]]), (macro * k + shape, np.concatenate(columns or [[]])))
-    matrix = sparse.coo_matrix(entries, shape=(m * k, m)).tocsr()
-    return Reconstruction(matrix=matrix, degree=found)
+            left = np.flatnonzero(closed & (degree == 0))
+            for start in range(0, len(left), _AT_ONCE):
+                some = left[start : start + _AT_ONCE]
+                solved, entries = _fit(at, ring[some], some, tried)
+                degree[some[solved]] = lower
+                parts.append(entries)
+    macro, shape, column, value = (
+        np.concatenate([part[i] for part in parts] or [np.empty(0)]) for i in range(4)
+    )
+    k = form.count(dim)
+    row = macro.astype(int) * k + shape.astype(int)
+    matrix = sparse.coo_matrix((value, (row, column.astype(int))), shape=(m * k, m)).tocsr()
+    return Reconstruction(form=form, matrix=matrix, degree=degree)
 
 
 def _useful(at: Moments, near: sparse.csr_matrix, closed: np.ndarray) -> sparse.csr_matrix:
@@ -230,41 +262,57 @@ def _useful(at: Moments, near: sparse.csr_matrix, closed: np.ndarray) -> sparse.
     return sparse.csr_matrix((ones, (i[kept], j[kept])), shape=near.shape)
 
 
-def _fit(
-    at: Moments, ring: sparse.csr_matrix, chosen: np.ndarray, degree: int
-) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Fits of the macro-elements `chosen` (n,) to their rings (n, m): which are determined.
+Entries = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
-    With them the entries of R: (macro-element, shape) (e, 2), column (e,), value (e,).
+
+def _fit(
+    at: Moments, ring: sparse.csr_matrix, chosen: np.ndarray, form: Form
+) -> tuple[np.ndarray, Entries]:
+    """Fits of macro-elements `chosen` (n,) to their rings (n, m): which (n,) are determined.
+
+    With them the entries of R: macro-element, shape, column and value (e,) each.
     """
+    other, weight = _neighbours(ring, chosen)
+    b, weight = _means(at, chosen, other, weight, form)
+    system = weight[..., None] * b
+    if not form.keeps_means:
+        own = np.zeros((len(chosen), 1, b.shape[-1]))
+        own[..., -1] = 1.0
+        system = np.concatenate([system, own], axis=1)
+    left, sizes, right = np.linalg.svd(system, full_matrices=False)
+    k = b.shape[-1]
+    solved = ((weight > 0).sum(axis=1) + (not form.keeps_means) >= k) & (sizes.shape[1] == k)
+    solved &= sizes[:, -1] > _RANK * sizes[:, 0]
+    u, s, v = left[solved, : other.shape[1]], sizes[solved], right[solved]
+    by_neighbour = np.einsum("nki,nk,njk->nij", v, 1 / s, u) * weight[solved][:, None]
+    values = np.concatenate([by_neighbour, -by_neighbour.sum(axis=2, keepdims=True)], axis=2)
+    columns = np.concatenate([other[solved], chosen[solved][:, None]], axis=1)
+    # The constant of a smooth form is its last function, whatever the degree of the fit.
+    entries = np.broadcast_arrays(
+        chosen[solved][:, None, None], np.arange(k)[:, None], columns[:, None], values
+    )
+    macro, shape, column, value = (x.ravel() for x in entries)
+    return solved, (macro, shape, column, value)
+
+
+def _neighbours(ring: sparse.csr_matrix, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Neighbours (n, w) of the chosen and whether each counts, as 0 or 1; the rest is padding."""
     count = np.diff(ring.indptr)
-    width = int(count.max(initial=0))
+    width = max(int(count.max(initial=0)), 1)
     slot = np.arange(len(ring.indices)) - np.repeat(ring.indptr[:-1], count)
     row = np.repeat(np.arange(len(chosen)), count)
-    other = np.repeat(chosen[:, None], max(width, 1), axis=1)
-    used = np.zeros(other.shape, dtype=bool)
-    other[row, slot], used[row, slot] = ring.indices, True
-    used &= other != chosen[:, None]
+    other, counts = np.repeat(chosen[:, None], width, axis=1), np.zeros((len(chosen), width))
+    other[row, slot] = ring.indices
+    counts[row, slot] = ring.indices != chosen[row]
+    return other, counts
+
+
+def _means(
+    at: Moments, chosen: np.ndarray, other: np.ndarray, counts: np.ndarray, form: Form
+) -> tuple[np.ndarray, np.ndarray]:
+    """Means of the chosen ones' ψ (n, w, k) over their neighbours, and the weights of these."""
     y = at.along(at.centre[other] - at.centre[chosen][:, None], chosen)
     spread = at.second(at.spread[other] - at.spread[chosen][:, None], chosen)
-    b = _powers(y, y[..., :, None] * y[..., None, :] + spread, degree)
     distance = np.linalg.norm(y, axis=-1)
-    weight = np.where(used & (distance > 0), 1 / np.where(distance > 0, distance, 1.0), 0.0)
-    left, sizes, right = np.linalg.svd(weight[..., None] * b, full_matrices=False)
-    k = b.shape[-1]
-    enough = (weight > 0).sum(axis=1) >= k
-    solved = enough & (sizes.shape[1] == k) & (sizes[:, -1] > _RANK * sizes[:, 0])
-    u, s, v = left[solved], sizes[solved], right[solved]
-    inverse = np.einsum("nki,nk,njk->nij", v, 1 / s, u) * weight[solved][:, None]
-    macro = chosen[solved]
-    shape = np.broadcast_to(np.arange(k), (len(macro), k))
-    place = np.stack([np.broadcast_to(macro[:, None], shape.shape), shape], axis=-1)
-    place = np.broadcast_to(place[:, :, None], (*inverse.shape, 2)).reshape(-1, 2)
-    column = np.broadcast_to(other[solved][:, None], inverse.shape).ravel()
-    own = np.stack([np.broadcast_to(macro[:, None], shape.shape), shape], axis=-1).reshape(-1, 2)
-    entries = (
-        np.concatenate([place, own]),
-        np.concatenate([column, own[:, 0]]),
-        np.concatenate([inverse.ravel(), -inverse.sum(axis=2).ravel()]),
-    )
-    return solved, entries
+    weight = np.where(distance > 0, counts / np.where(distance > 0, distance, 1.0), 0.0)
+    return _powers(y, y[..., :, None] * y[..., None, :] + spread, form), weight
