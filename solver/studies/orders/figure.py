@@ -9,8 +9,7 @@ from solver.report import formats
 from solver.report.axes import EPSILON, Scale, draw_axes
 from solver.report.marks import LOOKS, draw_marks, look_of
 from solver.report.svg import INK, MUTED, Drawing, Style
-from solver.studies.fits import ERRORS
-from solver.studies.orders.records import Curve
+from solver.studies.orders.records import ERRORS, Curve
 
 WIDTH, HEIGHT = 400, 330
 # QUAD9 and HEXA27 have a look of their own here, where they stand beside QUAD8 and HEXA20.
@@ -67,7 +66,7 @@ def _draw_marks(drawing: Drawing, curve: Curve, at: np.ndarray) -> None:
 
 def _guides(error: str, curves: Sequence[Curve]) -> list[float]:
     """The orders that theory knows of for these curves; 1 and 2 where it knows of none."""
-    known = [theory for curve in curves if (theory := curve.theory(error))]
+    known = [curve.theory(error) for curve in curves]
     orders = {order for theory in known for order in (theory.least, theory.best) if order}
     return sorted(orders) or [1.0, 2.0]
 
