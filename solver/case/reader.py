@@ -10,6 +10,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from solver.case.descriptions import require_file
 from solver.case.expressions import Expression
 from solver.case.rules import check_dimension
 from solver.case.schemas import CASE_SCHEMA, hint, key_path, validate
@@ -156,8 +157,8 @@ def parse_case(text: str, path: Path) -> Case:
 def check_mesh_file(case: Case) -> None:
     """Raise `InputError` where the case names a mesh file that is not there."""
     path = case.mesh.get("path")
-    if path and not path.is_file():
-        raise InputError(case.path, "mesh.file", str(path), "no such file")
+    if path:
+        require_file(case.path, "mesh.file", path, str(path))
 
 
 class _Reader:
@@ -311,6 +312,7 @@ def _check(case: Case) -> None:
             raise InputError(case.path, "steps", list(case.steps), allowed)
     _check_listed_twice(case)
     _check_errors(case)
+    _check_reference(case)
     if case.plane:
         check_dimension(case, 2)
 
@@ -351,6 +353,30 @@ def _check_errors(case: Case) -> None:
         else:
             continue
         raise InputError(case.path, f"tolerance.{error}", case.tolerance[error], allowed)
+
+
+def _check_reference(case: Case) -> None:
+    """Every value of the reference feeds a check; no tolerance admits any result at all."""
+    from solver.case.solutions import ERRORS
+
+    for check, tolerance in case.tolerance.items():
+        if tolerance > 1:
+            allowed = "must be at most 1: then the error is as large as the reference"
+            raise InputError(case.path, f"tolerance.{check}", tolerance, allowed)
+    for key in case.reference.keys() & {"contact_pressure", "gap"} if not case.zones else ():
+        allowed = "cannot be compared: the case has no contact"
+        raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+    if case.reference_kind and not case.reference and case.solution is None:
+        allowed = "gives no value to compare with, such as contact_pressure"
+        raise InputError(case.path, "reference.kind", case.reference_kind, allowed)
+    given = [load.value for load in case.loads]
+    given += [value for support in case.supports for value in support.fix.values()]
+    compared = EXACT in case.reference.values() or case.tolerance.keys() & ERRORS.keys()
+    if case.solution and not compared and not (case.reference and EXACT in given):
+        known = [name for name, what in ERRORS.items() if what in case.solution.quantities]
+        allowed = "nothing is compared with it; give a value (`contact_pressure: solution`) or a "
+        allowed += f"tolerance for one of {', '.join(known)}"
+        raise InputError(case.path, "reference.solution", case.solution.name, allowed)
 
 
 def _check_listed_twice(case: Case) -> None:

@@ -285,8 +285,9 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     for name in _BY_NODE:
         group[name] = getattr(zone, name)
     faces = group.create_group("master_faces")
-    for kind, connectivity in zone.master_faces:
-        faces[kind] = connectivity
+    # Faces of one type may be in several blocks, one for each type of cell behind them.
+    for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
+        faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
     if zone.nodal:
         nodal = group.create_group("nodal")
         for name, attribute in _AT_MULTIPLIER_NODES.items():

@@ -76,7 +76,7 @@ def test_changed_accepted_values_check_their_solve_again(project):
 def test_a_changed_solver_runs_all_and_a_changed_report_only_itself(project):
     append(project / "solver" / "report" / "page.py", "# changed\n")
     assert jobs(project) == REPORT
-    append(project / "solver" / "lac" / "__init__.py", "# changed\n")
+    append(project / "solver" / "mechanics" / "mortar" / "__init__.py", "# changed\n")
     solves = {"solve tiny-a", "solve tiny-a-swapped", "solve tiny-b"}
     assert jobs(project) == solves | REPORT
 
@@ -95,7 +95,7 @@ def test_savings_that_were_measured_come_into_the_report(project):
 def test_a_changed_solver_runs_all_also_where_snakemake_remembers_nothing(project):
     shutil.rmtree(project / ".snakemake")
     assert jobs(project) == set()
-    append(project / "solver" / "linear" / "direct.py", "# changed\n")
+    append(project / "solver" / "mechanics" / "linear" / "direct.py", "# changed\n")
     assert jobs(project) == {"solve tiny-a", "solve tiny-a-swapped", "solve tiny-b"} | REPORT
 
 

@@ -7,11 +7,18 @@ import shlex
 import sys
 from collections import namedtuple
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import yaml
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
+
+# The project's folder gives these packages alone: Snakemake put it first, and a file `jsonschema.py`
+# in it would be taken for the package.
+for package in ("solver", "workflow.progress"):
+    import_module(package)
+sys.path.sort(key=lambda folder: Path(folder) == Path(workflow.basedir))
 
 validate(config, "../schemas/config.schema.yaml")
 
@@ -19,7 +26,8 @@ VARIANTS = config["variants"] in (True, "true")
 # Jobs share their bytecode: to compile the sources anew in each costs a third of a small solve.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 MEMORY_CHECK = " --no-memory-check" * (config["memory_check"] in (False, "false"))
-PYTHON = shlex.quote(sys.executable)
+# Neither PYTHONPATH nor the user's own packages are for these processes.
+PYTHON = shlex.quote(sys.executable) + " -Es"
 # Before a file for what it takes and a command of the solver, which runs in a fork of the run's
 # warm process, where there is one.
 SOLVER = f"{PYTHON} -IS solver/commands/warm.py"

@@ -119,7 +119,7 @@ def _attempt(point: _Point, meshes: _Meshes, cures: Cures) -> dict[str, Any]:
     try:
         return _measured(point, meshes, cures)
     except InputError as error:
-        return {"word": REFUSED, "reason": f"{error.key}: {error.allowed}"}
+        return {"word": REFUSED, "reason": f"{error.key}: {error.problem}"}
     except SolveError as error:
         return {"word": FAILED, "reason": str(error)}
 
