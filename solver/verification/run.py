@@ -9,7 +9,8 @@ from typing import Any
 
 import meshio
 
-from solver.case.reader import Case, check_mesh_file, load_case
+from solver.case.model import Case
+from solver.case.reader import check_mesh_file, load_case
 from solver.mesh import generate, read_mesh, transform
 from solver.mesh.size import check_memory
 from solver.simulation.simulate import simulate

@@ -14,8 +14,7 @@ from dataclasses import MISSING, dataclass, fields
 from math import inf
 from typing import Any
 
-from solver.case.reader import Material
-from solver.case.schemas import hint
+from solver.case.material import Material
 from solver.case.solutions.base import (
     ERRORS,
     ElasticSolution,
@@ -27,7 +26,7 @@ from solver.case.solutions.hertz import HertzApproach, HertzCylinder, HertzSpher
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.nested import NestedCylinders, NestedSpheres
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
-from solver.system.errors import InputError
+from solver.system.errors import InputError, hint
 
 __all__ = [
     "ERRORS",

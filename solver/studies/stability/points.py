@@ -18,7 +18,7 @@ import meshio
 import numpy as np
 from scipy import sparse
 
-from solver.case.reader import Case
+from solver.case.model import Case
 from solver.mechanics.linear.condensation import Condensed
 from solver.mesh import generate, transform
 from solver.simulation.cures import ALL, Cures

@@ -27,7 +27,8 @@ import numpy as np
 
 from solver.case.descriptions import file_beside
 from solver.case.expressions import Expression
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.case.schemas import SWEEP_SCHEMA
 from solver.case.yaml import read_mapping
 from solver.system.errors import InputError

@@ -36,7 +36,8 @@ from typing import Any
 import yaml
 
 from solver.case.descriptions import file_beside, refuse_twins, refuse_unknown
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.case.schemas import STUDY_SCHEMA
 from solver.case.yaml import read_mapping
 from solver.mesh.catalogue import BY_NAME

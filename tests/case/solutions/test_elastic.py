@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, ParameterError
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.nested import NestedCylinders, NestedSpheres
