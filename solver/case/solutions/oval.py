@@ -41,11 +41,12 @@ class OvalCylinders(NestedCylinders):
     def _potentials(self) -> np.ndarray:
         """α, β, γ, δ (4, n_parts)."""
         (a, b, c), (inner, outer) = self.radii, (0, 1)
-        free = [_radial(a), _shear(a), _radial(b), _shear(b)]
-        first = np.linalg.solve(free, [0.0, 0.0, -self.wave, 0.0])
+        free = np.array([_radial(a), _shear(a), _radial(b), _shear(b)])
+        first = np.linalg.solve(free, np.array([0.0, 0.0, -self.wave, 0.0]))
         moved = self._moved(inner, b) @ first
-        held = [_radial(b), _shear(b), self._moved(outer, b), _shear(c)]
-        return np.array([first, np.linalg.solve(held, [-self.wave, 0.0, moved, 0.0])]).T
+        held = np.array([_radial(b), _shear(b), self._moved(outer, b), _shear(c)])
+        second = np.linalg.solve(held, np.array([-self.wave, 0.0, moved, 0.0]))
+        return np.array([first, second]).T
 
     def _moved(self, part: int, r: float) -> np.ndarray:
         """u_r by α, β, γ, δ."""

@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from solver.case.model import Material
+from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, Part, lame_of, parameter
 
 
