@@ -30,7 +30,7 @@ SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 .PHONY: help all-cases family case report summary compare gallery orders study stability infsup
 .PHONY: scaling benchmark test accept
 .PHONY: format lint lock faults mutants kills cluster-test docs bill clean clean-all
-.PHONY: environment study-environment gallery-environment test-environment lint-environment docs-environment
+.PHONY: environment gallery-environment test-environment lint-environment docs-environment
 .PHONY: bill-environment
 
 help: ## list the targets
@@ -70,7 +70,7 @@ orders: environment ## refine step by step and fit orders of convergence: all or
 	@$(SNAKEMAKE) orders
 
 study: override CONFIG += $(if $(LEVEL),study=$(LEVEL))
-study: study-environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
+study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
 	@$(SNAKEMAKE) study
 
 stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
@@ -131,9 +131,6 @@ lint: lint-environment ## check format, style and types of the sources
 environment:
 	@$(INSTALL) run
 
-study-environment:
-	@$(INSTALL) run pictures
-
 gallery-environment:
 	@$(INSTALL) run gallery
 
@@ -167,7 +164,7 @@ LOCK := $(ALONE) uv pip compile --quiet --universal --python-version 3.11 \
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
-	@for group in build mkl slurm pictures gallery test lint docs bill lock; do \
+	@for group in build mkl slurm gallery test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 

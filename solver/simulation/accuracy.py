@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from solver.case.reader import Case
+from solver.case.model import Case
 from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.elasticity import Block, steepness
 from solver.mechanics.fem.faces import FaceBlock, area_vectors

@@ -30,7 +30,8 @@ import h5py
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.mesh.catalogue import cell_type
 from solver.mesh.files.vtkhdf import read_grid, write_grid
 from solver.simulation.consistency import inconsistency

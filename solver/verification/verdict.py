@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.case.reader import Case
+from solver.case.model import Case
 from solver.simulation.accuracy import Accuracy, beyond_small_strain
 from solver.simulation.solution import Solution, job_name
 from solver.system.files import write_text
