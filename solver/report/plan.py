@@ -14,7 +14,6 @@ UNMEASURED = "not measured: make benchmark"
 # What each switch of `solver.simulation.skips.Skips` leaves out, in the order of the work.
 TITLES = {
     "cut": "the cut of slave cells",
-    "clipping": "clipping of faces",
     "quadrature": "more Gauss points, closure of integrals",
     "unloaded": "groups of bodies that nothing moves",
     "apart": "one factor for all bodies",

@@ -10,7 +10,6 @@ class Skips(Switches):
     """What changes arithmetic, but, to round-off, no result: all of it is left out as a rule.
 
     cut: cells whose slave faces own an inner node are not cut.
-    clipping: a slave face that lies within one master face is not clipped by it.
     quadrature: where all faces are affine images, plain Gauss rules integrate over the segments,
         without more points and without closure; cells with straight edges have the rules of these.
     status: no second solve where the first fulfils the conditions of contact, which starts from a
@@ -21,7 +20,6 @@ class Skips(Switches):
     """
 
     cut: bool = True
-    clipping: bool = True
     quadrature: bool = True
     status: bool = True
     refinement: bool = True

@@ -13,6 +13,7 @@ from typing import Self
 
 import numpy as np
 
+from solver.mechanics.fem import simplex_rule
 from solver.mechanics.fem.gauss import gauss_rule
 
 # Edges whose middle is off the chord by less than this share of it are straight.
@@ -114,7 +115,8 @@ def clip(regions: Regions, curves: Curves) -> Regions:
     ...                  bulge=np.zeros((1, 4, 2)), count=np.array([4]))
     >>> diagonal = Curves(origin=np.zeros((1, 2)), along=np.ones((1, 2)),
     ...                   idle=np.array([False]))
-    >>> float(quadrature(clip(square, diagonal), 1)[2].sum())
+    >>> (_, _, weights), = quadrature(clip(square, diagonal), 1)
+    >>> float(weights.sum())
     0.5
     """
     first, last = regions.start, regions.end
@@ -151,6 +153,7 @@ def clip(regions: Regions, curves: Curves) -> Regions:
 
 
 Parts = list[tuple[np.ndarray, Regions]]
+Pieces = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def clip_to_face(regions: Regions, corner: np.ndarray, bulge: np.ndarray) -> Parts:
@@ -233,44 +236,52 @@ def _boundary(
     return [*lines, *dents], caps
 
 
-def quadrature(regions: Regions, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Region numbers (s,), points (s, q, 2), weights (s, q) of the fans of their arcs.
+def quadrature(regions: Regions, degree: int) -> list[Pieces]:
+    """Points on the fans of the regions' arcs, for polynomials of a degree.
 
-    From n points each way; exact for polynomials of degree 2 n − 2 beside straight arcs, n − 2
-    beside others.
+    Region numbers (s,), points (s, q, 2) and weights (s, q); of triangles, where the rule is exact,
+    and of those with a bent side, where it is exact for degree 2 and has no fewer points.
     The region under the parabola 4 t (1 − t) has the area 2/3:
 
     >>> cap = Regions(start=np.array([[[1.0, 0.0], [0.0, 0.0]]]), count=np.array([2]),
     ...               bulge=np.array([[[0.0, 1.0], [0.0, 0.0]]]))
-    >>> round(float(quadrature(cap, 3)[2].sum()), 15)
+    >>> round(sum(float(weight.sum()) for _, _, weight in quadrature(cap, 1)), 15)
     0.666666666666667
     """
     total = np.where(regions.used[..., None], regions.start, 0.0).sum(axis=1)
     middle = total / np.maximum(regions.count, 1)[:, None]
     # Around the centroid, which lies away from edges bent inward.
-    which, points, weights = _fan(regions, middle, 3)
-    area = np.bincount(which, weights.sum(axis=1), minlength=len(middle))
-    moment = np.zeros_like(middle)
-    np.add.at(moment, which, np.einsum("sq,sqd->sd", weights, points - middle[which][:, None]))
+    area, moment = np.zeros(len(middle)), np.zeros_like(middle)
+    for which, points, weights in _fan(regions, middle, 1):
+        area += np.bincount(which, weights.sum(axis=1), minlength=len(middle))
+        np.add.at(moment, which, np.einsum("sq,sqd->sd", weights, points - middle[which][:, None]))
     area[area == 0] = 1.0
-    return _fan(regions, middle + moment / area[:, None], n)
+    return _fan(regions, middle + moment / area[:, None], degree)
 
 
-def _fan(regions: Regions, middle: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _fan(regions: Regions, middle: np.ndarray, degree: int) -> list[Pieces]:
     which, arc = np.nonzero(regions.used)
     first, last = regions.start[which, arc] - middle[which], regions.end[which, arc] - middle[which]
     bulge = regions.bulge[which, arc]
-    reference, weights = gauss_rule("TRIA3", n)
-    radius = 1 - reference[:, 1]
-    t = reference[:, 0] / radius
-    shapes = np.stack([1 - t, t, 4 * t * (1 - t)])
-    slopes = np.stack([-np.ones_like(t), np.ones_like(t), 4 - 8 * t])
-    nodes = np.stack([first, last, bulge], axis=1)
-    rim = np.einsum("kq,skd->sqd", shapes, nodes)
-    measure = _cross(rim, np.einsum("kq,skd->sqd", slopes, nodes)) * weights
-    real = (measure != 0).any(axis=1)
-    points = middle[which][:, None] + radius[:, None] * rim
-    return which[real], points[real], measure[real]
+    bent = bulge.any(axis=1)
+    straight = ~bent & (_cross(first, last) != 0)
+    reference, weights = simplex_rule(2, degree)
+    corner = np.stack([first[straight], last[straight]], axis=1)
+    points = middle[which[straight]][:, None] + np.einsum("qk,skd->sqd", reference, corner)
+    area = _cross(first[straight], last[straight])
+    pieces = [(which[straight], points, area[:, None] * weights)]
+    if bent.any():
+        reference, weights = gauss_rule("TRIA3", degree // 2 + 2)
+        radius = 1 - reference[:, 1]
+        t = reference[:, 0] / radius
+        shapes = np.stack([1 - t, t, 4 * t * (1 - t)])
+        slopes = np.stack([-np.ones_like(t), np.ones_like(t), 4 - 8 * t])
+        nodes = np.stack([first[bent], last[bent], bulge[bent]], axis=1)
+        rim = np.einsum("kq,skd->sqd", shapes, nodes)
+        measure = _cross(rim, np.einsum("kq,skd->sqd", slopes, nodes)) * weights
+        points = middle[which[bent]][:, None] + radius[:, None] * rim
+        pieces.append((which[bent], points, measure))
+    return pieces
 
 
 def joined(parts: Sequence[Regions]) -> Regions:

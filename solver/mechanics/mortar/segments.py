@@ -22,6 +22,7 @@ from solver.mechanics.mortar.clipping import clip, overlap, triangles
 from solver.mechanics.mortar.facets import Facets, project_along
 from solver.mechanics.mortar.pairing import Outlines, facing_pairs, outlines
 from solver.mechanics.mortar.regions import (
+    Pieces,
     Regions,
     clip_to_face,
     joined,
@@ -249,7 +250,6 @@ def _shared(own: np.ndarray, one: np.ndarray, other: np.ndarray) -> tuple[np.nda
 
 # Pieces of slave faces: pair numbers (s,), places (s, q, dim − 1), weights (s, q)
 
-Pieces = tuple[np.ndarray, np.ndarray, np.ndarray]
 Behind = tuple[np.ndarray, np.ndarray]
 
 
@@ -273,8 +273,8 @@ def _segments(pairs: _Pairs, behind: Behind, reach: float, more: int) -> Iterato
     chosen = np.flatnonzero(special)
     if len(chosen):
         some = pairs.of(chosen)
-        pieces = _bent(some, _among(behind, chosen, len(special)), degree)
-        yield from _with_master(some, pieces, reach)
+        for pieces in _bent(some, _among(behind, chosen, len(special)), degree):
+            yield from _with_master(some, pieces, reach)
 
 
 def _among(behind: Behind, chosen: np.ndarray, count: int) -> Behind:
@@ -308,7 +308,7 @@ def _polygons(window: np.ndarray, subject: np.ndarray, degree: int) -> Pieces:
     return which, np.einsum("qk,skt->sqt", barycentric, corner), 2 * area[:, None] * weights
 
 
-def _bent(pairs: _Pairs, behind: Behind, degree: int) -> Pieces:
+def _bent(pairs: _Pairs, behind: Behind, degree: int) -> list[Pieces]:
     """Fans of what faces have in common where edges are bent, or where others hide some of it."""
     corner, bulge = pairs.seen(outlines([pairs.slave]), pairs.i)
     slave = Regions(start=corner, bulge=bulge, count=np.full(len(corner), corner.shape[1]))
@@ -323,13 +323,8 @@ def _bent(pairs: _Pairs, behind: Behind, degree: int) -> Pieces:
             cut += [(chosen[k], part) for k, part in without_face(regions.of(deep), *outline)]
         parts = cut
     which = np.concatenate([which for which, _ in parts])
-    number, points, weight = quadrature(joined([regions for _, regions in parts]), _points(degree))
-    return which[number], points, weight
-
-
-def _points(degree: int) -> int:
-    """Points each way on a triangle with one bent side."""
-    return (degree + 1) // 2 + 3
+    pieces = quadrature(joined([regions for _, regions in parts]), degree)
+    return [(which[number], points, weight) for number, points, weight in pieces]
 
 
 def _layers(behind: Behind, count: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

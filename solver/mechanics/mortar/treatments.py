@@ -76,10 +76,6 @@ TREATMENTS: dict[str, Treatment] = {
 }
 
 
-SEGMENTED = tuple(name for name, t in TREATMENTS.items() if t.scheme(DEFAULT_POINTS).closure)
-"""Those that integrate over the intersections of faces."""
-
-
 def scheme_of(name: str, points: int | None) -> Scheme:
     """The integration of a treatment, by as many points each way where it has them."""
     return TREATMENTS[name].scheme(points or DEFAULT_POINTS)
