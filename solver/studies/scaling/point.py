@@ -29,6 +29,7 @@ from solver.system.clock import now
 from solver.system.files import write_text
 from solver.system.memory import available
 from solver.system.process import cores_for, run_apart
+from solver.verification.verdict import read_verdict
 
 SOLVED = "solved"
 # What of the machine's free memory a point may take: the rest is for who else is there.
@@ -98,14 +99,14 @@ def _solve(
     found["process"] = done.used
     if not verdict.is_file():
         return found | _ended("failed" if done.status is None else "crashed", done.reason)
-    content = json.loads(verdict.read_text(encoding="utf-8"))
-    found |= {key: content[key] for key in _FROM_VERDICT}
-    found |= {"verdict": content["verdict"], "machine": content["provenance"]}
-    if content["dofs"] is None:
-        reason = content["reason"].removeprefix(f"{case}: ")
-        return found | _ended(_OUTCOMES.get(content["verdict"], "failed"), reason)
-    found["faces"] = sum(body["faces"] for body in content["bodies"])
-    return found | _ended(SOLVED, content["reason"])
+    content = read_verdict(verdict)
+    found |= {key: getattr(content, key) for key in _FROM_VERDICT}
+    found |= {"verdict": content.verdict, "machine": content.provenance}
+    if content.dofs is None:
+        reason = content.reason.removeprefix(f"{case}: ")
+        return found | _ended(_OUTCOMES.get(content.verdict, "failed"), reason)
+    found["faces"] = sum(body.faces for body in content.bodies)
+    return found | _ended(SOLVED, content.reason)
 
 
 def _ended(outcome: str, reason: str) -> dict[str, Any]:
