@@ -9,18 +9,6 @@ from markupsafe import Markup, escape
 from solver.verification.verdict import Body
 
 NOTHING = "–"
-# Errors in the order in which they are shown, with what they are errors of.
-ERROR_LABELS = {
-    "displacement_l2": "displacement, L2",
-    "displacement_h1": "displacement, H1",
-    "stress_l2": "stress, L2",
-    "pressure_l2": "pressure, L2",
-    "pressure_max": "pressure, maximum",
-    "pressure_means": "pressure, macro-element means",
-    "pressure_oscillation": "pressure, second difference",
-    "half_width": "contact half-width",
-    "peak": "peak pressure",
-}
 
 
 def number(value: float | None) -> str:
@@ -54,6 +42,18 @@ def seconds(value: float | None) -> str:
     if value is None or math.isnan(value):
         return NOTHING
     return f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
+
+
+def duration(value: float) -> str:
+    """Two digits: `12 ms`, `0.12 s`, `1.2 s`; from ten seconds on whole ones."""
+    if value < 0.0995:
+        return f"{value * 1000:.2g} ms"
+    return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"
+
+
+def count(value: float) -> str:
+    """A whole number: `102,357`."""
+    return f"{value:,.0f}"
 
 
 def types(body: Body) -> str:

@@ -8,7 +8,8 @@ import meshio
 import numpy as np
 
 from solver.case.expressions import evaluate
-from solver.case.reader import Case, Exact, Load, Material, Scalar, Support
+from solver.case.material import Material
+from solver.case.model import Case, Exact, Load, Scalar, Support
 from solver.case.solutions import ExactSolution
 from solver.mechanics.fem import has_straight_edges
 from solver.mechanics.fem.bodies import body_numbers

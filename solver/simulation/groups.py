@@ -8,11 +8,10 @@ from collections.abc import Iterable
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, Zone
+from solver.case.model import Case, Zone
 from solver.case.rules import check_dimension
-from solver.case.schemas import hint
 from solver.mesh.catalogue import BY_MESHIO
-from solver.system.errors import InputError
+from solver.system.errors import InputError, hint
 
 ALL = "all"
 

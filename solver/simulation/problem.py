@@ -14,8 +14,11 @@ from solver.simulation.accuracy import (
     EPSILON,
     EPSILON_EXTENDED,
     Accuracy,
+    Roughness,
     pressure_of_forces,
     pressure_of_gaps,
+    roughness,
+    terms_of,
 )
 from solver.simulation.displacement import Displacement
 from solver.simulation.naming import body_names
@@ -158,6 +161,11 @@ class ContactProblem:
         """That of all degrees of freedom, without mean stress: a plain residual asks for it."""
         return stiffness(self.scene.points, self.scene.blocks)[0]
 
+    @cached_property
+    def roughness(self) -> Roughness:
+        """What rounded coordinates do to the mesh."""
+        return roughness(self.scene)
+
     def _acts(self) -> np.ndarray:
         """Which multipliers (k,) move anything: supports may hold the nodes of both surfaces.
 
@@ -298,17 +306,23 @@ class ContactProblem:
         if scale == 0:
             return Accuracy({"forces": float(forces.max()) / force_scale})
         gaps = self.gaps[closed]
-        moving = gaps @ sparse.diags((np.diff(scene.free.basis.indptr) > 0).astype(float))
+        own = self.own & (np.diff(scene.free.basis.indptr) > 0)
+        moving = gaps @ sparse.diags(own.astype(float))
+        moving.eliminate_zeros()
         noise = np.repeat(forces, dim) + residual * force_scale
         known = scene.rounding * self.covered * (self.initial != 0)
         known = known[closed] + EPSILON * iterate.displacement.opening_size(gaps, dim)
-        smallest = float(self.area.min()) ** (1 / (dim - 1))
+        rough, moved = self.roughness, iterate.displacement.total.reshape(scene.points.shape)
+        pushed = rough.gap(gaps, moved) * self.covered[closed]
+        tilted = scale * (rough.strain + float(rough.tilt.max()))
+        tilted += pressure_of_gaps(moving, pushed, self.diagonal)
         causes = {
             "forces": pressure_of_forces(moving, noise),
             "gap": pressure_of_gaps(moving, known, self.diagonal),
-            "coordinates": scale * scene.rounding / smallest,
+            "coordinates": tilted + rough.stress(scene.blocks, moved),
             "stress": max(unit * stress, EPSILON * mean_stress),
             "slender": unit * slender,
+            "sums": EPSILON * terms_of(scene.blocks) * scale,
         }
         return Accuracy({name: error / scale for name, error in causes.items()})
 

@@ -8,7 +8,7 @@ from typing import Any
 import meshio
 import numpy as np
 
-from solver.case.reader import Case
+from solver.case.model import Case
 from solver.mechanics.fem.elasticity import nodal_stress
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.stress import normal_stress

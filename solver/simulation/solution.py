@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     import meshio
 
-    from solver.case.reader import Case
+    from solver.case.model import Case
 
 
 def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:

@@ -25,7 +25,7 @@ from solver.verification.verdict import (
 )
 
 if TYPE_CHECKING:
-    from solver.case.reader import Case
+    from solver.case.model import Case
     from solver.simulation.solution import Solution
 
 NOT_VERIFIED = "not verified: the case gives no reference"

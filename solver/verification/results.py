@@ -30,7 +30,8 @@ import h5py
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.mesh.catalogue import cell_type
 from solver.mesh.files.vtkhdf import read_grid, write_grid
 from solver.simulation.consistency import inconsistency
@@ -286,8 +287,9 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     for name in _BY_NODE:
         group[name] = getattr(zone, name)
     faces = group.create_group("master_faces")
-    for kind, connectivity in zone.master_faces:
-        faces[kind] = connectivity
+    # Faces of one type may be in several blocks, one for each type of cell behind them.
+    for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
+        faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
     if zone.nodal:
         nodal = group.create_group("nodal")
         for name, attribute in _AT_MULTIPLIER_NODES.items():

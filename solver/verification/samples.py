@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from solver.case.expressions import evaluate
-from solver.case.schemas import hint
 from solver.mechanics.fem.stress import COMPONENTS
 from solver.simulation.exact import ExactValues, deformable
 from solver.simulation.solution import Solution, ZoneResult
-from solver.system.errors import InputError
+from solver.system.errors import InputError, hint
 
 Reference = Any
 

@@ -9,17 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.case.expressions import Expression
-from solver.case.reader import (
-    Case,
-    Load,
-    Material,
-    Observation,
-    Support,
-    Zone,
-    check_mesh_file,
-    load_case,
-    parse_case,
-)
+from solver.case.material import Material
+from solver.case.model import Case, Load, Observation, Support, Zone
+from solver.case.reader import check_mesh_file, load_case, parse_case
 from solver.case.schemas import CASE_SCHEMA
 from solver.case.solutions.uniform import Hydrostatic
 from solver.case.yaml import parse_mapping

@@ -178,6 +178,20 @@ def cancellation(
     return force, highest, slender
 
 
+def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
+    """The sizes of the gradients of the shape functions (n, n_nodes) in the middle of each cell."""
+    found = []
+    for block in blocks:
+        reference, weights = block.rule
+        middle = (weights @ reference / weights.sum())[None]
+        slope = np.empty(block.cells.shape)
+        for part in _chunks(block, points.shape[1]):
+            gradient, _ = physical_gradients(points, block.cells[part], block.type, middle)
+            slope[part] = np.linalg.norm(gradient[:, 0], axis=2)
+        found.append(slope)
+    return found
+
+
 def _stress(
     gradient: np.ndarray,
     displacement: np.ndarray,

@@ -32,8 +32,13 @@ from typing import Any
 from solver.case.descriptions import file_beside, refuse_unknown
 from solver.case.schemas import BENCHMARK_SCHEMA
 from solver.case.yaml import read_mapping
-from solver.studies.scaling import QUICK
-from solver.studies.scaling.description import Point, Scaling, Series, read_scaling
+from solver.studies import QUICK
+from solver.studies.scaling.description import (
+    Scaling,
+    ScalingPoint,
+    SizeSeries,
+    read_scaling,
+)
 
 
 @dataclass(frozen=True)
@@ -50,17 +55,17 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class WayComparison:
     """One mesh, solved in several ways."""
 
     title: str
-    point: Point
+    point: ScalingPoint
     repetitions: int
     ways: tuple[Way, ...]
 
 
 @dataclass(frozen=True)
-class Batch:
+class WarmBatch:
     """Cases solved in one process and in one each; `most` seconds are the goal."""
 
     title: str
@@ -77,9 +82,9 @@ class Benchmark:
     threads: int
     limit: float
     scaling: Scaling
-    comparisons: tuple[Comparison, ...]
-    growth: tuple[Series, ...]
-    batch: Batch
+    comparisons: tuple[WayComparison, ...]
+    growth: tuple[SizeSeries, ...]
+    batch: WarmBatch
 
 
 def read_benchmark(path: Path, size: str) -> Benchmark:
@@ -89,16 +94,16 @@ def read_benchmark(path: Path, size: str) -> Benchmark:
     small = int(content["quick"]["size"]) if size == QUICK else None
     known = {series.name: series for series in scaling.series}
 
-    def find(item: Mapping[str, Any], key: str, sizes: Sequence[int]) -> Series:
+    def find(item: Mapping[str, Any], key: str, sizes: Sequence[int]) -> SizeSeries:
         refuse_unknown(path, f"{key}.series", item["series"], "series", known)
         return replace(known[item["series"]], sizes=tuple(sizes))
 
     comparisons = []
     for i, item in enumerate(content["comparisons"]):
         unknowns = small or int(item["size"])
-        point = Point(find(item, f"comparisons[{i}]", [unknowns]), unknowns)
+        point = ScalingPoint(find(item, f"comparisons[{i}]", [unknowns]), unknowns)
         ways = tuple(Way(**way) for way in item["ways"])
-        comparisons.append(Comparison(item["title"], point, item["repetitions"], ways))
+        comparisons.append(WayComparison(item["title"], point, item["repetitions"], ways))
     growth = [
         find(
             item, f"growth[{i}]", [small // 2, small] if small else sorted(map(int, item["sizes"]))
@@ -117,8 +122,8 @@ def read_benchmark(path: Path, size: str) -> Benchmark:
     )
 
 
-def _batch(path: Path, item: Mapping[str, Any]) -> Batch:
+def _batch(path: Path, item: Mapping[str, Any]) -> WarmBatch:
     cases = tuple(
         file_beside(path, f"batch.cases[{i}]", case) for i, case in enumerate(item["cases"])
     )
-    return Batch(item["title"], float(item["most"]), cases)
+    return WarmBatch(item["title"], float(item["most"]), cases)

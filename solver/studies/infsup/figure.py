@@ -9,15 +9,15 @@ from solver.mesh.catalogue import BY_NAME
 from solver.report.axes import Scale, draw_axes
 from solver.report.marks import draw_marks, look_of
 from solver.report.svg import INK, MUTED, ORANGE, Drawing, Style
-from solver.studies.infsup.description import Ladder
-from solver.studies.infsup.half_loaded import CELLS, Profile
+from solver.studies.infsup.description import InfSupLadder
+from solver.studies.infsup.half_loaded import CELLS, PressureProfile
 
 WIDTH, HEIGHT = 400, 320
 # β_h below is drawn at the foot of the plot.
 _LEAST, _MOST = 0.02, 2.0
 
 
-def draw_constants(title: str, ladders: Sequence[Ladder]) -> Markup:
+def draw_constants(title: str, ladders: Sequence[InfSupLadder]) -> Markup:
     """β_h against the slave divisions, log–log; without the cut dashed."""
     drawing = Drawing(WIDTH, HEIGHT, f"Inf-sup constant by level: {title}")
     levels = np.array([level for each in ladders for level in each.levels])
@@ -55,7 +55,7 @@ def _words(kind: tuple[str, bool]) -> str:
     return kind[0] if kind[1] else f"{kind[0]}, uncut"
 
 
-def draw_profiles(profiles: Sequence[Profile]) -> Markup:
+def draw_profiles(profiles: Sequence[PressureProfile]) -> Markup:
     """The pressure along the interface: cut and uncut, bilateral left and opening right."""
     drawing = Drawing(2 * WIDTH, 260, f"Pressure under a half-loaded block, {profiles[0].cells}")
     values = np.concatenate([profile.pressure for profile in profiles])

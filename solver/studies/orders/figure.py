@@ -7,10 +7,9 @@ from markupsafe import Markup
 
 from solver.report import formats
 from solver.report.axes import EPSILON, Scale, draw_axes
-from solver.report.formats import ERROR_LABELS
 from solver.report.marks import LOOKS, draw_marks, look_of
 from solver.report.svg import INK, MUTED, Drawing, Style
-from solver.studies.orders.records import Curve
+from solver.studies.orders.records import ERRORS, Curve
 
 WIDTH, HEIGHT = 400, 330
 # QUAD9 and HEXA27 have a look of their own here, where they stand beside QUAD8 and HEXA20.
@@ -19,13 +18,13 @@ _LOOKS = {"QUAD9": (INK, "cross"), "HEXA27": (INK, "cross"), **LOOKS}
 
 def draw_panel(error: str, curves: Sequence[Curve]) -> Markup:
     """One error of all curves, with the slopes that theory knows drawn beside."""
-    drawing = Drawing(WIDTH, HEIGHT, f"Error of {ERROR_LABELS[error]}, against macro-element size")
+    drawing = Drawing(WIDTH, HEIGHT, f"Error of {ERRORS[error]}, against macro-element size")
     shown = [curve for curve in curves if len(curve.errors(error)[0])]
     sizes = [curve.errors(error)[0] for curve in shown]
     errors = [np.maximum(curve.errors(error)[1], EPSILON / 4) for curve in shown]
     x = Scale(*_range(sizes, 1.12), 58, WIDTH - 14, log=True)
     y = Scale(*_range(errors, 1.6), HEIGHT - 48, 34, log=True)
-    draw_axes(drawing, x, y, "macro-element / interface", f"relative error: {ERROR_LABELS[error]}")
+    draw_axes(drawing, x, y, "macro-element / interface", f"relative error: {ERRORS[error]}")
     _draw_guides(drawing, x, y, _guides(error, curves))
     for curve, h, e in zip(shown, sizes, errors, strict=True):
         at = np.column_stack([x(h), y(e)])
@@ -67,7 +66,7 @@ def _draw_marks(drawing: Drawing, curve: Curve, at: np.ndarray) -> None:
 
 def _guides(error: str, curves: Sequence[Curve]) -> list[float]:
     """The orders that theory knows of for these curves; 1 and 2 where it knows of none."""
-    known = [theory for curve in curves if (theory := curve.theory(error))]
+    known = [curve.theory(error) for curve in curves]
     orders = {order for theory in known for order in (theory.least, theory.best) if order}
     return sorted(orders) or [1.0, 2.0]
 

@@ -16,7 +16,7 @@ _COLORS = (BLUE, ORANGE, GREEN, PURPLE, INK, RED)
 
 
 @dataclass(frozen=True)
-class Drawn:
+class PlotLine:
     """A line of a plot: its name, places (n,) and values (n,), colour, mark, and tips."""
 
     name: str
@@ -37,7 +37,7 @@ def draw_plot(
     title: str,
     x_label: str,
     y_label: str,
-    lines: Sequence[Drawn],
+    lines: Sequence[PlotLine],
     slope: float = 1.0,
     size: tuple[int, int] = (WIDTH, HEIGHT),
 ) -> Markup:
@@ -55,7 +55,7 @@ def draw_plot(
     return drawing.svg()
 
 
-def draw_key(line: Drawn) -> Markup:
+def draw_key(line: PlotLine) -> Markup:
     """The line and mark of a line, for the legend."""
     drawing = Drawing(44, 14, line.name)
     drawing.line(2, 7, 42, 7, **_style(line))
@@ -75,12 +75,12 @@ def draw_bar(parts: Mapping[str, float], colors: Mapping[str, str]) -> Markup:
     return drawing.svg()
 
 
-def _style(line: Drawn) -> dict[str, Style]:
+def _style(line: PlotLine) -> dict[str, Style]:
     style: dict[str, Style] = {"stroke": line.color, "stroke_width": 1.6}
     return style | ({"stroke_dasharray": (5, 3)} if line.dashed else {})
 
 
-def _draw_line(drawing: Drawing, x: Scale, y: Scale, line: Drawn) -> None:
+def _draw_line(drawing: Drawing, x: Scale, y: Scale, line: PlotLine) -> None:
     at = np.column_stack([x(line.x), y(line.y)])
     drawing.polygons(at[None], closed=False, **_style(line))
     for place, tip in zip(at, line.tips or [""] * len(at), strict=True):

@@ -18,7 +18,7 @@ import meshio
 import numpy as np
 from scipy import sparse
 
-from solver.case.reader import Case
+from solver.case.model import Case
 from solver.mechanics.linear.condensation import Condensed
 from solver.mesh import generate, transform
 from solver.simulation.accuracy import Accuracy
@@ -28,7 +28,7 @@ from solver.simulation.scene import build_scene
 from solver.simulation.simulate import solve_problem
 from solver.studies.stability.floor import floor, stress_error
 from solver.studies.stability.states import State, exact_state
-from solver.studies.stability.sweeps import Series, Sweep, Value
+from solver.studies.stability.sweeps import Sweep, SweepSeries, Value
 from solver.system.clock import Clock
 from solver.system.errors import InputError, SolveError
 from solver.system.files import write_text
@@ -57,7 +57,7 @@ class _Meshes:
 @dataclass(frozen=True)
 class _Point:
     sweep: Sweep
-    series: Series
+    series: SweepSeries
     value: Value
     label: str
 

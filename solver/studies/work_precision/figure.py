@@ -15,9 +15,10 @@ from solver.report.axes import (
     draw_level,
     round_off,
 )
+from solver.report.html import NORMS
 from solver.report.marks import MARKS, draw_marks
 from solver.report.svg import INK, MUTED, RED, Drawing, Style
-from solver.studies.work_precision.records import ERRORS, Line, Measured, Panel, shown
+from solver.studies.work_precision.records import LevelLine, Panel, TimedSolve, shown
 
 PLOT, HEIGHT, LEFT, RIGHT, APART = 268, 340, 58, 112, 14
 # A row of the legend, about the width of a letter in it, the height of a label.
@@ -35,7 +36,7 @@ _DASHES: tuple[tuple[float, ...], ...] = ((), (6, 3), (1.5, 3), (7, 2, 1.5, 2))
 class Looks:
     """Colour, mark and dashes of every line: one colour a kind of treatment, one mark a line."""
 
-    def __init__(self, lines: Sequence[Line]):
+    def __init__(self, lines: Sequence[LevelLine]):
         self._looks: dict[str, tuple[str, str, int]] = {}
         kinds: dict[str, int] = {}
         for line in lines:
@@ -47,7 +48,7 @@ class Looks:
                 self._looks[line.title] = color, mark, variant
 
     @staticmethod
-    def _kind(line: Line) -> str:
+    def _kind(line: LevelLine) -> str:
         """What lines of one colour have in common."""
         return f"{line.treatment.zone.get('treatment')} {line.linear_solver}"
 
@@ -74,7 +75,7 @@ def draw_figure(panel: Panel, looks: Looks) -> Markup:
     """All pairs of a panel side by side, with the same scales."""
     pairs = panel.pairs
     width = LEFT + len(pairs) * (PLOT + APART) - APART + RIGHT
-    name = ERRORS[panel.error]
+    name = NORMS[panel.error]
     legend = _legend(panel, width)
     drawing = Drawing(
         width,
@@ -147,7 +148,9 @@ def _heights(
     return Scale(low, top, bottom - _STRIP, 42, log=True)
 
 
-def _draw_line(drawing: Drawing, x: Scale, y: Scale, line: Line, error: str, looks: Looks) -> None:
+def _draw_line(
+    drawing: Drawing, x: Scale, y: Scale, line: LevelLine, error: str, looks: Looks
+) -> None:
     """A line through its levels; across each mark the range of times, larger marks on finer ones.
 
     The line is broken where a level between has no solve.
@@ -167,17 +170,17 @@ def _draw_line(drawing: Drawing, x: Scale, y: Scale, line: Line, error: str, loo
             drawing.close_link()
 
 
-def _tip(line: Line, m: Measured, error: str) -> str:
+def _tip(line: LevelLine, m: TimedSolve, error: str) -> str:
     return (
         f"{line.title}, {m.label}: error {m.error(error):.2g}, {m.time.median:.3g} s "
         f"({m.time.low:.3g} … {m.time.high:.3g} s), {m.record['dofs']} unknowns"
     )
 
 
-def _unbroken(line: Line, error: str) -> list[list[Measured]]:
+def _unbroken(line: LevelLine, error: str) -> list[list[TimedSolve]]:
     """Runs of neighbouring levels that have this error."""
     having = line.having(error)
-    runs: list[list[Measured]] = [[]]
+    runs: list[list[TimedSolve]] = [[]]
     for m in line.levels:
         if m in having:
             runs[-1].append(m)

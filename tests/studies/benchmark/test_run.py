@@ -8,7 +8,7 @@ import yaml
 
 from solver.commands.cli import main
 from solver.studies.benchmark.description import read_benchmark
-from solver.studies.benchmark.words import ratios
+from solver.studies.benchmark.page import ratios
 from solver.system.errors import InputError
 
 ROOT = Path(__file__).parents[3]

@@ -2,15 +2,7 @@
 
 import pytest
 
-from solver.studies.benchmark.words import (
-    batched,
-    by_series,
-    compared,
-    grown,
-    ratios,
-    seconds,
-    stages,
-)
+from solver.studies.benchmark.page import as_text, batched, compared, grown, ratios, seconds, stages
 
 PROCESS = {"wall": 9.0, "cpu": 8.0, "peak_memory_mb": 1500.0}
 
@@ -52,13 +44,14 @@ def test_a_comparison_in_lines():
     ways = [way("a", 2.0), way("b", 1.0, linear_iterations=7), LOST]
     ways.append(way("c", 1.0, pressure_max=0.0, resolved=2e-7))
     comparison = {"title": "T", "series": "HEXA8", "repetitions": 1, "ways": ways}
-    head, first, second, lost, coarse = compared(comparison)
-    assert head == "T (HEXA8, 12,345 unknowns; a warm solve)"
-    assert "×1.00" in first
-    assert "×0.50" in second
-    assert "a factor, 7 iterations" in second
-    assert lost.split() == ["another", "missing:", "not", "installed"]
-    assert "pressure error < 2e-07" in coarse
+    title, rows = compared(comparison)
+    assert title == "T (HEXA8, 12,345 unknowns; a warm solve)"
+    assert rows == [
+        ["a", "2.00 s", "×1.00", "1.50 GB", "pressure error 3.0e-15", "a factor"],
+        ["b", "1.00 s", "×0.50", "1.50 GB", "pressure error 3.0e-15", "a factor, 7 iterations"],
+        ["another", "missing: not installed"],
+        ["c", "1.00 s", "×0.50", "1.50 GB", "pressure error < 2e-07", "a factor"],
+    ]
 
 
 def point(size, series="hexa8", **more):
@@ -89,33 +82,47 @@ def test_exponents_and_shares_stage_by_stage():
 
 def test_growth_in_lines():
     lost = point(9000, outcome="failed", reason="no end within 1 s")
-    text = list(grown([point(1000), point(4000), lost]))
-    assert text[0] == "Growth of HEXA8"
-    assert text[1] == "  9,000: failed: no end within 1 s"
-    assert "exponent  1.50 over unknowns  100.0 %" in text[2]
-    assert text[-1].startswith("  4,000 unknowns: ")
-    assert list(grown([lost])) == text[:2]
+    title, (first, whole, *_, last) = grown([point(1000), point(4000), lost])
+    assert title == "Growth of HEXA8"
+    assert first == ["9,000", "failed: no end within 1 s"]
+    assert whole == ["whole", "exponent 1.50", "over unknowns", "100.0 %"]
+    assert last[0] == "4,000 unknowns"
+    assert grown([lost]) == (title, [first])
     # One size has a share and no exponent.
-    assert "exponent     –" in list(grown([point(1000)]))[1]
-
-
-def test_points_are_grouped_by_series():
-    points = [point(1000), point(2000, "quad4"), point(4000)]
-    assert [[p["size"] for p in group] for group in by_series(points)] == [[1000, 4000], [2000]]
+    assert grown([point(1000)])[1][0][1] == "exponent –"
 
 
 def test_the_batch_in_lines():
     each = [{"case": "a", "cpu": 1.5}, {"case": "b", "cpu": 2.5}]
     passes = [{"cpu": 1.5, "wall": 1.0}, {"cpu": 1.0, "wall": 1.0}]
     together = {"outcome": "solved", "process": {"cpu": 3.0}, "passes": passes}
-    _, alone, one, warm, goal = batched(
-        {"title": "T", "most": 2.0, "each": each, "together": together}
-    )
-    assert alone.split()[-3:] == ["4.00", "s", "×1.00"]
+    batch = {"title": "T", "most": 2.0, "each": each, "together": together}
     # The process less its second pass: what it would have taken without.
-    assert one.split()[-3:] == ["2.00", "s", "×0.50"]
-    assert warm.split()[-3:] == ["1.00", "s", "×0.25"]
-    assert "under 2 s" in goal
+    assert batched(batch)[1] == [
+        ["a process each", "4.00 s", "×1.00"],
+        ["one process", "2.00 s", "×0.50"],
+        ["one warm process", "1.00 s", "×0.25", "goal: under 2 s"],
+    ]
     lost = {"outcome": "crashed", "reason": "out of luck"}
-    text = list(batched({"title": "T", "most": 2.0, "each": each, "together": lost}))
-    assert text[-1].endswith("crashed: out of luck")
+    assert batched(batch | {"together": lost})[1][1] == ["one process", "crashed: out of luck"]
+
+
+def test_the_whole_record_as_text():
+    each = [{"case": "a", "cpu": 1.5}]
+    lost = {"outcome": "crashed", "reason": "out of luck"}
+    record = {
+        "title": "Ratios",
+        "machine": {"cpu": "a cpu", "time_utc": "2026"},
+        "threads": 2,
+        "load": 0.5,
+        "whole": 9,
+        "comparisons": [{"title": "T", "series": "S", "repetitions": 0, "ways": [way("a"), LOST]}],
+        "batch": {"title": "B", "most": 2.0, "each": each, "together": lost},
+        "start": {"help": {"cpu": 0.25}, "plane": {"cpu": 1.0, "case": "c.yaml"}},
+        "growth": [point(1000), point(2000, "quad4"), point(4000)],
+    }
+    lines = as_text(record).splitlines()
+    assert lines[0] == "Ratios: a cpu, 2 threads, 2026"
+    assert lines.count("Growth of HEXA8") == 2, "a table for each series"
+    assert "  another                    missing: not installed" in lines
+    assert lines[-1] == "benchmark took 9 s"
