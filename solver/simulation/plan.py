@@ -11,11 +11,12 @@ import numpy as np
 from solver.mechanics.fem.mixed import AUTOMATIC_ABOVE
 from solver.mechanics.linear.condensation import ROUND_OFF
 from solver.mechanics.mortar.cut import needs_cut
+from solver.simulation.accuracy import NOTED_STRAIN
 from solver.simulation.naming import body_names
 from solver.simulation.problem import MIN_COVERAGE, ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene
 from solver.simulation.skips import EVERYTHING
-from solver.simulation.solution import Line
+from solver.simulation.solution import Line, Solution
 
 
 def decided(problem: ContactProblem) -> Iterator[Line]:
@@ -100,3 +101,10 @@ def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Li
     if scene.skips.refinement and all(state.residual <= ROUND_OFF for state in states):
         yield Line("no further refinement", "the residual is round-off", "refinement")
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
+
+
+def strained(solution: Solution) -> Iterator[Line]:
+    """A note where strains or rotations are not small."""
+    if max(solution.strain, solution.rotation) > NOTED_STRAIN:
+        what = f"largest strain {solution.strain:.1e}, rotation {solution.rotation:.1e}"
+        yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")

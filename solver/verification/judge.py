@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.simulation.accuracy import Accuracy
+from solver.simulation.accuracy import Accuracy, beyond_small_strain
 from solver.simulation.solution import job_name
 from solver.verification.verdict import (
     FAILED,
@@ -43,7 +43,15 @@ ACCURACY = (
 # What a verdict takes from a solution as it is.
 _OF_SOLUTION = (
     *("dofs", "macro_elements", "iterations", "linear_solver", "linear_iterations"),
-    *("matrix_entries", "length", "load_scale", "stage_cpu_seconds", "cpu_seconds"),
+    *(
+        "matrix_entries",
+        "length",
+        "load_scale",
+        "strain",
+        "rotation",
+        "stage_cpu_seconds",
+        "cpu_seconds",
+    ),
     *("peak_memory_mb", "accuracy", "errors"),
 )
 
@@ -58,16 +66,18 @@ def judge(
     """The verdict of a solve that came to its end: `passed` when every check holds.
 
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
-    the checks say, where rounding may have left less than four digits: then `attainable`, the
-    relative error that rounding alone may cause, is the first reason. `result` is the name of the
-    result file beside the verdict and `sha256` its hash.
+    the checks say, where rounding may have left less than four digits (then `attainable`, the
+    relative error that rounding alone may cause, is the first reason) or where strain or rotation
+    is beyond small strain. `result` is the name of the result file beside the verdict and `sha256`
+    its hash.
     """
     accuracy = Accuracy(solution.accuracy)
-    reasons = [accuracy.reason] if accuracy.reason else []
-    reasons += [check.reason for check in checks if not check.passed]
+    large = beyond_small_strain(solution.case, solution.strain, solution.rotation)
+    unreliable = [reason for reason in (accuracy.reason, large) if reason]
+    reasons = unreliable + [check.reason for check in checks if not check.passed]
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:
-        word = UNRELIABLE if accuracy.reason else FAILED
+        word = UNRELIABLE if unreliable else FAILED
     seconds = solution.seconds
     zones = solution.zones
     return Verdict(

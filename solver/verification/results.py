@@ -113,6 +113,7 @@ def _write(
     _write_grid(file.create_group(GRID), solution)
     _write_case(file.create_group("case"), solution)
     file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
+    file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
@@ -188,6 +189,8 @@ def _read_solution(file: h5py.File) -> Solution:
         balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=_read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
+        strain=float(file["solve"].attrs.get("strain", np.nan)),
+        rotation=float(file["solve"].attrs.get("rotation", np.nan)),
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},

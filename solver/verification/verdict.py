@@ -162,6 +162,8 @@ class Verdict:
     matrix_entries: int | None = None
     length: float | None = None
     load_scale: float | None = None
+    strain: float | None = None
+    rotation: float | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float | None = None

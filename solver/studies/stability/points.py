@@ -136,6 +136,7 @@ def _measured(point: _Point, meshes: _Meshes, cures: Cures) -> dict[str, Any]:
     solution = solve_problem(problem, clock, point.series.swapped)
     zones = solution.zones
     balance = solution.balance
+    # Of rounding alone: the strain of a sweep's points is that of no body.
     accuracy = Accuracy(solution.accuracy)
     measures: dict[str, Any] = {
         "word": UNRELIABLE if accuracy.reason else PASSED,
