@@ -19,6 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from solver.mechanics.mortar.status import Trial
+from solver.simulation.iterate import ContactIterate
+
 EPSILON = float(np.finfo(float).eps)
 EPSILON_EXTENDED = float(np.finfo(np.longdouble).eps)
 LEAST_DIGITS = 4
@@ -59,6 +62,97 @@ class Accuracy:
             f"rounding alone may change the result by {self.estimate:.0e} of itself: "
             f"{_REASONS[cause]}"
         )
+
+
+# Pressures and gaps below this share of their scales are round-off and change no status; gaps below
+# the second share of the displacements they are the difference of, or below so many roundings of
+# the coordinates, are so too; and pressures below so many times their estimated error.
+_NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
+
+
+def estimate(
+    iterate: ContactIterate,
+    pressure: np.ndarray,
+    diagonal: np.ndarray,
+    residual: float,
+    force_scale: float,
+) -> Accuracy:
+    """How many digits rounding leaves in the pressure (k,) of an iterate.
+
+    `diagonal` (n_dofs,) of the stiffness; `residual` relative to the size of the forces at work.
+    """
+    scene, constraints, closed = iterate.scene, iterate.constraints, iterate.closed
+    forces, unit = _rounding_of_forces(iterate), _unit(iterate)
+    scale = float(np.abs(pressure).max(initial=0.0))
+    if scale == 0:
+        return Accuracy({"forces": float(forces.max()) / force_scale})
+    noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
+    moving = _moving(iterate)[closed]
+    smallest = float(constraints.area.min()) ** (1 / (scene.points.shape[1] - 1))
+    mean_stress = scene.mean.cancellation(iterate.mean_stress)[1]
+    causes = {
+        "forces": pressure_of_forces(moving, noise),
+        "gap": pressure_of_gaps(moving, _rounding_of_gaps(iterate)[closed], diagonal),
+        "coordinates": scale * scene.rounding / smallest,
+        "stress": max(unit * iterate.sizes.highest, EPSILON * mean_stress),
+        "slender": unit * iterate.sizes.slender,
+    }
+    return Accuracy({name: error / scale for name, error in causes.items()})
+
+
+def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) -> Trial:
+    """Pressure (k,) and gap of an iterate with what is round-off of each, zone by zone.
+
+    The scale of pressures is the largest stress or pressure at the zone's own surfaces, the scale
+    of a gap the size of the displacements that open it.
+    """
+    scene, constraints, dim = iterate.scene, iterate.constraints, iterate.scene.points.shape[1]
+    left = iterate.residual() + constraints.on_free.T @ pressure
+    unbalanced = np.abs(scene.free.basis @ left)
+    forces, known = np.repeat(_rounding_of_forces(iterate), dim), _rounding_of_gaps(iterate)
+    moving, limit = _moving(iterate), np.zeros(len(pressure))
+    for zone in scene.zones:
+        mine, rows = zone.numbers, moving[zone.numbers]
+        places = constraints.gaps[mine].indices
+        stress = iterate.sizes.stress[places // dim].max(initial=0.0)
+        scale = max(float(np.abs(pressure[mine]).max(initial=0.0)), float(stress))
+        noise = forces + unbalanced[places].max(initial=0.0)
+        error = pressure_of_forces(rows, noise) + pressure_of_gaps(rows, known[mine], diagonal)
+        limit[mine] = _NOISE * scale + _ERRORS * error
+    motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)
+    covered = np.where(constraints.eligible, constraints.covered, np.inf)
+    return Trial(
+        pressure=pressure,
+        gap=iterate.gap,
+        pressure_limit=limit,
+        gap_limit=(_NOISE * iterate.opening_size + _NOISE_OF_MOTION * motion) / covered
+        + _ROUNDINGS * scene.rounding * (constraints.initial != 0),
+    )
+
+
+def _unit(iterate: ContactIterate) -> float:
+    return EPSILON_EXTENDED if iterate.extended else EPSILON
+
+
+def _moving(iterate: ContactIterate) -> sparse.csr_matrix:
+    """The coefficients of gaps (k, n_dofs) on degrees of freedom that supports leave free."""
+    free = np.diff(iterate.scene.free.basis.indptr) > 0
+    moving = (iterate.constraints.gaps @ sparse.diags(free.astype(float))).tocsr()
+    moving.eliminate_zeros()
+    return moving
+
+
+def _rounding_of_forces(iterate: ContactIterate) -> np.ndarray:
+    """Errors (n,) of the internal forces at nodes."""
+    mean_terms, _ = iterate.scene.mean.cancellation(iterate.mean_stress)
+    return _unit(iterate) * iterate.sizes.forces + EPSILON * mean_terms
+
+
+def _rounding_of_gaps(iterate: ContactIterate) -> np.ndarray:
+    """Errors (k,) of ∫ gap."""
+    scene, constraints = iterate.scene, iterate.constraints
+    known = scene.rounding * constraints.covered * (constraints.initial != 0)
+    return known + EPSILON * iterate.opening_size
 
 
 def pressure_of_forces(gaps: sparse.csr_matrix, noise: np.ndarray) -> float:

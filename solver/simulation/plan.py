@@ -11,8 +11,9 @@ import numpy as np
 from solver.mechanics.fem.mixed import AUTOMATIC_ABOVE
 from solver.mechanics.linear.condensation import ROUND_OFF
 from solver.mechanics.mortar.cut import needs_cut
+from solver.simulation.constraints import MIN_COVERAGE
 from solver.simulation.naming import body_names
-from solver.simulation.problem import MIN_COVERAGE, ContactProblem, Equilibrium
+from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene
 from solver.simulation.skips import EVERYTHING
 from solver.simulation.solution import Line
@@ -33,7 +34,7 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
         yield Line(f"mixed form in {scene.mean.n_cells} cells", why)
     yield from _cells(scene)
     for zone in scene.zones:
-        yield from _zone(zone, scene, problem.idle)
+        yield from _zone(zone, scene, problem.constraints.inactive_multipliers)
     asleep = np.flatnonzero(scene.asleep)
     if len(asleep):
         names = body_names(scene)

@@ -41,7 +41,7 @@ def measure(study: Study, point: Point, reference: Path | None, started: float) 
 
     `started` is when the process was, by `clock.now`. Raises InputError and SolveError.
     """
-    from solver.mechanics.linear.direct import standing_for_auto
+    from solver.mechanics.linear.direct import force_solver
     from solver.simulation.simulate import simulate
     from solver.studies.work_precision.reference import read_reference
     from solver.system.provenance import gather
@@ -54,7 +54,7 @@ def measure(study: Study, point: Point, reference: Path | None, started: float) 
     def run(clock: Clock) -> Any:
         return simulate(case, mesh, clock=clock)
 
-    with standing_for_auto(point.linear_solver):
+    with force_solver(point.linear_solver):
         solution = run(Clock())
         process = used_since(started)
         times = repeated(run, study.repetitions)
