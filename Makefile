@@ -14,16 +14,24 @@ CASES =
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-print-directory
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
-INSTALL := $(PYTHON) workflow/install --mkl "$(MKL)"
+# Neither the user's Python packages nor modules in this folder join a run, and nothing is written
+# outside it.
+unexport PYTHONPATH PYTHONHOME PYTHONSTARTUP
+export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
+export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
+ALONE := .venv/bin/python -I -m
+OURS := .venv/bin/python -Es -m
+INSTALL := $(PYTHON) -Es workflow/install --mkl "$(MKL)"
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
 SILENCE = $(if $(QUIET),--quiet rules progress reason host)
-SNAKEMAKE = .venv/bin/python -m snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
+SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
 
 .PHONY: help all-cases family case report summary compare gallery orders study stability infsup
 .PHONY: scaling benchmark test accept
-.PHONY: format lint lock faults mutants kills cluster-test docs bill clean clean-all
-.PHONY: environment study-environment gallery-environment test-environment lint-environment docs-environment
+.PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
+.PHONY: environment gallery-environment test-environment lint-environment docs-environment
+.PHONY: bill-environment
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -51,7 +59,7 @@ summary: ## print the last report's table, as Markdown
 
 compare: environment ## what is new since another batch: make compare BASE=folder [THIS=folder]
 	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
-	@.venv/bin/python -m solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
+	@$(OURS) solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
 
 gallery: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
 gallery: gallery-environment ## draw each result with PyVista, off-screen: all or FAMILY=…
@@ -62,7 +70,7 @@ orders: environment ## refine step by step and fit orders of convergence: all or
 	@$(SNAKEMAKE) orders
 
 study: override CONFIG += $(if $(LEVEL),study=$(LEVEL))
-study: study-environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
+study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
 	@$(SNAKEMAKE) study
 
 stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
@@ -77,9 +85,9 @@ BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
 PLANNED = $(if $(filter quick,$(LEVEL)),cases/ssnp170/e.yaml,$(foreach case,b c k m o, \
   cases/ssnp170/$(case).yaml) cases/hydrostatic/coincident-hexa27.yaml)
 benchmark: environment ## ratios side by side: linear solvers, cut, cures, batch, CalculiX
-	@.venv/bin/python -m solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
+	@$(OURS) solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
 	  $(if $(filter quick,$(LEVEL)),--quick)
-	@.venv/bin/python -m solver savings $(PLANNED) \
+	@$(OURS) solver savings $(PLANNED) \
 	  -o results/benchmark/savings$(if $(LEVEL),-$(LEVEL)).json
 
 infsup: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
@@ -87,43 +95,41 @@ infsup: environment ## the inf-sup test of every cell type, and the half-loaded 
 	@$(SNAKEMAKE) infsup
 
 test: test-environment ## run the tests
-	@.venv/bin/python -m pytest -n auto $(ARGS)
+	@$(ALONE) pytest -n auto $(ARGS)
 
 faults: test-environment ## read damaged files, 1,000 of them or COUNT=…: none may get through
-	@.venv/bin/python -m tests.faults $(or $(COUNT),1000)
+	@$(OURS) tests.faults $(or $(COUNT),1000)
 
 mutants: test-environment ## plant faults in the core, one at a time: which check notices each
-	@.venv/bin/python -m tests.faults.mutants
+	@$(OURS) tests.faults.mutants
 
 kills: test-environment ## kill runs at 100 random moments, and see that the next one recovers
-	@.venv/bin/python -m tests.workflow.kills $(ARGS)
+	@$(OURS) tests.workflow.kills $(ARGS)
 
 cluster-test: test-environment ## six solves through a SLURM of one machine, against a local run
-	@missing=$$(.venv/bin/python -m tests.workflow.slurm --missing); \
+	@missing=$$($(OURS) tests.workflow.slurm --missing); \
 	if test -n "$$missing"; then echo "make cluster-test: skipped: $$missing"; \
-	else $(INSTALL) slurm && .venv/bin/python -m tests.workflow.slurm; fi
+	else $(INSTALL) slurm && $(OURS) tests.workflow.slurm; fi
 
 RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
 accept: environment ## take results as the accepted values, showing the difference: all or CASE=…
 	@test -n "$(RESULTS)" || { echo "make accept: there is no such result; solve first"; exit 2; }
-	@.venv/bin/python -m solver accept $(RESULTS)
+	@$(OURS) solver accept $(RESULTS)
 
 format: lint-environment ## format the sources
-	@.venv/bin/python -m ruff check --quiet --fix-only .
-	@.venv/bin/python -m ruff format .
+	@$(ALONE) ruff check --quiet --fix-only .
+	@$(ALONE) ruff format .
 	@.venv/bin/snakefmt Snakefile workflow
 
 lint: lint-environment ## check format, style and types of the sources
-	.venv/bin/python -m ruff format --check .
-	.venv/bin/python -m ruff check .
+	$(ALONE) ruff format --check .
+	$(ALONE) ruff check .
 	.venv/bin/snakefmt --check Snakefile workflow
-	.venv/bin/python -m mypy
+	$(ALONE) mypy
+	.venv/bin/lint-imports --no-logo
 
 environment:
 	@$(INSTALL) run
-
-study-environment:
-	@$(INSTALL) run pictures
 
 gallery-environment:
 	@$(INSTALL) run gallery
@@ -137,27 +143,37 @@ lint-environment:
 docs-environment:
 	@$(INSTALL) run docs
 
+bill-environment:
+	@$(INSTALL) run bill
+
 docs: docs-environment ## write the documentation as a site into results/docs
-	@.venv/bin/python -m sphinx --quiet --fresh-env --fail-on-warning --keep-going \
+	@$(ALONE) sphinx --quiet --fresh-env --fail-on-warning --keep-going \
 	  -c docs/site -d .sphinx . results/docs
 	@.venv/bin/python docs/site/links.py results/docs
 
-bill: environment ## write the bill of materials: every locked package, licence and hash
-	@.venv/bin/python workflow/bill.py results/bill-of-materials.json
+BILL = results/bill-of-materials.json
+bill: bill-environment ## write the bill of materials: every installed package and its licence
+	@mkdir -p results
+	@$(ALONE) cyclonedx_py environment .venv/bin/python --pyproject pyproject.toml \
+	  --output-reproducible --output-file $(BILL)
+	@echo "Bill of materials: $(BILL)"
 
-LOCK := .venv/bin/python -m uv pip compile --quiet --universal --python-version 3.11 \
+LOCK := $(ALONE) uv pip compile --quiet --universal --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --no-annotate --custom-compile-command 'make lock'
 
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
-	@for group in build mkl slurm pictures gallery test lint docs lock; do \
+	@for group in build mkl slurm gallery test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 
+schemas: environment ## write the JSON Schemas of the typed files anew, for editors
+	@.venv/bin/python -m solver.commands.schemas
+
 clean: ## remove results and caches
 	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +
-	@rm -rf .snakemake .sphinx .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	@rm -rf .snakemake .sphinx .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
 	@find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
 clean-all: clean ## remove the environment too

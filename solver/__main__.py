@@ -1,6 +1,16 @@
 """Entry of `python -m solver`."""
 
+import io
 import sys
+from contextlib import suppress
+from pathlib import Path
+
+# The current folder has given this package and gives no other: a file `yaml.py` there is not ours.
+with suppress(OSError):
+    sys.path[:] = [folder for folder in sys.path if Path(folder) != Path.cwd()]
+# Lines leave as they are written, so that the last line of a log is what was said last.
+if isinstance(sys.stdout, io.TextIOWrapper):
+    sys.stdout.reconfigure(line_buffering=True)
 
 from solver.commands.cli import main
 

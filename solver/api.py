@@ -23,14 +23,14 @@ import meshio
 import numpy as np
 
 from solver.case.expressions import Expression
-from solver.case.reader import Case, load_case, parse_case
-from solver.case.schemas import key_path
+from solver.case.model import Case
+from solver.case.reader import load_case, parse_case
 from solver.mesh import read_mesh
+from solver.mesh.size import check_memory
 from solver.mesh.tidy import tidy
 from solver.simulation.skips import EVERYTHING, NEEDED
 from solver.simulation.solution import Solution, ZoneResult
-from solver.system.errors import InputError
-from solver.system.memory import check_memory
+from solver.system.errors import InputError, key_path
 from solver.system.provenance import gather
 from solver.verification.checks import CheckResult
 from solver.verification.results import write_result

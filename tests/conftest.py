@@ -1,6 +1,10 @@
 """Settings of all tests: the same examples every time, and no deadline on a busy machine."""
 
+import os
+
 from hypothesis import settings
 
 settings.register_profile("project", deadline=None, derandomize=True)
 settings.load_profile("project")
+# Output is buffered in the processes of the tests as it is on a user's machine.
+os.environ.pop("PYTHONUNBUFFERED", None)

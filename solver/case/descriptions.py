@@ -4,8 +4,7 @@ from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from solver.case.schemas import hint
-from solver.system.errors import InputError
+from solver.system.errors import InputError, hint
 
 
 class Named(Protocol):
@@ -51,8 +50,17 @@ def refuse_unknown(
 
 
 def file_beside(path: Path, key: str, name: str) -> Path:
-    """The file that `path` names under `key`, relative to itself; InputError if there is none."""
+    """The file that `path` names under `key`, relative to itself; InputError if it is missing."""
     file = path.parent / name
-    if not file.is_file():
-        raise InputError(path, key, name, "no such file")
+    require_file(path, key, file, name)
     return file
+
+
+def require_file(path: Path, key: str, file: Path, name: str) -> None:
+    """Raise InputError where a file that `path` names under `key` is missing."""
+    try:
+        found = file.is_file()
+    except OSError:  # the name is too long
+        found = False
+    if not found:
+        raise InputError(path, key, name, "no such file")

@@ -5,15 +5,17 @@ duplicate keys and deep nesting, and reads `no`, `on`, `12:30` and `1e-3` as YAM
 """
 
 import math
+import os
 import re
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from solver.case.schemas import key_path, validate
-from solver.system.errors import InputError
+from solver.case.schemas import validate
+from solver.system.errors import InputError, key_path
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 20
@@ -27,9 +29,16 @@ _WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
 
 
 def read_text(path: Path) -> str:
-    """The text of a file; `InputError` where it cannot be read, is not UTF-8 or exceeds 1 MB."""
+    """The text of a regular file of at most 1 MB in UTF-8; raises `InputError` for any other."""
     try:
-        with path.open("rb") as stream:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise InputError(path, "file", None, "its name must be UTF-8") from None
+    try:
+        # Opened without waiting: a FIFO has no writer.
+        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise InputError(path, "file", None, "must be a regular file")
             data = stream.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
@@ -114,6 +123,8 @@ class _Builder:
     def mapping(self, keys: Keys) -> dict:
         items: dict = {}
         while not isinstance(event := next(self.events), yaml.MappingEndEvent):
+            if isinstance(event, yaml.CollectionStartEvent):
+                raise self.error(keys, event, "a list or mapping cannot be a key")
             key = self.value(event, keys)
             if not isinstance(key, str):
                 raise self.error(keys, event, f"the key {key!r} is not text: put it in quotes")
@@ -134,7 +145,7 @@ class _Builder:
             return int(text)
         if _FLOAT.fullmatch(text):
             if not math.isfinite(float(text)):
-                raise self.error(keys, event, f"{text} is too large a number")
+                raise self.error(keys, event, f"{text[:40]} is too large a number")
             return float(text)
         return text
 

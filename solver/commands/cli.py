@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.commands import benchmark, scaling, stability, study
+from solver.commands import studies
 from solver.commands.options import add_command, add_threads, limit_threads
 from solver.system.errors import InputError, SolveError, of_machine
 
@@ -116,17 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
-    command = add_command(commands, "orders", _orders, "write the page of orders of convergence")
-    command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
-    command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the levels")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-
-    command = commands.add_parser("study", help="error against run time: points and their page")
-    study.add_commands(command)
-    command = commands.add_parser("scaling", help="growth with size: points and their page")
-    scaling.add_commands(command)
-    benchmark.add_commands(commands)
-    stability.add_commands(commands)
+    studies.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -251,14 +241,6 @@ def _compare(options: argparse.Namespace) -> int:
     from solver.report.compare import compare
 
     return FAILED if compare(options.base, options.this, options.output).worse else PASSED
-
-
-def _orders(options: argparse.Namespace) -> int:
-    from solver.studies.orders.description import read_ladders
-    from solver.studies.orders.page import write_orders
-
-    write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
-    return PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:

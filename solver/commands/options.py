@@ -5,9 +5,6 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""The variables that tell the libraries how many threads to use."""
-
 
 def add_command(
     commands: Any, name: str, run: Callable[[argparse.Namespace], int], purpose: str
@@ -26,5 +23,7 @@ def add_threads(command: argparse.ArgumentParser) -> None:
 
 def limit_threads(number: int) -> None:
     """Tell the libraries, which read it when they are loaded; the environment comes first."""
+    from solver.system.process import THREADS
+
     for variable in THREADS:
         os.environ.setdefault(variable, str(number))

@@ -21,7 +21,7 @@ from functools import partial
 from typing import NoReturn
 
 import solver
-from solver.commands.warm import LIMIT, THREADS, outcome
+from solver.commands.warm import GREETING, LIMIT, THREADS, outcome
 
 # What the solver imports only where it is needed; what is missing here, the command will say.
 _LATE = ("gmsh", "jsonschema.validators", "skfem.element", "rslab", "cvxopt")
@@ -67,6 +67,7 @@ def load() -> None:
 
 def _answer(client: socket.socket) -> int:
     """Run the client's command in a process of its own and tell how it ended."""
+    client.send(GREETING)
     message, streams, *_ = socket.recv_fds(client, LIMIT, 2)
     request = json.loads(message or "{}")
     # Libraries take the number of threads when they are loaded: for another one, no answer.

@@ -14,12 +14,16 @@ import signal
 import socket
 import sys
 import time
+from contextlib import suppress
 from datetime import timedelta
 
 SOCKET = "WARM_SOLVER"
 LIMIT = 1 << 16  # bytes of a message
 # A fork keeps the threads that its libraries were loaded with.
 THREADS = "OMP_NUM_THREADS"
+GREETING = b"ready"
+# Seconds to wait for the server's greeting, which comes once all its packages are loaded.
+PATIENCE = 30.0
 _COLUMNS = "s h:m:s max_rss max_vms max_uss max_pss io_in io_out mean_load cpu_time"
 
 
@@ -32,7 +36,7 @@ def main(benchmark: str, command: list[str]) -> int:
     ended = _warm(place, command) if place else None
     if ended is None:
         python = sys.executable
-        ended = outcome(os.spawnv(os.P_NOWAIT, python, [python, "-m", "solver", *command]))
+        ended = outcome(os.spawnv(os.P_NOWAIT, python, [python, "-Es", "-m", "solver", *command]))
     _write_benchmark(benchmark, time.monotonic() - started, ended)
     status = os.waitstatus_to_exitcode(ended["status"])
     return status if status >= 0 else 128 - status
@@ -49,15 +53,27 @@ def outcome(process: int) -> dict:
 
 
 def _warm(place: str, command: list[str]) -> dict | None:
-    """What became of the command in a fork; None where no answer comes."""
+    """What became of the command in a fork; None where no answer comes.
+
+    A server that does not greet in time hangs: no later client asks it, for its socket is removed.
+    It never runs the command, which is sent after the greeting.
+    """
     request = {"command": command, "threads": os.environ.get(THREADS)}
     with socket.socket(socket.AF_UNIX) as connection:
         try:
+            connection.settimeout(PATIENCE)
             connection.connect(place)
+            if connection.recv(len(GREETING)) != GREETING:
+                return None
+            connection.settimeout(None)
             socket.send_fds(connection, [json.dumps(request).encode()], [1, 2])
             return json.loads(connection.recv(LIMIT) or "null")
+        except TimeoutError:
+            with suppress(OSError):
+                os.unlink(place)  # noqa: PTH108 -- pathlib is long to import
         except OSError:
-            return None
+            pass
+    return None
 
 
 def _write_benchmark(path: str, seconds: float, ended: dict) -> None:

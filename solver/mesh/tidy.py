@@ -20,7 +20,8 @@ def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
     `raw` has any blocks, groups in its cell and point sets, and, if its file numbers the cells,
     these numbers as cell data `number`. Cells written twice become one. Cells of lower dimension
     stay when their nodes belong to volume cells and they are faces or in a group; nodes of no cell
-    go. Point cells become node groups. Raises InputError naming the file `where`.
+    go. A group none of whose members stay is kept, empty. Point cells become node groups. Raises
+    InputError naming the file `where`.
     """
     table = _Table(raw, where)
     dim = max((cell.dim for cell in table.cells), default=0)
@@ -28,11 +29,12 @@ def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
         raise InputError(where, "cells", None, "the mesh has no cells of dimension 2 or 3")
     points = _flattened(raw.points, dim, where)
     blocks = [table.merged(cell) for cell in sorted(table.cells, key=lambda c: _order(c, dim))]
+    names = sorted({name for block in blocks for name in block.groups})
     blocks = _attached(blocks, dim, len(points), where)
     for block in blocks:
         if block.cell.dim == dim:
             block.turn(points, where)
-    return _compact(points, blocks, table.node_groups)
+    return _compact(points, blocks, names, table.node_groups)
 
 
 class _Block:
@@ -167,7 +169,10 @@ def _attached(blocks: list[_Block], dim: int, n_points: int, where: object) -> l
 
 
 def _compact(
-    points: np.ndarray, blocks: list[_Block], node_groups: dict[str, np.ndarray]
+    points: np.ndarray,
+    blocks: list[_Block],
+    names: list[str],
+    node_groups: dict[str, np.ndarray],
 ) -> meshio.Mesh:
     present = np.zeros(len(points), dtype=bool)
     for block in blocks:
@@ -175,7 +180,6 @@ def _compact(
     used = np.flatnonzero(present)
     new = np.full(len(points), -1)
     new[used] = np.arange(len(used))
-    names = sorted({name for block in blocks for name in block.groups})
     sets = {
         name: [np.flatnonzero(block.groups.get(name, ())) for block in blocks] for name in names
     }
@@ -183,6 +187,6 @@ def _compact(
     return meshio.Mesh(
         points[used],
         [(block.cell.meshio, new[block.nodes]) for block in blocks],
-        cell_sets={name: ids for name, ids in sets.items() if any(len(i) for i in ids)},
-        point_sets={n: ids[ids >= 0] for n, ids in node_sets.items() if (ids >= 0).any()},
+        cell_sets=sets,
+        point_sets={n: ids[ids >= 0] for n, ids in node_sets.items()},
     )

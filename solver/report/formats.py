@@ -40,6 +40,18 @@ def seconds(value: float | None) -> str:
     return NOTHING if value is None else f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
 
 
+def duration(value: float) -> str:
+    """Two digits: `12 ms`, `0.12 s`, `1.2 s`; from ten seconds on whole ones."""
+    if value < 0.0995:
+        return f"{value * 1000:.2g} ms"
+    return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"
+
+
+def count(value: float) -> str:
+    """A whole number: `102,357`."""
+    return f"{value:,.0f}"
+
+
 def types(body: Mapping[str, Any]) -> str:
     """The cell types of a body."""
     return ", ".join(body["cells"])

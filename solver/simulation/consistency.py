@@ -12,8 +12,8 @@ import numpy as np
 from solver.simulation.solution import NodalContact, Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
-# roundings of coordinates and displacements, a pressure by so many times its estimated error.
-_TOLERANCE, _ROUNDINGS, _ERRORS = 1e-8, 1e3, 10
+# roundings of coordinates and displacements, a pressure by its estimated error.
+_TOLERANCE, _ROUNDINGS = 1e-8, 1e3
 
 Shape = tuple[int | None, ...]
 
@@ -90,7 +90,7 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     own = float(np.abs(contact.multiplier).max(initial=0.0))
     scale = max(own, float(np.abs(solution.stress[nodes]).max(initial=0.0)))
     largest = max(float(np.abs(other.multiplier).max(initial=0.0)) for other in solution.zones)
-    error = _ERRORS * max(solution.accuracy.values(), default=0.0) * largest
+    error = max(solution.accuracy.values(), default=0.0) * largest
     worst = float(contact.multiplier.min(initial=0.0))
     if worst < -_TOLERANCE * scale - error:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"

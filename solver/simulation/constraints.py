@@ -26,7 +26,8 @@ class ContactConstraints:
 
     `gaps` (k, n_dofs); `on_free` (k, n_free) the same on free unknowns; `initial` (k,); `area`,
     `covered` (k,) whole and intersected; `eligible` (k,) may close; `inactive_multipliers` (k,)
-    move nothing; `own` (n_free,) marks the unknowns of slave nodes.
+    move nothing; `slave` (n_dofs,) marks the degrees of freedom of slave nodes, `own` (n_free,) the
+    free unknowns there.
     """
 
     gaps: sparse.csr_matrix
@@ -36,6 +37,7 @@ class ContactConstraints:
     covered: np.ndarray
     eligible: np.ndarray
     inactive_multipliers: np.ndarray
+    slave: np.ndarray
     own: np.ndarray
 
     @cached_property
@@ -62,6 +64,7 @@ def contact_constraints(scene: Scene) -> ContactConstraints:
     active = _row_sizes(on_free) > _ACTIVE * _row_sizes(gaps)
     for zone in scene.zones:
         active[zone.numbers] |= zone.treatment.cut
+    slave = _slave_dofs(scene)
     return ContactConstraints(
         gaps=gaps,
         on_free=on_free,
@@ -70,7 +73,8 @@ def contact_constraints(scene: Scene) -> ContactConstraints:
         covered=covered,
         eligible=touching & active & ~scene.resting,
         inactive_multipliers=touching & ~active,
-        own=_slave_unknowns(scene),
+        slave=slave,
+        own=np.asarray(abs(scene.free.basis).T @ slave.astype(float)) > 0,
     )
 
 
@@ -78,13 +82,13 @@ def _row_sizes(matrix: sparse.csr_matrix) -> np.ndarray:
     return np.sqrt(np.asarray(matrix.multiply(matrix).sum(axis=1)).ravel())
 
 
-def _slave_unknowns(scene: Scene) -> np.ndarray:
-    """Free unknowns (n_free,) that belong to slave nodes."""
-    dim, own = scene.points.shape[1], np.zeros(scene.n_dofs)
+def _slave_dofs(scene: Scene) -> np.ndarray:
+    """Which degrees of freedom (n_dofs,) belong to slave nodes."""
+    dim, slave = scene.points.shape[1], np.zeros(scene.n_dofs, dtype=bool)
     for zone in scene.zones:
         for faces in zone.sub_faces:
-            own[(dim * faces.nodes[..., None] + np.arange(dim)).ravel()] = 1.0
-    return np.asarray(abs(scene.free.basis).T @ own) > 0
+            slave[(dim * faces.nodes[..., None] + np.arange(dim)).ravel()] = True
+    return slave
 
 
 def free_motion(

@@ -11,12 +11,13 @@ import numpy as np
 from solver.mechanics.fem.mixed import AUTOMATIC_ABOVE
 from solver.mechanics.linear.condensation import ROUND_OFF
 from solver.mechanics.mortar.cut import needs_cut
+from solver.simulation.accuracy import NOTED_STRAIN
 from solver.simulation.constraints import MIN_COVERAGE
 from solver.simulation.naming import body_names
 from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene
 from solver.simulation.skips import EVERYTHING
-from solver.simulation.solution import Line
+from solver.simulation.solution import Line, Solution
 
 
 def decided(problem: ContactProblem) -> Iterator[Line]:
@@ -56,8 +57,8 @@ def _cells(scene: Scene) -> Iterator[Line]:
         yield Line("plain Gauss rules in TETRA10 cells", "all edges are straight", "quadrature")
 
 
-def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
-    """The lines of one zone; `idle` (k,): the multipliers that act on no free unknown."""
+def _zone(zone: ZoneScene, scene: Scene, inactive: np.ndarray) -> Iterator[Line]:
+    """The lines of one zone; `inactive` (k,): the multipliers that act on no free unknown."""
     name, operator = zone.zone.name, zone.operator
     if zone.zone.treatment != "lac":
         yield Line(f"{name}: treatment {zone.zone.treatment}", zone.treatment.what)
@@ -79,7 +80,7 @@ def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
     if bare:
         why = f"less than {MIN_COVERAGE:.0%} of their area lies under the master surface"
         yield Line(f"{name}: {bare} macro-elements out of contact", why)
-    held = int(idle[zone.numbers].sum())
+    held = int(inactive[zone.numbers].sum())
     if held:
         why = "supports hold the nodes of both surfaces there"
         yield Line(f"{name}: {held} multipliers left out", why)
@@ -101,3 +102,10 @@ def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Li
     if scene.skips.refinement and all(state.residual <= ROUND_OFF for state in states):
         yield Line("no further refinement", "the residual is round-off", "refinement")
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
+
+
+def strained(solution: Solution) -> Iterator[Line]:
+    """A note where strains or rotations are not small."""
+    if max(solution.strain, solution.rotation) > NOTED_STRAIN:
+        what = f"largest strain {solution.strain:.1e}, rotation {solution.rotation:.1e}"
+        yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")

@@ -1,6 +1,7 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -16,7 +17,7 @@ from solver.mechanics.linear.condensation import ConstrainedSystem, solve
 from solver.mechanics.linear.multigrid import Unknowns
 from solver.mechanics.linear.systems import Systems, parts_of
 from solver.mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
-from solver.simulation.accuracy import Accuracy, estimate, judged
+from solver.simulation.accuracy import Accuracy, Roughness, estimate, judged, roughness
 from solver.simulation.constraints import (
     contact_constraints,
     free_motion,
@@ -86,6 +87,10 @@ class ContactProblem:
         n_bodies = len(scene.asleep) if scene.skips.apart else 1
         self.parts = parts_of(on_free, unknowns.body, n_bodies)
         self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
+
+    @cached_property
+    def _rough(self) -> Roughness:
+        return roughness(self.scene)
 
     @property
     def system(self) -> ConstrainedSystem | None:
@@ -199,7 +204,7 @@ class ContactProblem:
             trial=judged(iterate, pressure, self.diagonal),
             status=status,
             residual=residual,
-            accuracy=estimate(iterate, pressure, self.diagonal, residual, scale),
+            accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
         )
 
     def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:

@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 
 from solver.case.expressions import evaluate
-from solver.case.reader import Case, Zone
+from solver.case.model import Case, Zone
 from solver.mechanics.fem.bodies import body_numbers
 from solver.mechanics.fem.elasticity import Block
 from solver.mechanics.fem.faces import FaceBlock, boundary_faces, surface_points, volume_cells

@@ -8,8 +8,8 @@ from typing import Any
 import meshio
 import numpy as np
 
-from solver.case.reader import Case
-from solver.mechanics.fem.elasticity import nodal_stress
+from solver.case.model import Case
+from solver.mechanics.fem.elasticity import largest_strain, nodal_stress
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.stress import normal_stress
 from solver.mesh.catalogue import BY_NAME
@@ -18,7 +18,7 @@ from solver.simulation.consistency import inconsistency
 from solver.simulation.cures import ALL, Cures
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
-from solver.simulation.plan import decided, noted
+from solver.simulation.plan import decided, noted, strained
 from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene, build_scene
 from solver.simulation.skips import NEEDED, Skips
@@ -85,6 +85,7 @@ def solve_problem(
     plan += noted(problem, states)
     with clock.stage("recovery"):
         solution = _recover(problem, states, plan, swapped, hexahedra)
+    solution.plan += strained(solution)
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
@@ -121,6 +122,7 @@ def _recover(
     )
     stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
     scale = _stress_scale(scene, stress)
+    strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
     zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
     return Solution(
         case=scene.case,
@@ -144,6 +146,8 @@ def _recover(
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
         plan=plan,
+        strain=strain,
+        rotation=rotation,
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
     )

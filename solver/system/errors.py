@@ -1,25 +1,28 @@
 """The ways in which a command ends early: its input is refused, or the solve fails."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class InputError(Exception):
-    """The input is refused: one line that names the file, the key, the value and what is allowed.
+    """The input is refused: one line that names the file, the key, the value and the problem.
 
     The command line prints the line and exits with status 2.
     """
 
-    def __init__(self, where: object, key: str, value: object, allowed: str):
-        """Compose the line; `value` None leaves the value out (a key that is missing).
+    def __init__(self, where: object, key: str, value: object, problem: str):
+        """Compose the line. A `value` of None is not shown: the key is missing.
 
         `told` is the line without the file.
         """
-        self.where, self.key, self.value, self.allowed = str(where), key, value, allowed
+        self.where, self.key, self.value, self.problem = printable(where), key, value, problem
         shown = "" if value is None else f" = {_shorten(value)}"
-        self.told = f"{key}{shown}: {allowed}"
+        self.told = f"{key}{shown}: {problem}"
         super().__init__(f"{self.where}: {self.told}")
 
 
 class MachineError(InputError):
-    """Refused not for what the input says, but for what the machine has now: another run may do."""
+    """The input is valid, but memory or disk is short. Another run may succeed."""
 
 
 class SolveError(Exception):
@@ -27,10 +30,10 @@ class SolveError(Exception):
 
 
 def of_machine(error: Exception) -> str:
-    """In one line what the machine lacks, memory or a file that can be used; else nothing."""
+    """What the machine lacks, memory or a usable file, in one line; empty for other errors."""
     said = " ".join(str(error).split())
     if isinstance(error, MemoryError) or _is_unmapped(error):
-        return f"out of memory: {said or 'no more is to be had'}"
+        return f"out of memory: {said or 'none left'}"
     if isinstance(error, OSError) and error.errno:
         return f"{error.filename or 'output'}: {error.strerror}"
     return ""
@@ -39,6 +42,30 @@ def of_machine(error: Exception) -> str:
 def _is_unmapped(error: Exception) -> bool:
     """Whether a library could not be loaded for want of memory."""
     return isinstance(error, ImportError) and "failed to map segment" in str(error)
+
+
+def printable(name: object) -> str:
+    """A name as one line of UTF-8: other characters are escaped."""
+    text = str(name)
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """`did you mean …?` when one of the known names is near, else the list of them."""
+    known = sorted(known)
+    near = get_close_matches(str(name), known, n=1)
+    listed = f"allowed: {', '.join(known)}" if known else "there is none"
+    return f"did you mean {near[0]}? ({listed})" if near else listed
+
+
+def key_path(keys: Iterable[str | int]) -> str:
+    """`contact[0].slave` for the keys `("contact", 0, "slave")`."""
+    path = ""
+    for key in keys:
+        name = str(key) if str(key).isprintable() else repr(key)
+        step = f"[{key}]" if isinstance(key, int) else name
+        path += step if isinstance(key, int) or not path else f".{step}"
+    return path
 
 
 def _shorten(value: object, length: int = 80) -> str:

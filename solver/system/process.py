@@ -9,21 +9,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
 
-from solver.commands.options import THREADS
 from solver.system.clock import now, processor_time
 from solver.system.memory import peak_mb
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""The variables that tell the libraries how many threads to use."""
 
 
 @dataclass(frozen=True)
 class Ended:
     """How a process ended: exit status (negative: by that signal), None where it was stopped.
 
-    That is after `limit` seconds. `output` is what it printed; wall and processor seconds of it and
-    its children, and the largest resident memory of any of them, MB.
+    That is after `limit` seconds. `output` is what it printed, `complaint` what it wrote to its
+    standard error; wall and processor seconds of it and its children, and the largest resident
+    memory of any of them, MB.
     """
 
     status: int | None
     output: str
+    complaint: str
     wall: float
     cpu: float
     peak_memory_mb: float
@@ -36,10 +40,13 @@ class Ended:
 
     @property
     def reason(self) -> str:
-        """How it died and its last words, or that it was stopped; not for one that ended well."""
+        """How it died and its last words, or that it was stopped; not for one that ended well.
+
+        Last words are those on standard error, if any: the two streams have no common order.
+        """
         if self.status is None:
             return f"no end within {self.limit:g} s"
-        lines = [line for line in self.output.splitlines() if line.strip()]
+        lines = (self.complaint.strip() or self.output.strip()).splitlines()
         last = lines[-1].strip() if lines else "no word"
         return f"the process died with exit status {self.status}: {last}"
 
@@ -81,7 +88,7 @@ def run_apart(
             resource.setrlimit(resource.RLIMIT_DATA, (int(memory), int(memory)))
 
     threads = dict.fromkeys(THREADS, str(len(cores)))
-    with tempfile.TemporaryFile() as output:
+    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as complaint:
         started = now()
         process = subprocess.Popen(
             command,
@@ -89,7 +96,7 @@ def run_apart(
             env={**os.environ, **threads, **(environment or {})},
             stdin=subprocess.DEVNULL,
             stdout=output,
-            stderr=subprocess.STDOUT,
+            stderr=complaint,
             preexec_fn=prepare,  # noqa: PLW1509 -- it calls the system alone
         )
         over = Event()
@@ -110,7 +117,8 @@ def run_apart(
         wall = now() - started
         process.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)
-        text = output.read().decode(errors="replace")
+        complaint.seek(0)
+        said, complained = (s.read().decode(errors="replace") for s in (output, complaint))
     cpu = used.ru_utime + used.ru_stime
     ending = None if over.is_set() else process.returncode
-    return Ended(ending, text, wall, cpu, peak_mb(used), limit)
+    return Ended(ending, said, complained, wall, cpu, peak_mb(used), limit)

@@ -30,7 +30,8 @@ import h5py
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.mesh.catalogue import cell_type
 from solver.mesh.files.vtkhdf import read_grid, write_grid
 from solver.simulation.consistency import inconsistency
@@ -111,6 +112,7 @@ def _write(
     _write_grid(file.create_group(GRID), solution)
     _write_case(file.create_group("case"), solution)
     file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
+    file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
@@ -186,6 +188,8 @@ def _read_solution(file: h5py.File) -> Solution:
         balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=_read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
+        strain=float(file["solve"].attrs.get("strain", np.nan)),
+        rotation=float(file["solve"].attrs.get("rotation", np.nan)),
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
@@ -285,8 +289,9 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     for name in _BY_NODE:
         group[name] = getattr(zone, name)
     faces = group.create_group("master_faces")
-    for kind, connectivity in zone.master_faces:
-        faces[kind] = connectivity
+    # Faces of one type may be in several blocks, one for each type of cell behind them.
+    for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
+        faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
     if zone.nodal:
         nodal = group.create_group("nodal")
         for name, attribute in _AT_MULTIPLIER_NODES.items():

@@ -9,15 +9,16 @@ from typing import Any
 
 import meshio
 
-from solver.case.reader import Case, check_mesh_file, load_case
+from solver.case.model import Case
+from solver.case.reader import check_mesh_file, load_case
 from solver.mesh import generate, read_mesh, transform
+from solver.mesh.size import check_memory
 from solver.simulation.simulate import simulate
 from solver.simulation.skips import EVERYTHING, NEEDED, Skips
 from solver.simulation.solution import Solution
 from solver.system.clock import Clock, processor_time
 from solver.system.errors import InputError, MachineError, SolveError, of_machine
 from solver.system.files import last_line
-from solver.system.memory import check_memory
 from solver.system.provenance import gather
 from solver.verification.checks import CheckResult, run_checks
 from solver.verification.norms import errors

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.case.reader import Case
-from solver.simulation.accuracy import Accuracy
+from solver.case.model import Case
+from solver.simulation.accuracy import Accuracy, beyond_small_strain
 from solver.simulation.solution import Solution, job_name
 from solver.system.files import write_text
 from solver.verification.checks import CheckResult
@@ -32,6 +32,8 @@ _UNKNOWN: dict[str, Any] = {
     "matrix_entries": None,
     "length": None,
     "load_scale": None,
+    "strain": None,
+    "rotation": None,
     "seconds": {},
     "stage_cpu_seconds": {},
     "cpu_seconds": None,
@@ -61,15 +63,17 @@ def of_solution(
 ) -> dict[str, Any]:
     """The verdict of a solve that came to its end: `passed` when every check holds.
 
-    `unreliable` whatever the checks say, where rounding may have left less than four digits; then
-    `attainable`, the relative error that rounding alone may cause, is the first reason.
+    `unreliable` whatever the checks say, where rounding may have left less than four digits (then
+    `attainable`, the relative error that rounding alone may cause, is the first reason) or where
+    strain or rotation is beyond small strain.
     `result` is the name of the result file beside the verdict. Extremes are pairs of minimum and
     maximum over all zones; `worst` names the check nearest to its tolerance, or furthest past it.
     """
     accuracy = Accuracy(solution.accuracy)
-    reasons = [accuracy.reason] if accuracy.reason else []
+    large = beyond_small_strain(solution.case, solution.strain, solution.rotation)
+    reasons = [reason for reason in (accuracy.reason, large) if reason]
+    failed = UNRELIABLE if reasons else FAILED
     reasons += [check.reason for check in checks if not check.passed]
-    failed = UNRELIABLE if accuracy.reason else FAILED
     zones = solution.zones
     return _identity(solution.case, solution.swapped, solution.hexahedra) | {
         "verdict": failed if reasons else PASSED,
@@ -84,6 +88,8 @@ def of_solution(
         "matrix_entries": solution.matrix_entries,
         "length": solution.length,
         "load_scale": solution.load_scale,
+        "strain": solution.strain,
+        "rotation": solution.rotation,
         "seconds": _with_total(solution.seconds),
         "stage_cpu_seconds": dict(solution.stage_cpu_seconds),
         "cpu_seconds": solution.cpu_seconds,

@@ -9,16 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.case.expressions import Expression
-from solver.case.reader import (
-    Case,
-    Load,
-    Material,
-    Observation,
-    Support,
-    Zone,
-    load_case,
-    parse_case,
-)
+from solver.case.material import Material
+from solver.case.model import Case, Load, Observation, Support, Zone
+from solver.case.reader import check_mesh_file, load_case, parse_case
 from solver.case.schemas import CASE_SCHEMA
 from solver.case.solutions.uniform import Hydrostatic
 from solver.case.yaml import parse_mapping
@@ -64,7 +57,7 @@ reference:
   gap: x*0
   displacement: [0.0, -0.1*y]
   stress: {yy: -25, zz: -7.5*x/x}
-tolerance: {multiplier: 1e-6}
+tolerance: {multiplier: 1e-6, stress_l2: 1e-6}
 counts: {lower: {cells: 144, faces: 12}}
 """
 MINIMAL = """\
@@ -114,19 +107,19 @@ def test_every_key_arrives():
         },
         reference_kind="analytical",
         solution=Hydrostatic(pressure=25.0, material=Material(2000.0, 0.3), dim=2),
-        tolerance={"multiplier": 1e-6},
+        tolerance={"multiplier": 1e-6, "stress_l2": 1e-6},
         counts={"lower": {"cells": 144, "faces": 12}},
     )
 
 
 def test_where_a_reference_comes_from_arrives():
-    origin = "reference: {kind: %s, gap: 0, remark: as told}\n"
+    origin = "reference: {kind: %s, normal_stress: 0, remark: as told}\n"
     refined = parse_case(MINIMAL + origin % "refined, uncertainty: 2.0e-3", PATH)
     assert (refined.reference_kind, refined.reference_uncertainty) == ("refined", 2e-3)
     assert (refined.reference_code, refined.reference_remark) == (None, "as told")
     other = parse_case(MINIMAL + origin % "other_code, code: {name: solver, version: '14'}", PATH)
     assert other.reference_code == {"name": "solver", "version": "14"}
-    assert other.reference == {"gap": 0.0}
+    assert other.reference == {"normal_stress": 0.0}
 
 
 def test_defaults_are_those_of_the_contract():
@@ -150,6 +143,14 @@ def test_numbers_are_floats():
     assert type(case.zones[0].interference) is float
 
 
+def test_a_mesh_file_of_too_long_a_name():
+    case = parse_case(
+        MINIMAL.replace("{recipe: blocks, size: 1.0}", f"{{file: {'a' * 256}}}"), PATH
+    )
+    with pytest.raises(InputError, match=r"^family/c\.yaml: mesh\.file = .* no such file$"):
+        check_mesh_file(case)
+
+
 def test_load_case_reads_the_file(tmp_path):
     file = tmp_path / "c.yaml"
     file.write_text(MINIMAL)
@@ -164,6 +165,9 @@ def test_needed_keys(key):
         parse_case("\n".join(lines), PATH)
 
 
+SOLUTION_ALONE = (
+    "reference: {kind: analytical, solution: {name: hydrostatic, pressure: 1, material: all}}"
+)
 REFUSED = [
     # unknown keys, with the nearest allowed one
     ('"a\\nb": 1', "'a\\nb' = 1: unknown key; allowed: "),
@@ -305,11 +309,27 @@ REFUSED = [
         "reference: {kind: analytical, pressure: 1}",
         "reference.pressure = 1: unknown key; did you mean contact_pressure?",
     ),
-    ("tolerance: 0", "tolerance = 0: must be a positive number, or a mapping of checks"),
+    ("tolerance: 0", "tolerance = 0: must be a positive number of at most 1, or a mapping of"),
     ("tolerance: {multiplier: -1}", "tolerance.multiplier = -1: must be a positive number"),
     (
         "tolerance: {multipliers: 1}",
         "tolerance.multipliers = 1: unknown key; did you mean multiplier?",
+    ),
+    ("tolerance: 1.0e+300", "tolerance.all = 1e+300: must be at most 1"),
+    ("tolerance: {balance: 1.5}", "tolerance.balance = 1.5: must be at most 1"),
+    # a reference that nothing would be compared with
+    ("reference: {kind: analytical}", "reference.kind = 'analytical': gives no value to compare"),
+    (
+        "reference: {kind: analytical, contact_pressure: 25}",
+        "reference.contact_pressure = '25.0': cannot be compared: the case has no contact",
+    ),
+    (
+        SOLUTION_ALONE,
+        "reference.solution = 'hydrostatic': nothing is compared with it; give a value",
+    ),
+    (
+        f"{SOLUTION_ALONE[:-1]}, normal_stress: 1}}",
+        "reference.solution = 'hydrostatic': nothing is compared with it; give a value",
     ),
     ("counts: {top: {cells: 1.5}}", "counts.top.cells = 1.5: must be a whole number"),
     # what the reader of the text refuses
@@ -380,7 +400,7 @@ def test_a_plane_case_does_not_speak_of_z(old, new, message):
 def test_every_check_may_have_its_tolerance():
     schema = json.loads(CASE_SCHEMA.read_text())
     names = set(schema["properties"]["tolerance"]["properties"])
-    assert names == {check.name for check in CHECKS}
+    assert names == {"all"} | {check.name for check in CHECKS}
 
 
 def test_every_value_of_the_schema_says_what_is_allowed():

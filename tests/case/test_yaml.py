@@ -1,6 +1,7 @@
 """The strict reader: YAML 1.2's plain values, and a clear line for everything else."""
 
 import json
+import os
 from contextlib import suppress
 from pathlib import Path
 
@@ -54,7 +55,7 @@ def test_values(text, value):
         ("a: !!python/object:os.system 1", r"^c.yaml: a: the tag .* is not allowed"),
         ("a: !!binary aGk=", r"^c.yaml: a: the tag .* is not allowed"),
         ("1: a", r"^c.yaml: line 1: the key 1 is not text: put it in quotes"),
-        ("a: {[1]: b}", r"^c.yaml: a: the key \[1\] is not text"),
+        ("a: {[1]: b}", r"^c.yaml: a: a list or mapping cannot be a key"),
         ('a: "x\\0"', r"^c.yaml: a: control characters are not allowed"),
         ("a: 1e999", r"^c.yaml: a: 1e999 is too large a number"),
         ("a: [1, 2", r"^c.yaml: line \d: must be YAML \("),
@@ -78,6 +79,12 @@ def test_depth_is_limited():
         parse_mapping("a: " + "[" * 100_000, WHERE)
 
 
+@pytest.mark.parametrize("text", ["a: " + "{" * 100_000, "? " * 100_000, "a: " + "[a: " * 100_000])
+def test_nested_keys_do_not_exhaust_the_stack(text):
+    with pytest.raises(InputError, match=r"mapping cannot be a key|nested deeper than"):
+        parse_mapping(text, WHERE)
+
+
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InputError, match=r"none\.yaml: file: cannot be read \(No such file"):
         read_text(tmp_path / "none.yaml")
@@ -85,6 +92,18 @@ def test_files_that_cannot_be_read(tmp_path):
         read_text(tmp_path)
     with pytest.raises(InputError, match="file: cannot be read"):
         read_text(Path("a\x00b"))
+    os.mkfifo(tmp_path / "fifo.yaml")
+    with pytest.raises(InputError, match="file: must be a regular file"):
+        read_text(tmp_path / "fifo.yaml")
+    (tmp_path / ".#c.yaml").symlink_to("user@host.1234:5678")  # Emacs' lock of a file being edited
+    with pytest.raises(InputError, match=r"file: cannot be read \(No such file"):
+        read_text(tmp_path / ".#c.yaml")
+    with pytest.raises(InputError, match=r"file: cannot be read \(File name too long"):
+        read_text(tmp_path / ("a" * 256))
+    unnamed = tmp_path / os.fsdecode(b"\xff\n.yaml")
+    unnamed.write_bytes(b"name: a")
+    with pytest.raises(InputError, match=r"\\udcff\\n\.yaml: file: its name must be UTF-8$"):
+        read_text(unnamed)
     file = tmp_path / "c.yaml"
     file.write_bytes(b"name: \xff")
     with pytest.raises(InputError, match=r"file: must be UTF-8 text \(byte 6 is not UTF-8\)"):

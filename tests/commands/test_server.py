@@ -135,6 +135,24 @@ print(*(set(sys.modules) - before))
     assert {name for name in late if name.partition(".")[0] in PACKAGES} == set()
 
 
+def test_a_server_that_hangs_is_given_up_by_all(folder):
+    source = folder / "solver" / "commands" / "warm.py"
+    text = source.read_text()
+    assert "PATIENCE = 30.0" in text
+    server = start(folder, "stopped")
+    try:
+        assert client(folder, "validate", "good.yaml", place="stopped").stdout.startswith("warm")
+        server.send_signal(signal.SIGSTOP)
+        source.write_text(text.replace("PATIENCE = 30.0", "PATIENCE = 1.0"))
+        done = client(folder, "validate", "good.yaml", place="stopped")
+    finally:
+        source.write_text(text)
+        server.kill()
+        server.communicate()
+    assert (done.returncode, done.stdout) == (0, "cold\ngood.yaml: valid\n")
+    assert not (folder / "stopped").exists()
+
+
 def test_the_server_ends_with_whoever_began_it_and_its_forks_come_to_their_end(folder):
     server = start(folder, "last")
     running = subprocess.Popen(

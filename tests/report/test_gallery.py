@@ -148,21 +148,21 @@ def test_without_opengl_the_report_draws_and_says_why(tmp_path, monkeypatch):
     assert "without OpenGL (VTK finds no OpenGL here (SIGSEGV))" in page
     assert "no result, no picture" in page
     names = sorted(path.name for path in (tmp_path / "out" / "gallery").iterdir())
-    assert names == ["fam-one-plain.png", "fam-two-plain.png"]
+    assert names == ["fam-one-plain.svg", "fam-two-plain.svg"]
     assert all(f'src="gallery/{name}"' in page for name in names)
 
 
 def test_pictures_are_drawn_again_for_newer_results_alone(tmp_path):
     verdicts, out = batch(tmp_path), tmp_path / "out"
     write_gallery(verdicts, out, plain=True, log=lambda _: None)
-    one, two = (out / "gallery" / f"fam-{name}-plain.png" for name in ("one", "two"))
+    one, two = (out / "gallery" / f"fam-{name}-plain.svg" for name in ("one", "two"))
     for path in (one, two):
         path.write_bytes(b"kept")
     later = two.stat().st_mtime + 10
     os.utime(verdicts[0].parent / "result.vtkhdf", (later, later))
     write_gallery(verdicts, out, plain=True, log=lambda _: None)
     assert one.read_bytes() == b"kept"
-    assert two.read_bytes()[:4] == b"\x89PNG"
+    assert two.read_bytes()[:4] == b"<svg"
 
 
 def test_a_damaged_result_is_said_in_place_of_its_picture(tmp_path):

@@ -1,5 +1,6 @@
 """Bodies that nothing moves are left out, bodies without contact are solved on their own."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -180,6 +181,25 @@ def test_a_rigid_body_has_no_stiffness_and_bears_its_load(cells):
         assert solution.zones[0].multiplier == pytest.approx(PRESSURE, rel=1e-12)
         assert max(solution.balance.values()) < 1e-13
     assert np.abs(short.displacement - full.displacement).max() < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("support", "said"),
+    [
+        ("{group: base, fix: {y: 0.001}}", "supports[1].fix.y = 0.001: given to 2 nodes of the"),
+        ("{group: base, fix: {x: 0.5*x}}", "supports[1].fix.x = 0.5: given to 2 nodes of the"),
+    ],
+)
+def test_a_displacement_given_to_a_rigid_body_is_refused(support, said):
+    text = "\n".join(line for line in SCENE.split("\n") if "far" not in line)
+    text = text.replace("materials:", "bodies: {bottom: {rigid: true}}\nmaterials:")
+    text = text.replace("slave: bottom_contact, master: top", "slave: top_contact, master: bottom")
+    text = text.replace("loads:", f"  - {support}\nloads:").replace(
+        "  - {group: base, fix: [y]}\n", ""
+    )
+    message = re.escape(said) + " rigid body bottom, which is fixed; allowed there: 0"
+    with pytest.raises(InputError, match=message):
+        simulate(parse_case(text, Path("rigid.yaml")), block_mesh("QUAD4", "QUAD4", (1, 3)))
 
 
 def test_on_a_rigid_body_a_gap_is_judged_by_the_stiffness_of_the_other():

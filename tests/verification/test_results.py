@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
+from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.system.files import seal
 from solver.system.provenance import gather
 from solver.verification.checks import run_checks
 from solver.verification.results import read_result, write_result
 from tests.handmade import plane, solid
+from tests.scenes import block_case, block_mesh, errors
 
 
 def same(a, b):
@@ -55,6 +57,28 @@ def written(solution, tmp_path):
     path = tmp_path / "result.vtkhdf"
     write_result(path, solution, run_checks(solution), gather(solution.case.path, None))
     return path
+
+
+def test_faces_of_one_type_on_cells_of_two_types(tmp_path):
+    """SEG2 on QUAD4 and TRIA3: one cell on the surface of the upper block is cut in two."""
+    mesh = block_mesh("QUAD4", "QUAD4")
+    quads, edges = mesh.cells
+    low = mesh.points[quads.data][..., 1].min(axis=1)
+    first = np.flatnonzero(low == 0)[0]
+    kept = np.delete(np.arange(len(quads.data)), first)
+    sets = {
+        name: [np.flatnonzero(np.isin(kept, of[0])), of[1], [0, 1] if name == "top" else []]
+        for name, of in mesh.cell_sets.items()
+    }
+    halves = quads.data[first][[[0, 1, 2], [0, 2, 3]]]
+    cells = [("quad", quads.data[kept]), edges, ("triangle", halves)]
+    mixed = meshio.Mesh(mesh.points, cells, cell_sets=sets)
+    solution = simulate(block_case(2), mixed)
+    path = tmp_path / "result.vtkhdf"
+    write_result(path, solution, [], {})
+    (faces,) = read_result(path).solution.zones[0].master_faces
+    assert (faces[0], faces[1].shape) == ("SEG2", (2, 2))
+    assert max(errors(solution).values()) < 1e-12
 
 
 def test_everything_comes_back(solution, written):

@@ -86,6 +86,7 @@ def pip(locks: list[Path], options: list[str]) -> None:
     """Install the packages of lock files with pip."""
     command: list[str | Path] = [PYTHON, "-m", "pip", "install", "--quiet"]
     command += ["--disable-pip-version-check", "--no-input", "--no-compile"]
+    command += ["--no-cache-dir"]
     command += ["--require-hashes", *options]
     for lock in locks:
         command += ["--requirement", lock]

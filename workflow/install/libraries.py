@@ -65,7 +65,12 @@ def provide(venv: Path) -> None:
 def failure(venv: Path) -> str:
     """Load and start gmsh in the environment; return why that failed, or nothing."""
     program = "import gmsh; gmsh.initialize(); gmsh.finalize()"
-    run = subprocess.run([venv / "bin" / "python", "-c", program], capture_output=True, text=True)
+    run = subprocess.run(
+        [venv / "bin" / "python", "-c", program],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "HOME": os.devnull},  # where FLTK would leave its preferences
+    )
     return (run.stderr.strip() or f"status {run.returncode}") if run.returncode else ""
 
 

@@ -7,11 +7,18 @@ import shlex
 import sys
 from collections import namedtuple
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import yaml
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
+
+# The project's folder gives these packages alone: Snakemake put it first, and a file `jsonschema.py`
+# in it would be taken for the package.
+for package in ("solver", "workflow.progress"):
+    import_module(package)
+sys.path.sort(key=lambda folder: Path(folder) == Path(workflow.basedir))
 
 validate(config, "../schemas/config.schema.yaml")
 
@@ -19,7 +26,8 @@ VARIANTS = config["variants"] in (True, "true")
 # Jobs share their bytecode: to compile the sources anew in each costs a third of a small solve.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 MEMORY_CHECK = " --no-memory-check" * (config["memory_check"] in (False, "false"))
-PYTHON = shlex.quote(sys.executable)
+# Neither PYTHONPATH nor the user's own packages are for these processes.
+PYTHON = shlex.quote(sys.executable) + " -Es"
 # Before a file for what it takes and a command of the solver, which runs in a fork of the run's
 # warm process, where there is one.
 SOLVER = f"{PYTHON} -IS solver/commands/warm.py"
@@ -86,7 +94,10 @@ def stamp_of(file):
     return f"{about.st_size} {about.st_mtime_ns} {os.access(file, os.R_OK)}"
 
 
-OF_REPORT = sources("report/**/*.py", "report/templates/*")
+OF_REPORT = sources(
+    *("report/**/*.py", "report/templates/*", "studies/**/*.jinja"),
+    *(f"studies/**/{page}.py" for page in ("page", "figure", "records")),
+)
 OF_SOLVER = sorted({*sources("**/*.py", "case/schemas/*")} - {*OF_REPORT})
 OF_MESH = sources(
     *("case/**/*.py", "case/schemas/*", "system/errors.py", "system/files.py"),
@@ -179,13 +190,13 @@ def older(file, time):
     return not Path(file).is_file() or Path(file).stat().st_mtime < time
 
 
-def measured_points(read, model, file, size, folder):
+def measured_points(read, file, size, folder):
     """The points by name that a file describes; says how long those that are missing will take.
 
-    `read` the file at its `size`; `model` has the seconds of each point, `folder` its record.
+    `read` the file at its `size`; `folder` has the records.
     """
     from solver.system.errors import InputError
-    from solver.studies.work_precision.expected import announcement
+    from solver.studies.points import announcement
 
     try:
         content = read(Path(file), size)
@@ -194,7 +205,7 @@ def measured_points(read, model, file, size, folder):
     newest = max(Path(source).stat().st_mtime for source in [file, *SOLVER_SOURCES])
     points = {point.name: point for point in content.points}
     pending = [name for name in points if older(f"{folder}/{name}.json", newest)]
-    logger.info(announcement(content, model(content), Path(folder), pending))
+    logger.info(announcement(content, Path(folder), pending))
     return points
 
 

@@ -138,7 +138,7 @@ def keep_warm():
 
     It listens from now on and answers once it is warm; without it jobs start from nothing.
     """
-    from solver.commands.options import THREADS
+    from solver.system.process import THREADS
 
     folder = tempfile.TemporaryDirectory()
     with socket.socket(socket.AF_UNIX) as listener:
@@ -148,14 +148,22 @@ def keep_warm():
             return  # a file system without sockets, or too long a name
         listener.listen()
         server = subprocess.Popen(
-            [sys.executable, "-m", "solver", "serve", str(listener.fileno())],
+            [sys.executable, "-Es", "-m", "solver", "serve", str(listener.fileno())],
             stdin=subprocess.PIPE,  # its end tells that this run has ended
             pass_fds=[listener.fileno()],
             env={**os.environ, **dict.fromkeys(THREADS, "1")},
         )
     os.environ["WARM_SOLVER"] = f"{folder.name}/warm"
     atexit.register(folder.cleanup)
-    atexit.register(server.communicate)
+    atexit.register(end_warm, server)
+
+
+def end_warm(server):
+    """Let the warm process end; one that hangs is killed."""
+    try:
+        server.communicate(timeout=10)
+    except subprocess.TimeoutExpired:
+        server.kill()
 
 
 onstart:

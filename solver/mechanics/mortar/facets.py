@@ -11,7 +11,7 @@ from solver.mesh.catalogue import CellType
 from solver.system.errors import SolveError
 
 # Below these shares of a face's size, its bending and the skew of its map are round-off.
-_FLAT = 1e-9
+FLAT = 1e-9
 _AFFINE = 1e-12
 # Newton's method stops at steps below the first (in parts of a face) and accepts the second.
 _CONVERGED, _ACCEPTED = 1e-13, 1e-8
@@ -53,7 +53,7 @@ def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]
     """
     normals = nodal_normals(points, [(block.type.name, block.nodes) for block in blocks])
     differ = max(np.abs(normals[b.nodes] - b.normal[:, None]).max(initial=0.0) for b in blocks)
-    if differ <= _FLAT:
+    if differ <= FLAT:
         return blocks
     return [replace(block, directions=normals[block.nodes]) for block in blocks]
 
@@ -103,7 +103,7 @@ def _shape(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which faces are flat, which straight-edged as well, and which affine images."""
     bend = np.abs(np.einsum("fad,fd->fa", corner, normal)).max(axis=1)
-    flat = bend <= _FLAT * radius
+    flat = bend <= FLAT * radius
     n, edges = kind.n_vertices, np.array(kind.edges)
     if kind.order == 2 and kind.dim == 2:
         ends = corner[:, edges]
@@ -116,7 +116,7 @@ def _shape(
     sides = corner[:, [1, n - 1]] - first if kind.dim == 2 else corner[:, [1]] - first
     image = first + np.einsum("ar,frd->fad", kind.nodes - kind.nodes[0], sides)
     skew = np.linalg.norm(image - corner, axis=2).max(axis=1)
-    straight = bend <= _FLAT * radius
+    straight = bend <= FLAT * radius
     return flat, straight, straight & (skew <= _AFFINE * radius)
 
 

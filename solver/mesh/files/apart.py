@@ -63,7 +63,7 @@ def _attempt(
     try:
         return reader(path), None
     except InputError as error:
-        return None, (error.where, error.key, error.value, error.allowed)
+        return None, (error.where, error.key, error.value, error.problem)
     except BaseException as error:  # noqa: BLE001 -- whatever the reader trips over is in the file
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         return None, (str(path), "mesh", None, f"cannot be read ({reason})")

@@ -1,5 +1,6 @@
 """gmsh, opened and closed: a quiet, repeatable session, and its current model as a mesh."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -37,7 +38,8 @@ def session(**options: float) -> Iterator[None]:
 
     Options are gmsh's own, with `__` for the dot in their names (`Mesh__Algorithm=5`).
     """
-    gmsh.initialize(readConfigFiles=False, run=False, interruptible=False)
+    with _without_home():
+        gmsh.initialize(readConfigFiles=False, run=False, interruptible=False)
     try:
         for name, value in (_OPTIONS | options).items():
             gmsh.option.setNumber(name.replace("__", "."), value)
@@ -45,6 +47,19 @@ def session(**options: float) -> Iterator[None]:
         yield
     finally:
         gmsh.finalize()
+
+
+@contextmanager
+def _without_home() -> Iterator[None]:
+    """Keep FLTK, which gmsh is linked with, from writing its preferences into the home folder."""
+    home = os.environ.get("HOME")
+    os.environ["HOME"] = os.devnull
+    try:
+        yield
+    finally:
+        del os.environ["HOME"]
+        if home is not None:
+            os.environ["HOME"] = home
 
 
 def number_of(cell_type: str) -> int:

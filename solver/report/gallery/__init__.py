@@ -63,9 +63,9 @@ def write_gallery(
 def _drawing(plain: bool) -> tuple[Draw, str]:
     """What draws a result into a file, and the ending of these files."""
     if plain:
-        from solver.report.gallery.plain import ENDING, draw
+        from solver.report.gallery.plain import draw
 
-        return draw, f"-plain{ENDING}"
+        return draw, "-plain.svg"
     from solver.report.gallery.drawing import draw as by_pyvista
 
     return by_pyvista, ".png"

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, Zone
+from solver.case.model import Case, Zone
 from solver.mechanics.fem.faces import boundary_faces, volume_cells
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME, CellType
 from solver.mesh.files.abaqus import FACES

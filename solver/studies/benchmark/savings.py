@@ -18,7 +18,8 @@ from typing import Any
 
 import meshio
 
-from solver.case.reader import Case, load_case
+from solver.case.model import Case
+from solver.case.reader import load_case
 from solver.simulation.simulate import simulate
 from solver.simulation.skips import EVERYTHING, NEEDED, Skips
 from solver.simulation.solution import job_name

@@ -8,20 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from solver.mesh.catalogue import BY_NAME, CellType
+from solver.report.html import NORMS
 from solver.report.rows import Row, read_rows
-from solver.studies.fits import (
-    DEGREES,
-    ERRORS,
-    THEORY,
-    Order,
-    Slope,
-    element_size,
-    fit_slope,
-    is_rounding,
-)
-from solver.studies.orders.description import Family, Ladder
+from solver.studies.fits import Fit, fit_order, is_rounding
+from solver.studies.orders.description import Ladder, LadderFamily
+from solver.studies.orders.theory import DEGREES, THEORY, UNKNOWN, Order, element_size
 
 VERDICT = "verdict.json"
+# The errors of ladders in the order in which they are shown.
+ERRORS = {name: what for name, what in NORMS.items() if name != "stress_max"}
 # A slope this much below an order is still that order: levels are few, and not yet the limit.
 LEEWAY = 0.1
 
@@ -34,7 +29,7 @@ class Curve:
     """
 
     name: str
-    family: Family
+    family: LadderFamily
     ladder: Ladder
     rows: Sequence[Row]
 
@@ -93,18 +88,18 @@ class Curve:
         sizes, values = np.array(pairs, dtype=float).reshape(-1, 2).T
         return sizes, values
 
-    def slope(self, error: str) -> Slope | None:
+    def slope(self, error: str) -> Fit | None:
         """The slope over the finest levels."""
-        return fit_slope(*self.errors(error))
+        return fit_order(*self.errors(error))
 
     def rounding(self, error: str) -> bool:
         """Whether the finest levels are exact up to rounding, so that there is no slope."""
         return is_rounding(*self.errors(error))
 
-    def theory(self, error: str) -> Order | None:
-        """What theory says of the slope; None where it says nothing."""
+    def theory(self, error: str) -> Order:
+        """What theory says of the slope."""
         own = self.family.theory.get(self.degree, {}).get(error)
-        return Order(*own) if own else THEORY.get(self.degree, {}).get(error)
+        return Order(*own) if own else THEORY.get(self.degree, {}).get(error, UNKNOWN)
 
     def least(self, error: str) -> float | None:
         """The slope that has to be reached, if any."""
@@ -129,30 +124,30 @@ class Curve:
 
     def below_theory(self, error: str) -> bool:
         """Whether the slope is less than theory guarantees, by more than its spread explains."""
-        slope, theory = self.slope(error), self.theory(error)
-        if slope is None or theory is None or theory.least is None:
+        slope, least = self.slope(error), self.theory(error).least
+        if slope is None or least is None:
             return False
-        return slope.value + max(2 * slope.spread, LEEWAY) < theory.least
+        return slope.value + max(2 * slope.spread, LEEWAY) < least
 
     @cached_property
     def complaints(self) -> list[str]:
         """Levels without a result, slopes and finest errors that are not reached, one line each."""
         lines = [f"{self.family.name}/{self.name}: {line}" for line in self.missing]
-        for error in ERRORS:
+        for error, what in ERRORS.items():
             if self.reached(error) is False:
                 slope = self.slope(error)
                 shown = f"{slope.value:.3f} ± {slope.spread:.3f}" if slope else "not known"
                 asked = f"at least {self.least(error):g} is asked for"
-                lines.append(f"{self.family.name}/{self.name}: {ERRORS[error]}: {shown}; {asked}")
+                lines.append(f"{self.family.name}/{self.name}: {what}: {shown}; {asked}")
             if self.kept(error) is False:
                 found = self.at_finest(error)
                 shown = "not known" if found is None else f"{found:.1e}"
                 asked = f"at most {self.ladder.finest[error]:g} is asked for at the finest level"
-                lines.append(f"{self.family.name}/{self.name}: {ERRORS[error]}: {shown}; {asked}")
+                lines.append(f"{self.family.name}/{self.name}: {what}: {shown}; {asked}")
         return lines
 
 
-def read_curves(family: Family, results: Path) -> list[Curve]:
+def read_curves(family: LadderFamily, results: Path) -> list[Curve]:
     """The curves of a family, from `results/<family>/<ladder>/<level>/verdict.json`.
 
     A ladder's first direction always has one; the other where it has been solved.

@@ -1,13 +1,13 @@
 """The map of numerical stability: digits of the pressure, a square a point, three maps abreast."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from markupsafe import Markup
 
 from solver.report import formats
 from solver.report.svg import INK, MUTED, RULE, Drawing
+from solver.studies.points import Record
 
 # Dark is good, and the lightness alone tells it (viridis; van der Walt and Smith).
 _COLORS = (
@@ -24,8 +24,6 @@ MOST_DIGITS = 16
 _FEWEST = 5
 _WIDTH, _HEIGHT, _GAP, _LABEL = 37.0, 19.0, 34.0, 250.0
 _PANELS = {"floor": "floor of double precision", "cured": "solved", "uncured": "without cures"}
-
-Record = Mapping[str, Any]
 
 
 def digits(error: float | None) -> int | None:

@@ -14,7 +14,8 @@ from typing import Any
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, Material
+from solver.case.material import Material
+from solver.case.model import Case
 from solver.mesh import transform
 from solver.studies.stability.sweeps import HYDROSTATIC
 

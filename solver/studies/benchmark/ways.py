@@ -1,33 +1,12 @@
-"""The process that is measured: `python -m solver.studies.benchmark.worker JOB`, JOB a JSON object.
+"""What the processes of the benchmark do, each started by `studies.points.measure_apart`."""
 
-Its numerical libraries read the number of threads when they are loaded, and peak memory is the
-process's own: hence a process for each way.
-"""
-
-import json
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from solver.system.clock import Clock, now, processor_time
-from solver.system.errors import InputError, SolveError
 from solver.system.process import used_since
-
-
-def main(job: Mapping[str, Any]) -> None:
-    """Do the job, write what was found: also where a solve is refused or fails."""
-    from solver.verification.verdict import to_json
-
-    work = {"solve": solve, "batch": batch}[job["kind"]]
-    try:
-        found = {"outcome": "solved", "reason": ""} | work(job)
-    except InputError as error:
-        found = {"outcome": "refused", "reason": error.told}
-    except SolveError as error:
-        found = {"outcome": "failed", "reason": str(error)}
-    Path(job["output"]).write_text(to_json(found), encoding="utf-8")
 
 
 def solve(job: Mapping[str, Any]) -> dict[str, Any]:
@@ -92,7 +71,3 @@ def _without_mkl() -> None:
 
 def _silent(line: str) -> None:
     """Print nothing."""
-
-
-if __name__ == "__main__":
-    main(json.loads(sys.argv[1]))
