@@ -12,7 +12,8 @@ import numpy as np
 from solver.simulation.solution import NodalContact, Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
-# roundings of coordinates and displacements, a pressure by its estimated error.
+# roundings of coordinates and displacements, a pressure by its estimated error and by what so many
+# roundings of displacements are as stress.
 _TOLERANCE, _ROUNDINGS = 1e-8, 1e3
 
 Shape = tuple[int | None, ...]
@@ -90,14 +91,18 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     own = float(np.abs(contact.multiplier).max(initial=0.0))
     scale = max(own, float(np.abs(solution.stress[nodes]).max(initial=0.0)))
     largest = max(float(np.abs(other.multiplier).max(initial=0.0)) for other in solution.zones)
-    error = max(solution.accuracy.values(), default=0.0) * largest
+    round_off = _ROUNDINGS * float(np.finfo(float).eps)
+    young = max(material.young for material in solution.case.materials.values())
+    smallest = float(zone.area.min()) ** (1 / (moved.shape[1] - 1))
+    error = round_off * young * float(np.abs(moved).max()) / smallest
+    error += max(solution.accuracy.values(), default=0.0) * largest
     worst = float(contact.multiplier.min(initial=0.0))
     if worst < -_TOLERANCE * scale - error:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"
     size = float(np.ptp(moved, axis=0).max(initial=0.0))
     place = float(np.abs(solution.mesh.points[nodes]).max() + np.abs(moved).max())
     worst = float(contact.gap.min(initial=0.0))
-    if worst < -_TOLERANCE * size - _ROUNDINGS * np.finfo(float).eps * place:
+    if worst < -_TOLERANCE * size - round_off * place:
         yield f"zone {zone.name}: the surfaces overlap, a gap of {worst:.3g}"
 
 
