@@ -29,7 +29,7 @@ SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 
 .PHONY: help all-cases family case report summary compare gallery orders study stability infsup
 .PHONY: scaling benchmark test accept
-.PHONY: format lint lock faults mutants kills cluster-test docs bill clean clean-all
+.PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment gallery-environment test-environment lint-environment docs-environment
 .PHONY: bill-environment
 
@@ -167,6 +167,9 @@ lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrad
 	@for group in build mkl slurm gallery test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
+
+schemas: environment ## write the JSON Schemas of the typed files anew, for editors
+	@.venv/bin/python -m solver.commands.schemas
 
 clean: ## remove results and caches
 	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +

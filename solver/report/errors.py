@@ -1,7 +1,6 @@
 """Error against run time of all solves of a family, log–log, with what to compare them with."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 from urllib.parse import quote
 
 import numpy as np
@@ -9,6 +8,7 @@ from markupsafe import Markup
 
 from solver.report import formats, stages
 from solver.report.axes import EPSILON, Scale, draw_axes, draw_floor, draw_level, round_off
+from solver.report.families import CodeError
 from solver.report.rows import Row
 from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
 
@@ -32,7 +32,7 @@ def _unknowns(rows: Sequence[Row]) -> int:
     return max((row.dofs or 1 for row in rows), default=1)
 
 
-def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]) -> Markup:
+def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Markup:
     """Points of all solves with lines for the tolerance, the reference code and round-off."""
     shown = drawn(rows)
     drawing = Drawing(WIDTH, HEIGHT, "Worst error against run time of every solve")
@@ -46,9 +46,8 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]
     for tolerance in sorted({row.allowed for row in shown if row.allowed}):
         draw_level(drawing, x, y, tolerance, f"tolerance {100 * tolerance:.3g} %", RED)
     for entry in reference_code:
-        name = f"{entry.get('name', 'reference code')} {entry.get('version', '')}"
-        label = f"{name.strip()}: {formats.error(float(entry['error']))}"
-        draw_level(drawing, x, y, float(entry["error"]), label, MUTED, (6, 4))
+        label = f"{entry.name} {entry.version}: {formats.error(entry.error)}"
+        draw_level(drawing, x, y, entry.error, label, MUTED, (6, 4))
     at = np.column_stack([x(times), y(errors)])
     for row, point in zip(shown, at, strict=True):
         _mark(drawing, row, point)

@@ -107,7 +107,7 @@ class Section:
         """The pressure along the interface of the solves that the family names, or of some."""
         found = []
         for row, figure in self._figures():
-            drawing = profile(row, self.pictures, figure.along)
+            drawing = profile(row, self.pictures, figure.expression)
             found.append(Profile(row, drawing, figure.caption))
         return found
 
@@ -156,7 +156,7 @@ def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> 
     found = []
     for name, members in families(rows).items():
         file = files.get(name)
-        family = read_family(file) if file else Family(name, name)
+        family = read_family(file) if file else Family(name, name=name)
         ladders = bool(file and file.with_name("orders.yaml").is_file())
         found.append(Section(family, members, pictures, ladders))
-    return sorted(found, key=lambda section: section.family.order)
+    return sorted(found, key=lambda section: section.family.place)

@@ -52,7 +52,7 @@ def test_a_family_as_its_file_tells_it(file):
     assert (family.name, family.title) == ("blocks", "Blocks & <b>more</b>")
     assert family.reference == "It is uniform."
     assert [figure.job for figure in family.figures] == ["two-blocks", "not-solved"]
-    assert family.figures[0].along(np.array([[3.0, 0.0]])) == 6.0
+    assert family.figures[0].expression(np.array([[3.0, 0.0]])) == 6.0
     assert family.complaint == ""
 
 
@@ -78,7 +78,7 @@ def test_a_family_without_a_file_has_its_folder_s_name(tmp_path):
         ("2*x", "2*open(x)", "figures[0].along = '2*open(x)': `open(x)` is not allowed"),
         ('"7"', "7", "reference_code[0].version = 7: must be text (in quotes if it is a number)"),
         ("1.0e-9", "-1", "reference_code[0].error = -1: must be a positive number"),
-        ("job: not-solved", "jobs: [a]", "figures[1].job: this key is needed"),
+        ("job: not-solved", "jobs: [a]", "figures[1].jobs = ['a']: unknown key; did you mean job?"),
         ("title:", "title", "file"),
     ],
 )
