@@ -14,8 +14,8 @@
           - {title: rslab, solver: rslab}            # the linear solver
           - {title: without MKL, free: true}         # free software alone
           - {title: not cut, treatment: uncut}       # of the interface
-          - {title: no cures, cures: false}          # see `solver.simulation.cures`
-          - {title: nothing left out, everything: true}   # see `solver.simulation.skips`
+          - {title: no cures, cures: false}          # see `solver.simulation.options`
+          - {title: nothing left out, everything: true}   # see `solver.simulation.options`
           - {title: CalculiX, program: calculix}     # another code
     growth: [{series: hexa8, sizes: [1.0e+5, 3.0e+5]}]
     batch: {title: …, most: 2, cases: [case.yaml]}   # in one warm process, and one by one
