@@ -17,15 +17,14 @@
           - {title: no cures, cures: false}          # see `solver.simulation.options`
           - {title: nothing left out, everything: true}   # see `solver.simulation.options`
           - {title: CalculiX, program: calculix}     # another code
-    growth: [{series: hexa8, sizes: [1.0e+5, 3.0e+5]}]
     batch: {title: …, most: 2, cases: [case.yaml]}   # in one warm process, and one by one
-    quick: {size: 1000}           # of every mesh, for a first look; growth from half of it
+    quick: {size: 1000}           # of every mesh, for a first look
 
 `most` is the number of seconds that all cases of the batch together should not exceed.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +32,7 @@ from solver.case.descriptions import file_beside, refuse_unknown
 from solver.case.schemas import BENCHMARK_SCHEMA
 from solver.case.yaml import read_mapping
 from solver.studies import QUICK
-from solver.studies.scaling.description import (
-    Scaling,
-    ScalingPoint,
-    SizeSeries,
-    read_scaling,
-)
+from solver.studies.scaling.description import ScalingPoint, read_scaling
 
 
 @dataclass(frozen=True)
@@ -75,49 +69,35 @@ class WarmBatch:
 
 @dataclass(frozen=True)
 class Benchmark:
-    """All of it. `growth`: series, their sizes those to be measured."""
+    """All of it."""
 
     path: Path
     title: str
     threads: int
     limit: float
-    scaling: Scaling
     comparisons: tuple[WayComparison, ...]
-    growth: tuple[SizeSeries, ...]
     batch: WarmBatch
 
 
 def read_benchmark(path: Path, size: str) -> Benchmark:
     """The benchmark in a file, or its quick version; InputError says what is refused."""
     content = read_mapping(path, BENCHMARK_SCHEMA)
-    scaling = read_scaling(path.parent / content["scaling"])
     small = int(content["quick"]["size"]) if size == QUICK else None
-    known = {series.name: series for series in scaling.series}
-
-    def find(item: Mapping[str, Any], key: str, sizes: Sequence[int]) -> SizeSeries:
-        refuse_unknown(path, f"{key}.series", item["series"], "series", known)
-        return replace(known[item["series"]], sizes=tuple(sizes))
-
+    known = {
+        series.name: series for series in read_scaling(path.parent / content["scaling"]).series
+    }
     comparisons = []
     for i, item in enumerate(content["comparisons"]):
-        unknowns = small or int(item["size"])
-        point = ScalingPoint(find(item, f"comparisons[{i}]", [unknowns]), unknowns)
+        refuse_unknown(path, f"comparisons[{i}].series", item["series"], "series", known)
+        point = ScalingPoint(known[item["series"]], small or int(item["size"]))
         ways = tuple(Way(**way) for way in item["ways"])
         comparisons.append(WayComparison(item["title"], point, item["repetitions"], ways))
-    growth = [
-        find(
-            item, f"growth[{i}]", [small // 2, small] if small else sorted(map(int, item["sizes"]))
-        )
-        for i, item in enumerate(content["growth"])
-    ]
     return Benchmark(
         path=path,
         title=content["title"],
         threads=content["threads"],
         limit=float(content["limit"]),
-        scaling=replace(scaling, threads=content["threads"], limit=float(content["limit"])),
         comparisons=tuple(comparisons),
-        growth=tuple(growth),
         batch=_batch(path, content["batch"]),
     )
 

@@ -23,13 +23,12 @@ A goal's `what` is `cpu` or `wall` (seconds of the whole process, from mesh file
 solve`. A point is one series and size; its name is the path of its record: `hexa8/10000`.
 """
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from solver.case.descriptions import file_beside, refuse_twins, refuse_unknown
 from solver.case.model import Case
@@ -122,7 +121,7 @@ class ScalingPoint:
             mesh["size"] = [width] * (self.series.dim - 1) + [thickness]
             solution = {**template["reference"]["solution"], "base": -thickness}
             content["reference"] = {**template["reference"], "solution": solution}
-        return yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
+        return json.dumps(content, indent=1)
 
     def parsed(self, path: Path) -> Case:
         """The point's case, as of a case file at `path`."""

@@ -27,13 +27,12 @@ A point is one problem, pair, treatment, level and linear solver. Its name is th
 file: `patch-2d/tria3-quad4/lac/4`, `patch-2d/tria3-quad4/lac+cholmod/4`.
 """
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from solver.case.descriptions import file_beside, refuse_twins, refuse_unknown
 from solver.case.model import Case
@@ -48,14 +47,6 @@ from solver.system.errors import InputError
 
 AUTO = "auto"
 _START = 1.5  # seconds: libraries loaded, mesh made, record written
-
-
-class _Plain(yaml.SafeDumper):
-    """Writes out what occurs twice: case files have no aliases."""
-
-    def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002 -- PyYAML asks for it
-        """Always."""
-        return True
 
 
 @dataclass(frozen=True)
@@ -162,7 +153,7 @@ class StudyPoint:
             "mesh": mesh,
             "contact": [zone | self.treatment.zone for zone in template["contact"]],
         }
-        return parse_case(yaml.dump(content, Dumper=_Plain), self.problem.case)
+        return parse_case(json.dumps(content), self.problem.case)
 
 
 @dataclass(frozen=True, kw_only=True)
