@@ -26,7 +26,9 @@ def left_out(rows: Sequence[Row]) -> list[LeftOut]:
     """The table of a family, a line a switch; empty where nothing was left out."""
     found = []
     for skip, title in TITLES.items():
-        mine = [(row.name, line[1]) for row in rows for line in row.plan or () if skip in line[2:]]
+        mine = [
+            (row.name, line[1]) for row in rows for line in row.verdict.plan if skip in line[2:]
+        ]
         if mine:
             reasons = dict.fromkeys(why for _, why in mine)
             found.append(LeftOut(title, "; ".join(reasons), len({name for name, _ in mine})))

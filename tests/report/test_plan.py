@@ -4,6 +4,7 @@ from solver.report.plan import TITLES, LeftOut, left_out
 from solver.report.rows import Row
 from solver.simulation.options import Shortcuts
 from tests.report.test_report import verdict
+from tests.report.verdicts import record
 
 PLAN = [
     ["interface: plain Gauss rules", "every face is an affine image", "quadrature"],
@@ -14,7 +15,9 @@ PLAN = [
 
 
 def test_the_table_of_a_family(tmp_path):
-    rows = [Row(verdict(name, "passed", plan=PLAN), tmp_path) for name in ("fam-a", "fam-b")]
+    rows = [
+        Row(record(verdict(name, "passed", plan=PLAN)), tmp_path) for name in ("fam-a", "fam-b")
+    ]
     assert left_out(rows) == [
         LeftOut(TITLES["quadrature"], "every face is an affine image", 2),
         LeftOut(TITLES["status"], "complementary", 2),
