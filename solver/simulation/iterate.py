@@ -42,7 +42,7 @@ class ContactIterate:
     def internal(self) -> np.ndarray:
         """Internal forces (n, dim)."""
         points, blocks = self.scene.points, self.scene.blocks
-        if self.scene.cures.differences:
+        if self.scene.options.safeguards.differences:
             internal = internal_force(points, blocks, self.deformation, self.extended)
         else:
             product = stiffness(points, blocks)[0] @ self.displacement.total
@@ -63,7 +63,7 @@ class ContactIterate:
 
     def _opening(self, gaps: sparse.csr_matrix) -> np.ndarray:
         dim = self.scene.points.shape[1]
-        return self.displacement.opening(gaps, dim, self.scene.cures.differences)
+        return self.displacement.opening(gaps, dim, self.scene.options.safeguards.differences)
 
     @cached_property
     def opening_size(self) -> np.ndarray:

@@ -79,13 +79,12 @@ class ContactProblem:
         refuse_unsolvable(scene, self.motions, self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
         free = unsupported(self.motions, scene.free.basis)
-        self.at_rest = Displacement.zero(free, surface, scene.cures.remainder)
+        self.at_rest = Displacement.zero(free, surface, scene.options.safeguards.remainder)
         self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
-        n_bodies = len(scene.asleep) if scene.skips.apart else 1
-        self.parts = parts_of(on_free, unknowns.body, n_bodies)
+        self.parts = parts_of(on_free, unknowns.body, len(scene.asleep))
         self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
 
     @cached_property
@@ -121,13 +120,13 @@ class ContactProblem:
         SolveError where no status fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0, or a system is singular.
         """
         scene, eligible = self.scene, self.constraints.eligible
-        if not scene.skips.status:
+        if not scene.options.shortcuts.status:
             start = eligible
         start = self._first_guess(factor) if start is None else start
         latest: list[Equilibrium] = []
 
         def attempt(closed: np.ndarray) -> Trial:
-            if not scene.skips.status:
+            if not scene.options.shortcuts.status:
                 self._systems.forget()
             latest[:] = [self._solve_closed(closed, factor)]
             return latest[0].trial
@@ -135,7 +134,7 @@ class ContactProblem:
         if bilateral:
             attempt(eligible)
             return latest[0]
-        area, confirm = self.constraints.covered, not scene.skips.status
+        area, confirm = self.constraints.covered, not scene.options.shortcuts.status
         status = find_status(attempt, start, eligible, area, self._gap_stiffness, confirm)
         trial = latest[0].trial
         touching = scene.resting & (trial.gap <= trial.gap_limit)
@@ -183,7 +182,7 @@ class ContactProblem:
 
     def _refined(self, start: ContactIterate, scale: float, status: StatusResult) -> Equilibrium:
         """Solved from an iterate; in extended precision where that gains digits."""
-        system, cures = self._constrained(start.closed), self.scene.cures
+        system, cures = self._constrained(start.closed), self.scene.options.safeguards
         found = self._once(system, start, scale, status)
         if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
             found = self._once(system, replace(found.iterate, extended=True), scale, status)
@@ -192,10 +191,9 @@ class ContactProblem:
     def _once(
         self, system: ConstrainedSystem, start: ContactIterate, scale: float, status: StatusResult
     ) -> Equilibrium:
-        refine = self.scene.cures.refinement
+        refine = self.scene.options.safeguards.refinement
         # In a stretched model a force of the size of round-off may be a large one elsewhere.
-        goes_on = start.extended or not self.scene.skips.refinement
-        options = {"round_off": 0.0} if goes_on else {}
+        options = {"round_off": 0.0} if start.extended else {}
         iterate, multiplier, residual = solve(system, start, scale, refine, **options)
         pressure = np.zeros(len(start.closed))
         pressure[start.closed] = multiplier
