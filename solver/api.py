@@ -32,10 +32,10 @@ from solver.simulation.skips import EVERYTHING, NEEDED
 from solver.simulation.solution import Solution, ZoneResult
 from solver.system.errors import InputError, key_path
 from solver.system.provenance import gather
-from solver.verification.checks import CheckResult
+from solver.verification.judge import judge
 from solver.verification.results import write_result
-from solver.verification.run import mesh_of, solve_checked, summary
-from solver.verification.verdict import of_solution
+from solver.verification.run import mesh_of, solve_checked
+from solver.verification.verdict import CheckResult, Verdict
 
 CaseLike: TypeAlias = Case | Mapping[str, Any] | str | os.PathLike[str]
 MeshLike: TypeAlias = meshio.Mesh | str | os.PathLike[str]
@@ -99,24 +99,29 @@ class Solved:
     provenance: dict[str, str | int]
 
     @cached_property
+    def outcome(self) -> Verdict:
+        """The verdict as a typed record."""
+        return judge(self.solution, self.checks, None, self.provenance)
+
+    @property
     def record(self) -> dict[str, Any]:
         """All that the report would show, plain values as `check --json` prints them."""
-        return of_solution(self.solution, self.checks, None, self.provenance)
+        return self.outcome.plain()
 
     @property
     def verdict(self) -> str:
-        """One of passed, failed and unreliable, as in the report."""
-        return self.record["verdict"]
+        """One of passed, solved (without a reference), failed, unreliable, as in the report."""
+        return self.outcome.verdict
 
     @property
     def passed(self) -> bool:
-        """Whether all checks hold and rounding has left digits enough."""
-        return self.record["passed"]
+        """Whether all checks hold, one of them against a reference, with digits enough."""
+        return self.outcome.passed
 
     @property
     def reason(self) -> str:
         """Why it did not pass, in one line; empty where it did."""
-        return self.record["reason"]
+        return self.outcome.reason
 
     @property
     def points(self) -> np.ndarray:
@@ -176,7 +181,7 @@ class Solved:
         return str(draw_pressure(self.solution, self.solution.job, over, zone))
 
     def __str__(self) -> str:
-        return summary(self.record)
+        return self.outcome.summary
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the picture, and the verdict in one line."""

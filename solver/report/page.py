@@ -15,7 +15,7 @@ from solver.report.tables import outcome
 def main_page(sections: Sequence[Section], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
     rows = [row for section in sections for row in section.rows]
-    checks = {check["name"]: check for row in rows for check in row.checks or ()}
+    checks = {check.name: check for row in rows for check in row.verdict.checks}
     return (
         environment()
         .get_template("summary.html.jinja")
@@ -25,7 +25,7 @@ def main_page(sections: Sequence[Section], folder: Path) -> str:
             study=(folder / "study.html").is_file(),
             stability=(folder / "stability.html").is_file(),
             gallery=(folder / "gallery.html").is_file(),
-            bad=[row for row in rows if row.word != "passed"],
+            bad=[row for row in rows if not row.sound],
             outcome=outcome(rows),
             counts=counted(rows),
             families=sections,
@@ -59,7 +59,7 @@ def family_page(section: Section, folder: Path) -> str:
 
 def _facts(rows: Sequence[Row]) -> list[tuple[str, str]]:
     """When, where and with what the solves ran."""
-    origins = [row.provenance for row in rows if row.provenance]
+    origins = [row.verdict.provenance for row in rows if row.verdict.provenance]
     if not origins:
         return []
 
@@ -85,7 +85,7 @@ def _times(rows: Sequence[Row]) -> str:
 
 
 def _costs(row: Row) -> tuple[float | None, float | None]:
-    return row.total, row.cpu_seconds
+    return row.total, row.verdict.cpu_seconds
 
 
 def _order(name: str) -> tuple[int, str]:

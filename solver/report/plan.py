@@ -49,7 +49,7 @@ def left_out(rows: Sequence[Row], savings: Savings) -> list[LeftOut]:
     """The table of a family, a line a switch; empty where nothing was left out."""
     found = []
     for skip, title in TITLES.items():
-        mine = [(row, line) for row in rows for line in row.plan or () if _switch(line) == skip]
+        mine = [(row, line) for row in rows for line in row.verdict.plan if _switch(line) == skip]
         if mine:
             reasons = dict.fromkeys(line[1] for _, line in mine)
             names = dict.fromkeys(row.name for row, _ in mine)
@@ -75,7 +75,9 @@ def saved(job: str, skip: str, savings: Savings) -> str:
 
 def with_savings(row: Row, savings: Savings) -> list[tuple[str, str, str]]:
     """The plan of one solve: what was left out, why, what that saves."""
-    return [(line[0], line[1], saved(row.name, _switch(line), savings)) for line in row.plan or ()]
+    return [
+        (line[0], line[1], saved(row.name, _switch(line), savings)) for line in row.verdict.plan
+    ]
 
 
 def _switch(line: Sequence[str]) -> str:

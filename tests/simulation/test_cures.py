@@ -9,7 +9,7 @@ import pytest
 from solver.case.reader import parse_case
 from solver.simulation.cures import ALL, Cures
 from solver.simulation.simulate import simulate
-from solver.verification.verdict import of_solution
+from solver.verification.judge import judge
 from tests.scenes import block_case, block_mesh, errors, moved, with_points
 from tests.simulation.test_extremes import MESHES, patch_errors, patch_solution, turn
 
@@ -98,7 +98,7 @@ def test_unreliable_where_coordinates_leave_no_digits_and_only_there(dim):
     """Turned and 10¹² blocks away the stored coordinates are off by 10⁻⁴ of a block."""
     near = patch_solution(dim, move=lambda x: x @ turn(dim, 1.1).T)
     assert max(near.accuracy.values()) < 1e-11
-    assert of_solution(near, [])["verdict"] == "passed"
-    verdict = of_solution(patch_solution(dim, move=lambda x: x @ turn(dim, 1.1).T + 1e12), [])
-    assert verdict["verdict"] == "unreliable"
-    assert "coordinates" in verdict["reason"]
+    assert judge(near, []).verdict == "solved"
+    verdict = judge(patch_solution(dim, move=lambda x: x @ turn(dim, 1.1).T + 1e12), [])
+    assert verdict.verdict == "unreliable"
+    assert "coordinates" in verdict.reason

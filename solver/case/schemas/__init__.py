@@ -17,7 +17,6 @@ LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")
 FAMILY_SCHEMA = Path(__file__).with_name("family.schema.json")
 SCALING_SCHEMA = Path(__file__).with_name("scaling.schema.json")
 STUDY_SCHEMA = Path(__file__).with_name("study.schema.json")
-SUMMARY_SCHEMA = Path(__file__).with_name("summary.schema.json")
 SWEEP_SCHEMA = Path(__file__).with_name("sweep.schema.json")
 
 

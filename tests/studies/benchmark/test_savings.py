@@ -12,6 +12,7 @@ from solver.simulation.skips import Skips
 from solver.studies.benchmark.savings import savings
 from tests.commands.test_cli import PLANE
 from tests.report.test_report import verdict
+from tests.report.verdicts import put, record
 from tests.scenes import block_case, block_mesh
 
 CUT = {"skip": "cut", "what": "no cut", "why": "SEG3", "median": 0.02, "low": 0.01, "high": 0.03}
@@ -66,7 +67,9 @@ def test_what_is_saved_in_words():
 
 
 def test_the_table_of_a_family(tmp_path):
-    rows = [Row(verdict(name, "passed", plan=PLAN), tmp_path) for name in ("fam-a", "fam-b")]
+    rows = [
+        Row(record(verdict(name, "passed", plan=PLAN)), tmp_path) for name in ("fam-a", "fam-b")
+    ]
     table = {line.what: line for line in left_out(rows, MEASURED)}
     assert list(table) == [TITLES["cut"], TITLES["status"], TITLES["refinement"]]
     cut = table[TITLES["cut"]]
@@ -81,12 +84,10 @@ def test_every_switch_has_a_title():
 
 
 def test_the_report_shows_what_was_left_out_why_and_what_that_saves(tmp_path):
-    folder = tmp_path / "fam" / "fam-a"
-    folder.mkdir(parents=True)
-    (folder / "verdict.json").write_text(json.dumps(verdict("fam-a", "passed", plan=PLAN)))
+    file = put(tmp_path / "fam/fam-a/verdict.json", verdict("fam-a", "passed", plan=PLAN))
     (tmp_path / FILE).parent.mkdir()
     (tmp_path / FILE).write_text(json.dumps({"jobs": MEASURED}))
-    write_report([folder / "verdict.json"], tmp_path / "report", log=lambda _: None)
+    write_report([file], tmp_path / "report", log=lambda _: None)
     page = (tmp_path / "report" / "fam.html").read_text()
     for wanted in (TITLES["cut"], "20.0 ms, 20% of the solve", UNMEASURED, "a line of"):
         assert wanted in page
