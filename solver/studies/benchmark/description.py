@@ -5,7 +5,7 @@
     limit: 300                    # seconds that a process may take
     scaling: scaling.yaml         # whose series the meshes are
     comparisons:                  # the same mesh, solved in several ways; ratios to the first one
-      - title: Linear solver, 3D
+      - title: Linear solver in space
         series: hexa8
         size: 1.0e+5              # unknowns at least
         repetitions: 1            # after the first solve, in one process; 0: the first one counts

@@ -77,7 +77,7 @@ class InfSupLadder:
 
     @property
     def verdict(self) -> str:
-        """What the levels show, in words."""
+        """What the levels tell, in words."""
         if self.reason:
             return self.reason
         if self.constants[-1] < ZERO:
@@ -101,7 +101,7 @@ class InfSupLadder:
 
     @property
     def levels_off(self) -> bool:
-        """Whether β_h stays above zero, as far as these levels show."""
+        """Whether β_h stays above zero, as far as these levels tell."""
         return not self.reason and bool(self.order <= LEVEL)
 
 

@@ -33,9 +33,9 @@ from solver.simulation.solution import job_name
 class Ladder:
     """One case file, and what the divisions of its recipe are multiplied by, level by level.
 
-    Ladders of the same `problem` share their plots; `label` distinguishes those of the same cells.
-    `observed` holds the reference code's own slopes by error, `finest` the largest errors allowed
-    at the finest level.
+    Ladders of the same `problem` share their plots; `label` tells those of the same cells apart.
+    `observed` holds the reference code's own
+    slopes by error, `finest` the largest errors allowed at the finest level.
     """
 
     case: Path
@@ -80,7 +80,7 @@ class LadderFamily:
 
     @property
     def name(self) -> str:
-        """The name of its folder."""
+        """The family's name: that of its folder."""
         return self.folder.name
 
 

@@ -61,7 +61,7 @@ class StudyTreatment:
 
 @dataclass(frozen=True)
 class Reference:
-    """The regular mesh whose result is taken for exact, and its own uncertainty, by error."""
+    """The regular mesh that stands for an exact solution, and how far it may be off, by error."""
 
     cells: str
     divisions: tuple[int, int]
@@ -139,7 +139,7 @@ class StudyPoint:
         return self._case({"cells": self.slave}, {"cells": self.master}, self.level)
 
     def reference_case(self, reference: Reference) -> Case:
-        """The problem on the mesh whose result is taken for exact."""
+        """The problem on the mesh that stands for an exact solution."""
         section = {"cells": reference.cells, "divisions": list(reference.divisions)}
         return self._case(section, section, 1)
 
