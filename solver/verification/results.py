@@ -32,7 +32,7 @@ import numpy as np
 
 from solver.case.reader import Case, parse_case
 from solver.mesh.catalogue import cell_type
-from solver.mesh.files.vtkhdf import read_grid, write_grid
+from solver.mesh.files.vtkhdf import check_name, read_grid, write_grid
 from solver.simulation.consistency import inconsistency
 from solver.simulation.solution import (
     BodyInfo,
@@ -44,7 +44,7 @@ from solver.simulation.solution import (
 )
 from solver.system.errors import InputError
 from solver.system.files import is_sealed, replacing, seal
-from solver.system.hdf5 import column, new_file, read_table, write_table
+from solver.system.hdf5 import column, new_file, read_file, read_table, write_table
 from solver.verification.checks import CheckResult
 from solver.verification.units import label_fields
 
@@ -96,6 +96,7 @@ def write_result(
     provenance: Mapping[str, Any],
 ) -> None:
     """Write a solution, its checks and its provenance to a `.vtkhdf` file."""
+    check_name(Path(path))
     with replacing(path) as temporary:
         with new_file(temporary) as file:
             _write(file, solution, checks, provenance)
@@ -134,7 +135,7 @@ def read_result(path: str | Path) -> Result:
     if not is_sealed(path):
         raise _no_result(path, "damaged, of another version, or none at all")
     try:
-        with h5py.File(path) as file:
+        with read_file(path) as file:
             file.visititems(_refuse_complex)
             result = Result(_read_solution(file), _plain(file["provenance"].attrs))
         fault = inconsistency(result.solution)
