@@ -4,8 +4,7 @@ from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from solver.case.schemas import hint
-from solver.system.errors import InputError
+from solver.system.errors import InputError, hint
 
 
 class Named(Protocol):

@@ -14,8 +14,8 @@ from typing import Any
 
 import yaml
 
-from solver.case.schemas import key_path, validate
-from solver.system.errors import InputError
+from solver.case.schemas import validate
+from solver.system.errors import InputError, key_path
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 20

@@ -1,34 +1,24 @@
 """Numbers and lists as the tables of the report show them."""
 
+import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from markupsafe import Markup, escape
 
+from solver.verification.verdict import Body
+
 NOTHING = "–"
-# Errors in the order in which they are shown, with what they are errors of.
-ERROR_LABELS = {
-    "displacement_l2": "displacement, L2",
-    "displacement_h1": "displacement, H1",
-    "stress_l2": "stress, L2",
-    "pressure_l2": "pressure, L2",
-    "pressure_max": "pressure, maximum",
-    "pressure_means": "pressure, macro-element means",
-    "pressure_oscillation": "pressure, second difference",
-    "half_width": "contact half-width",
-    "peak": "peak pressure",
-}
 
 
 def number(value: float | None) -> str:
     """Six significant digits, and no negative zero."""
-    return NOTHING if value is None else f"{value + 0.0:.6g}"
+    return NOTHING if value is None or math.isnan(value) else f"{value + 0.0:.6g}"
 
 
 def error(value: float | None) -> str:
     """Two digits and the power of ten; a zero is a zero."""
-    return NOTHING if value is None else "0" if value == 0 else f"{value:.1e}"
+    return NOTHING if value is None or math.isnan(value) else "0" if value == 0 else f"{value:.1e}"
 
 
 def extremes(pair: Sequence[float] | None, scale: float | None = None) -> str:
@@ -49,12 +39,26 @@ def _near_zero(value: float, scale: float | None) -> str:
 
 def seconds(value: float | None) -> str:
     """Hundredths; more than a hundred seconds are whole."""
-    return NOTHING if value is None else f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
+    if value is None or math.isnan(value):
+        return NOTHING
+    return f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
 
 
-def types(body: Mapping[str, Any]) -> str:
+def duration(value: float) -> str:
+    """Two digits: `12 ms`, `0.12 s`, `1.2 s`; from ten seconds on whole ones."""
+    if value < 0.0995:
+        return f"{value * 1000:.2g} ms"
+    return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"
+
+
+def count(value: float) -> str:
+    """A whole number: `102,357`."""
+    return f"{value:,.0f}"
+
+
+def types(body: Body) -> str:
     """The cell types of a body."""
-    return ", ".join(body["cells"])
+    return ", ".join(body.cells)
 
 
 def against(count: int, reference: int | None) -> str:
@@ -64,7 +68,7 @@ def against(count: int, reference: int | None) -> str:
 
 def digits(value: float | None) -> str:
     """All the digits there are."""
-    return NOTHING if value is None else f"{value + 0.0:.15g}"
+    return NOTHING if value is None or math.isnan(value) else f"{value + 0.0:.15g}"
 
 
 def formula(text: str) -> Markup:

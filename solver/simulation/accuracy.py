@@ -1,7 +1,7 @@
-"""What a solve can know of its own accuracy: how many digits rounding has left in the pressure.
+"""What a solve can know of its own accuracy: digits lost to rounding, strains that are not small.
 
-Each term is a size at which something is rounded, times the unit of rounding, turned into a
-pressure by what it acts on; it is relative to the largest pressure:
+Each term of `Accuracy` is a size at which something is rounded, times the unit of rounding, turned
+into a pressure by what it acts on; it is relative to the largest pressure:
 
     forces       terms of opposite sign cancel where internal forces are summed (stretched cells,
                  nearly incompressible material), and what the solve leaves unbalanced
@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from solver.case.model import Case
 from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.elasticity import Block, steepness
 from solver.mechanics.fem.faces import FaceBlock, area_vectors
@@ -33,6 +34,8 @@ EPSILON = float(np.finfo(float).eps)
 EPSILON_EXTENDED = float(np.finfo(np.longdouble).eps)
 LEAST_DIGITS = 4
 """A result with fewer digits is unreliable."""
+NOTED_STRAIN, SMALL_STRAIN = 1e-2, 1e-1
+"""A strain or rotation above the first is reported, one above the second is unreliable."""
 
 _REASONS = {
     "forces": "the terms that add up to its forces are far larger than they",
@@ -70,6 +73,19 @@ class Accuracy:
             f"rounding alone may change the result by {self.estimate:.0e} of itself: "
             f"{_REASONS[cause]}"
         )
+
+
+def beyond_small_strain(case: Case, strain: float, rotation: float) -> str:
+    """Why a result with these largest strain and rotation is unreliable; empty where it is not.
+
+    A case that names an exact solution asks for one of small strain, whatever the strain.
+    """
+    if case.solution is not None or not max(strain, rotation) > SMALL_STRAIN:
+        return ""
+    return (
+        f"strain {strain:.2g} with rotation {rotation:.2g} is beyond small strain: above "
+        f"{SMALL_STRAIN:g} linear theory does not describe the bodies"
+    )
 
 
 def pressure_of_forces(gaps: sparse.csr_matrix, noise: np.ndarray) -> float:

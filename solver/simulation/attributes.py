@@ -8,7 +8,8 @@ import meshio
 import numpy as np
 
 from solver.case.expressions import evaluate
-from solver.case.reader import Case, Exact, Load, Material, Scalar, Support
+from solver.case.material import Material
+from solver.case.model import Case, Exact, Load, Scalar, Support
 from solver.case.solutions import ExactSolution
 from solver.mechanics.fem import has_straight_edges
 from solver.mechanics.fem.bodies import body_numbers
@@ -16,11 +17,12 @@ from solver.mechanics.fem.elasticity import Block, lame_parameters
 from solver.mechanics.fem.faces import FaceBlock, boundary_faces, nodal_normals, volume_cells
 from solver.mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from solver.mechanics.fem.mixed import MeanStress, in_mixed_form, split
-from solver.mechanics.fem.supports import Fixed, FreeMotion, free_motion
+from solver.mechanics.fem.supports import SAME, Fixed, FreeMotion, free_motion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME
 from solver.simulation.exact import node_parts
 from solver.simulation.groups import ALL
+from solver.system.errors import InputError
 
 
 class CutZone(Protocol):
@@ -188,8 +190,18 @@ class Attributes:
             for direction in support.fix
         ]
         dim = self.points.shape[1]
+        largest = max((float(np.abs(f.values).max(initial=0.0)) for f in fixed), default=0.0)
         for group in sorted(self.case.rigid):
             nodes = self.nodes(group, f"bodies.{group}")
+            for support in fixed:
+                given = support.values[np.isin(support.nodes, nodes)]
+                if (np.abs(given) > SAME * largest).any():
+                    allowed = (
+                        f"given to {len(given)} nodes of the rigid body {group}, which is fixed; "
+                        "allowed there: 0 (move the other body instead)"
+                    )
+                    value = float(given[np.abs(given).argmax()])
+                    raise InputError(self.case.path, support.key, value, allowed)
             for axis in np.eye(dim):
                 directions = np.tile(axis, (len(nodes), 1))
                 fixed.append(Fixed(f"bodies.{group}", nodes, directions, np.zeros(len(nodes))))

@@ -8,20 +8,19 @@ from typing import Any
 import meshio
 import numpy as np
 
-from solver.case.reader import Case
-from solver.mechanics.fem.elasticity import nodal_stress
+from solver.case.model import Case
+from solver.mechanics.fem.elasticity import largest_strain, nodal_stress
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.stress import normal_stress
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.balance import imbalances
 from solver.simulation.consistency import inconsistency
-from solver.simulation.cures import ALL, Cures
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
-from solver.simulation.plan import decided, noted
+from solver.simulation.options import LEAN, Options
+from solver.simulation.plan import decided, noted, strained
 from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene, build_scene
-from solver.simulation.skips import NEEDED, Skips
 from solver.simulation.solution import Line, NodalContact, Solution, StepResult, ZoneResult
 from solver.simulation.unloaded import without_unloaded
 from solver.system.clock import Clock, processor_time
@@ -41,23 +40,20 @@ def simulate(
     swapped: bool = False,
     hexahedra: str | None = None,
     log: Log = lambda _: None,
-    cures: Cures = ALL,
+    options: Options = LEAN,
     clock: Clock | None = None,
-    skips: Skips = NEEDED,
 ) -> Solution:
     """Solve a case on its mesh.
 
     `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
-    `cures` turns what keeps the digits off, to show what it does, and `skips` what is left out
-    where the scene does not need it. The time of every stage is added to `clock`, where one is
-    given. Raises InputError where the case and its mesh do not fit,
-    SolveError where no solution is found.
+    The time of every stage is added to `clock`, where one is given.
+    Raises InputError where the case and its mesh do not fit, SolveError where no solution is found.
     """
     started = processor_time()
     clock = Clock() if clock is None else clock
-    scene = build_scene(case, mesh, swapped, hexahedra, clock, cures, skips)
+    scene = build_scene(case, mesh, swapped, hexahedra, clock, options)
     check_geometry(scene)
-    if skips.unloaded:
+    if options.shortcuts.unloaded:
         with clock.stage("assembly"):
             scene = without_unloaded(scene)
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
@@ -85,6 +81,7 @@ def solve_problem(
     plan += noted(problem, states)
     with clock.stage("recovery"):
         solution = _recover(problem, states, plan, swapped, hexahedra)
+    solution.plan += strained(solution)
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
@@ -117,6 +114,7 @@ def _recover(
     stress = nodal_stress(scene.points, scene.blocks, last.straining, last.extended)
     stress += scene.mean.nodal_stress(last.mean_stress, scene.blocks)
     scale = _stress_scale(scene, stress)
+    strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
     zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
     return Solution(
         case=scene.case,
@@ -140,6 +138,8 @@ def _recover(
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
         plan=plan,
+        strain=strain,
+        rotation=rotation,
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),
     )

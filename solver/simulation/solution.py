@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     import meshio
 
-    from solver.case.reader import Case
+    from solver.case.model import Case
 
 
 def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
@@ -24,7 +24,7 @@ def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
 
 
 class Line(NamedTuple):
-    """A line of the plan: what was left out or decided, and why; `skip` is its switch in `Skips`.
+    """A line of the plan: what was left out or decided, and why; `skip`: its switch in `Shortcuts`.
 
     Empty where it has none.
     """
@@ -119,7 +119,8 @@ class Solution:
     `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
     `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
     the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
-    largest stress. `accuracy` are the relative errors that rounding alone may cause, by cause (see
+    largest stress. `strain` and `rotation` (radians) are the largest of the last load factor.
+    `accuracy` are the relative errors that rounding alone may cause, by cause (see
     `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
@@ -150,6 +151,8 @@ class Solution:
     plan: list[Line]
     matrix_entries: int = 0
     linear_iterations: int = 0
+    strain: float = float("nan")
+    rotation: float = float("nan")
     accuracy: dict[str, float] = field(default_factory=dict)
     mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)

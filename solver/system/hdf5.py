@@ -50,7 +50,7 @@ def _refuse_foreign(file: h5py.File, path: str | Path) -> None:
     level, seen = [file.id], set()
     for _ in range(_DEEPEST):
         below = []
-        for group, name in ((group, name) for group in level for name in group):
+        for group, name in [(each, name) for each in level for name in each]:
             kind = group.links.get_info(name).type
             item = h5o.open(group, name) if kind == h5l.TYPE_HARD else None
             # What a soft link names is met by itself.

@@ -30,7 +30,8 @@ import h5py
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.mesh.catalogue import cell_type
 from solver.mesh.files.vtkhdf import check_name, read_grid, write_grid
 from solver.simulation.consistency import inconsistency
@@ -43,10 +44,10 @@ from solver.simulation.solution import (
     ZoneResult,
 )
 from solver.system.errors import InputError
-from solver.system.files import is_sealed, replacing, seal
+from solver.system.files import replacing, seal, seal_of
 from solver.system.hdf5 import column, new_file, read_file, read_table, write_table
-from solver.verification.checks import CheckResult
 from solver.verification.units import label_fields
+from solver.verification.verdict import CheckResult
 
 GRID = "VTKHDF"
 _SCALARS = (
@@ -83,10 +84,11 @@ _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 @dataclass
 class Result:
-    """What a result file gives back: the solution, and where it came from."""
+    """What a result file gives back: the solution, where it came from, and the file's hash."""
 
     solution: Solution
     provenance: dict[str, Any]
+    sha256: str
 
 
 def write_result(
@@ -94,13 +96,13 @@ def write_result(
     solution: Solution,
     checks: Iterable[CheckResult],
     provenance: Mapping[str, Any],
-) -> None:
-    """Write a solution, its checks and its provenance to a `.vtkhdf` file."""
+) -> str:
+    """Write a solution, its checks and its provenance to a `.vtkhdf` file; the file's hash."""
     check_name(Path(path))
     with replacing(path) as temporary:
         with new_file(temporary) as file:
             _write(file, solution, checks, provenance)
-        seal(temporary)
+        return seal(temporary)
 
 
 def _write(
@@ -112,6 +114,7 @@ def _write(
     _write_grid(file.create_group(GRID), solution)
     _write_case(file.create_group("case"), solution)
     file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
+    file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
@@ -132,12 +135,12 @@ def _write(
 
 def read_result(path: str | Path) -> Result:
     """Read a result file back; `InputError` for a file that is none, or not as it was written."""
-    if not is_sealed(path):
+    if not (sha256 := seal_of(path)):
         raise _no_result(path, "damaged, of another version, or none at all")
     try:
         with read_file(path) as file:
             file.visititems(_refuse_complex)
-            result = Result(_read_solution(file), _plain(file["provenance"].attrs))
+            result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)
     except InputError:
         raise
@@ -187,6 +190,8 @@ def _read_solution(file: h5py.File) -> Solution:
         balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=_read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
+        strain=float(file["solve"].attrs.get("strain", np.nan)),
+        rotation=float(file["solve"].attrs.get("rotation", np.nan)),
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},

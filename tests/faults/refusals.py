@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-_RAISED = {"InputError", "MachineError", "SolveError", "error", "_error", "_no_result"}
+_RAISED = {
+    "InputError",
+    "FieldError",
+    "MachineError",
+    "SolveError",
+    "error",
+    "_error",
+    "_no_result",
+}
 
 HEAD = """\
 # Refusals

@@ -21,10 +21,8 @@ def size_of(file, refine):
 
 def memory(file, attempt, refine=1):
     """Megabytes that a job of this case asks for, more each time it has to be run again."""
-    from solver.system.memory import needed
-
     size = size_of(file, refine)
-    return attempt * round(AROUND_MB + needed(size.points, size.dim).most / 1e6)
+    return attempt * round(AROUND_MB + size.memory.most / 1e6)
 
 
 def minutes(file, attempt, refine=1):

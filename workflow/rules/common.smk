@@ -94,7 +94,10 @@ def stamp_of(file):
     return f"{about.st_size} {about.st_mtime_ns} {os.access(file, os.R_OK)}"
 
 
-OF_REPORT = sources("report/**/*.py", "report/templates/*")
+OF_REPORT = sources(
+    *("report/**/*.py", "report/templates/*", "studies/**/*.jinja"),
+    *(f"studies/**/{page}.py" for page in ("page", "figure", "records")),
+)
 OF_SOLVER = sorted({*sources("**/*.py", "case/schemas/*")} - {*OF_REPORT})
 OF_MESH = sources(
     *("case/**/*.py", "case/schemas/*", "system/errors.py", "system/files.py"),
@@ -187,13 +190,13 @@ def older(file, time):
     return not Path(file).is_file() or Path(file).stat().st_mtime < time
 
 
-def measured_points(read, model, file, size, folder):
+def measured_points(read, file, size, folder):
     """The points by name that a file describes; says how long those that are missing will take.
 
-    `read` the file at its `size`; `model` has the seconds of each point, `folder` its record.
+    `read` the file at its `size`; `folder` has the records.
     """
     from solver.system.errors import InputError
-    from solver.studies.work_precision.expected import announcement
+    from solver.studies.points import announcement
 
     try:
         content = read(Path(file), size)
@@ -202,7 +205,7 @@ def measured_points(read, model, file, size, folder):
     newest = max(Path(source).stat().st_mtime for source in [file, *SOLVER_SOURCES])
     points = {point.name: point for point in content.points}
     pending = [name for name in points if older(f"{folder}/{name}.json", newest)]
-    logger.info(announcement(content, model(content), Path(folder), pending))
+    logger.info(announcement(content, Path(folder), pending))
     return points
 
 

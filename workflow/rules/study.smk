@@ -10,9 +10,8 @@ MEASURING_SOURCES = [STUDY_FILE, *SOLVER_SOURCES]
 @cache
 def study():
     from solver.studies.work_precision.description import read_study
-    from solver.studies.work_precision.expected import model
 
-    return measured_points(read_study, model, STUDY_FILE, SIZE, POINTS)
+    return measured_points(read_study, STUDY_FILE, SIZE, POINTS)
 
 
 def reference_of(w):

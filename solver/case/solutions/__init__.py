@@ -14,8 +14,7 @@ from dataclasses import MISSING, dataclass, fields
 from math import inf
 from typing import Any
 
-from solver.case.reader import Material
-from solver.case.schemas import hint
+from solver.case.material import Material
 from solver.case.solutions.base import (
     ERRORS,
     ElasticSolution,
@@ -26,8 +25,11 @@ from solver.case.solutions.base import (
 from solver.case.solutions.hertz import HertzApproach, HertzCylinder, HertzSphere
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.nested import NestedCylinders, NestedSpheres
+from solver.case.solutions.oval import OvalCylinders
+from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
-from solver.system.errors import InputError
+from solver.case.solutions.waves import Waves2d, Waves3d
+from solver.system.errors import InputError, hint
 
 __all__ = [
     "ERRORS",
@@ -45,11 +47,16 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     Hydrostatic,
     NestedCylinders,
     NestedSpheres,
+    OvalCylinders,
     Parabola2d,
     Paraboloid3d,
     HertzCylinder,
     HertzSphere,
     HertzApproach,
+    Waves2d,
+    Waves3d,
+    PolynomialPressure2d,
+    PolynomialPressure3d,
 )
 SOLUTIONS: dict[str, type[ExactSolution]] = {c.name: c for c in _CLASSES}
 _ALL, _RIGID = "all", "rigid"

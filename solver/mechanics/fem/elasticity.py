@@ -178,6 +178,33 @@ def cancellation(
     return force, highest, slender
 
 
+def largest_strain(
+    points: np.ndarray, blocks: list[Block], displacement: np.ndarray
+) -> tuple[float, float]:
+    """The largest principal strain, by size, and rotation (radians) in the middle of the cells.
+
+    Of a displacement (n_nodes, dim). Both are small where linear elasticity holds.
+    """
+    strain = rotation = 0.0
+    for block in blocks:
+        reference, weights = block.rule
+        middle = (weights @ reference / weights.sum())[None]
+        for part in _chunks(block, points.shape[1]):
+            cells = block.cells[part]
+            gradient, _ = physical_gradients(points, cells, block.type, middle)
+            nodal = displacement[cells] - displacement[cells[:, :1]]
+            slope = np.einsum("cai,caj->cij", nodal, gradient[:, 0])
+            turned = np.swapaxes(slope, 1, 2)
+            size = np.linalg.norm(slope + turned, axis=(1, 2))
+            # The largest principal value is at least this share of the norm.
+            near = size >= size.max() / np.sqrt(points.shape[1])
+            principal = np.linalg.eigvalsh((slope + turned)[near]) / 2
+            strain = max(strain, float(np.abs(principal).max()))
+            angle = np.linalg.norm(slope - turned, axis=(1, 2)) / np.sqrt(8)
+            rotation = max(rotation, float(angle.max()))
+    return strain, rotation
+
+
 def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
     """The sizes of the gradients of the shape functions (n, n_nodes) in the middle of each cell."""
     found = []

@@ -10,6 +10,8 @@ from solver.system.errors import InputError
 
 # Directions (unit vectors) whose part outside the others is smaller depend on them.
 _DEPENDENT = 1e-8
+SAME = 1e-9
+"""Displacements that differ by less than this share of the largest are the same."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed], where: object) -
         length = np.linalg.norm(rest, axis=1)
         missing = values[now] - np.einsum("nd,nd->n", direction, offset[node])
         new = length > _DEPENDENT
-        clash = ~new & (np.abs(missing) > 1e-9 * largest)
+        clash = ~new & (np.abs(missing) > SAME * largest)
         if clash.any():
             first = np.flatnonzero(clash)[0]
             key = fixed[source[now][first]].key

@@ -14,26 +14,25 @@
           - {title: rslab, solver: rslab}            # the linear solver
           - {title: without MKL, free: true}         # free software alone
           - {title: not cut, treatment: uncut}       # of the interface
-          - {title: no cures, cures: false}          # see `solver.simulation.cures`
-          - {title: nothing left out, everything: true}   # see `solver.simulation.skips`
+          - {title: no cures, cures: false}          # see `solver.simulation.options`
+          - {title: nothing left out, everything: true}   # see `solver.simulation.options`
           - {title: CalculiX, program: calculix}     # another code
-    growth: [{series: hexa8, sizes: [1.0e+5, 3.0e+5]}]
     batch: {title: …, most: 2, cases: [case.yaml]}   # in one warm process, and one by one
-    quick: {size: 1000}           # of every mesh, for a first look; growth from half of it
+    quick: {size: 1000}           # of every mesh, for a first look
 
 `most` is the number of seconds that all cases of the batch together should not exceed.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from solver.case.descriptions import file_beside, refuse_unknown
 from solver.case.schemas import BENCHMARK_SCHEMA
 from solver.case.yaml import read_mapping
-from solver.studies.scaling import QUICK
-from solver.studies.scaling.description import Point, Scaling, Series, read_scaling
+from solver.studies import QUICK
+from solver.studies.scaling.description import ScalingPoint, read_scaling
 
 
 @dataclass(frozen=True)
@@ -50,17 +49,17 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class WayComparison:
     """One mesh, solved in several ways."""
 
     title: str
-    point: Point
+    point: ScalingPoint
     repetitions: int
     ways: tuple[Way, ...]
 
 
 @dataclass(frozen=True)
-class Batch:
+class WarmBatch:
     """Cases solved in one process and in one each; `most` seconds are the goal."""
 
     title: str
@@ -70,55 +69,41 @@ class Batch:
 
 @dataclass(frozen=True)
 class Benchmark:
-    """All of it. `growth`: series, their sizes those to be measured."""
+    """All of it."""
 
     path: Path
     title: str
     threads: int
     limit: float
-    scaling: Scaling
-    comparisons: tuple[Comparison, ...]
-    growth: tuple[Series, ...]
-    batch: Batch
+    comparisons: tuple[WayComparison, ...]
+    batch: WarmBatch
 
 
 def read_benchmark(path: Path, size: str) -> Benchmark:
     """The benchmark in a file, or its quick version; InputError says what is refused."""
     content = read_mapping(path, BENCHMARK_SCHEMA)
-    scaling = read_scaling(path.parent / content["scaling"])
     small = int(content["quick"]["size"]) if size == QUICK else None
-    known = {series.name: series for series in scaling.series}
-
-    def find(item: Mapping[str, Any], key: str, sizes: Sequence[int]) -> Series:
-        refuse_unknown(path, f"{key}.series", item["series"], "series", known)
-        return replace(known[item["series"]], sizes=tuple(sizes))
-
+    known = {
+        series.name: series for series in read_scaling(path.parent / content["scaling"]).series
+    }
     comparisons = []
     for i, item in enumerate(content["comparisons"]):
-        unknowns = small or int(item["size"])
-        point = Point(find(item, f"comparisons[{i}]", [unknowns]), unknowns)
+        refuse_unknown(path, f"comparisons[{i}].series", item["series"], "series", known)
+        point = ScalingPoint(known[item["series"]], small or int(item["size"]))
         ways = tuple(Way(**way) for way in item["ways"])
-        comparisons.append(Comparison(item["title"], point, item["repetitions"], ways))
-    growth = [
-        find(
-            item, f"growth[{i}]", [small // 2, small] if small else sorted(map(int, item["sizes"]))
-        )
-        for i, item in enumerate(content["growth"])
-    ]
+        comparisons.append(WayComparison(item["title"], point, item["repetitions"], ways))
     return Benchmark(
         path=path,
         title=content["title"],
         threads=content["threads"],
         limit=float(content["limit"]),
-        scaling=replace(scaling, threads=content["threads"], limit=float(content["limit"])),
         comparisons=tuple(comparisons),
-        growth=tuple(growth),
         batch=_batch(path, content["batch"]),
     )
 
 
-def _batch(path: Path, item: Mapping[str, Any]) -> Batch:
+def _batch(path: Path, item: Mapping[str, Any]) -> WarmBatch:
     cases = tuple(
         file_beside(path, f"batch.cases[{i}]", case) for i, case in enumerate(item["cases"])
     )
-    return Batch(item["title"], float(item["most"]), cases)
+    return WarmBatch(item["title"], float(item["most"]), cases)

@@ -28,7 +28,7 @@ _LEFT = "12.5 * (1 + (1 - x) / sqrt((1 - x)**2))"  # 25 where x < 1, else 0
 
 
 @dataclass(frozen=True)
-class Profile:
+class PressureProfile:
     """Contact pressure over 25 along the interface: `place` and `pressure`, a value a face.
 
     `cut`: with the cut, or as meshed where the cells need none.
@@ -46,7 +46,9 @@ class Profile:
         return float(np.abs(np.diff(self.pressure, 2)).max())
 
 
-def profiles(faces: int = FACES, log: Callable[[str], Any] = lambda _: None) -> list[Profile]:
+def profiles(
+    faces: int = FACES, log: Callable[[str], Any] = lambda _: None
+) -> list[PressureProfile]:
     """All cells, cut and uncut, bilateral and opening, on so many slave faces."""
     found = []
     for cells, has_cut in CELLS.items():
@@ -58,7 +60,7 @@ def profiles(faces: int = FACES, log: Callable[[str], Any] = lambda _: None) -> 
     return found
 
 
-def profile_pair(cells: str, cut: bool, faces: int = FACES) -> list[Profile]:
+def profile_pair(cells: str, cut: bool, faces: int = FACES) -> list[PressureProfile]:
     """The profiles of one kind of cells, bilateral and opening."""
     master = faces // COARSER
     recipe = {
@@ -77,7 +79,7 @@ def profile_pair(cells: str, cut: bool, faces: int = FACES) -> list[Profile]:
     for bilateral in (True, False):
         pressure = problem.solve(1.0, bilateral=bilateral).pressure / PRESSURE
         along = place[order].tolist(), pressure[order].tolist()
-        found.append(Profile(cells, cut, bilateral, *along))
+        found.append(PressureProfile(cells, cut, bilateral, *along))
     return found
 
 

@@ -28,8 +28,6 @@ from solver.case.schemas import LADDERS_SCHEMA
 from solver.case.yaml import read_mapping
 from solver.simulation.solution import job_name
 
-FILE_NAME = "orders.yaml"
-
 
 @dataclass(frozen=True)
 class Ladder:
@@ -63,11 +61,11 @@ class ReferenceCode:
 
 
 @dataclass(frozen=True)
-class Family:
+class LadderFamily:
     """The ladders of a family.
 
     `least` and `theory` go by degree ("linear", "quadratic") and error; `theory` holds only what
-    differs from `orders.THEORY`. `shortfalls` says why slopes stay below theory. Where `title` or
+    differs from `theory.THEORY`. `shortfalls` says why slopes stay below theory. Where `title` or
     `description` is empty, `family.yaml` has it.
     """
 
@@ -86,10 +84,10 @@ class Family:
         return self.folder.name
 
 
-def read_ladders(path: Path) -> Family:
+def read_ladders(path: Path) -> LadderFamily:
     """The ladders in a file; `InputError` says what is refused, and what is allowed."""
     content = read_mapping(path, LADDERS_SCHEMA)
-    return Family(
+    return LadderFamily(
         folder=path.resolve().parent,
         title=content.get("title", ""),
         description=content.get("description", ""),

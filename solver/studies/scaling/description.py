@@ -23,35 +23,29 @@ A goal's `what` is `cpu` or `wall` (seconds of the whole process, from mesh file
 solve`. A point is one series and size; its name is the path of its record: `hexa8/10000`.
 """
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import prod
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from solver.case.descriptions import file_beside, point_of, refuse_twins, refuse_unknown
-from solver.case.reader import Case, parse_case
+from solver.case.descriptions import file_beside, refuse_twins, refuse_unknown
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.case.schemas import SCALING_SCHEMA
 from solver.case.yaml import read_mapping
 from solver.mesh.catalogue import BY_NAME
-from solver.studies.scaling import FULL, QUICK
+from solver.mesh.size import Size, of_bodies, of_body
+from solver.studies import FULL, QUICK
+from solver.studies.points import PointStudy
 
 GROWTH = "growth of "
-# Nodes of an unstructured block for each product of its divisions, and of those of a side: as
-# counted, within a tenth.
-_SIMPLICES = {
-    "TRIA3": (1.155, 2.4),
-    "TRIA6": (4.62, 5.0),
-    "TETRA4": (0.674, 4.8),
-    "TETRA10": (5.0, 26.0),
-}
+_START = 5.0  # seconds: three interpreters, libraries loaded, small mesh
 
 
 @dataclass(frozen=True)
-class Series:
+class SizeSeries:
     """One mesh of two blocks at all sizes; `divisions` the proportion of slave and master."""
 
     name: str
@@ -75,10 +69,10 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Point:
+class ScalingPoint:
     """One series at one size (unknowns that the mesh has at least)."""
 
-    series: Series
+    series: SizeSeries
     size: int
 
     @property
@@ -91,9 +85,22 @@ class Point:
         """The divisions of slave and master: the coarsest mesh that has the unknowns."""
         for finer in range(1, self.size + 1):
             found = self._divisions(finer)
-            if unknowns(self.series.cells, found) >= self.size:
+            if self._mesh(found).unknowns >= self.size:
                 return found
         raise AssertionError("every mesh has more unknowns than divisions")
+
+    def _mesh(self, divisions: Sequence[Sequence[int]]) -> Size:
+        return of_bodies([of_body(self.series.cells, block) for block in divisions])
+
+    @property
+    def mesh(self) -> Size:
+        """The size of the point's mesh."""
+        return self._mesh(self.divisions)
+
+    @property
+    def seconds(self) -> float:
+        """About how long the point takes."""
+        return _START + self.mesh.seconds
 
     def _divisions(self, finer: int) -> tuple[list[int], list[int]]:
         proportion, dim = self.series.divisions, self.series.dim
@@ -114,27 +121,11 @@ class Point:
             mesh["size"] = [width] * (self.series.dim - 1) + [thickness]
             solution = {**template["reference"]["solution"], "base": -thickness}
             content["reference"] = {**template["reference"], "solution": solution}
-        return yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
+        return json.dumps(content, indent=1)
 
     def parsed(self, path: Path) -> Case:
         """The point's case, as of a case file at `path`."""
         return parse_case(self.source(), path)
-
-
-def unknowns(cells: str, divisions: Sequence[Sequence[int]]) -> float:
-    """Unknowns of blocks of so many divisions each: of grids as counted, else about."""
-    kind = BY_NAME[cells]
-    return kind.dim * sum(_nodes(cells, block) for block in divisions)
-
-
-def _nodes(cells: str, divisions: Sequence[int]) -> float:
-    vertices = prod(n + 1 for n in divisions)
-    if cells in ("QUAD4", "HEXA8"):
-        return vertices
-    if cells in ("QUAD8", "HEXA20"):
-        return vertices + sum(n * vertices / (n + 1) for n in divisions)
-    inside, outside = _SIMPLICES[cells]
-    return inside * prod(divisions) + outside * prod(divisions[:-1])
 
 
 @dataclass(frozen=True)
@@ -150,27 +141,18 @@ class Goal:
     others: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Scaling:
+@dataclass(frozen=True, kw_only=True)
+class Scaling(PointStudy):
     """All of it."""
 
-    path: Path
-    title: str
-    size: str
-    threads: int
-    limit: float
-    series: tuple[Series, ...]
+    series: tuple[SizeSeries, ...]
     goals: tuple[Goal, ...]
 
     @cached_property
-    def points(self) -> tuple[Point, ...]:
-        """Every point, the small ones of all series first: a run that is broken off tells most."""
-        every = [Point(series, size) for series in self.series for size in series.sizes]
+    def points(self) -> tuple[ScalingPoint, ...]:
+        """Every point, small ones of all series first: a run that is interrupted shows most."""
+        every = [ScalingPoint(series, size) for series in self.series for size in series.sizes]
         return tuple(sorted(every, key=lambda point: point.size))
-
-    def point(self, name: str) -> Point:
-        """The point of that name; InputError where there is none."""
-        return point_of(self.path, self.points, name)
 
 
 def read_scaling(path: Path, size: str = FULL) -> Scaling:
@@ -192,10 +174,10 @@ def read_scaling(path: Path, size: str = FULL) -> Scaling:
     )
 
 
-def _series(path: Path, index: int, item: Mapping[str, Any], fit: Sequence[float]) -> Series:
+def _series(path: Path, index: int, item: Mapping[str, Any], fit: Sequence[float]) -> SizeSeries:
     slave, master = item["divisions"]
     low, high = item.get("fit", fit)
-    return Series(
+    return SizeSeries(
         name=item["name"],
         title=item["title"],
         case=file_beside(path, f"series[{index}].case", item["case"]),
@@ -207,7 +189,9 @@ def _series(path: Path, index: int, item: Mapping[str, Any], fit: Sequence[float
     )
 
 
-def _quick(path: Path, quick: Mapping[str, Any], series: Sequence[Series]) -> Iterator[Series]:
+def _quick(
+    path: Path, quick: Mapping[str, Any], series: Sequence[SizeSeries]
+) -> Iterator[SizeSeries]:
     """The small sizes of some series."""
     known = {one.name: one for one in series}
     for i, name in enumerate(quick["series"]):

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 import meshio
 import numpy as np
 
-from solver.case.reader import Case
+from solver.case.model import Case
 from solver.mechanics.fem.elasticity import internal_force, nodal_stress
 from solver.mesh import transform
 from solver.simulation.problem import ContactProblem

@@ -27,7 +27,8 @@ import numpy as np
 
 from solver.case.descriptions import file_beside
 from solver.case.expressions import Expression
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.case.schemas import SWEEP_SCHEMA
 from solver.case.yaml import read_mapping
 from solver.system.errors import InputError
@@ -37,7 +38,7 @@ Value = float | list[float]
 
 
 @dataclass(frozen=True)
-class Series:
+class SweepSeries:
     """The points of a sweep on one mesh in one direction."""
 
     mesh: str
@@ -62,7 +63,7 @@ class Sweep:
     values: tuple[Value, ...]
     labels: tuple[str, ...]
     beyond: tuple[Value, ...]
-    series: tuple[Series, ...]
+    series: tuple[SweepSeries, ...]
     cases: Mapping[str, Mapping[str, Any]]
     changes: Mapping[str, Mapping[str, Any]]
 
@@ -100,7 +101,7 @@ def read_sweep(path: Path, quick: bool = False) -> Sweep:
         labels=tuple(shown[str(value)] for value in chosen),
         beyond=tuple(content.get("beyond", [])),
         series=tuple(
-            Series(mesh, swapped)
+            SweepSeries(mesh, swapped)
             for mesh in content["meshes"]
             for swapped in directions[content.get("directions", "first")]
         ),

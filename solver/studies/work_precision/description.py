@@ -27,36 +27,30 @@ A point is one problem, pair, treatment, level and linear solver. Its name is th
 file: `patch-2d/tria3-quad4/lac/4`, `patch-2d/tria3-quad4/lac+cholmod/4`.
 """
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from solver.case.descriptions import file_beside, point_of, refuse_twins, refuse_unknown
-from solver.case.reader import Case, parse_case
+from solver.case.descriptions import file_beside, refuse_twins, refuse_unknown
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.case.schemas import STUDY_SCHEMA
 from solver.case.yaml import read_mapping
 from solver.mesh.catalogue import BY_NAME
-from solver.studies.work_precision import FULL, QUICK
+from solver.mesh.size import Size, of_bodies, of_body
+from solver.studies import FULL, QUICK
+from solver.studies.points import PointStudy
 from solver.system.errors import InputError
 
-FILE_NAME = "study.yaml"
 AUTO = "auto"
-
-
-class _Plain(yaml.SafeDumper):
-    """Writes out what occurs twice: case files have no aliases."""
-
-    def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002 -- PyYAML asks for it
-        """Always."""
-        return True
+_START = 1.5  # seconds: libraries loaded, mesh made, record written
 
 
 @dataclass(frozen=True)
-class Treatment:
+class StudyTreatment:
     """A way to treat the interface; `slaves` are the only slave cells that it is for, if any."""
 
     name: str
@@ -106,15 +100,27 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Point:
+class StudyPoint:
     """What one measurement is of."""
 
     problem: Problem
     slave: str
     master: str
-    treatment: Treatment
+    treatment: StudyTreatment
     level: int
+    repetitions: int
     linear_solver: str = AUTO
+
+    @property
+    def mesh(self) -> Size:
+        """About the size of its mesh."""
+        pairs = zip((self.slave, self.master), self.problem.divisions, strict=True)
+        return of_bodies([of_body(cells, divisions, self.level) for cells, divisions in pairs])
+
+    @property
+    def seconds(self) -> float:
+        """About how long the point takes."""
+        return _START + (1 + self.repetitions) * self.mesh.seconds
 
     @property
     def pair(self) -> str:
@@ -147,25 +153,20 @@ class Point:
             "mesh": mesh,
             "contact": [zone | self.treatment.zone for zone in template["contact"]],
         }
-        return parse_case(yaml.dump(content, Dumper=_Plain), self.problem.case)
+        return parse_case(json.dumps(content), self.problem.case)
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, kw_only=True)
+class Study(PointStudy):
     """All of it. `varied`: (problem, slave, master, treatment, linear solver) beside `auto`."""
 
-    path: Path
-    title: str
-    size: str
-    threads: int
     repetitions: int
-    limit: float
-    treatments: tuple[Treatment, ...]
+    treatments: tuple[StudyTreatment, ...]
     problems: tuple[Problem, ...]
     varied: tuple[tuple[str, str, str, str, str], ...] = ()
 
     @cached_property
-    def points(self) -> tuple[Point, ...]:
+    def points(self) -> tuple[StudyPoint, ...]:
         """Every point, level by level within each curve."""
         curves = [
             (problem, slave, master, treatment, AUTO)
@@ -177,19 +178,17 @@ class Study:
         problems, treatments = _by_name(self.problems), _by_name(self.treatments)
         curves += [(problems[p], s, m, treatments[t], solver) for p, s, m, t, solver in self.varied]
         return tuple(
-            Point(p, s, m, t, k, solver) for p, s, m, t, solver in curves for k in p.levels
+            StudyPoint(p, s, m, t, k, self.repetitions, solver)
+            for p, s, m, t, solver in curves
+            for k in p.levels
         )
-
-    def point(self, name: str) -> Point:
-        """The point of that name; InputError where there is none."""
-        return point_of(self.path, self.points, name)
 
 
 def read_study(path: Path, size: str = FULL) -> Study:
     """The study in a file, or its quick part; InputError says what is refused, what allowed."""
     content = read_mapping(path, STUDY_SCHEMA)
     treatments = tuple(
-        Treatment(t["name"], t["title"], t["zone"], tuple(t.get("slaves", ())))
+        StudyTreatment(t["name"], t["title"], t["zone"], tuple(t.get("slaves", ())))
         for t in content["treatments"]
     )
     problems = tuple(_problem(path, i, p) for i, p in enumerate(content["problems"]))
@@ -235,7 +234,7 @@ def _varied(
     path: Path,
     content: Mapping[str, Any],
     problems: Sequence[Problem],
-    treatments: Sequence[Treatment],
+    treatments: Sequence[StudyTreatment],
 ) -> Iterable[tuple[str, str, str, str, str]]:
     """The curves whose linear solver is chosen; refuses one whose problem or treatment is not."""
     known = {"problem": _by_name(problems), "treatment": _by_name(treatments)}

@@ -9,7 +9,7 @@ import pytest
 from solver.mechanics.fem.faces import boundary_faces, volume_cells
 from solver.mesh import generate, read_mesh
 from solver.studies.benchmark import calculix
-from solver.studies.scaling.description import Point, Series
+from solver.studies.scaling.description import ScalingPoint, SizeSeries
 from solver.system.errors import SolveError
 from solver.system.process import cores_for
 
@@ -29,7 +29,9 @@ TABLE = """
 def small(cells):
     """Two blocks of few cells: the case and its mesh."""
     template = ROOT / "cases/scaling/templates/space.yaml"
-    point = Point(Series("few", cells, template, cells, (3, 2), False, (200,), (100, 1000)), 200)
+    point = ScalingPoint(
+        SizeSeries("few", cells, template, cells, (3, 2), False, (200,), (100, 1000)), 200
+    )
     case = point.parsed(Path("few.yaml"))
     return case, generate(case.mesh, "few")
 

@@ -7,7 +7,8 @@ import pytest
 from solver.case.reader import parse_case
 from solver.simulation.scene import build_scene
 from solver.studies.infsup.constant import inf_sup_constant
-from solver.studies.infsup.description import Ladder, run
+from solver.studies.infsup.description import InfSupLadder
+from solver.studies.infsup.point import run
 from solver.system.clock import Clock
 from tests.scenes import block_case, block_mesh
 
@@ -99,7 +100,7 @@ def test_the_other_stable_treatments_level_off_too(treatment, coarser):
 )
 def test_simplices_prisms_and_pyramids_level_off_with_the_cut_alone(cells, contact, levels):
     cut, uncut = (
-        run(Ladder(cells, cut, True, 2, contact, levels=levels), lambda _: None)
+        run(InfSupLadder(cells, cut, True, 2, contact, levels=levels), lambda _: None)
         for cut in (True, False)
     )
     assert cut.levels_off
