@@ -137,11 +137,12 @@ def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray
 
 
 def _never_closing(true: Wrapped) -> Wrapped:
-    def eligible(problem: Any, scene: Any) -> None:
-        true(problem, scene)
-        problem.eligible[len(problem.eligible) // 2] = False
+    def constraints(scene: Any) -> Any:
+        found = true(scene)
+        found.eligible[len(found.eligible) // 2] = False
+        return found
 
-    return eligible
+    return constraints
 
 
 def _first_system_kept(true: Wrapped) -> Wrapped:
@@ -161,20 +162,18 @@ def _factor_of_half(true: Wrapped) -> Wrapped:
 
 
 def _never_closes(true: Wrapped) -> Wrapped:
-    return lambda solve, start, eligible, *scales, **more: true(
-        solve, start, eligible & False, *scales, **more
-    )
+    return lambda solve, start, eligible, *more: true(solve, start, eligible & False, *more)
 
 
 def _stays_closed(true: Wrapped) -> Wrapped:
     """Tension is borne."""
 
-    def status(solve: Any, start: Any, eligible: Any, *scales: float, **more: bool) -> Any:
-        def no_tension_seen(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            pressure, gap = solve(closed)
-            return np.abs(pressure), gap
+    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
+        def no_tension_seen(closed: np.ndarray) -> Any:
+            trial = solve(closed)
+            return replace(trial, pressure=np.abs(trial.pressure))
 
-        return true(no_tension_seen, eligible, eligible, *scales, **more)
+        return true(no_tension_seen, eligible, eligible, *more)
 
     return status
 
@@ -227,7 +226,7 @@ MUTANTS = (
     Mutant("pair-lost", "one master face is overlooked when faces are paired", PLANE,
            "solver.mechanics.mortar.segments:candidate_pairs", changed(_master_overlooked)),
     Mutant("macro-element-dropped", "one macro-element may never close", PLANE,
-           "solver.simulation.problem:ContactProblem.__init__", _never_closing),
+           "solver.simulation.problem:contact_constraints", _never_closing),
     Mutant("macro-element-numbers", "sub-faces go to the next macro-element", VARYING,
            "solver.simulation.scene:cut", changed(_rolled_sub_faces)),
     Mutant("template-off-by-one", "the cut's first sub-face takes its nodes one further on", PLANE,
@@ -274,7 +273,8 @@ MUTANTS = (
     Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,
            "solver.mechanics.linear.condensation:prepare", _factor_of_half),
     Mutant("multiplier-sign", "the multiplier balances the wrong way", PLANE,
-           "solver.mechanics.linear.condensation:Condensed.multiplier", changed(lambda p: -p)),
+           "solver.mechanics.linear.condensation:CondensedSystem.multiplier",
+           changed(lambda p: -p)),
     Mutant("never-closes", "the contact status finds nothing to close", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
