@@ -24,34 +24,73 @@
 `most` is the number of seconds that all cases of the batch together should not exceed.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
-from solver.case.descriptions import file_beside, refuse_unknown
-from solver.case.schemas import BENCHMARK_SCHEMA
+from msgspec import Meta, structs
+
+from solver.case.typed import ONCE, FieldError, Section, Text, read_as
 from solver.case.yaml import read_mapping
 from solver.studies import QUICK
-from solver.studies.scaling.description import (
-    Scaling,
-    ScalingPoint,
-    SizeSeries,
-    read_scaling,
-)
+from solver.studies.keys import Count, Seconds, Unknowns
+from solver.studies.scaling.description import Scaling, ScalingPoint, SizeSeries, read_scaling
+from solver.system.errors import InputError, hint
 
 
-@dataclass(frozen=True)
-class Way:
+class Way(Section, frozen=True):
     """One way to solve; see the module's text."""
 
-    title: str
-    solver: str = "auto"
+    title: Text
+    solver: Literal["auto", "multigrid", "pardiso", "rslab", "cholmod", "superlu"] = "auto"
     free: bool = False
-    treatment: str = "lac"
+    treatment: Text = "lac"
     cures: bool = True
     everything: bool = False
-    program: str = ""
+    program: Literal["", "calculix"] = ""
+
+
+class _Comparison(Section, frozen=True):
+    title: Text
+    series: Text
+    size: Unknowns
+    repetitions: Annotated[int, Meta(ge=0, le=100, description="a whole number, 0 to 100")]
+    ways: Annotated[tuple[Way, ...], Meta(min_length=1)]
+
+
+class _Growth(Section, frozen=True):
+    series: Text
+    sizes: Annotated[tuple[Unknowns, ...], ONCE]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.sizes) < 2:
+            raise FieldError(("sizes",), "must be a list of two sizes or more")
+
+
+class WarmBatch(Section, frozen=True):
+    """Cases solved in one process and in one each; `most` seconds are the goal."""
+
+    title: Text
+    most: Seconds
+    cases: Annotated[tuple[Path, ...], Meta(min_length=1)]
+
+
+class _Quick(Section, frozen=True):
+    size: Unknowns
+
+
+class BenchmarkFile(Section, frozen=True):
+    """The keys of `benchmark.yaml`."""
+
+    title: Text
+    threads: Count
+    limit: Seconds
+    scaling: Path
+    comparisons: tuple[_Comparison, ...]
+    growth: tuple[_Growth, ...]
+    batch: WarmBatch
+    quick: _Quick
 
 
 @dataclass(frozen=True)
@@ -62,15 +101,6 @@ class WayComparison:
     point: ScalingPoint
     repetitions: int
     ways: tuple[Way, ...]
-
-
-@dataclass(frozen=True)
-class WarmBatch:
-    """Cases solved in one process and in one each; `most` seconds are the goal."""
-
-    title: str
-    most: float
-    cases: tuple[Path, ...]
 
 
 @dataclass(frozen=True)
@@ -89,41 +119,32 @@ class Benchmark:
 
 def read_benchmark(path: Path, size: str) -> Benchmark:
     """The benchmark in a file, or its quick version; InputError says what is refused."""
-    content = read_mapping(path, BENCHMARK_SCHEMA)
-    scaling = read_scaling(path.parent / content["scaling"])
-    small = int(content["quick"]["size"]) if size == QUICK else None
+    content = read_as(BenchmarkFile, read_mapping(path), path)
+    scaling = read_scaling(content.scaling)
+    small = int(content.quick.size) if size == QUICK else None
     known = {series.name: series for series in scaling.series}
 
-    def find(item: Mapping[str, Any], key: str, sizes: Sequence[int]) -> SizeSeries:
-        refuse_unknown(path, f"{key}.series", item["series"], "series", known)
-        return replace(known[item["series"]], sizes=tuple(sizes))
+    def find(name: str, key: str, *sizes: float) -> SizeSeries:
+        if name not in known:
+            raise InputError(path, f"{key}.series", name, f"no such series; {hint(name, known)}")
+        return structs.replace(known[name], sizes=tuple(sorted(map(int, sizes))))
 
     comparisons = []
-    for i, item in enumerate(content["comparisons"]):
-        unknowns = small or int(item["size"])
-        point = ScalingPoint(find(item, f"comparisons[{i}]", [unknowns]), unknowns)
-        ways = tuple(Way(**way) for way in item["ways"])
-        comparisons.append(WayComparison(item["title"], point, item["repetitions"], ways))
+    for i, item in enumerate(content.comparisons):
+        unknowns = small or int(item.size)
+        point = ScalingPoint(find(item.series, f"comparisons[{i}]", unknowns), unknowns)
+        comparisons.append(WayComparison(item.title, point, item.repetitions, item.ways))
     growth = [
-        find(
-            item, f"growth[{i}]", [small // 2, small] if small else sorted(map(int, item["sizes"]))
-        )
-        for i, item in enumerate(content["growth"])
+        find(item.series, f"growth[{i}]", *([small // 2, small] if small else item.sizes))
+        for i, item in enumerate(content.growth)
     ]
     return Benchmark(
         path=path,
-        title=content["title"],
-        threads=content["threads"],
-        limit=float(content["limit"]),
-        scaling=replace(scaling, threads=content["threads"], limit=float(content["limit"])),
+        title=content.title,
+        threads=content.threads,
+        limit=content.limit,
+        scaling=replace(scaling, threads=content.threads, limit=content.limit),
         comparisons=tuple(comparisons),
         growth=tuple(growth),
-        batch=_batch(path, content["batch"]),
+        batch=content.batch,
     )
-
-
-def _batch(path: Path, item: Mapping[str, Any]) -> WarmBatch:
-    cases = tuple(
-        file_beside(path, f"batch.cases[{i}]", case) for i, case in enumerate(item["cases"])
-    )
-    return WarmBatch(item["title"], float(item["most"]), cases)

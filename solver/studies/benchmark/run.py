@@ -172,6 +172,6 @@ def _growth(place: Bench, benchmark: Benchmark) -> list[Record]:
     for series in benchmark.growth:
         for size in series.sizes:
             record = place.folder / "point.json"
-            measure_point(benchmark.scaling, ScalingPoint(series, size), record)
+            measure_point(benchmark.scaling, ScalingPoint(series, int(size)), record)
             found.append(json.loads(record.read_text(encoding="utf-8")))
     return found

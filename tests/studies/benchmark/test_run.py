@@ -88,7 +88,7 @@ def test_the_projects_own_is_valid_and_has_a_quick_version():
         ),
         (
             lambda c: c["growth"][0].update(series="quad5"),
-            r"growth\[0\].series .* there is no such",
+            r"growth\[0\].series .* no such",
         ),
         (lambda c: c["batch"].update(cases=["no.yaml"]), r"batch.cases\[0\] .* no such file"),
         (lambda c: c["comparisons"][0].update(repetitions=-1), "must be a whole number, 0 to 100"),
