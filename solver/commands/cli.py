@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from solver.commands import studies
 from solver.commands.options import add_command, add_threads, limit_threads
@@ -21,6 +21,7 @@ from solver.system.errors import InputError, SolveError, of_machine
 
 if TYPE_CHECKING:
     from solver.verification.run import Job
+    from solver.verification.verdict import CheckResult
 
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
@@ -171,7 +172,7 @@ def _solve(options: argparse.Namespace) -> int:
     job = replace(_job(options), memory_check=checked, everything=everything)
     with telling(options.verbose, options.quiet):
         verdict = solve(job, options.output, options.verdict, log)
-    return PASSED if verdict["passed"] else FAILED
+    return PASSED if verdict.sound else FAILED
 
 
 def _silent(line: str) -> None:
@@ -179,32 +180,32 @@ def _silent(line: str) -> None:
 
 
 def _crashed(options: argparse.Namespace) -> int:
-    from solver.verification.run import record_crash, summary
+    from solver.verification.run import record_crash
 
-    print(summary(record_crash(_job(options), options.verdict, options.log, options.status)))
+    print(record_crash(_job(options), options.verdict, options.log, options.status).summary)
     return PASSED
 
 
 def _check(options: argparse.Namespace) -> int:
-    from solver.verification.run import check, summary
+    from solver.verification.run import check
     from solver.verification.verdict import to_json
 
     verdicts = [check(result) for result in options.results]
     if options.json:
-        print(to_json(verdicts))
+        print(to_json([verdict.plain() for verdict in verdicts]))
     else:
         for verdict in verdicts:
-            print(summary(verdict))
-            for row in verdict["checks"]:
+            print(verdict.summary)
+            for row in verdict.checks:
                 print("  " + _row(row))
-    return PASSED if all(verdict["passed"] for verdict in verdicts) else FAILED
+    return PASSED if all(verdict.sound for verdict in verdicts) else FAILED
 
 
-def _row(check: dict[str, Any]) -> str:
-    name = f"{check['name']} {check['zone'] or ''}"
-    extremes = f"{check['minimum']:.10g} … {check['maximum']:.10g}"
-    error = f"error {check['error']:.1e} (allowed {check['tolerance']:.0e})"
-    return f"{'ok' if check['passed'] else 'FAILED':<7}{name:<40}{extremes:<36}{error}"
+def _row(check: "CheckResult") -> str:
+    extremes = f"{check.minimum:.10g} … {check.maximum:.10g}"
+    error = f"error {check.error:.1e} (allowed {check.tolerance:.0e})"
+    word = "ok" if check.passed else "FAILED"
+    return f"{word:<7}{check.name + ' ' + (check.zone or ''):<40}{extremes:<36}{error}"
 
 
 def _verdicts(options: argparse.Namespace) -> list[Path]:

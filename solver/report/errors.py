@@ -29,7 +29,7 @@ def floor(rows: Sequence[Row]) -> tuple[float, float]:
 
 
 def _unknowns(rows: Sequence[Row]) -> int:
-    return max((row.dofs or 1 for row in rows), default=1)
+    return max((row.verdict.dofs or 1 for row in rows), default=1)
 
 
 def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Markup:
@@ -68,9 +68,9 @@ def _mark(drawing: Drawing, row: Row, point: np.ndarray) -> None:
         f"{row.name}: {formats.error(error)} ({check}), {formats.seconds(row.total)}, {row.word}; "
         f"{stages.told(row.stages)}"
     )
-    color = COLORS.get(row.reference_kind, INK)
+    color = COLORS.get(row.verdict.reference_kind or "", INK)
     drawing.open_link(f"#{quote(row.anchor)}", tip)
-    if row.word == "passed":
+    if row.sound:
         drawing.circles(point[None], 4, fill=color, fill_opacity=0.55, stroke=color)
     else:
         drawing.crosses(point[None], 5, stroke=RED, stroke_width=2.2)
@@ -86,7 +86,7 @@ def _labels(drawing: Drawing, rows: Sequence[Row], at: np.ndarray) -> None:
         for left, base in ((x + 6, y + 4), (x - 6 - width, y + 4), (x - width / 2, y - 7)):
             box = (left, base - 8, left + width, base)
             if not any(_overlap(box, other) for other in boxes):
-                drawing.text(left, base, name, size=10, color=RED if row.why else INK)
+                drawing.text(left, base, name, size=10, color=INK if row.sound else RED)
                 boxes.append(box)
                 break
 

@@ -1,22 +1,24 @@
 """Numbers and lists as the tables of the report show them."""
 
+import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from markupsafe import Markup, escape
+
+from solver.verification.verdict import Body
 
 NOTHING = "–"
 
 
 def number(value: float | None) -> str:
     """Six significant digits, and no negative zero."""
-    return NOTHING if value is None else f"{value + 0.0:.6g}"
+    return NOTHING if value is None or math.isnan(value) else f"{value + 0.0:.6g}"
 
 
 def error(value: float | None) -> str:
     """Two digits and the power of ten; a zero is a zero."""
-    return NOTHING if value is None else "0" if value == 0 else f"{value:.1e}"
+    return NOTHING if value is None or math.isnan(value) else "0" if value == 0 else f"{value:.1e}"
 
 
 def extremes(pair: Sequence[float] | None, scale: float | None = None) -> str:
@@ -37,7 +39,9 @@ def _near_zero(value: float, scale: float | None) -> str:
 
 def seconds(value: float | None) -> str:
     """Hundredths; more than a hundred seconds are whole."""
-    return NOTHING if value is None else f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
+    if value is None or math.isnan(value):
+        return NOTHING
+    return f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
 
 
 def duration(value: float) -> str:
@@ -52,9 +56,9 @@ def count(value: float) -> str:
     return f"{value:,.0f}"
 
 
-def types(body: Mapping[str, Any]) -> str:
+def types(body: Body) -> str:
     """The cell types of a body."""
-    return ", ".join(body["cells"])
+    return ", ".join(body.cells)
 
 
 def against(count: int, reference: int | None) -> str:
@@ -64,7 +68,7 @@ def against(count: int, reference: int | None) -> str:
 
 def digits(value: float | None) -> str:
     """All the digits there are."""
-    return NOTHING if value is None else f"{value + 0.0:.15g}"
+    return NOTHING if value is None or math.isnan(value) else f"{value + 0.0:.15g}"
 
 
 def formula(text: str) -> Markup:

@@ -23,6 +23,7 @@ MEANING = {
     "displacement": "displacement at every node",
     "stress_components": "the other components of stress at every node",
     "balance": "contact forces and reactions against the loads: forces and moments",
+    "counts": "cells and contact faces of the bodies as meshed",
     "observation": "pressure of one contact element at every load step",
     "observation_gap": "gap of one contact element at every load step",
 }

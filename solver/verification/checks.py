@@ -19,6 +19,7 @@ from solver.case.solutions import ERRORS
 from solver.simulation.exact import ExactValues
 from solver.simulation.solution import Solution, ZoneResult
 from solver.verification import samples
+from solver.verification.verdict import CheckResult, Regression
 
 RELATIVE = 1e-3
 GAP = 2e-5
@@ -31,64 +32,6 @@ class Accepted:
 
     minimum: float
     maximum: float
-
-
-@dataclass(frozen=True)
-class Regression:
-    """How far a check's extremes lie from the accepted ones, over the check's scale."""
-
-    minimum: float
-    maximum: float
-    change: float
-    tolerance: float
-    passed: bool
-
-
-@dataclass(frozen=True)
-class CheckResult:
-    """One check of one zone (None: of the whole solve).
-
-    `value` and `reference` are those of the place `where` the deviation is largest; `regression` is
-    None while no value has been accepted. `passed` asks that the error be within the tolerance and
-    that no accepted value has changed.
-    """
-
-    name: str
-    alias: str | None
-    zone: str | None
-    norm: str
-    minimum: float
-    maximum: float
-    value: float
-    reference: float
-    where: str
-    scale: float
-    error: float
-    tolerance: float
-    regression: Regression | None
-    passed: bool
-
-    @property
-    def title(self) -> str:
-        """The check's name with its zone, the key of its accepted values."""
-        return f"{self.name} {self.zone}" if self.zone else self.name
-
-    @property
-    def reason(self) -> str:
-        """Why the check failed, in one line; empty where it holds."""
-        if not self.error <= self.tolerance:
-            return (
-                f"{self.title}: {self.value:.9g} at {self.where}, reference {self.reference:.9g}: "
-                f"error {self.error:.2e}, tolerance {self.tolerance:.1e}"
-            )
-        if self.regression and not self.regression.passed:
-            old = self.regression
-            return (
-                f"{self.title}: {self.minimum:.12g} … {self.maximum:.12g}, accepted "
-                f"{old.minimum:.12g} … {old.maximum:.12g}: change {old.change:.2e}, tolerance "
-                f"{old.tolerance:.1e}"
-            )
-        return ""
 
 
 @dataclass(frozen=True)
@@ -111,6 +54,11 @@ class Check:
     by_zone: bool = True
     accepted: float = ROUND_OFF
     norm: str = "max"
+
+    @property
+    def verifies(self) -> bool:
+        """Whether the check compares the solution with a reference."""
+        return self.key is not None or self.norm == "error"
 
     def tolerance_in(self, overrides: Mapping[str, float]) -> float:
         """The tolerance under a case's overrides: by check, or `all` for the relative ones."""
@@ -162,6 +110,7 @@ CHECKS: tuple[Check, ...] = (
     Check("displacement", "DEPL", "displacement", samples.displacement, _elongation, by_zone=False),
     Check("stress_components", None, "stress", samples.stress_components, _load, by_zone=False),
     Check("balance", None, None, samples.balance, _unit, 1e-10, fixed=True, by_zone=False),
+    Check("counts", None, None, samples.counts, _unit, 0.0, fixed=True, by_zone=False),
     Check("observation", "OBSERVATION/PRES", _PRESSURE, samples.observed("pressure"), _load),
     Check(
         "observation_gap",
@@ -241,6 +190,7 @@ def _judge(
         tolerance=tolerance,
         regression=regression,
         passed=error <= tolerance and (regression is None or regression.passed),
+        verifies=check.verifies,
     )
 
 
@@ -252,7 +202,13 @@ def _compare(
         for new, was in zip(extremes, (old.minimum, old.maximum), strict=True)
     ]
     change = float(np.max(changes))
-    return Regression(old.minimum, old.maximum, change, tolerance, change <= tolerance)
+    return Regression(
+        minimum=old.minimum,
+        maximum=old.maximum,
+        change=change,
+        tolerance=tolerance,
+        passed=change <= tolerance,
+    )
 
 
 def _over(deviation: float, scale: float) -> float:

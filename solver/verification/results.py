@@ -44,10 +44,10 @@ from solver.simulation.solution import (
     ZoneResult,
 )
 from solver.system.errors import InputError
-from solver.system.files import is_sealed, replacing, seal
+from solver.system.files import replacing, seal, seal_of
 from solver.system.hdf5 import column, new_file, read_table, write_table
-from solver.verification.checks import CheckResult
 from solver.verification.units import label_fields
+from solver.verification.verdict import CheckResult
 
 GRID = "VTKHDF"
 _SCALARS = (
@@ -84,10 +84,11 @@ _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 @dataclass
 class Result:
-    """What a result file gives back: the solution, and where it came from."""
+    """What a result file gives back: the solution, where it came from, and the file's hash."""
 
     solution: Solution
     provenance: dict[str, Any]
+    sha256: str
 
 
 def write_result(
@@ -95,12 +96,12 @@ def write_result(
     solution: Solution,
     checks: Iterable[CheckResult],
     provenance: Mapping[str, Any],
-) -> None:
-    """Write a solution, its checks and its provenance to a `.vtkhdf` file."""
+) -> str:
+    """Write a solution, its checks and its provenance to a `.vtkhdf` file; the file's hash."""
     with replacing(path) as temporary:
         with new_file(temporary) as file:
             _write(file, solution, checks, provenance)
-        seal(temporary)
+        return seal(temporary)
 
 
 def _write(
@@ -133,12 +134,12 @@ def _write(
 
 def read_result(path: str | Path) -> Result:
     """Read a result file back; `InputError` for a file that is none, or not as it was written."""
-    if not is_sealed(path):
+    if not (sha256 := seal_of(path)):
         raise _no_result(path, "damaged, of another version, or none at all")
     try:
         with h5py.File(path) as file:
             file.visititems(_refuse_complex)
-            result = Result(_read_solution(file), _plain(file["provenance"].attrs))
+            result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)
     except InputError:
         raise

@@ -17,6 +17,7 @@ from solver.case.expressions import evaluate
 from solver.mechanics.fem.stress import COMPONENTS
 from solver.simulation.exact import ExactValues, deformable
 from solver.simulation.solution import Solution, ZoneResult
+from solver.system.errors import InputError, hint
 
 Reference = Any
 
@@ -169,6 +170,25 @@ def balance(solution: Solution, _: None, __: Reference) -> Sample:
     names = list(solution.balance)
     values = np.array(list(solution.balance.values()), dtype=float)
     return Sample(values, np.zeros(len(values)), lambda i: f"the balance of {names[i]}")
+
+
+def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
+    """Cells and contact faces of the bodies as meshed, against those that the case gives.
+
+    Raises `InputError` for a group that is not a body.
+    """
+    case, bodies = solution.case, {body.name: body for body in solution.bodies}
+    rows = []
+    for group, given in case.counts.items():
+        if group not in bodies:
+            allowed = f"is not a body; {hint(group, bodies)}"
+            raise InputError(case.path, f"counts.{group}", group, allowed)
+        found = {"cells": sum(bodies[group].cells.values()), "faces": bodies[group].faces}
+        rows += [(found[what], number, f"{what} of {group}") for what, number in given.items()]
+    if not rows:
+        return None
+    values, expected, places = zip(*rows, strict=True)
+    return Sample(np.array(values, float), np.array(expected, float), lambda i: places[i])
 
 
 def observed(quantity: str) -> Sampler:

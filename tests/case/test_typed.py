@@ -78,7 +78,8 @@ def test_a_file_becomes_an_object():
         ("by_place: {top: 1}\nbolts: []", "by_place.top = 1: unknown key; allowed: left, right"),
         ("by_place: {left: {name: a}}\nbolts: []", "by_place.left.size: this key is needed"),
         ("by_place: {left: null}\nbolts: []", "by_place.left: must be {name, size, head, turns}"),
-        ("sizes: [1, 2, 1.0]\nbolts: []", "= [1, 2, 1.0]: must be a list of a positive number up to 1e30, each once"),
+        ("sizes: [1, 2, 1.0]\nbolts: []", "= [1, 2, 1.0]: must be a list of a positive number"),
+        ("sizes: [1, 1]\nbolts: []", "a positive number up to 1e30, each once"),
         ("sizes: []\nbolts: []", "sizes = []: must be a list of a positive number up to 1e30"),
         (
             "bolts: [{name: a, size: 1}, {name: b, size: 1}, {name: c, size: 1}]",

@@ -22,10 +22,10 @@ from solver.case.reader import load_case
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError, SolveError
 from solver.verification.checks import run_checks
+from solver.verification.judge import judge
 from solver.verification.norms import errors
 from solver.verification.regression import accepted_values
 from solver.verification.run import mesh_of
-from solver.verification.verdict import of_solution
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 PLANE, SOLID = "ssnp170/c", "opening/overlap-tetra10-hexa8"
@@ -72,7 +72,8 @@ def verdict(case: str) -> dict[str, Any]:
     try:
         solution = simulate(loaded, mesh)
         solution.errors = errors(solution)
-        return of_solution(solution, run_checks(solution, accepted_values(solution)))
+        found = judge(solution, run_checks(solution, accepted_values(solution)))
+        return {"passed": found.passed, "reason": found.reason}
     except (InputError, SolveError) as error:
         return {"passed": False, "reason": str(error)}
     except Exception as error:  # noqa: BLE001 -- the batch's verdict is then `crashed`

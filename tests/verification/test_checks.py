@@ -147,7 +147,8 @@ def test_a_check_without_a_reference_is_not_listed(tmp_path):
         if not line.strip().startswith(("normal_stress", "gap", "stress", "displacement"))
     )
     names = {check.name for check in run_checks(plane(tmp_path, text))}
-    assert names == PRESSURES | {"element_status", "coverage", "balance", "observation"}
+    others = {"element_status", "coverage", "balance", "counts", "observation"}
+    assert names == PRESSURES | others
 
 
 def test_balance_runs_without_any_reference(tmp_path):

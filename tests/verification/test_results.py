@@ -106,6 +106,8 @@ def test_a_solve_without_contact_comes_back(tmp_path):
     solution = plane(tmp_path)
     solution.zones = []
     retold(solution, "observe: [{zone: interface, nearest: [0, 0]}]\n", "")
+    retold(solution, "  contact_pressure: 25.0\n", "")
+    retold(solution, "  gap: 0.0\n", "")
     retold(solution, "contact: [{name: interface, slave: lower, master: upper}]\n", "")
     for step in solution.steps:
         step.observations = []

@@ -11,7 +11,6 @@ from typing import Any
 from solver.system.errors import InputError, hint, key_path
 
 CASE_SCHEMA = Path(__file__).with_name("case.schema.json")
-SUMMARY_SCHEMA = Path(__file__).with_name("summary.schema.json")
 
 
 def validate(content: object, schema: Path, where: object) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.mesh.catalogue import BY_NAME, cell_type
 from solver.system.errors import InputError
-from solver.system.files import is_sealed, seal
+from solver.system.files import seal, seal_of
 from solver.system.hdf5 import new_file
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
@@ -101,7 +101,7 @@ def read(path: Path) -> meshio.Mesh:
     if not h5py.is_hdf5(path):
         lines = path.read_text(errors="replace")[:2000].splitlines()
         raise InputError(path, "mesh", None, lines[0] if lines else "the file is empty")
-    if not is_sealed(path):
+    if not seal_of(path):
         raise InputError(path, "mesh", None, "damaged, or no mesh that this program wrote")
     with h5py.File(path, "r") as file:
         if "VTKHDF" not in file or _GROUPS not in file:

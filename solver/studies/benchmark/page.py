@@ -1,11 +1,9 @@
-"""The benchmark's record as text: tables of ratios, exponents and shares."""
+"""The benchmark's record as text: tables of ratios."""
 
 import statistics
 from collections.abc import Iterator, Sequence
 
-from solver.studies.fits import fit_power
 from solver.studies.points import SOLVED, Record
-from solver.studies.scaling.records import BY_FACES, WHOLE
 
 # A title and rows; a row has a name and numbers, or a reason in place of these.
 TextTable = tuple[str, list[list[str]]]
@@ -23,12 +21,10 @@ def as_text(record: Record) -> str:
 
 
 def tables(record: Record) -> Iterator[TextTable]:
-    """A table for each comparison, for the batch, the program's start, and each series."""
+    """A table for each comparison, for the batch, and for the program's start."""
     yield from map(compared, record["comparisons"])
     yield batched(record["batch"])
     yield started(record["start"])
-    for name in dict.fromkeys(point["series"] for point in record["growth"]):
-        yield grown([point for point in record["growth"] if point["series"] == name])
 
 
 def _printed(table: TextTable) -> str:
@@ -99,31 +95,3 @@ def started(start: Record) -> TextTable:
         ["--help", f"{start['help']['cpu']:.2f} s", "goal: under 0.3 s"],
         ["a plane case", f"{plane['cpu']:.2f} s", "goal: under 1.1 s", plane["case"]],
     ]
-
-
-def grown(points: Sequence[Record]) -> TextTable:
-    """Exponents of one series from size to size, and the share of each stage at the largest."""
-    lost = [p for p in points if p["outcome"] != SOLVED]
-    rows = [[f"{p['size']:,}", f"{p['outcome']}: {p['reason']}"] for p in lost]
-    solved = [point for point in points if point["outcome"] == SOLVED]
-    for name, exponent, share in stages(solved) if solved else ():
-        power = "exponent –" if exponent is None else f"exponent {exponent:.2f}"
-        over = "over faces" if name in BY_FACES else "over unknowns"
-        rows.append([name, power, over, f"{100 * share:.1f} %"])
-    for last in solved[-1:]:
-        used, error = last["process"], last["errors"]["pressure_max"]
-        times = f"{used['cpu']:.1f} s", f"{used['wall']:.1f} s of wall"
-        memory = f"{used['peak_memory_mb'] / 1000:.2f} GB"
-        name = f"{last['dofs']:,} unknowns"
-        rows.append([name, *times, memory, last["linear_solver"], f"pressure error {error:.1e}"])
-    return f"Growth of {points[0]['cells']}", rows
-
-
-def stages(points: Sequence[Record]) -> Iterator[tuple[str, float | None, float]]:
-    """Name, exponent and share at the largest point: the whole process, then stage by stage."""
-    costs = [{WHOLE: p["process"]["cpu"], **p["stage_cpu_seconds"]} for p in points]
-    whole = costs[-1][WHOLE]
-    for name in costs[-1]:
-        work = [p["faces" if name in BY_FACES else "dofs"] for p in points]
-        growth = fit_power(work, [cost.get(name, 0.0) for cost in costs])
-        yield name, growth.value if growth else None, costs[-1][name] / whole

@@ -1,6 +1,5 @@
 """Runs the benchmark: each way in a process of its own, one after the other, nothing beside it."""
 
-import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,7 +12,6 @@ from solver.studies.benchmark import calculix, ways
 from solver.studies.benchmark.description import Benchmark, WarmBatch, Way, WayComparison
 from solver.studies.points import FAILED, MISSING, SOLVED, ended, measure_apart, surroundings
 from solver.studies.scaling.description import ScalingPoint
-from solver.studies.scaling.point import measure_point
 from solver.system.clock import now
 from solver.system.errors import SolveError
 from solver.system.process import cores_for, run_apart
@@ -86,8 +84,6 @@ def run_benchmark(benchmark: Benchmark, log: Log) -> Record:
         record["batch"] = _batch(place, benchmark.batch)
         log("measuring: start of the program")
         record["start"] = _start(place, benchmark.batch.cases[0])
-        log("measuring: growth")
-        record["growth"] = _growth(place, benchmark)
     return record | {"whole": now() - started}
 
 
@@ -164,14 +160,3 @@ def _start(place: Bench, case: Path) -> Record:
     mesh = place.mesh(case, "start")
     plane = place.often("solve", case, "--mesh", mesh, "-o", f"{mesh}.r.vtkhdf")
     return {"help": place.often("--help"), "plane": {"case": str(case)} | plane}
-
-
-def _growth(place: Bench, benchmark: Benchmark) -> list[Record]:
-    """The points of each series, as the scaling family measures them."""
-    found = []
-    for series in benchmark.growth:
-        for size in series.sizes:
-            record = place.folder / "point.json"
-            measure_point(benchmark.scaling, ScalingPoint(series, int(size)), record)
-            found.append(json.loads(record.read_text(encoding="utf-8")))
-    return found

@@ -112,10 +112,10 @@ def _point_rows(curves: Sequence[Curve]) -> list[dict[str, Any]]:
             "level": row.folder.name,
             "verdict": row.word,
             "reason": row.why,
-            "unknowns": row.dofs,
-            "macro_elements": row.macro_elements,
+            "unknowns": row.verdict.dofs,
+            "macro_elements": row.verdict.macro_elements,
             "seconds": row.total,
-            **{error: (row.verdict.get("errors") or {}).get(error) for error in ERRORS},
+            **{error: row.norms.get(error) for error in ERRORS},
         }
         for curve in curves
         for row in curve.rows

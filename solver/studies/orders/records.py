@@ -1,6 +1,6 @@
 """Refinement ladders as the report shows them: the verdicts of every ladder, and fitted slopes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -36,7 +36,7 @@ class Curve:
     @cached_property
     def solved(self) -> list[Row]:
         """The rows that have errors, and therefore a point in the plots."""
-        return [row for row in self.rows if _errors(row) and row.macro_elements]
+        return [row for row in self.rows if row.norms and row.verdict.macro_elements]
 
     @cached_property
     def missing(self) -> list[str]:
@@ -51,8 +51,8 @@ class Curve:
     def slave_cells(self) -> list[CellType]:
         """The cell types of the slave's cells; none where nothing is solved."""
         bodies = self.solved[-1].sides if self.solved else []
-        slaves = [body for body in bodies if body["role"] in ("slave", "both")]
-        return [BY_NAME[name] for body in slaves for name in body["cells"]]
+        slaves = [body for body in bodies if body.role in ("slave", "both")]
+        return [BY_NAME[name] for body in slaves for name in body.cells]
 
     @cached_property
     def label(self) -> str:
@@ -76,14 +76,14 @@ class Curve:
     @cached_property
     def sizes(self) -> list[float]:
         """The mean size of a macro-element over that of the interface, level by level."""
-        return [element_size(row.macro_elements, self.dim) for row in self.solved]
+        return [element_size(row.verdict.macro_elements or 0, self.dim) for row in self.solved]
 
     def errors(self, error: str) -> tuple[np.ndarray, np.ndarray]:
         """Sizes (k,) and errors (k,) of the levels that have this error."""
         pairs = [
             (size, value)
             for size, row in zip(self.sizes, self.solved, strict=True)
-            if (value := _errors(row).get(error)) is not None
+            if (value := row.norms.get(error)) is not None
         ]
         sizes, values = np.array(pairs, dtype=float).reshape(-1, 2).T
         return sizes, values
@@ -162,11 +162,6 @@ def read_curves(family: LadderFamily, results: Path) -> list[Curve]:
             rows = sorted(found, key=lambda row: int(row.folder.name))
             curves.append(Curve(folder.name, family, ladder, rows))
     return curves
-
-
-def _errors(row: Row) -> Mapping[str, float | None]:
-    """Errors against the exact solution, by the names of `orders.ERRORS`."""
-    return row.verdict.get("errors") or {}
 
 
 def _reason(row: Row) -> str:

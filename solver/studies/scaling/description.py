@@ -23,6 +23,7 @@ A goal's `what` is `cpu` or `wall` (seconds of the whole process, from mesh file
 solve`. A point is one series and size; its name is the path of its record: `hexa8/10000`.
 """
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +31,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from msgspec import Meta, field, structs
 
 from solver.case.model import Case
@@ -142,7 +142,7 @@ class ScalingPoint:
             mesh["size"] = [width] * (self.series.dim - 1) + [thickness]
             solution = {**template["reference"]["solution"], "base": -thickness}
             content["reference"] = {**template["reference"], "solution": solution}
-        return yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
+        return json.dumps(content, indent=1)
 
     def parsed(self, path: Path) -> Case:
         """The point's case, as of a case file at `path`."""

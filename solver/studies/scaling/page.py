@@ -8,10 +8,12 @@ import numpy as np
 
 from solver.report import formats, stages
 from solver.report.html import render
+from solver.report.marks import MARKS
+from solver.report.svg import BLUE, GREEN, INK, ORANGE, PURPLE, RED
 from solver.report.tables import as_csv
+from solver.studies.plots import SMALL, PlotLine, draw_bar, draw_lines
 from solver.studies.points import disturbed, facts, outcome, page_name
 from solver.studies.scaling.description import Scaling
-from solver.studies.scaling.figure import SMALL, PlotLine, draw_bar, draw_key, draw_plot, look
 from solver.studies.scaling.records import (
     BY_FACES,
     OTHER,
@@ -25,6 +27,10 @@ from solver.studies.scaling.records import (
 )
 from solver.system.files import write_text
 
+# Colour and mark by the number of a line: either shows which it is.
+_COLORS = (BLUE, ORANGE, GREEN, PURPLE, INK, RED)
+# The slope of cost in proportion to size.
+_LINEAR = [1.0]
 _SIDES = {3: "3D", 2: "2D"}
 _PLOTS = {
     "cpu": "processor time of the whole process, s",
@@ -136,11 +142,13 @@ def _plot_lines(lines: Sequence[SeriesSolves], what: str, over: str) -> list[Plo
     """A line for each series: a cost, as `ScaledSolve.cost` names it."""
     found = []
     for number, line in enumerate(lines):
-        color, mark = look(number)
+        color, mark = _COLORS[number % len(_COLORS)], MARKS[number % len(MARKS)]
         x = np.array([m.record[over] for m in line.solved], dtype=float)
         y = np.maximum([m.cost(what) for m in line.solved], 1e-3)
         tips = [_tip(line, m) for m in line.solved]
-        found.append(PlotLine(line.series.title, x, y, color, mark, tips, line.series.slab))
+        slab = line.series.slab
+        dashes = (5.0, 3.0) if slab else ()
+        found.append(PlotLine(line.series.title, x, y, color, mark, dashes, not slab, tips=tips))
     return found
 
 
@@ -155,10 +163,10 @@ def _section(title: str, lines: Sequence[SeriesSolves], dim: int) -> dict[str, A
     """Time and memory of the series of one dimension."""
     mine = [line for line in lines if line.series.dim == dim and line.solved]
     plots = [
-        draw_plot(f"{title}: {label}", "unknowns", label, _plot_lines(mine, what, "dofs"))
+        draw_lines(f"{title}: {label}", "unknowns", label, _plot_lines(mine, what, "dofs"), _LINEAR)
         for what, label in (_PLOTS if mine else {}).items()
     ]
-    keys = [(draw_key(one), one.name) for one in _plot_lines(mine, "cpu", "dofs")]
+    keys = [(one.key(), one.name) for one in _plot_lines(mine, "cpu", "dofs")]
     return {"title": title, "plots": plots, "keys": keys}
 
 
@@ -167,17 +175,17 @@ def _pairing(lines: Sequence[SeriesSolves]) -> Any:
     mine = [line for line in lines if line.series.dim == 3 and line.solved]
     label = "pairing and intersection, processor time, s"
     drawn = _plot_lines(mine, "pairing", "faces")
-    return draw_plot(label, "faces of both sides", label, drawn) if mine else ""
+    return draw_lines(label, "faces of both sides", label, drawn, _LINEAR) if mine else ""
 
 
 def _stage_plot(line: SeriesSolves, colors: dict[str, str]) -> Any:
     """All stages of a series over its unknowns."""
     x = np.array([m.record["dofs"] for m in line.solved], dtype=float)
     drawn = [
-        PlotLine(stage, x, np.maximum([m.cost(stage) for m in line.solved], 1e-3), color, "circle")
+        PlotLine(stage, x, np.maximum([m.cost(stage) for m in line.solved], 1e-3), color)
         for stage, color in colors.items()
     ]
-    return draw_plot(line.series.title, "unknowns", "processor time, s", drawn, size=SMALL)
+    return draw_lines(line.series.title, "unknowns", "processor time, s", drawn, _LINEAR, SMALL)
 
 
 def _bar(line: SeriesSolves, colors: dict[str, str]) -> Any:

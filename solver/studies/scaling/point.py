@@ -27,6 +27,7 @@ from solver.system.clock import now
 from solver.system.files import write_text
 from solver.system.memory import available
 from solver.system.process import cores_for, run_apart
+from solver.verification.verdict import read_verdict
 
 # The share of the machine's free memory that a point may take: the rest is for other programs.
 _SHARE = 0.9
@@ -83,12 +84,12 @@ def _solve(
     found["process"] = done.used
     if not verdict.is_file():
         return found | ended(FAILED if done.status is None else CRASHED, done.reason)
-    content = json.loads(verdict.read_text(encoding="utf-8"))
-    found |= {key: content[key] for key in _FROM_VERDICT}
-    found |= {"verdict": content["verdict"], "machine": content["provenance"]}
-    if content["dofs"] is None:
-        word = content["verdict"]
-        reason = content["reason"].removeprefix(f"{case}: ")
+    content = read_verdict(verdict)
+    found |= {key: getattr(content, key) for key in _FROM_VERDICT}
+    found |= {"verdict": content.verdict, "machine": content.provenance}
+    if content.dofs is None:
+        word = content.verdict
+        reason = content.reason.removeprefix(f"{case}: ")
         return found | ended(word if word in (REFUSED, CRASHED) else FAILED, reason)
-    found["faces"] = sum(body["faces"] for body in content["bodies"])
-    return found | ended(SOLVED, content["reason"])
+    found["faces"] = sum(body.faces for body in content.bodies)
+    return found | ended(SOLVED, content.reason)

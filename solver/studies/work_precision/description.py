@@ -27,13 +27,13 @@ A point is one problem, pair, treatment, level and linear solver. Its name is th
 file: `patch-2d/tria3-quad4/lac/4`, `patch-2d/tria3-quad4/lac+cholmod/4`.
 """
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from msgspec import Meta, structs
 
 from solver.case.model import Case
@@ -60,14 +60,6 @@ AUTO = "auto"
 _START = 1.5  # seconds: libraries loaded, mesh made, record written
 _Division = Annotated[int, Meta(ge=2, le=1024, description="a whole number from 2 to 1024")]
 Pair = Annotated[tuple[Cell, Cell], Meta(description="a list of two cell types: slave, master")]
-
-
-class _Plain(yaml.SafeDumper):
-    """Writes out what occurs twice: case files have no aliases."""
-
-    def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002 -- PyYAML asks for it
-        """Always."""
-        return True
 
 
 class StudyTreatment(Section, frozen=True):
@@ -179,7 +171,7 @@ class StudyPoint:
             "mesh": mesh,
             "contact": [zone | self.treatment.zone for zone in template["contact"]],
         }
-        return parse_case(yaml.dump(content, Dumper=_Plain), self.problem.case)
+        return parse_case(json.dumps(content), self.problem.case)
 
 
 class _SolverChoice(Section, frozen=True):

@@ -1,8 +1,6 @@
-"""The benchmark's arithmetic: ratios, exponents, shares; what is said of a way without a solve."""
+"""The benchmark's arithmetic: ratios; what is said of a way without a solve."""
 
-import pytest
-
-from solver.studies.benchmark.page import as_text, batched, compared, grown, ratios, seconds, stages
+from solver.studies.benchmark.page import as_text, batched, compared, ratios, seconds
 
 PROCESS = {"wall": 9.0, "cpu": 8.0, "peak_memory_mb": 1500.0}
 
@@ -54,44 +52,6 @@ def test_a_comparison_in_lines():
     ]
 
 
-def point(size, series="hexa8", **more):
-    """Solve grows with exponent 1.5 over unknowns, pairing with 2 over faces."""
-    cost = {"pairing": 1e-6 * (size / 10) ** 2, "solve": 1e-3 * size**1.5}
-    return {
-        "series": series,
-        "cells": "HEXA8",
-        "size": size,
-        "outcome": "solved",
-        "reason": "",
-        "dofs": size,
-        "faces": size // 10,
-        "stage_cpu_seconds": cost,
-        "process": PROCESS | {"cpu": 4 * cost["solve"]},
-        "linear_solver": "a factor",
-        "errors": {"pressure_max": 1e-14},
-        **more,
-    }
-
-
-def test_exponents_and_shares_stage_by_stage():
-    found = {name: (value, share) for name, value, share in stages([point(1000), point(4000)])}
-    assert found["whole"] == (pytest.approx(1.5), 1.0)
-    assert found["solve"] == (pytest.approx(1.5), pytest.approx(0.25))
-    assert found["pairing"][0] == pytest.approx(2.0)
-
-
-def test_growth_in_lines():
-    lost = point(9000, outcome="failed", reason="no end within 1 s")
-    title, (first, whole, *_, last) = grown([point(1000), point(4000), lost])
-    assert title == "Growth of HEXA8"
-    assert first == ["9,000", "failed: no end within 1 s"]
-    assert whole == ["whole", "exponent 1.50", "over unknowns", "100.0 %"]
-    assert last[0] == "4,000 unknowns"
-    assert grown([lost]) == (title, [first])
-    # One size has a share and no exponent.
-    assert grown([point(1000)])[1][0][1] == "exponent –"
-
-
 def test_the_batch_in_lines():
     each = [{"case": "a", "cpu": 1.5}, {"case": "b", "cpu": 2.5}]
     passes = [{"cpu": 1.5, "wall": 1.0}, {"cpu": 1.0, "wall": 1.0}]
@@ -119,10 +79,8 @@ def test_the_whole_record_as_text():
         "comparisons": [{"title": "T", "series": "S", "repetitions": 0, "ways": [way("a"), LOST]}],
         "batch": {"title": "B", "most": 2.0, "each": each, "together": lost},
         "start": {"help": {"cpu": 0.25}, "plane": {"cpu": 1.0, "case": "c.yaml"}},
-        "growth": [point(1000), point(2000, "quad4"), point(4000)],
     }
     lines = as_text(record).splitlines()
     assert lines[0] == "Ratios: a cpu, 2 threads, 2026"
-    assert lines.count("Growth of HEXA8") == 2, "a table for each series"
     assert "  another                    missing: not installed" in lines
     assert lines[-1] == "benchmark took 9 s"

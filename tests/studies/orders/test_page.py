@@ -12,6 +12,7 @@ from solver.studies.orders import page as orders
 from solver.studies.orders.description import read_ladders
 from solver.studies.orders.page import write_orders
 from solver.studies.orders.records import groups, read_curves
+from tests.report.verdicts import put as write
 
 LADDERS = """
 title: Powers of <h>
@@ -41,9 +42,7 @@ def put(folder, level, cells, dim, word="passed", **errors):
         "seconds": {"total": 1.0},
         "checks": [],
     }
-    path = folder / str(level) / "verdict.json"
-    path.parent.mkdir(parents=True)
-    path.write_text(json.dumps(verdict))
+    write(folder / str(level) / "verdict.json", verdict)
 
 
 @pytest.fixture
