@@ -11,7 +11,7 @@ from scipy import sparse
 from solver.mechanics.fem.elasticity import Block, element_matrices
 from solver.mechanics.fem.loads import body_forces
 from solver.mechanics.linear.direct import factorise
-from solver.mechanics.mortar.facets import locate
+from solver.mechanics.mortar.facets import project_along
 from solver.mesh import read_mesh
 from solver.mesh.catalogue import BY_NAME
 from solver.studies.work_precision.reference import write_reference
@@ -44,7 +44,7 @@ def test_a_line_along_a_face_never_meets_it():
     bent = np.array([[(0, 0), (1, 0), (0.5, 0.3)]], dtype=float)
     along = np.array([[(1.0, 0.0)]])
     with pytest.raises(SolveError, match="1 points could not be projected onto SEG3 faces"):
-        locate(BY_NAME["SEG3"], bent, np.array([[(0.0, 5.0)]]), along)
+        project_along(BY_NAME["SEG3"], bent, np.array([[(0.0, 5.0)]]), along)
 
 
 def test_a_row_of_nothing():
