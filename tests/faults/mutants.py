@@ -18,6 +18,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from solver.case.model import Material
 from solver.case.reader import load_case
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError, SolveError
@@ -179,6 +180,25 @@ def _stays_closed(true: Wrapped) -> Wrapped:
     return status
 
 
+def _every_third_off(stress: np.ndarray) -> np.ndarray:
+    stress[::3, 0] -= 9e-4 * 25  # between the extremes: accepted values notice nothing
+    return stress
+
+
+def _lower_half_softer(true: Wrapped) -> Wrapped:
+    def by_material(self: Any, value: Callable[[Any], float], otherwise: float) -> Any:
+        found, height = true(self, value, otherwise), self.points[:, -1]
+        if value(Material(1.0, 0.3)) != 0.3:
+            return found
+        middle = (height.min() + height.max()) / 2
+        lower = {
+            kind: height[cells].mean(axis=1) < middle for kind, cells in self.cut.cells.items()
+        }
+        return {kind: np.where(lower[kind], 0.2991, values) for kind, values in found.items()}
+
+    return by_material
+
+
 def _rolled_sub_faces(result: Any) -> Any:
     faces = [replace(f, macro=np.roll(f.macro, 1)) for f in result.sub_faces]
     return replace(result, sub_faces=faces)
@@ -269,6 +289,13 @@ MUTANTS = (
     Mutant("stress-mean", "stress at nodes is the plain mean over the cell's quadrature", LAYERS,
            "solver.mechanics.fem.elasticity:_extrapolation",
            changed(lambda fit: np.full(fit.shape, 1 / fit.shape[1]))),
+    Mutant("stress-rows", "every node of a cell gets the stress of its neighbour", VARYING,
+           "solver.mechanics.fem.elasticity:_extrapolation",
+           changed(lambda fit: np.roll(fit, 1, axis=0))),
+    Mutant("stress-bits", "σ_xx is off by 9e-4 of the load at every third node", PLANE,
+           "solver.simulation.simulate:nodal_stress", changed(_every_third_off)),
+    Mutant("poisson-digits", "ν of the lower block is 0.2991 in place of 0.3", PLANE,
+           "solver.simulation.attributes:Attributes._by_material", _lower_half_softer),
     Mutant("stale-system", "the factored system is that of the first status", CLOSING,
            "solver.simulation.problem:ContactProblem._constrained", _first_system_kept),
     Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,
