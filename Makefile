@@ -82,13 +82,9 @@ scaling: environment ## growth with size, to a million unknowns; the small in a 
 	@$(SNAKEMAKE) scaling
 
 BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
-PLANNED = $(if $(filter quick,$(LEVEL)),cases/ssnp170/e.yaml,$(foreach case,b c k m o, \
-  cases/ssnp170/$(case).yaml) cases/hydrostatic/coincident-hexa27.yaml)
 benchmark: environment ## ratios side by side: linear solvers, cut, cures, batch, CalculiX
 	@$(OURS) solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
 	  $(if $(filter quick,$(LEVEL)),--quick)
-	@$(OURS) solver savings $(PLANNED) \
-	  -o results/benchmark/savings$(if $(LEVEL),-$(LEVEL)).json
 
 infsup: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 infsup: environment ## the inf-sup test of every cell type, and the half-loaded block

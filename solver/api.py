@@ -28,7 +28,7 @@ from solver.case.reader import load_case, parse_case
 from solver.mesh import read_mesh
 from solver.mesh.size import check_memory
 from solver.mesh.tidy import tidy
-from solver.simulation.skips import EVERYTHING, NEEDED
+from solver.simulation.options import Options
 from solver.simulation.solution import Solution, ZoneResult
 from solver.system.errors import InputError, key_path
 from solver.system.provenance import gather
@@ -62,7 +62,7 @@ def solve_case(
     `meshio.Mesh` with named cell sets, is taken as it is in place of the case's own, and a
     mapping then needs no key `mesh`. `swapped` exchanges slave and master, `hexahedra` (pyramids
     or hexahedra) overrides how slave hexahedra are cut. `everything`: what the scene does not need
-    is done all the same (see `solver.simulation.skips`). With `memory_check` a solve that cannot
+    is done all the same (see `solver.simulation.options`). With `memory_check` a solve that cannot
     fit into memory is not begun. `log` is given lines on how it goes: `log=print`.
 
     A case of a file on its own mesh is held against its accepted values too.
@@ -78,8 +78,10 @@ def solve_case(
     if memory_check:
         check_memory(len(made.points), made.points.shape[1], given.path, log)
     accepted = mesh is None and given.path.is_file()
-    skips = EVERYTHING if everything else NEEDED
-    solution, checks = solve_checked(given, made, swapped, hexahedra, log, accepted, skips=skips)
+    options = Options.everything() if everything else Options()
+    solution, checks = solve_checked(
+        given, made, swapped, hexahedra, log, accepted, options=options
+    )
     file = given.mesh.get("path") if mesh is None else mesh
     provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
     return Solved(solution, checks, provenance)

@@ -136,10 +136,6 @@ def _add_benchmark(commands: Any) -> None:
     command.add_argument("--quick", action="store_true", help="on tiny meshes, for a first look")
     _output(command, RECORD)
 
-    command = add_command(commands, "savings", _savings, "measure what each line of a plan saves")
-    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
-    _output(command, "SAVINGS.json")
-
 
 def _benchmark(options: argparse.Namespace) -> int:
     from solver.studies.benchmark.description import read_benchmark
@@ -152,13 +148,6 @@ def _benchmark(options: argparse.Namespace) -> int:
     record = run_benchmark(benchmark, partial(print, file=sys.stderr, flush=True))
     write_text(options.output, to_json(record) + "\n")
     print(as_text(record))
-    return 0
-
-
-def _savings(options: argparse.Namespace) -> int:
-    from solver.studies.benchmark.savings import write_savings
-
-    write_savings(options.output, options.cases, partial(print, flush=True))
     return 0
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from solver.report import stages
 from solver.report.html import MEANING, NORMS, environment
 from solver.report.pictures import picture
-from solver.report.plan import left_out, read_savings, with_savings
+from solver.report.plan import left_out
 from solver.report.rows import Row, counted
 from solver.report.sections import Section
 from solver.report.tables import outcome
@@ -40,7 +40,6 @@ def main_page(sections: Sequence[Section], folder: Path) -> str:
 
 def family_page(section: Section, folder: Path) -> str:
     """The page of a family: problem, reference, figures, its solves case by case."""
-    savings = read_savings(folder.parent)
     return (
         environment()
         .get_template("family.html.jinja")
@@ -50,8 +49,7 @@ def family_page(section: Section, folder: Path) -> str:
             norms=NORMS,
             stages=_stages(section.rows),
             picture=lambda row: picture(row, section.pictures),
-            left_out=left_out(section.rows, savings),
-            plan=lambda row: with_savings(row, savings),
+            left_out=left_out(section.rows),
             folder=folder,
         )
     )

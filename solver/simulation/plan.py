@@ -9,20 +9,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from solver.mechanics.fem.mixed import AUTOMATIC_ABOVE
-from solver.mechanics.linear.condensation import ROUND_OFF
 from solver.mechanics.mortar.cut import needs_cut
 from solver.simulation.accuracy import NOTED_STRAIN
 from solver.simulation.naming import body_names
+from solver.simulation.options import Options
 from solver.simulation.problem import MIN_COVERAGE, ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene
-from solver.simulation.skips import EVERYTHING
 from solver.simulation.solution import Line, Solution
 
 
 def decided(problem: ContactProblem) -> Iterator[Line]:
     """What the scene alone decides, before the solve, in the order of the work."""
     scene = problem.scene
-    if scene.skips == EVERYTHING:
+    if scene.options.shortcuts == Options.everything().shortcuts:
         yield Line("everything is done", "as asked for by --everything, needed or not")
     groups, cells = scene.unnamed
     if groups or cells:
@@ -47,7 +46,7 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
         yield Line(what, "supports or rigidity hold all of it where it is", "unloaded")
     if len(problem.parts) > 1:
         why = "no contact joins them"
-        yield Line(f"{len(problem.parts)} groups of bodies solved apart", why, "apart")
+        yield Line(f"{len(problem.parts)} groups of bodies solved apart", why)
 
 
 def _cells(scene: Scene) -> Iterator[Line]:
@@ -63,14 +62,11 @@ def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
         yield Line(f"{name}: treatment {zone.zone.treatment}", zone.treatment.what)
     kinds = sorted({block.type.name for block in zone.slave_faces})
     whole = [kind for kind in kinds if not needs_cut(kind)]
-    if zone.treatment.cut and whole and scene.skips.cut:
-        yield Line(f"{name}: no cut", f"{', '.join(whole)} faces own an inner node", "cut")
-    if operator.unclipped:
-        what = f"{name}: {operator.unclipped} of {operator.segments} segments not clipped"
-        yield Line(what, "there a slave face lies within one master face", "clipping")
+    if zone.treatment.cut and whole:
+        yield Line(f"{name}: no cut", f"{', '.join(whole)} faces own an inner node")
     if operator.closed_faces:
         why = "some faces are no affine images of their reference face"
-        why = why if scene.skips.quadrature else "as asked for"
+        why = why if scene.options.shortcuts.quadrature else "as asked for"
         yield Line(f"{name}: closure of {operator.closed_faces} face integrals", why)
     elif operator.plain:
         yield Line(f"{name}: plain Gauss rules", "every face is an affine image", "quadrature")
@@ -91,15 +87,13 @@ def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Li
     if scene.zones and len(states) > 1:
         why = "displacements are small: all load factors share them"
         yield Line("pairs and intersections found once", why)
-    if scene.skips.status and all(state.status.iterations == 1 for state in states):
+    if scene.options.shortcuts.status and all(state.status.iterations == 1 for state in states):
         why = "the first status already fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0"
         yield Line("no second active-set solve", why, "status")
     different = {state.status.closed.tobytes() for state in states}
-    if scene.skips.status and len(different) < len(states):
+    if scene.options.shortcuts.status and len(different) < len(states):
         why = "the same multipliers are closed as at another load factor"
         yield Line("no new factor for each load factor", why, "status")
-    if scene.skips.refinement and all(state.residual <= ROUND_OFF for state in states):
-        yield Line("no further refinement", "the residual is round-off", "refinement")
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
 
 

@@ -83,7 +83,7 @@ class _Iterate:
     def internal(self) -> np.ndarray:
         """Internal forces (n, dim)."""
         scene = self.problem.scene
-        if scene.cures.differences:
+        if scene.options.safeguards.differences:
             internal = internal_force(scene.points, scene.blocks, self.straining, self.extended)
         else:
             product = self.problem.whole_stiffness @ self.displacement.total
@@ -146,7 +146,7 @@ class ContactProblem:
         self.motions = rigid_motions(scene.points, scene.body)
         free = unsupported(self.motions, scene.free.basis)
         surface = np.diff(self.gaps.tocsc().indptr) > 0
-        self.at_rest = Displacement.zero(free, surface, scene.cures.remainder)
+        self.at_rest = Displacement.zero(free, surface, scene.options.safeguards.remainder)
         self._refuse_unheld()
         self.has_own_unknowns = self._find_own_unknowns()
         self.matrix, self.diagonal = _stiffness(scene)
@@ -205,14 +205,14 @@ class ContactProblem:
         `bilateral`: no status is sought, all macro-elements stay closed, in tension too.
         """
         scene = self.scene
-        if not scene.skips.status:
+        if not scene.options.shortcuts.status:
             start = self.eligible
         start = self._first_guess(factor) if start is None else start
         force = factor * scene.force
         latest: list[_Solved] = []
 
         def attempt(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            if not scene.skips.status:
+            if not scene.options.shortcuts.status:
                 self._systems.forget()
             found = self._solve_closed(closed, force, factor)
             latest[:] = [found]
@@ -230,7 +230,7 @@ class ContactProblem:
                 self.eligible,
                 pressure_scale,
                 scene.length,
-                confirm=not scene.skips.status,
+                confirm=not scene.options.shortcuts.status,
             )
         solved, shape = latest[0], scene.points.shape
         found = solved.iterate.displacement
@@ -264,7 +264,7 @@ class ContactProblem:
     def opening(self, displacement: Displacement, gaps: sparse.csr_matrix) -> np.ndarray:
         """∫ gap (m,) that a displacement opens, by rows `gaps` (m, n_dofs) of the operator."""
         dim = self.scene.points.shape[1]
-        return displacement.opening(gaps, dim, self.scene.cures.differences)
+        return displacement.opening(gaps, dim, self.scene.options.safeguards.differences)
 
     def _average_gap(self, displacement: Displacement) -> np.ndarray:
         opening = self.initial + self.opening(displacement, self.gaps)
@@ -277,16 +277,15 @@ class ContactProblem:
         scale = self._force_scale(force, offset.reshape(self.scene.points.shape))
         at_rest = self.at_rest.moved(offset)
         start = _Iterate(self, closed, force, at_rest, np.zeros(self.scene.mean.size))
-        found, cures = self._refined(system, start, scale), self.scene.cures
+        found, cures = self._refined(system, start, scale), self.scene.options.safeguards
         if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
             found = self._refined(system, replace(found.iterate, extended=True), scale)
         return found
 
     def _refined(self, system: Constrained, start: _Iterate, scale: float) -> _Solved:
-        refine = self.scene.cures.refinement
+        refine = self.scene.options.safeguards.refinement
         # In a stretched model a force of the size of round-off may be a large one elsewhere.
-        goes_on = start.extended or not self.scene.skips.refinement
-        options = {"round_off": 0.0} if goes_on else {}
+        options = {"round_off": 0.0} if start.extended else {}
         iterate, multiplier, residual = solve(system, start, scale, refine, **options)
         pressure = np.zeros(len(start.closed))
         pressure[start.closed] = multiplier

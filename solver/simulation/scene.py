@@ -1,7 +1,6 @@
 """From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import meshio
@@ -18,12 +17,11 @@ from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
 from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from solver.mechanics.mortar.held import joined
 from solver.mechanics.mortar.operator import GapOperator, gap_operator
-from solver.mechanics.mortar.treatments import SEGMENTED, TREATMENTS, Treatment, scheme_of
+from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.attributes import Attributes
-from solver.simulation.cures import ALL, Cures
 from solver.simulation.groups import check_groups, named_parts
-from solver.simulation.skips import NEEDED, Skips
+from solver.simulation.options import LEAN, Options
 from solver.system.clock import Clock
 from solver.system.errors import InputError
 
@@ -96,8 +94,7 @@ class Scene:
     meshed: dict[str, np.ndarray]
     volume_groups: dict[str, dict[str, np.ndarray]]
     rounding: float
-    cures: Cures
-    skips: Skips
+    options: Options
     unnamed: tuple[int, int]
     asleep: np.ndarray
     held: np.ndarray
@@ -115,33 +112,33 @@ def build_scene(
     swapped: bool,
     hexahedra: str | None,
     clock: Clock,
-    cures: Cures = ALL,
-    skips: Skips = NEEDED,
+    options: Options = LEAN,
 ) -> Scene:
     """The discrete problem of a case; raises InputError where case and mesh do not fit."""
     check_groups(case, mesh, swapped)
     mesh, unnamed = named_parts(case, mesh)
-    origin = mesh.points.mean(axis=0) * cures.local_coordinates
+    safeguards = options.safeguards
+    origin = mesh.points.mean(axis=0) * safeguards.local_coordinates
     local = replace_points(mesh, mesh.points - origin)
     length = float(np.ptp(local.points, axis=0).max())
     zones = [_as_solved(zone, swapped, hexahedra) for zone in case.zones]
     with clock.stage("cut"):
         surfaces = _surfaces(case, local, zones, swapped)
-        cut_mesh, sub_faces = _cut(local, zones, surfaces, skips)
+        cut_mesh, sub_faces = _cut(local, zones, surfaces)
     points = cut_mesh.points
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
     scenes = []
     with clock.stage("pairing"):
         for zone, (slave, master), faces in zip(zones, surfaces, sub_faces, strict=True):
             count = sum(len(block.nodes) for block in slave)
-            operator = _operator(points, zone, faces, master, count, cures, skips)
-            noise = _GAP_ROUND_OFF * rounding * cures.gap_threshold
+            operator = _operator(points, zone, faces, master, count, options)
+            noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
             initial = _initial_gaps(zone, operator, points, faces, origin, noise)
             operator = replace(operator, initial=initial)
             scenes.append(ZoneScene(zone, 0, count, slave, master, faces, operator))
     groups = Attributes(case, local, cut_mesh, scenes, origin)
     with clock.stage("assembly"):
-        blocks, mean = groups.elasticity(cures.mixed, plain=skips.quadrature)
+        blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
         force = groups.forces()
         scenes = _without_held(scenes, free)
@@ -161,8 +158,7 @@ def build_scene(
         meshed=volume_cells(mesh),
         volume_groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
         rounding=rounding,
-        cures=cures,
-        skips=skips,
+        options=options,
         unnamed=unnamed,
         asleep=np.zeros(int(body.max()) + 1, dtype=bool),
         held=np.zeros(int(body.max()) + 1, dtype=bool),
@@ -186,7 +182,7 @@ def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndar
     """Values (n, dim) at the nodes of the mesh, interpolated at those of the scene's cut mesh."""
     surfaces = [(zone.slave_faces, zone.master_faces) for zone in scene.zones]
     zones = [zone.zone for zone in scene.zones]
-    return _cut(replace_points(mesh, values), zones, surfaces, scene.skips)[0].points
+    return _cut(replace_points(mesh, values), zones, surfaces)[0].points
 
 
 def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
@@ -242,7 +238,6 @@ def _cut(
     mesh: meshio.Mesh,
     zones: list[Zone],
     surfaces: list[tuple[list[FaceBlock], list[FaceBlock]]],
-    skips: Skips,
 ) -> tuple[CutMesh, list[list[SubFaces]]]:
     """The cut mesh, and each zone's sub-faces with macro-elements counted within the zone."""
     faces, macro, into_hexahedra, uncut, first = [], [], [], [], [0]
@@ -254,7 +249,7 @@ def _cut(
             uncut.append(not TREATMENTS[zone.treatment].cut)
         first.append(first[-1] + sum(len(block.nodes) for block in slave))
     cells = volume_cells(mesh)
-    cut_mesh = cut(mesh.points, cells, faces, macro, into_hexahedra, uncut, not skips.cut)
+    cut_mesh = cut(mesh.points, cells, faces, macro, into_hexahedra, uncut)
     sub_faces = []
     for low, high in pairwise(first):
         mine = [(f, (f.macro >= low) & (f.macro < high)) for f in cut_mesh.sub_faces]
@@ -270,8 +265,7 @@ def _operator(
     sub_faces: list[SubFaces],
     master_faces: list[FaceBlock],
     count: int,
-    cures: Cures,
-    skips: Skips,
+    options: Options,
 ) -> GapOperator:
     slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
     if zone.normal == "nodal":
@@ -280,12 +274,10 @@ def _operator(
     corners = np.concatenate([f.centre for f in [*slaves, *masters]])
     search = float(np.linalg.norm(np.ptp(corners, axis=0)))
     search += max(f.radius.max() for f in [*slaves, *masters])
-    if not skips.quadrature:
+    if not options.shortcuts.quadrature:
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
-    if not skips.clipping and zone.treatment in SEGMENTED:
-        scheme = replace(scheme, meet=partial(scheme.meet, clip_all=True))
-    scheme = replace(scheme, closure=scheme.closure and cures.closure)
+    scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
     return gap_operator(slaves, masters, count, len(points), search, scheme)
 
 

@@ -15,13 +15,12 @@ from solver.mechanics.fem.stress import normal_stress
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.balance import imbalances
 from solver.simulation.consistency import inconsistency
-from solver.simulation.cures import ALL, Cures
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
+from solver.simulation.options import LEAN, Options
 from solver.simulation.plan import decided, noted, strained
 from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene, build_scene
-from solver.simulation.skips import NEEDED, Skips
 from solver.simulation.solution import Line, NodalContact, Solution, StepResult, ZoneResult
 from solver.simulation.unloaded import without_unloaded
 from solver.system.clock import Clock, processor_time
@@ -41,23 +40,20 @@ def simulate(
     swapped: bool = False,
     hexahedra: str | None = None,
     log: Log = lambda _: None,
-    cures: Cures = ALL,
+    options: Options = LEAN,
     clock: Clock | None = None,
-    skips: Skips = NEEDED,
 ) -> Solution:
     """Solve a case on its mesh.
 
     `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
-    `cures` turns what keeps the digits off, to show what it does, and `skips` what is left out
-    where the scene does not need it. The time of every stage is added to `clock`, where one is
-    given. Raises InputError where the case and its mesh do not fit,
-    SolveError where no solution is found.
+    The time of every stage is added to `clock`, where one is given.
+    Raises InputError where the case and its mesh do not fit, SolveError where no solution is found.
     """
     started = processor_time()
     clock = Clock() if clock is None else clock
-    scene = build_scene(case, mesh, swapped, hexahedra, clock, cures, skips)
+    scene = build_scene(case, mesh, swapped, hexahedra, clock, options)
     check_geometry(scene)
-    if skips.unloaded:
+    if options.shortcuts.unloaded:
         with clock.stage("assembly"):
             scene = without_unloaded(scene)
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")

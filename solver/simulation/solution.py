@@ -24,7 +24,7 @@ def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
 
 
 class Line(NamedTuple):
-    """A line of the plan: what was left out or decided, and why; `skip` is its switch in `Skips`.
+    """A line of the plan: what was left out or decided, and why; `skip`: its switch in `Shortcuts`.
 
     Empty where it has none.
     """

@@ -42,11 +42,9 @@ def unknowns_of(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
 def parts_of(scene: Scene, constraints: sparse.csr_matrix, bodies: np.ndarray) -> list[Part]:
     """The groups of bodies that no row of `constraints` (k, n_free) joins.
 
-    `bodies` (n_free,) of the unknowns. One part, where the scene has groups solved together.
+    `bodies` (n_free,) of the unknowns.
     """
     everything = Part(*(np.ones(n, dtype=bool) for n in reversed(constraints.shape)))
-    if not scene.skips.apart:
-        return [everything]
     group = joined_bodies(constraints, bodies, len(scene.asleep))[bodies]
     numbers = np.unique(group)
     if len(numbers) == 1:

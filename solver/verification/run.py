@@ -13,8 +13,8 @@ from solver.case.model import Case
 from solver.case.reader import check_mesh_file, load_case
 from solver.mesh import generate, read_mesh, transform
 from solver.mesh.size import check_memory
+from solver.simulation.options import LEAN, Options
 from solver.simulation.simulate import simulate
-from solver.simulation.skips import EVERYTHING, NEEDED, Skips
 from solver.simulation.solution import Solution
 from solver.system.clock import Clock, processor_time
 from solver.system.errors import InputError, MachineError, SolveError, of_machine
@@ -108,14 +108,14 @@ def solve_checked(
     log: Log = lambda _: None,
     accepted: bool = True,
     clock: Clock | None = None,
-    skips: Skips = NEEDED,
+    options: Options = LEAN,
 ) -> tuple[Solution, list[CheckResult]]:
     """Solve a case on its mesh and run its checks, those of `accepted` values too if asked.
 
     The time of every stage is added to `clock`, where one is given.
     """
     clock = Clock() if clock is None else clock
-    solution = simulate(case, mesh, swapped, hexahedra, log, clock=clock, skips=skips)
+    solution = simulate(case, mesh, swapped, hexahedra, log, options, clock)
     with clock.stage("checks"):
         solution.errors = errors(solution)
         checks = run_checks(solution, accepted_values(solution) if accepted else {})
@@ -171,9 +171,9 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> Verdic
         check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
     # What was accepted is a result on the case's own mesh.
     accepted = job.refine == 1
-    skips = EVERYTHING if job.everything else NEEDED
+    options = Options.everything() if job.everything else Options()
     solution, checks = solve_checked(
-        case, mesh, job.swapped, job.hexahedra, log, accepted, clock, skips
+        case, mesh, job.swapped, job.hexahedra, log, accepted, clock, options
     )
     solution.cpu_seconds = processor_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))

@@ -97,7 +97,11 @@ MISFITS = [
         "materials = ['lower']: 1 of 2 volume cells have no material; name their group, or `all`",
     ),
     # contact surfaces
-    ("slave: bottom_contact", "slave: empty", "contact[0].slave = 'empty': is empty, or none of "),
+    (
+        "slave: bottom_contact",
+        "slave: empty",
+        "contact[0].slave = 'empty': is empty, or none of its members touches a volume cell; a gr",
+    ),
     ("slave: bottom_contact", "slave: lower", "contact[0].slave = 'lower': holds 1 QUAD4 but no f"),
     ("master: top_contact", "master: top", "contact[0].master = 'top': no such group in the mesh;"),
     ("master: top_contact", "master: same", "contact[0].master = 'same': 1 of its faces are slave"),

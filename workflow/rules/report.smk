@@ -11,9 +11,6 @@ FAMILY_FILES = sorted(
     }
 )
 
-# What each line of a plan saves, where `make benchmark` has measured it.
-SAVINGS = [f for f in ("results/benchmark/savings.json",) if Path(f).is_file()]
-
 
 # The pages of families are no outputs here: one that is missing, of a family not asked for before,
 # would hide from Snakemake that the batch is another one.
@@ -21,7 +18,6 @@ rule report:
     input:
         verdicts=[verdict_of(job) for job in RUN.values()],
         families=FAMILY_FILES,
-        savings=SAVINGS,
         sources=REPORT_SOURCES,
     output:
         report(

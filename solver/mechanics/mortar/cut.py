@@ -64,18 +64,15 @@ def cut(
     macro: list[np.ndarray],
     into_hexahedra: list[bool],
     uncut: list[bool] | None = None,
-    without_need: bool = False,
 ) -> CutMesh:
     """Cut the cells behind slave faces.
 
     `faces` are the slave faces of all zones, `macro` their macro-element numbers, `into_hexahedra`
     the choice for hexahedra, all by block; blocks marked `uncut` are left as they are.
-    `without_need`: those that own an inner node are cut as well.
     """
     left = uncut or [False] * len(faces)
     chosen = [
-        (without_need or needs_cut(block.type.name)) and not leave
-        for block, leave in zip(faces, left, strict=True)
+        needs_cut(block.type.name) and not leave for block, leave in zip(faces, left, strict=True)
     ]
     slaves = _slave_faces_by_cell(
         list(compress(faces, chosen)),

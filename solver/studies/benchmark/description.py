@@ -14,8 +14,8 @@
           - {title: rslab, solver: rslab}            # the linear solver
           - {title: without MKL, free: true}         # free software alone
           - {title: not cut, treatment: uncut}       # of the interface
-          - {title: no cures, cures: false}          # see `solver.simulation.cures`
-          - {title: nothing left out, everything: true}   # see `solver.simulation.skips`
+          - {title: no cures, cures: false}          # see `solver.simulation.options`
+          - {title: nothing left out, everything: true}   # see `solver.simulation.options`
           - {title: CalculiX, program: calculix}     # another code
     batch: {title: …, most: 2, cases: [case.yaml]}   # in one warm process, and one by one
     quick: {size: 1000}           # of every mesh, for a first look

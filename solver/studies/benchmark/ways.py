@@ -14,23 +14,24 @@ def solve(job: Mapping[str, Any]) -> dict[str, Any]:
     from solver.case.reader import load_case
     from solver.mechanics.linear.direct import standing_for_auto
     from solver.mesh import read_mesh
-    from solver.simulation.cures import ALL, Cures
+    from solver.simulation.options import Options, Safeguards, Shortcuts
     from solver.simulation.simulate import simulate
-    from solver.simulation.skips import EVERYTHING, NEEDED
     from solver.studies.timing import repeated
     from solver.verification.norms import errors
 
     case = load_case(Path(job["case"]))
     zones = tuple(replace(zone, treatment=job["treatment"]) for zone in case.zones)
     case, mesh = replace(case, zones=zones), read_mesh(job["mesh"])
-    cures = ALL if job["cures"] else Cures.none()
-    skips = EVERYTHING if job["everything"] else NEEDED
+    options = Options(
+        Shortcuts.none() if job["everything"] else Shortcuts(),
+        Safeguards() if job["cures"] else Safeguards.none(),
+    )
     if job["free"]:
         _without_mkl()
     first = Clock()
 
     def run(clock: Clock) -> Any:
-        return simulate(case, mesh, cures=cures, skips=skips, clock=clock)
+        return simulate(case, mesh, options=options, clock=clock)
 
     with standing_for_auto(job["solver"]):
         solution = run(first)

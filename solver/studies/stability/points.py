@@ -1,4 +1,4 @@
-"""The points of a sweep: each solved with all cures and with none, measured, and put on record.
+"""The points of a sweep: each solved with all safeguards and with none, measured and recorded.
 
 A point that is refused, or whose solve fails, is on record with its reason. Errors are relative to
 the pressure, or, for the gap, to the size of the model. A point holds when its pressure and stress
@@ -22,7 +22,7 @@ from solver.case.model import Case
 from solver.mechanics.linear.condensation import Condensed
 from solver.mesh import generate, transform
 from solver.simulation.accuracy import Accuracy
-from solver.simulation.cures import ALL, Cures
+from solver.simulation.options import Options, Safeguards
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import solve_problem
@@ -88,8 +88,8 @@ def _points(sweep: Sweep) -> Iterator[_Point]:
 
 
 def _record(point: _Point, meshes: _Meshes) -> dict[str, Any]:
-    """One point: identity, floor, measures with all cures and with none, whether it holds."""
-    cured = _attempt(point, meshes, ALL)
+    """One point: identity, floor, measures with all safeguards and with none, whether it holds."""
+    cured = _attempt(point, meshes, Safeguards())
     beyond = point.value in point.sweep.beyond
     return {
         "series": point.series.name,
@@ -98,7 +98,7 @@ def _record(point: _Point, meshes: _Meshes) -> dict[str, Any]:
         "beyond": beyond,
         "holds": _within(cured) or (beyond and _known_to_itself(cured)),
         **cured,
-        "uncured": _attempt(point, meshes, Cures.none()),
+        "uncured": _attempt(point, meshes, Safeguards.none()),
     }
 
 
@@ -115,23 +115,25 @@ def _known_to_itself(measured: dict[str, Any]) -> bool:
     return max(measured["pressure"], measured["stress"]) <= measured["attainable"]
 
 
-def _attempt(point: _Point, meshes: _Meshes, cures: Cures) -> dict[str, Any]:
+def _attempt(point: _Point, meshes: _Meshes, safeguards: Safeguards) -> dict[str, Any]:
     """What came of the point: measures, or the reason why there are none."""
     try:
-        return _measured(point, meshes, cures)
+        return _measured(point, meshes, safeguards)
     except InputError as error:
         return {"word": REFUSED, "reason": f"{error.key}: {error.problem}"}
     except SolveError as error:
         return {"word": FAILED, "reason": str(error)}
 
 
-def _measured(point: _Point, meshes: _Meshes, cures: Cures) -> dict[str, Any]:
+def _measured(point: _Point, meshes: _Meshes, safeguards: Safeguards) -> dict[str, Any]:
     case = point.sweep.case(point.series.mesh, point.value)
     raw = meshes.raw(case)
     mesh = transform(raw, case.transform, str(case.path)) if case.transform else raw
     state = exact_state(case, point.sweep.state, raw)
     clock = Clock()
-    scene = build_scene(case, mesh, point.series.swapped, None, clock, cures)
+    scene = build_scene(
+        case, mesh, point.series.swapped, None, clock, Options(safeguards=safeguards)
+    )
     problem = ContactProblem(scene)
     solution = solve_problem(problem, clock, point.series.swapped)
     zones = solution.zones
@@ -151,7 +153,7 @@ def _measured(point: _Point, meshes: _Meshes, cures: Cures) -> dict[str, Any]:
         "unknowns": solution.dofs,
         "attainable": accuracy.estimate,
     }
-    if cures == ALL:
+    if safeguards == Safeguards():
         measures |= _known(problem, raw, mesh, state)
     return measures
 

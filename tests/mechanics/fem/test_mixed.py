@@ -11,7 +11,7 @@ from solver.mechanics.fem.elasticity import Block, internal_force, nodal_stress
 from solver.mechanics.fem.mixed import split
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME
-from solver.simulation.cures import Cures
+from solver.simulation.options import Options, Safeguards
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.clock import Clock
@@ -71,11 +71,11 @@ def test_either_way_to_cut_hexahedra(cells, hexahedra):
 @pytest.mark.parametrize(("bottom", "top", "counts"), [PAIRS[1], PAIRS[4], PAIRS[6]])
 def test_the_displacement_form_loses_the_digits(bottom, top, counts):
     """ε / (1 − 2ν) is what it keeps in double precision, whether chosen or the cure turned off."""
-    double = Cures(extended=False)
-    lost = patch(bottom, top, counts, everywhere(0.499999999, "displacement"), cures=double)
+    double = Options(safeguards=Safeguards(extended=False))
+    lost = patch(bottom, top, counts, everywhere(0.499999999, "displacement"), options=double)
     assert min(lost) > 1e-9
-    double = Cures(extended=False, mixed=False)
-    assert patch(bottom, top, counts, everywhere(0.499999999), cures=double) == lost
+    double = Options(safeguards=Safeguards(extended=False, mixed=False))
+    assert patch(bottom, top, counts, everywhere(0.499999999), options=double) == lost
 
 
 @pytest.mark.parametrize(("bottom", "top", "counts"), [PAIRS[1], PAIRS[4]])

@@ -1,13 +1,12 @@
 """Each cure against lost digits holds what it is there for, and without it the digits are gone."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.simulation.cures import ALL, Cures
+from solver.simulation.options import Options, Safeguards
 from solver.simulation.simulate import simulate
 from solver.verification.judge import judge
 from tests.scenes import block_case, block_mesh, errors, moved, with_points
@@ -17,8 +16,8 @@ LONG = np.finfo(np.longdouble).eps < np.finfo(float).eps
 needs_extended = pytest.mark.skipif(not LONG, reason="extended precision is double precision here")
 
 
-def without(cure: str) -> Cures:
-    return replace(ALL, **{cure: False})
+def without(safeguard: str) -> Options:
+    return Options(safeguards=Safeguards(**{safeguard: False}))
 
 
 def turned(dim):
@@ -41,7 +40,7 @@ def tall(dim):
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize(
-    ("cure", "scene", "held", "lost"),
+    ("safeguard", "scene", "held", "lost"),
     [
         ("gap_threshold", turned, 1e-12, 1e-4),
         ("differences", soft, 1e-12, 1e-9),
@@ -50,16 +49,16 @@ def tall(dim):
         pytest.param("extended", tall, 3e-12, 4e-12, marks=needs_extended),
     ],
 )
-def test_a_cure_holds_what_is_lost_without_it(dim, cure, scene, held, lost):
+def test_a_cure_holds_what_is_lost_without_it(dim, safeguard, scene, held, lost):
     assert max(patch_errors(dim, **scene(dim))) < held
-    assert max(patch_errors(dim, cures=without(cure), **scene(dim))) > lost
+    assert max(patch_errors(dim, options=without(safeguard), **scene(dim))) > lost
 
 
 def test_without_closure_faces_that_are_no_parallelograms_break_the_patch_test():
     mesh = moved(block_mesh("HEXA8", "HEXA8"), 0.05)
     held, lost = (
-        errors(simulate(block_case(3), mesh, hexahedra="hexahedra", cures=cures))["pressure"]
-        for cures in (ALL, without("closure"))
+        errors(simulate(block_case(3), mesh, hexahedra="hexahedra", options=options))["pressure"]
+        for options in (Options(), without("closure"))
     )
     assert held < 1e-12
     assert lost > 1e-9
@@ -75,10 +74,10 @@ def test_without_local_coordinates_moments_are_lost_far_from_the_origin(dim):
     far = [with_points(mesh, mesh.points + 1e8 / part) for part in (3, 7, 11)]
     held, lost = (
         max(
-            max(simulate(parse_case(text, Path("far.yaml")), m, cures=cures).balance.values())
+            max(simulate(parse_case(text, Path("far.yaml")), m, options=options).balance.values())
             for m in far
         )
-        for cures in (ALL, without("local_coordinates"))
+        for options in (Options(), without("local_coordinates"))
     )
     assert held < 1e-13
     assert lost > 1e-11
