@@ -13,7 +13,7 @@ from solver.mechanics.fem.elasticity import largest_strain, nodal_stress
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.stress import normal_stress
 from solver.mesh.catalogue import BY_NAME
-from solver.simulation.balance import imbalances
+from solver.simulation.balance import imbalances, pressures_of_forces
 from solver.simulation.consistency import inconsistency
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
@@ -115,7 +115,10 @@ def _recover(
     stress += scene.mean.nodal_stress(last.mean_stress, scene.blocks)
     scale = _stress_scale(scene, stress)
     strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
-    zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
+    zones = [
+        _zone_result(scene, zone, last, stress, forces)
+        for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
+    ]
     return Solution(
         case=scene.case,
         swapped=swapped,
@@ -170,7 +173,11 @@ def _contact_direction(scene: Scene) -> np.ndarray:
 
 
 def _zone_result(
-    scene: Scene, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
+    scene: Scene,
+    zone: ZoneScene,
+    state: Equilibrium,
+    stress: np.ndarray,
+    pressure_of_forces: np.ndarray | None,
 ) -> ZoneResult:
     surface = zone.operator.surface
     slave_nodes, slave_normal = _nodal_normals(
@@ -194,6 +201,7 @@ def _zone_result(
         slave_nodes=slave_nodes,
         master_nodes=master_nodes,
         nodal=_nodal_contact(zone, state),
+        pressure_of_forces=pressure_of_forces,
     )
 
 

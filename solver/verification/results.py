@@ -293,6 +293,8 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     # Faces of one type may be in several blocks, one for each type of cell behind them.
     for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
         faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
+    if zone.pressure_of_forces is not None:
+        group["pressure_of_forces"] = zone.pressure_of_forces
     if zone.nodal:
         nodal = group.create_group("nodal")
         for name, attribute in _AT_MULTIPLIER_NODES.items():
@@ -309,7 +311,12 @@ def _read_zone(
         **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
         **{key: group[key][()] for key in _BY_NODE},
         nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
+        pressure_of_forces=_optional(group, "pressure_of_forces"),
     )
+
+
+def _optional(group: h5py.Group, name: str) -> np.ndarray | None:
+    return group[name][()] if name in group else None
 
 
 def _read_nodal(group: h5py.Group) -> NodalContact:

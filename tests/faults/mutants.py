@@ -27,6 +27,7 @@ from solver.verification.judge import judge
 from solver.verification.norms import errors
 from solver.verification.regression import accepted_values
 from solver.verification.run import mesh_of
+from solver.verification.verdict import CheckResult
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 PLANE, SOLID = "ssnp170/c", "opening/overlap-tetra10-hexa8"
@@ -65,6 +66,12 @@ class Mutant:
     case: str
     place: str
     patch: Callable[[Wrapped], Any]
+
+
+def checks(case: str) -> dict[str, CheckResult]:
+    """The checks of a case of the batch by name."""
+    loaded, mesh = _case(case)
+    return {check.name: check for check in run_checks(simulate(loaded, mesh))}
 
 
 def verdict(case: str) -> dict[str, Any]:
@@ -282,6 +289,9 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared among a face's nodes alike", BENT,
            "solver.mechanics.fem.loads:shape_functions",
            lambda true: lambda name: _Alike(true(name))),
+    Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
+           "solver.simulation.scene:gap_operator",
+           changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
     Mutant("coverage-lost", "the part that is covered is taken for the whole face", PARTLY,
            "solver.simulation.scene:gap_operator",
            changed(lambda o: replace(o, covered=o.area,
