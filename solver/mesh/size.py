@@ -5,8 +5,8 @@ and 20,000 to 640,000 unknowns: 100 MB for the program, then for each unknown (n
 dimensions) 1.9 to 7.4 kB in 2D and 4.4 to 16 kB in 3D, less for more elongated bodies. With
 multigrid it is 1.9 (TETRA4) to 4.1 kB (HEXA20), for HEXA8 cubes 2.3 to 2.4 kB from 500,000 to
 1,000,000 unknowns. A solve is refused by the least figure, so that none is refused that fits; the
-usual one is for a warning, and a cluster is asked for the most, since a factor may have to take
-over. Time was measured from 10,000 to 1,000,000 unknowns on two cores, meshing included.
+usual one is for a warning, and a cluster is asked for the most, in case a factor is needed. Time
+was measured from 10,000 to 1,000,000 unknowns on two cores, meshing included.
 """
 
 from collections.abc import Callable, Mapping, Sequence

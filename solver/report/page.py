@@ -8,11 +8,11 @@ from solver.report.html import MEANING, NORMS, environment
 from solver.report.pictures import picture
 from solver.report.plan import left_out
 from solver.report.rows import Row, counted
-from solver.report.sections import Section
+from solver.report.sections import FamilySection
 from solver.report.tables import outcome
 
 
-def main_page(sections: Sequence[Section], folder: Path) -> str:
+def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
     rows = [row for section in sections for row in section.rows]
     checks = {check.name: check for row in rows for check in row.verdict.checks}
@@ -38,7 +38,7 @@ def main_page(sections: Sequence[Section], folder: Path) -> str:
     )
 
 
-def family_page(section: Section, folder: Path) -> str:
+def family_page(section: FamilySection, folder: Path) -> str:
     """The page of a family: problem, reference, figures, its solves case by case."""
     return (
         environment()

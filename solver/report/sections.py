@@ -30,7 +30,7 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Section:
+class FamilySection:
     """One family with its rows, failures first; `pictures` is where drawings are kept."""
 
     family: Family
@@ -148,7 +148,7 @@ class Section:
         return {kind: COLORS.get(kind, INK) for kind in kinds}
 
 
-def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[Section]:
+def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[FamilySection]:
     """The sections of all rows, in the order that families ask for, else in that of the rows.
 
     `files` holds the `family.yaml` of a family by its name.
@@ -158,5 +158,5 @@ def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> 
         file = files.get(name)
         family = read_family(file) if file else Family(name, name=name)
         ladders = bool(file and file.with_name("orders.yaml").is_file())
-        found.append(Section(family, members, pictures, ladders))
+        found.append(FamilySection(family, members, pictures, ladders))
     return sorted(found, key=lambda section: section.family.place)

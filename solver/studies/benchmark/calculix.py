@@ -46,8 +46,8 @@ def version() -> str:
         return ""
     # It leaves files wherever it runs.
     with TemporaryDirectory() as folder:
-        told = run_apart([PROGRAM, "-v"], cores_for(1), 10.0, folder=Path(folder)).output
-    found = re.search(r"Version (\S+)", told)
+        output = run_apart([PROGRAM, "-v"], cores_for(1), 10.0, folder=Path(folder)).output
+    found = re.search(r"Version (\S+)", output)
     return found[1] if found else "unknown"
 
 
@@ -68,7 +68,7 @@ def solve(
 
 
 def deck_lines(case: Case, mesh: meshio.Mesh) -> Iterator[str]:
-    """The lines of the deck of a case in space, with pressures, supports along axes, one contact.
+    """The lines of the deck of a 3D case with pressures, supports along axes, one contact.
 
     Raises KeyError for cells that CalculiX has not, or orders otherwise.
     """

@@ -52,15 +52,17 @@ def draw_profiles(profiles: Sequence[PressureProfile]) -> Markup:
     values = np.concatenate([profile.pressure for profile in profiles])
     low, high = min(-0.2, values.min() - 0.1), max(1.4, values.max() + 0.1)
     names = {True: "with the cut" if CELLS[cells] else "needs no cut", False: "without"}
+    colors = {True: INK, False: ORANGE}
+    for cut in {profile.cut for profile in profiles}:
+        drawing.text(WIDTH - 30, 66 - 16 * cut, names[cut], "end", color=colors[cut])
     for k, what in enumerate(("bilateral", "opening")):
         left = 52 + k * WIDTH
         x, y = Scale(0, 2, left, left + WIDTH - 70), Scale(low, high, 214, 34)
         draw_axes(drawing, x, y, "x", f"p / 25, {cells}, {what}")
         for profile in sorted(profiles, key=lambda one: one.cut):
-            color, width = (INK, 1.6) if profile.cut else (ORANGE, 1.0)
-            drawing.text(WIDTH - 30, 66 - 16 * profile.cut, names[profile.cut], "end", color=color)
             if profile.bilateral is (what == "bilateral"):
                 at = np.array(profile.place), np.array(profile.pressure)
-                PlotLine(what, *at, color, width=width, sizes=0.0).draw(drawing, x, y)
+                width = 1.6 if profile.cut else 1.0
+                PlotLine(what, *at, colors[profile.cut], width=width, sizes=0.0).draw(drawing, x, y)
     drawing.line(WIDTH - 4, 34, WIDTH - 4, 214, stroke=MUTED, stroke_width=0.4)
     return drawing.svg()

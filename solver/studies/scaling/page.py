@@ -54,6 +54,8 @@ def write_scaling(
 def goals_reached(goals: Sequence[Reached]) -> str:
     """How many goals are reached, of those that the measured sizes can answer."""
     known = [one.good for one in goals if one.value is not None]
+    if not known:
+        return "These sizes answer no goal."
     return f"{sum(known)} of {len(known)} goals measured here are reached."
 
 

@@ -93,7 +93,7 @@ def draw_figure(panel: Panel, looks: Looks) -> Markup:
         draw_level(drawing, x, y, LIMIT, "0.1 %" if last else "", RED)
         if panel.uncertainty:
             label = "reference ±" if last else ""
-            # Its label keeps off that of the limit.
+            # Its label must not cover the label of the limit.
             below = float(y(panel.uncertainty) - y(LIMIT))
             lowered = math.copysign(max(0.0, _LABEL - abs(below)), below)
             draw_level(drawing, x, y, panel.uncertainty, label, MUTED, (6, 4), lowered)
@@ -179,6 +179,6 @@ def _unbroken(line: LevelLine, error: str) -> list[list[TimedSolve]]:
 
 
 def draw_note(panel: Panel) -> str:
-    """How the marks tell the levels, in words."""
+    """How the marks show the levels, in words."""
     levels = ", ".join(map(str, panel.problem.levels))
     return f"Marks grow with the level: {levels} times the divisions of the coarsest mesh."

@@ -26,7 +26,7 @@ ERRORS = (
 )
 TARGETS = {1e-2: "1 %", 1e-3: "0.1 %", 1e-4: "0.01 %", 1e-6: "10⁻⁶"}
 TIE = 1.1
-"""Times of two treatments that differ by less than this factor are not told apart."""
+"""Times of two treatments that differ by less than this factor are equal within noise."""
 _NUMBER = re.compile(r"\b\d[\d.e+-]*")
 
 
