@@ -78,7 +78,7 @@ def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | N
     determined[alone.indices[np.abs(alone.data) > _OWN]] = True
     if not determined.all():
         return nothing
-    forces = rows @ (state.internal - state.force).astype(float).ravel()
+    forces = rows @ (state.iterate.internal - state.force).astype(float).ravel()
     matrix = integrals.T @ integrals + sparse.diags_array((size == 0).astype(float))
     pressure = np.atleast_1d(spsolve(matrix.tocsc(), integrals.T @ forces)) * scale
     return list(np.split(pressure, np.cumsum([zone.count for zone in scene.zones])[:-1]))
