@@ -28,6 +28,8 @@ from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.elasticity import Block, steepness
 from solver.mechanics.fem.faces import FaceBlock, area_vectors
 from solver.mechanics.mortar.facets import FLAT
+from solver.mechanics.mortar.status import Trial
+from solver.simulation.iterate import ContactIterate
 from solver.simulation.scene import Scene
 
 EPSILON = float(np.finfo(float).eps)
@@ -36,6 +38,11 @@ LEAST_DIGITS = 4
 """A result with fewer digits is unreliable."""
 NOTED_STRAIN, SMALL_STRAIN = 1e-2, 1e-1
 """A strain or rotation above the first is reported, one above the second is unreliable."""
+
+# Pressures and gaps below this share of their scales are round-off and change no status; gaps below
+# the second share of the displacements they are the difference of, or below so many roundings of
+# the coordinates, are so too; and pressures below so many times their estimated error.
+_NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
 
 _REASONS = {
     "forces": "the terms that add up to its forces are far larger than they",
@@ -177,6 +184,96 @@ def terms_of(blocks: Sequence[Block]) -> int:
     """The most terms of a stress at a node: nodes of a cell, those of its gradients, points."""
     dim = blocks[0].type.dim
     return max(2 * dim * block.type.n_nodes + len(block.rule[1]) for block in blocks)
+
+
+def estimate(
+    iterate: ContactIterate,
+    pressure: np.ndarray,
+    diagonal: np.ndarray,
+    rough: Roughness,
+    residual: float,
+    force_scale: float,
+) -> Accuracy:
+    """How many digits rounding leaves in the pressure (k,) of an iterate.
+
+    `diagonal` (n_dofs,) of the stiffness, `rough` what rounded coordinates do to the mesh,
+    `residual` relative to the size of the forces at work.
+    """
+    scene, constraints, closed = iterate.scene, iterate.constraints, iterate.closed
+    forces, unit = _rounding_of_forces(iterate), _unit(iterate)
+    scale = float(np.abs(pressure).max(initial=0.0))
+    if scale == 0:
+        return Accuracy({"forces": float(forces.max()) / force_scale})
+    noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
+    moving, moved = _moving(iterate)[closed], iterate.displacement.total.reshape(scene.points.shape)
+    pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
+    tilted = scale * (rough.strain + float(rough.tilt.max()))
+    tilted += pressure_of_gaps(moving, pushed, diagonal)
+    mean_stress = scene.mean.cancellation(iterate.mean_stress)[1]
+    causes = {
+        "forces": pressure_of_forces(moving, noise),
+        "gap": pressure_of_gaps(moving, _rounding_of_gaps(iterate)[closed], diagonal),
+        "coordinates": tilted + rough.stress(scene.blocks, moved),
+        "stress": max(unit * iterate.sizes.highest, EPSILON * mean_stress),
+        "slender": unit * iterate.sizes.slender,
+        "sums": EPSILON * terms_of(scene.blocks) * scale,
+    }
+    return Accuracy({name: error / scale for name, error in causes.items()})
+
+
+def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) -> Trial:
+    """Pressure (k,) and gap of an iterate with what is round-off of each, zone by zone.
+
+    The scale of pressures is the largest stress or pressure at the zone's own surfaces, the scale
+    of a gap the size of the displacements that open it.
+    """
+    scene, constraints, dim = iterate.scene, iterate.constraints, iterate.scene.points.shape[1]
+    left = iterate.residual() + constraints.on_free.T @ pressure
+    unbalanced = np.abs(scene.free.basis @ left)
+    forces, known = np.repeat(_rounding_of_forces(iterate), dim), _rounding_of_gaps(iterate)
+    moving, limit = _moving(iterate), np.zeros(len(pressure))
+    for zone in scene.zones:
+        mine, rows = zone.numbers, moving[zone.numbers]
+        places = constraints.gaps[mine].indices
+        stress = iterate.sizes.stress[places // dim].max(initial=0.0)
+        scale = max(float(np.abs(pressure[mine]).max(initial=0.0)), float(stress))
+        noise = forces + unbalanced[places].max(initial=0.0)
+        error = pressure_of_forces(rows, noise) + pressure_of_gaps(rows, known[mine], diagonal)
+        limit[mine] = _NOISE * scale + _ERRORS * error
+    motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)
+    covered = np.where(constraints.eligible, constraints.covered, np.inf)
+    return Trial(
+        pressure=pressure,
+        gap=iterate.gap,
+        pressure_limit=limit,
+        gap_limit=(_NOISE * iterate.opening_size + _NOISE_OF_MOTION * motion) / covered
+        + _ROUNDINGS * scene.rounding * (constraints.initial != 0),
+    )
+
+
+def _unit(iterate: ContactIterate) -> float:
+    return EPSILON_EXTENDED if iterate.extended else EPSILON
+
+
+def _moving(iterate: ContactIterate) -> sparse.csr_matrix:
+    """The coefficients of gaps (k, n_dofs) on what supports leave free of the slave nodes."""
+    own = iterate.constraints.slave & (np.diff(iterate.scene.free.basis.indptr) > 0)
+    moving = (iterate.constraints.gaps @ sparse.diags(own.astype(float))).tocsr()
+    moving.eliminate_zeros()
+    return moving
+
+
+def _rounding_of_forces(iterate: ContactIterate) -> np.ndarray:
+    """Errors (n,) of the internal forces at nodes."""
+    mean_terms, _ = iterate.scene.mean.cancellation(iterate.mean_stress)
+    return _unit(iterate) * iterate.sizes.forces + EPSILON * mean_terms
+
+
+def _rounding_of_gaps(iterate: ContactIterate) -> np.ndarray:
+    """Errors (k,) of ∫ gap."""
+    scene, constraints = iterate.scene, iterate.constraints
+    known = scene.rounding * constraints.covered * (constraints.initial != 0)
+    return known + EPSILON * iterate.opening_size
 
 
 def _largest(gaps: sparse.csr_matrix) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -23,7 +23,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     result: dict[str, float] = {}
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length)
-    unbalanced = (state.internal - state.force - contact).astype(float).ravel()
+    unbalanced = (state.iterate.internal - state.force - contact).astype(float).ravel()
     basis = scene.free.basis
     # What is left on held unknowns are the reactions; on free ones nothing may be left.
     free_part = (basis @ (basis.T @ unbalanced)).reshape(points.shape)

@@ -18,7 +18,7 @@ class Displacement:
     The rigid motion is that of the contact surface, so that the remainder is smallest where the
     other body feels it. `motions` (n_dofs, k) are the rigid motions that supports leave free, `fit`
     (k, n_dofs) finds how much of each a displacement holds, `amount` (k,) is how far each goes. The
-    remainder is the sum, never evaluated, of two parts `straining` (2, n_dofs): what the first
+    remainder is the sum, never evaluated, of two parts `deformation` (2, n_dofs): what the first
     loses to rounding is in the second, so that each refinement gains its digits in full.
 
     Without the cure (`split` False) there are no motions and the second part stays zero.
@@ -27,7 +27,7 @@ class Displacement:
     motions: sparse.csr_matrix
     fit: sparse.csr_matrix
     amount: np.ndarray
-    straining: np.ndarray
+    deformation: np.ndarray
     split: bool = True
 
     @classmethod
@@ -44,19 +44,19 @@ class Displacement:
     @property
     def total(self) -> np.ndarray:
         """The displacement (n_dofs,) itself."""
-        return self.motions @ self.amount + self.straining.sum(axis=0)
+        return self.motions @ self.amount + self.deformation.sum(axis=0)
 
     def moved(self, change: np.ndarray) -> "Displacement":
         """This displacement with `change` (n_dofs,) added."""
         more = self.fit @ change
-        first, second = self.straining
+        first, second = self.deformation
         added = change - self.motions @ more
         total = first + added
         # What the sum lost (Knuth, The Art of Computer Programming, vol. 2, §4.2.2).
         back = total - first
         lost = (first - (total - back)) + (added - back) if self.split else 0.0
-        straining = np.stack([total, second + lost])
-        return Displacement(self.motions, self.fit, self.amount + more, straining, self.split)
+        deformation = np.stack([total, second + lost])
+        return Displacement(self.motions, self.fit, self.amount + more, deformation, self.split)
 
     def opening(self, gaps: sparse.csr_matrix, dim: int, differences: bool = True) -> np.ndarray:
         """∫ gap (m,) that it opens, by the gap operator `gaps` (m, n_dofs), dofs dim · node + axis.
@@ -84,6 +84,6 @@ def _apart(
 ) -> np.ndarray:
     """For each entry of the gap operator its displacement less that of its row's first node."""
     whole = (displacement.motions @ displacement.amount).astype(Extended)
-    whole += displacement.straining.astype(Extended).sum(axis=0)
+    whole += displacement.deformation.astype(Extended).sum(axis=0)
     first = gaps.indices[np.minimum(gaps.indptr[:-1], len(gaps.indices) - 1)] // dim
     return whole[gaps.indices] - whole[dim * first[rows] + gaps.indices % dim]

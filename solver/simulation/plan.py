@@ -11,9 +11,10 @@ import numpy as np
 from solver.mechanics.fem.mixed import AUTOMATIC_ABOVE
 from solver.mechanics.mortar.cut import needs_cut
 from solver.simulation.accuracy import NOTED_STRAIN
+from solver.simulation.constraints import MIN_COVERAGE
 from solver.simulation.naming import body_names
 from solver.simulation.options import Options
-from solver.simulation.problem import MIN_COVERAGE, ContactProblem, Equilibrium
+from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene
 from solver.simulation.solution import Line, Solution
 
@@ -33,7 +34,7 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
         yield Line(f"mixed form in {scene.mean.n_cells} cells", why)
     yield from _cells(scene)
     for zone in scene.zones:
-        yield from _zone(zone, scene, problem.idle)
+        yield from _zone(zone, scene, problem.constraints.inactive_multipliers)
     asleep = np.flatnonzero(scene.asleep)
     if len(asleep):
         names = body_names(scene)
@@ -55,8 +56,8 @@ def _cells(scene: Scene) -> Iterator[Line]:
         yield Line("plain Gauss rules in TETRA10 cells", "all edges are straight", "quadrature")
 
 
-def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
-    """The lines of one zone; `idle` (k,): the multipliers that act on no free unknown."""
+def _zone(zone: ZoneScene, scene: Scene, inactive: np.ndarray) -> Iterator[Line]:
+    """The lines of one zone; `inactive` (k,): the multipliers that act on no free unknown."""
     name, operator = zone.zone.name, zone.operator
     if zone.zone.treatment != "lac":
         yield Line(f"{name}: treatment {zone.zone.treatment}", zone.treatment.what)
@@ -75,7 +76,7 @@ def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
     if bare:
         why = f"less than {MIN_COVERAGE:.0%} of their area lies under the master surface"
         yield Line(f"{name}: {bare} macro-elements out of contact", why)
-    held = int(idle[zone.numbers].sum())
+    held = int(inactive[zone.numbers].sum())
     if held:
         why = "supports hold the nodes of both surfaces there"
         yield Line(f"{name}: {held} multipliers left out", why)

@@ -15,7 +15,7 @@ from solver.mechanics.fem.mixed import MeanStress
 from solver.mechanics.fem.supports import FreeMotion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
 from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
-from solver.mechanics.mortar.held import joined
+from solver.mechanics.mortar.held import merge_fixed_multipliers
 from solver.mechanics.mortar.operator import GapOperator, gap_operator
 from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from solver.mesh.catalogue import BY_NAME
@@ -172,7 +172,7 @@ def _without_held(zones: list[ZoneScene], free: FreeMotion) -> list[ZoneScene]:
     for zone in zones:
         operator = zone.operator
         if zone.treatment.joins:
-            operator = joined(operator, free.basis)
+            operator = merge_fixed_multipliers(operator, free.basis)
         found.append(replace(zone, first=first, operator=operator))
         first += len(operator.initial)
     return found

@@ -94,6 +94,8 @@ def _walk(problem: ContactProblem, steps: tuple[float, ...], log: Log) -> list[E
     for factor in steps:
         start = states[-1].status.closed if states else None
         state = problem.solve(factor, start)
+        if (state.trial.offence(state.iterate.closed) > 1).any():
+            raise SolveError(f"load factor {factor:g}: contact bears tension or surfaces overlap")
         states.append(state)
         log(
             f"load factor {factor:g}: {state.status.iterations} iterations, "
@@ -111,8 +113,10 @@ def _recover(
 ) -> Solution:
     scene = problem.scene
     last = states[-1]
-    stress = nodal_stress(scene.points, scene.blocks, last.straining, last.extended)
-    stress += scene.mean.nodal_stress(last.mean_stress, scene.blocks)
+    stress = nodal_stress(
+        scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
+    )
+    stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
     scale = _stress_scale(scene, stress)
     strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
     zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
@@ -141,7 +145,7 @@ def _recover(
         strain=strain,
         rotation=rotation,
         accuracy=last.accuracy.causes,
-        mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),
+        mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
     )
 
 

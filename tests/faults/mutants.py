@@ -120,15 +120,14 @@ def _first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
 
 def _one_dropped(parts: list) -> list:
     """Without the smallest segment that is more than round-off."""
-    sizes = [part.weight.sum(axis=1) for part in parts]
+    sizes = [part.area for part in parts]
     if not parts:
         return parts
     least = _SLIVER * max(size.max() for size in sizes)
     real = [np.where(size > least, size, np.inf) for size in sizes]
     block = int(np.argmin([size.min() for size in real]))
     keep = np.arange(len(real[block])) != real[block].argmin()
-    kept = type(parts[block])(**{k: v[keep] for k, v in vars(parts[block]).items()})
-    return [kept if i == block else part for i, part in enumerate(parts)]
+    return [part.of(keep) if i == block else part for i, part in enumerate(parts)]
 
 
 def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -137,11 +136,12 @@ def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray
 
 
 def _never_closing(true: Wrapped) -> Wrapped:
-    def eligible(problem: Any, scene: Any) -> None:
-        true(problem, scene)
-        problem.eligible[len(problem.eligible) // 2] = False
+    def constraints(scene: Any) -> Any:
+        found = true(scene)
+        found.eligible[len(found.eligible) // 2] = False
+        return found
 
-    return eligible
+    return constraints
 
 
 def _first_system_kept(true: Wrapped) -> Wrapped:
@@ -161,20 +161,18 @@ def _factor_of_half(true: Wrapped) -> Wrapped:
 
 
 def _never_closes(true: Wrapped) -> Wrapped:
-    return lambda solve, start, eligible, *scales, **more: true(
-        solve, start, eligible & False, *scales, **more
-    )
+    return lambda solve, start, eligible, *more: true(solve, start, eligible & False, *more)
 
 
 def _stays_closed(true: Wrapped) -> Wrapped:
     """Tension is borne."""
 
-    def status(solve: Any, start: Any, eligible: Any, *scales: float, **more: bool) -> Any:
-        def no_tension_seen(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            pressure, gap = solve(closed)
-            return np.abs(pressure), gap
+    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
+        def no_tension_seen(closed: np.ndarray) -> Any:
+            trial = solve(closed)
+            return replace(trial, pressure=np.abs(trial.pressure))
 
-        return true(no_tension_seen, eligible, eligible, *scales, **more)
+        return true(no_tension_seen, eligible, eligible, *more)
 
     return status
 
@@ -207,7 +205,7 @@ class _Alike:
 
 MUTANTS = (
     Mutant("gap-sign", "the initial gap counts with the wrong sign", CLOSING,
-           "solver.mechanics.mortar.operator:_integrals",
+           "solver.mechanics.mortar.operator:integrals",
            changed(lambda p: replace(p, gap=-p.gap))),
     Mutant("operator-sign", "the gap operator has the wrong sign: surfaces attract", PLANE,
            "solver.simulation.scene:gap_operator", changed(lambda o: replace(o, matrix=-o.matrix))),
@@ -215,19 +213,19 @@ MUTANTS = (
            "solver.simulation.scene:facets",
            given(lambda x, kind, nodes, n: (x, kind, nodes[:, ::-1], n))),
     Mutant("master-order", "master shape functions are given to the next node", TILTED,
-           "solver.mechanics.mortar.operator:_integrals",
-           changed(lambda p: replace(p, master=np.roll(p.master, 1, axis=2)))),
+           "solver.mechanics.mortar.operator:integrals",
+           changed(lambda p: replace(p, vectors=(p.vectors[0], np.roll(p.vectors[1], 1, axis=2))))),
     Mutant("slave-side-lost", "slave nodes are missing in the gap's derivative", PLANE,
-           "solver.mechanics.mortar.operator:_integrals",
-           changed(lambda p: replace(p, slave=0 * p.slave))),
+           "solver.mechanics.mortar.operator:integrals",
+           changed(lambda p: replace(p, vectors=(0 * p.vectors[0], p.vectors[1])))),
     Mutant("sliver-lost", "the smallest segment is dropped", PLANE,
            "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
     Mutant("sliver-lost-3d", "the smallest segment is dropped, in space", TILTED_SOLID,
            "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
     Mutant("pair-lost", "one master face is overlooked when faces are paired", PLANE,
-           "solver.mechanics.mortar.segments:candidate_pairs", changed(_master_overlooked)),
+           "solver.mechanics.mortar.pairing:candidate_pairs", changed(_master_overlooked)),
     Mutant("macro-element-dropped", "one macro-element may never close", PLANE,
-           "solver.simulation.problem:ContactProblem.__init__", _never_closing),
+           "solver.simulation.problem:contact_constraints", _never_closing),
     Mutant("macro-element-numbers", "sub-faces go to the next macro-element", VARYING,
            "solver.simulation.scene:cut", changed(_rolled_sub_faces)),
     Mutant("template-off-by-one", "the cut's first sub-face takes its nodes one further on", PLANE,
@@ -274,7 +272,8 @@ MUTANTS = (
     Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,
            "solver.mechanics.linear.condensation:prepare", _factor_of_half),
     Mutant("multiplier-sign", "the multiplier balances the wrong way", PLANE,
-           "solver.mechanics.linear.condensation:Condensed.multiplier", changed(lambda p: -p)),
+           "solver.mechanics.linear.condensation:CondensedSystem.multiplier",
+           changed(lambda p: -p)),
     Mutant("never-closes", "the contact status finds nothing to close", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,

@@ -10,11 +10,12 @@ from solver.case.reader import parse_case
 from solver.mechanics.fem.elasticity import Block, largest_strain
 from solver.mesh import generate, transform
 from solver.mesh.catalogue import BY_NAME
+from solver.simulation.accuracy import Accuracy
 from solver.simulation.simulate import simulate
 from solver.studies.stability.states import exact_state
 from solver.studies.stability.sweeps import read_sweep
+from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
-from solver.verification.verdict import Accuracy, of_solution
 from tests.scenes import POISSON, YOUNG, block_case, block_mesh
 
 SWEEPS = Path(__file__).parents[2] / "cases/stability/sweeps"
@@ -83,10 +84,10 @@ def test_large_strain_is_noted_or_unreliable(pressure, noted, unreliable, tmp_pa
     file = tmp_path / "r.vtkhdf"
     write_result(file, found, [], {})
     for solution in (found, read_result(file).solution):
-        verdict = of_solution(solution, [])
-        assert (verdict["verdict"] == "unreliable") == unreliable
-        assert verdict["strain"] == found.strain
-        assert ("strain 1.1e+02 with rotation" in verdict["reason"]) == unreliable
+        verdict = judge(solution, [])
+        assert (verdict.verdict == "unreliable") == unreliable
+        assert verdict.strain == found.strain
+        assert ("strain 1.1e+02 with rotation" in verdict.reason) == unreliable
 
 
 def test_strain_and_rotation_of_a_known_motion():

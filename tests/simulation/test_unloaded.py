@@ -233,7 +233,7 @@ def test_a_body_outside_every_zone_is_solved_on_its_own(mesh):
 
 def test_a_group_keeps_its_factor_while_another_changes_its_status(mesh, monkeypatch):
     """The near pair is lifted at one end and needs several solves, the far one is factored once."""
-    from solver.simulation import systems
+    from solver.mechanics.linear import systems
 
     sizes, plain = [], systems.condense
     monkeypatch.setattr(systems, "condense", lambda *a: sizes.append(a[0].shape[0]) or plain(*a))

@@ -3,7 +3,7 @@
 import logging
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 
 from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.condensed_matrix import Symmetric
@@ -15,6 +15,9 @@ from solver.system.errors import SolveError
 _LOG = logging.getLogger(__name__)
 
 MULTIGRID = "multigrid"
+# Shares of the diagonal added to a matrix that is singular to working precision: its round-off.
+_SHIFTS = 0.0, 1e-15, 1e-14
+_SOFT = "displacements along the softest motions are not determined"
 _ASKED = "as asked for"
 # Unknowns in space from which multigrid takes less time than a factor, and half the memory or less:
 # whether PARDISO makes the factor, whether cells are quadratic, which takes twice the iterations.
@@ -34,16 +37,25 @@ def multigrid_from(quadratic: bool) -> int:
     return _MULTIGRID_FROM[BACKENDS["pardiso"].available(), quadratic]
 
 
-class Chosen:
+class LinearSolver:
     """What solves one system, as often as wanted: `name`, and `why` it was chosen.
 
     Multigrid gives way to a factor once it does not converge: thin cells, nearly incompressible
-    material. `gave_up` then says why; else it is empty.
+    material. `gave_up` then says why; else it is empty. Where the matrix is singular to working
+    precision, which `doubt` then says, the factor is that of a matrix that differs by round-off:
+    what it solves is a solution only if refinement converges.
     """
 
-    def __init__(self, matrix: Symmetric, dim: int, solver: Factor | Multigrid, why: str):
-        self._matrix, self._dim, self._solver, self.why = matrix, dim, solver, why
-        self.gave_up = ""
+    def __init__(self, matrix: Symmetric, dim: int, solver: Factor | Multigrid | None, why: str):
+        """Without a `solver` the matrix is factored."""
+        self._matrix, self._dim, self._why = matrix, dim, why
+        self.gave_up = self.doubt = ""
+        self._solver = self._factor() if solver is None else solver
+
+    @property
+    def why(self) -> str:
+        """Why it was chosen, and what to mind."""
+        return f"{self._why}; nearly singular: {_SOFT}" if self.doubt else self._why
 
     @property
     def name(self) -> str:
@@ -65,14 +77,28 @@ class Chosen:
         except SolveError as error:
             if not isinstance(self._solver, Multigrid):
                 raise
-            self.why = self.gave_up = _instead(error)
+            self._why = self.gave_up = _instead(error)
             _LOG.info("%s", self.why)
         self._solver.close()
-        self._solver = factorise(self._matrix.tocsr(), dim=self._dim)
+        self._solver = self._factor()
         return self._solver.solve(right, accuracy)
 
+    def _factor(self) -> Factor:
+        matrix = self._matrix.tocsr()
+        try:
+            return factorise(matrix, dim=self._dim)
+        except SolveError as error:
+            self.doubt = str(error)
+        for shift in _SHIFTS:
+            try:
+                shifted = matrix + shift * diags(matrix.diagonal())
+                return factorise(shifted, dim=self._dim, least=0.0)
+            except SolveError:
+                continue
+        raise SolveError(self.doubt)
 
-def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> Chosen:
+
+def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> LinearSolver:
     """Make ready to solve with a symmetric positive definite `matrix` (n, n).
 
     `gave_up`: why multigrid did on a matrix like it; then it is not tried again. Raises SolveError
@@ -87,12 +113,12 @@ def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> Chosen:
         why = f"{least} unknowns or more in space: quicker and smaller than a factor"
         try:
             solver = Multigrid(matrix, unknowns)
-            return Chosen(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
+            return LinearSolver(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
             against = gave_up = _instead(error)
             _LOG.info("%s", against)
-    chosen = Chosen(matrix, dim, factorise(matrix.tocsr(), dim=dim), against)
+    chosen = LinearSolver(matrix, dim, None, against)
     chosen.gave_up = gave_up
     return chosen
 

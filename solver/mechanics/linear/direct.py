@@ -39,7 +39,7 @@ _auto: ContextVar[str] = ContextVar("auto", default="auto")
 
 
 @contextmanager
-def standing_for_auto(kind: str) -> Iterator[None]:
+def force_solver(kind: str) -> Iterator[None]:
     """Within the block `auto` stands for `kind`, the name of a solver, or `multigrid`.
 
     Raises SolveError there for a solver that is not installed, or not for that kind of matrix.
@@ -98,7 +98,11 @@ class Factor:
 
 
 def factorise(
-    matrix: spmatrix | sparray, kind: str = "auto", precision: str = "auto", dim: int = 3
+    matrix: spmatrix | sparray,
+    kind: str = "auto",
+    precision: str = "auto",
+    dim: int = 3,
+    least: float = SINGULAR,
 ) -> Factor:
     """Factor a symmetric positive definite `matrix` (n, n), of which the upper triangle is read.
 
@@ -107,7 +111,7 @@ def factorise(
     of the mesh behind the matrix, guides what auto stands for.
 
     Raises SolveError where the matrix is not positive definite, or singular to working precision:
-    the smallest eigenvalue of the matrix scaled to a diagonal near one is at most `SINGULAR`.
+    the smallest eigenvalue of the matrix scaled to a diagonal near one is at most `least`.
     """
     upper = _upper_triangle(matrix)
     if upper.shape[0] == 0:
@@ -130,7 +134,7 @@ def factorise(
         factor = _factorise_single(backend, upper, scale)
         if factor is not None:
             return factor
-    return _factorise_double(backend, upper, scale, definite=True)
+    return _factorise_double(backend, upper, scale, definite=True, limit=least)
 
 
 def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Factor:
@@ -145,7 +149,8 @@ def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Fact
         scale *= _power_of_two(1 / np.sqrt(_largest_in_row(_scaled(upper, scale))))
     upper = _scaled(upper, scale)
     # Not rslab: its pivots stay within a supernode, where that of a multiplier may be alone, zero.
-    return _factorise_double(_choose(kind, ("pardiso",)), upper, scale, definite=False)
+    backend = _choose(kind, ("pardiso",))
+    return _factorise_double(backend, upper, scale, definite=False, limit=SINGULAR_INDEFINITE)
 
 
 def _choose(kind: str, order: tuple[str, ...]) -> Backend:
@@ -162,7 +167,7 @@ def _choose(kind: str, order: tuple[str, ...]) -> Backend:
 
 
 def _factorise_double(
-    backend: Backend, upper: csr_matrix, scale: np.ndarray, definite: bool
+    backend: Backend, upper: csr_matrix, scale: np.ndarray, definite: bool, limit: float
 ) -> Factor:
     try:
         solve = backend.factor(upper, definite)
@@ -170,7 +175,6 @@ def _factorise_double(
         wanted = "positive definite" if definite else "regular"
         raise SolveError(f"the matrix is not {wanted}: a pivot fails in {backend.name}") from None
     smallest = _smallest_eigenvalue(solve, upper.shape[0])
-    limit = SINGULAR if definite else SINGULAR_INDEFINITE
     if not smallest > limit:
         raise SolveError(
             f"the matrix is singular to working precision: scaled to a largest entry of 1, its "

@@ -12,7 +12,7 @@ from solver.system.process import used_since
 def solve(job: Mapping[str, Any]) -> dict[str, Any]:
     """One mesh solved in one way: the process up to the first solve's end, and warm repetitions."""
     from solver.case.reader import load_case
-    from solver.mechanics.linear.direct import standing_for_auto
+    from solver.mechanics.linear.direct import force_solver
     from solver.mesh import read_mesh
     from solver.simulation.options import Options, Safeguards, Shortcuts
     from solver.simulation.simulate import simulate
@@ -33,7 +33,7 @@ def solve(job: Mapping[str, Any]) -> dict[str, Any]:
     def run(clock: Clock) -> Any:
         return simulate(case, mesh, options=options, clock=clock)
 
-    with standing_for_auto(job["solver"]):
+    with force_solver(job["solver"]):
         solution = run(first)
         process = used_since(job["started"])
         times = repeated(run, job["repetitions"]) if job["repetitions"] else {}

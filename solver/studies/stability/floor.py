@@ -46,12 +46,12 @@ def floor(
     amount = fit @ exact.astype(float)
     remainder = (exact - motions.astype(np.longdouble) @ amount).reshape(scene.points.shape)
     found = []
-    for straining in _roundings(remainder):
-        internal = internal_force(scene.points, scene.blocks, straining, extended=True)
+    for deformation in _roundings(remainder):
+        internal = internal_force(scene.points, scene.blocks, deformation, extended=True)
         internal += scene.mean.force(mean_stress)
         left = scene.free.basis.T @ (scene.force - internal).astype(float).ravel()
         pressure = system.multiplier(left)
-        stress = nodal_stress(scene.points, scene.blocks, straining, extended=True)
+        stress = nodal_stress(scene.points, scene.blocks, deformation, extended=True)
         stress += scene.mean.nodal_stress(mean_stress, scene.blocks)
         error = float(np.abs(pressure / state.pressure - 1).max(initial=0.0))
         found.append((error, stress_error(stress, scene, state)))

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.case.model import Case
-from solver.mechanics.linear.condensation import Condensed
+from solver.mechanics.linear.condensation import CondensedSystem
 from solver.mesh import generate, transform
 from solver.simulation.accuracy import Accuracy
 from solver.simulation.options import Options, Safeguards
@@ -165,12 +165,12 @@ def _known(
     pressure, stress = floor(problem, raw, mesh, state)
     known: dict[str, Any] = {"floor_pressure": pressure, "floor_stress": stress}
     system = problem.system
-    if isinstance(system, Condensed) and problem.scene.points.shape[1] == 2:
+    if isinstance(system, CondensedSystem) and problem.scene.points.shape[1] == 2:
         known |= _spectrum(system, problem.matrix)
     return known
 
 
-def _spectrum(system: Condensed, stiffness: sparse.csr_matrix) -> dict[str, Any]:
+def _spectrum(system: CondensedSystem, stiffness: sparse.csr_matrix) -> dict[str, Any]:
     """Condition number and inertia of the condensed system, scaled to a diagonal of one.
 
     By all its eigenvalues where it is small, in full precision; else the inertia alone, which is

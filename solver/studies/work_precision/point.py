@@ -72,7 +72,7 @@ def measure(job: Mapping[str, Any]) -> dict[str, Any]:
 
     Raises InputError and SolveError.
     """
-    from solver.mechanics.linear.direct import standing_for_auto
+    from solver.mechanics.linear.direct import force_solver
     from solver.simulation.simulate import simulate
     from solver.studies.work_precision.reference import read_reference
     from solver.system.provenance import gather
@@ -87,7 +87,7 @@ def measure(job: Mapping[str, Any]) -> dict[str, Any]:
     def run(clock: Clock) -> Any:
         return simulate(case, mesh, clock=clock)
 
-    with standing_for_auto(point.linear_solver):
+    with force_solver(point.linear_solver):
         solution = run(Clock())
         process = used_since(job["started"])
         times = repeated(run, study.repetitions)

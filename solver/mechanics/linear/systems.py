@@ -10,13 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem.bodies import joined_bodies, nodes_of_unknowns, whole_motions
-from solver.mechanics.linear.choice import Chosen, against_condensation
-from solver.mechanics.linear.condensation import Condensed, Constrained, condense, saddle_point
+from solver.mechanics.fem.bodies import joined_bodies
+from solver.mechanics.linear.choice import LinearSolver, against_condensation
+from solver.mechanics.linear.condensation import (
+    CondensedSystem,
+    ConstrainedSystem,
+    condense,
+    saddle_point,
+)
 from solver.mechanics.linear.direct import Factor
 from solver.mechanics.linear.krylov import EPSILON
 from solver.mechanics.linear.multigrid import Unknowns
-from solver.simulation.scene import Scene
 from solver.system.errors import SolveError
 
 _NOTHING_OWN = "constraints without an unknown of their own leave a saddle point"
@@ -30,22 +34,15 @@ class Part:
     multipliers: np.ndarray
 
 
-def unknowns_of(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
-    """What the free unknowns of a scene stand for, given the rigid motions of its bodies."""
-    basis, dim = scene.free.basis, scene.points.shape[1]
-    node = nodes_of_unknowns(basis, dim)
-    together = basis.T @ whole_motions(motions, len(scene.asleep))
-    quadratic = any(block.type.order == 2 for block in scene.blocks)
-    return Unknowns(dim, node, together, scene.body[node], quadratic)
+def parts_of(constraints: sparse.csr_matrix, bodies: np.ndarray, n_bodies: int) -> list[Part]:
+    """The groups of bodies that no row of `constraints` (k, n) joins; one part if that is all.
 
-
-def parts_of(scene: Scene, constraints: sparse.csr_matrix, bodies: np.ndarray) -> list[Part]:
-    """The groups of bodies that no row of `constraints` (k, n_free) joins.
-
-    `bodies` (n_free,) of the unknowns.
+    `bodies` (n,) of the unknowns.
     """
     everything = Part(*(np.ones(n, dtype=bool) for n in reversed(constraints.shape)))
-    group = joined_bodies(constraints, bodies, len(scene.asleep))[bodies]
+    if n_bodies == 1:
+        return [everything]
+    group = joined_bodies(constraints, bodies, n_bodies)[bodies]
     numbers = np.unique(group)
     if len(numbers) == 1:
         return [everything]
@@ -54,18 +51,18 @@ def parts_of(scene: Scene, constraints: sparse.csr_matrix, bodies: np.ndarray) -
 
 
 @dataclass(frozen=True)
-class Apart:
+class IndependentSystems:
     """Systems that share nothing, as one: `parts` with their unknowns and closed multipliers."""
 
-    parts: Sequence[tuple[np.ndarray, np.ndarray, Constrained]]
+    parts: Sequence[tuple[np.ndarray, np.ndarray, ConstrainedSystem]]
     n_multipliers: int
 
     @property
-    def _largest(self) -> Constrained:
+    def _largest(self) -> ConstrainedSystem:
         return max(self.parts, key=lambda part: len(part[0]))[2]
 
     @property
-    def factor(self) -> Factor | Chosen:
+    def factor(self) -> Factor | LinearSolver:
         """That of the largest system."""
         return self._largest.factor
 
@@ -74,24 +71,29 @@ class Apart:
         """Why that was chosen."""
         return f"{self._largest.why}; largest of {len(self.parts)} systems"
 
+    @property
+    def doubt(self) -> str:
+        """The first of its parts."""
+        return next((system.doubt for _, _, system in self.parts if system.doubt), "")
+
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
-        """See `Constrained`."""
-        change = np.zeros(len(force))
+        """See `ConstrainedSystem`."""
+        change = np.zeros_like(force)
         for unknowns, mine, system in self.parts:
             change[unknowns] = system.correction(force[unknowns], violation[mine], accuracy)
         return change
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
-        """See `Constrained`."""
-        found = np.zeros(self.n_multipliers)
+        """See `ConstrainedSystem`."""
+        found = np.zeros((self.n_multipliers, *force.shape[1:]))
         for unknowns, mine, system in self.parts:
             found[mine] = system.multiplier(force[unknowns])
         return found
 
     def imbalance(self, force: np.ndarray) -> float:
-        """See `Constrained`."""
+        """See `ConstrainedSystem`."""
         return max(system.imbalance(force[unknowns]) for unknowns, _, system in self.parts)
 
 
@@ -100,7 +102,7 @@ class Systems:
 
     `matrix` K (n, n), `constraints` (k, n) of all multipliers, `own` (n,) the unknowns that may be
     eliminated by condensation, None where some multiplier has none: then the saddle point is
-    factored. `unknowns` tells what each stands for.
+    factored. `unknowns` describes each.
     """
 
     def __init__(
@@ -113,9 +115,9 @@ class Systems:
     ):
         self._matrix, self._constraints, self._own = matrix, constraints, own
         self._unknowns, self._parts = unknowns, parts
-        self._kept: dict[int, tuple[bytes, Constrained]] = {}
+        self._kept: dict[int, tuple[bytes, ConstrainedSystem]] = {}
         self._gave_up: dict[int, str] = {}
-        self.latest: Constrained | None = None
+        self.latest: ConstrainedSystem | None = None
 
     def forget(self) -> None:
         """Keep no factor."""
@@ -125,10 +127,10 @@ class Systems:
     def _drop(self, number: int) -> None:
         """Keep of a part's system only why multigrid gave up on it, if it did."""
         system = self._kept.pop(number)[1]
-        if isinstance(system, Condensed) and system.factor.gave_up:
+        if isinstance(system, CondensedSystem) and system.factor.gave_up:
             self._gave_up[number] = system.factor.gave_up
 
-    def closed(self, closed: np.ndarray) -> Constrained:
+    def closed(self, closed: np.ndarray) -> ConstrainedSystem:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
         if len(self._parts) == 1:
             self.latest = self._of(0, None, closed)
@@ -138,10 +140,10 @@ class Systems:
             unknowns = np.flatnonzero(part.unknowns)
             system = self._of(number, unknowns, closed & part.multipliers)
             found.append((unknowns, np.flatnonzero(part.multipliers[closed]), system))
-        self.latest = Apart(found, int(closed.sum()))
+        self.latest = IndependentSystems(found, int(closed.sum()))
         return self.latest
 
-    def _of(self, number: int, chosen: np.ndarray | None, closed: np.ndarray) -> Constrained:
+    def _of(self, number: int, chosen: np.ndarray | None, closed: np.ndarray) -> ConstrainedSystem:
         """The system of one part, of the `chosen` unknowns; None: of all."""
         key = closed.tobytes()
         if number not in self._kept or self._kept[number][0] != key:
@@ -151,7 +153,9 @@ class Systems:
             self._kept[number] = key, self._factored(number, chosen, closed)
         return self._kept[number][1]
 
-    def _factored(self, number: int, chosen: np.ndarray | None, closed: np.ndarray) -> Constrained:
+    def _factored(
+        self, number: int, chosen: np.ndarray | None, closed: np.ndarray
+    ) -> ConstrainedSystem:
         matrix, constraints = self._matrix, self._constraints[closed]
         own, unknowns = self._own, self._unknowns
         if chosen is not None:
@@ -167,7 +171,7 @@ class Systems:
         return condense(matrix, constraints, own, unknowns, self._gave_up.get(number, ""))
 
 
-def _saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> Constrained:
+def _saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> ConstrainedSystem:
     try:
         return saddle_point(matrix, constraints, _NOTHING_OWN)
     except SolveError as error:
