@@ -16,7 +16,7 @@ from solver.mechanics.fem.mixed import MeanStress
 from solver.mechanics.fem.supports import FreeMotion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
 from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
-from solver.mechanics.mortar.held import joined
+from solver.mechanics.mortar.held import merge_fixed_multipliers
 from solver.mechanics.mortar.operator import GapOperator, gap_operator
 from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from solver.mesh.catalogue import BY_NAME
@@ -203,7 +203,7 @@ def _zones(
         initial = _initial_gaps(zone, operator, groups, part.sub_faces, noise)
         operator = replace(operator, initial=initial)
         if TREATMENTS[zone.treatment].joins:
-            operator = joined(operator, free.basis)
+            operator = merge_fixed_multipliers(operator, free.basis)
         found.append(
             ZoneScene(
                 zone=zone,

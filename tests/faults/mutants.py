@@ -120,15 +120,14 @@ def _first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
 
 def _one_dropped(parts: list) -> list:
     """Without the smallest segment that is more than round-off."""
-    sizes = [part.weight.sum(axis=1) for part in parts]
+    sizes = [part.area for part in parts]
     if not parts:
         return parts
     least = _SLIVER * max(size.max() for size in sizes)
     real = [np.where(size > least, size, np.inf) for size in sizes]
     block = int(np.argmin([size.min() for size in real]))
     keep = np.arange(len(real[block])) != real[block].argmin()
-    kept = type(parts[block])(**{k: v[keep] for k, v in vars(parts[block]).items()})
-    return [kept if i == block else part for i, part in enumerate(parts)]
+    return [part.of(keep) if i == block else part for i, part in enumerate(parts)]
 
 
 def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -206,7 +205,7 @@ class _Alike:
 
 MUTANTS = (
     Mutant("gap-sign", "the initial gap counts with the wrong sign", CLOSING,
-           "solver.mechanics.mortar.operator:_integrals",
+           "solver.mechanics.mortar.operator:integrals",
            changed(lambda p: replace(p, gap=-p.gap))),
     Mutant("operator-sign", "the gap operator has the wrong sign: surfaces attract", PLANE,
            "solver.simulation.scene:gap_operator", changed(lambda o: replace(o, matrix=-o.matrix))),
@@ -214,17 +213,17 @@ MUTANTS = (
            "solver.simulation.scene:facets",
            given(lambda x, kind, nodes, n: (x, kind, nodes[:, ::-1], n))),
     Mutant("master-order", "master shape functions are given to the next node", TILTED,
-           "solver.mechanics.mortar.operator:_integrals",
-           changed(lambda p: replace(p, master=np.roll(p.master, 1, axis=2)))),
+           "solver.mechanics.mortar.operator:integrals",
+           changed(lambda p: replace(p, vectors=(p.vectors[0], np.roll(p.vectors[1], 1, axis=2))))),
     Mutant("slave-side-lost", "slave nodes are missing in the gap's derivative", PLANE,
-           "solver.mechanics.mortar.operator:_integrals",
-           changed(lambda p: replace(p, slave=0 * p.slave))),
+           "solver.mechanics.mortar.operator:integrals",
+           changed(lambda p: replace(p, vectors=(0 * p.vectors[0], p.vectors[1])))),
     Mutant("sliver-lost", "the smallest segment is dropped", PLANE,
            "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
     Mutant("sliver-lost-3d", "the smallest segment is dropped, in space", TILTED_SOLID,
            "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
     Mutant("pair-lost", "one master face is overlooked when faces are paired", PLANE,
-           "solver.mechanics.mortar.segments:candidate_pairs", changed(_master_overlooked)),
+           "solver.mechanics.mortar.pairing:candidate_pairs", changed(_master_overlooked)),
     Mutant("macro-element-dropped", "one macro-element may never close", PLANE,
            "solver.simulation.problem:contact_constraints", _never_closing),
     Mutant("macro-element-numbers", "sub-faces go to the next macro-element", VARYING,

@@ -76,9 +76,8 @@ def test_each_alone(skip, cells):
     assert left <= told
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_what_the_plan_says_of_coincident_meshes(dim):
-    cells = {2: "QUAD9", 3: "HEXA27"}[dim]
+@pytest.mark.parametrize(("dim", "cells"), [(2, "QUAD9"), (3, "HEXA27")])
+def test_what_the_plan_says_of_coincident_meshes(dim, cells):
     solution = simulate(block_case(dim), block_mesh(cells, cells, (2, 2)))
     said = {line.skip: line.what for line in solution.plan}
     assert {skip for skip in said if skip} == {"quadrature", "status"}

@@ -1,9 +1,12 @@
 """The patch test, held to round-off over all pairs of cell types and whatever keeps it a patch."""
 
+from dataclasses import replace
+
 import meshio
 import numpy as np
 import pytest
 
+from solver.mechanics.mortar import operator
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.simulate import simulate
@@ -76,6 +79,28 @@ def test_moved_nodes(bottom, top, hexahedra, bent):
     mesh = mesh if bent else straightened(mesh)
     assert_exact(simulate(block_case(3).as_solved(hexahedra=hexahedra), mesh))
     assert_exact(simulate(block_case(3).as_solved(True, hexahedra), mesh))
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("share", [0.08, 0.15])
+def test_strongly_bent_faces(share, swapped):
+    """Nodes moved by a share of an edge: coverage, which nothing corrects, stays one."""
+    assert_exact(simulate(block_case(3), moved(block_mesh("HEXA20", "HEXA20"), share / 3), swapped))
+
+
+@pytest.mark.parametrize("share", [0.02, 0.08])
+def test_segments_that_are_lost_are_seen(monkeypatch, share):
+    """Three per cent of the area of one pair's segments in every four: nothing makes up for it."""
+    true = operator.intersect
+
+    def losing(*given):
+        return [replace(s, weight=np.where(np.arange(len(s.gap)) % 4 == 0, 0.88, 1.0)[:, None]
+                        * s.weight) for s in true(*given)]  # fmt: skip
+
+    monkeypatch.setattr(operator, "intersect", losing)
+    found = errors(simulate(block_case(3), moved(block_mesh("HEXA20", "HEXA20"), share / 3)))
+    assert found["coverage"] > 0.01
+    assert found["pressure"] > 1e-3
 
 
 @pytest.mark.parametrize("bottom", PLANE)

@@ -164,6 +164,14 @@ def test_a_load_that_bends_them_between_the_macro_elements_is_refused():
         simulate(blocks(wave), slender(1e5))
 
 
+def test_a_body_that_its_loads_pull_away_is_not_searched_for_long(monkeypatch):
+    """The load on the whole is a pull: no macro-element system of unit gaps is worth forming."""
+    monkeypatch.setattr(problem, "_COLUMNS", 0)
+    pull = PRESSED.replace("25.0", "'25.0 - 60*x'")
+    with pytest.raises(SolveError, match="nothing keeps top from a free motion"):
+        simulate(blocks(pull), block_mesh("QUAD4", "TRIA3", (6, 4)))
+
+
 @pytest.fixture
 def bent():
     """A problem with an open end, and its state."""
@@ -190,7 +198,7 @@ def test_what_gaps_bring_up_is_what_opening_takes_away(bent):
     """Forces |T| p = W ḡ + q of the state, with q those of all macro-elements closed."""
     assembled, state = bent
     area = assembled.constraints.covered
-    stiffness = assembled._gap_stiffness()
+    stiffness = assembled._gap_stiffness(1.0)
     closed = assembled.solve(1.0, bilateral=True).pressure
     assert area * state.pressure == pytest.approx(
         stiffness @ state.gap + area * closed, abs=1e-10 * closed.max()

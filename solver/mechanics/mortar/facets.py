@@ -16,9 +16,11 @@ _AFFINE = 1e-12
 # Newton's method stops at steps below the first (in parts of a face) and accepts the second.
 _CONVERGED, _ACCEPTED = 1e-13, 1e-8
 _NEWTON_STEPS = 30
+# Points that it loses are approached from the middle of the face in as many stages.
+_STAGES = 32
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Facets:
     """Faces of one type with what the pairing and the intersections need, per face.
 
@@ -74,17 +76,19 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
         lost = int((~(size > 0)).sum())
         raise SolveError(f"{lost} {kind.name} faces have no size left in the precision of the mesh")
     normal /= size[:, None]
-    shape = _shape(kind, corner - centre[:, None], radius, normal)
+    flat, straight, affine = _shape(kind, corner - centre[:, None], radius, normal)
     return Facets(
-        kind,
-        nodes,
-        number,
-        corner,
-        centre,
-        radius,
-        normal,
-        _tangents(normal),
-        *shape,
+        type=kind,
+        nodes=nodes,
+        number=number,
+        corner=corner,
+        centre=centre,
+        radius=radius,
+        normal=normal,
+        tangents=_tangents(normal),
+        flat=flat,
+        straight=straight,
+        affine=affine,
     )
 
 
@@ -120,11 +124,6 @@ def _shape(
     return flat, straight, straight & (skew <= _AFFINE * radius)
 
 
-def shift(face: Facets, chosen: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """Node coordinates (c, n_nodes, dim) of the chosen faces, seen from origins (c, dim)."""
-    return face.corner[chosen] - origin[:, None]
-
-
 def surface_vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
     """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`."""
     n, n_nodes, dim = block.corner.shape
@@ -132,7 +131,7 @@ def surface_vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
     return area_vectors(block.corner.reshape(-1, dim), nodes, slopes)
 
 
-def locate(
+def project_along(
     kind: CellType,
     corner: np.ndarray,
     target: np.ndarray,
@@ -148,19 +147,52 @@ def locate(
     (they lie outside the face, and all that matters is that neighbours agree on them).
     """
     start, distance = _on_affine_face(kind, corner, target, direction)
-    place = start
+    place, distance, size = _newton(kind, corner, target, direction, start, distance)
+    lost = ~(size <= _ACCEPTED)
+    if outline:
+        return np.where(lost[..., None], start, place), distance
+    if lost.any():
+        face, q = np.nonzero(lost)
+        rest = corner[face], target[face, q][:, None], direction[face, q][:, None]
+        again, height, size = _from_the_middle(kind, *rest)
+        place[lost], distance[lost] = again[:, 0], height[:, 0]
+        lost[lost] = ~(size[:, 0] <= _ACCEPTED)
+    if lost.any():
+        raise SolveError(f"{int(lost.sum())} points could not be projected onto {kind.name} faces")
+    return place, distance
+
+
+def _newton(
+    kind: CellType,
+    corner: np.ndarray,
+    target: np.ndarray,
+    direction: np.ndarray,
+    place: np.ndarray,
+    distance: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places, distances, and the sizes (f, q) of the last steps."""
     for _ in range(_NEWTON_STEPS):
         step = _newton_step(kind, corner, target, direction, place, distance)
         place, distance = place - step[..., :-1], distance - step[..., -1]
         size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
         if not (size > _CONVERGED).any():
             break
-    lost = ~(size <= _ACCEPTED)
-    if outline:
-        return np.where(lost[..., None], start, place), distance
-    if lost.any():
-        raise SolveError(f"{int(lost.sum())} points could not be projected onto {kind.name} faces")
-    return place, distance
+    return place, distance, size
+
+
+def _from_the_middle(
+    kind: CellType, corner: np.ndarray, target: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same, going from the middle of the face to the point: for faces bent up to folding."""
+    middle = kind.nodes[: kind.n_vertices].mean(axis=0)
+    values = shape_functions(kind.name).values(middle)
+    centre = np.einsum("a,fad->fd", values, corner)[:, None]
+    place = np.broadcast_to(middle, (*target.shape[:2], kind.dim))
+    distance = np.zeros(target.shape[:2])
+    for share in np.arange(1, _STAGES + 1) / _STAGES:
+        between = centre + share * (target - centre)
+        place, distance, size = _newton(kind, corner, between, direction, place, distance)
+    return place, distance, size
 
 
 def _on_affine_face(

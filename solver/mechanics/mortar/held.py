@@ -20,7 +20,7 @@ from solver.mechanics.mortar.operator import GapOperator
 _HELD = 1e-12
 
 
-def joined(operator: GapOperator, basis: sparse.csr_matrix) -> GapOperator:
+def merge_fixed_multipliers(operator: GapOperator, basis: sparse.csr_matrix) -> GapOperator:
     """The operator without multipliers of held nodes; `basis` (n_dofs, n_free) is what is free.
 
     It stays as it is where all nodes are held, or none.

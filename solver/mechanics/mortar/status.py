@@ -73,8 +73,9 @@ def find_status(
 
     `area` (k,) turns pressures into forces. `stiffness()` is asked for where the quick search
     fails: the forces (e, e) that average gaps of the eligible multipliers bring up, each imposed
-    with all others closed. `confirm`: the set that is found is solved once more. Raises SolveError
-    where no status fulfils the conditions.
+    with all others closed. It may raise SolveError where no pressure makes equilibrium. `confirm`:
+    the set that is found is solved once more. Raises SolveError where no status fulfils the
+    conditions.
     """
     closed, seen = start & eligible, set()
     changes: list[int] = []
@@ -124,11 +125,14 @@ def _certain(
     Raises `failure`, why the quick search ended, where this one ends without a status too.
     """
     _LOG.info("contact status: complementarity problem of %d multipliers", eligible.sum())
-    closed, matrix = eligible, None
+    closed = eligible
+    try:
+        matrix = stiffness()
+    except SolveError as error:
+        raise failure or error from None
     for _ in range(_MAX_CORRECTIONS):
         try:
             trial = solve(closed)
-            matrix = stiffness() if matrix is None else matrix
         except SolveError as error:
             raise failure or error from None
         wrong = eligible & (trial.offence(closed) > 1)

@@ -1,7 +1,6 @@
 """Quadrature points on whole slave faces, with their share of the surface and their normals."""
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from solver.mechanics.fem.quadrature import Rule
 from solver.mechanics.mortar.facets import Facets, surface_vectors
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Samples:
     """Points on the n faces of one block, the same q places on each.
 
@@ -21,10 +20,6 @@ class Samples:
     values: np.ndarray
     weight: np.ndarray
     normal: np.ndarray
-
-    def of(self, chosen: np.ndarray) -> Self:
-        """Those of some of the faces."""
-        return type(self)(self.values, self.weight[chosen], self.normal[chosen])
 
 
 def face_samples(slaves: list[Facets]) -> list[Samples]:
@@ -41,4 +36,4 @@ def sampled(block: Facets, rule: Rule) -> Samples:
     if block.directions is not None:
         vectors = np.einsum("qa,fad->fqd", values, block.directions)
     normal = vectors / np.linalg.norm(vectors, axis=2, keepdims=True)
-    return Samples(values, measure * weights, normal)
+    return Samples(values=values, weight=measure * weights, normal=normal)
