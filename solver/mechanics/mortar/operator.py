@@ -87,6 +87,9 @@ def meet_in_segments(
 
     `among`: by block, the slave faces that are looked at, all of them by default; `weighted`: with
     quadrature for integrands weighted by linear shape functions of the slave.
+
+    >>> [s.area.tolist() for s in meet_in_segments([slave], [], [master], 1.0)]
+    [[1.0, 1.0]]
     """
     found = []
     for a, slave in enumerate(slaves):
@@ -126,6 +129,14 @@ def gap_operator(
     looked for nearby, and farther away only for sub-faces that found no partner there. What is out
     of reach of contact does not count as covered. Faces that meet along directions other than
     their own normals have no closure.
+
+    A slave edge of length 2 under two master edges, open by 1/2:
+
+    >>> operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    >>> operator.matrix.toarray().reshape(5, 2)[:, 1].round(15).tolist()
+    [-1.0, -1.0, 0.5, 1.0, 0.5]
+    >>> operator.initial.round(15).tolist(), operator.covered.round(15).tolist()
+    ([1.0], [2.0])
     """
     if any(block.directions is not None for block in slaves):
         scheme = replace(scheme, closure=False)
