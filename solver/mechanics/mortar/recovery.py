@@ -23,6 +23,10 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy import sparse
 
+from solver.mechanics.mortar.facets import tangents_of
+from solver.mechanics.mortar.segments import Segments
+from solver.mechanics.mortar.surface_points import Surface
+
 # A macro-element covered by less than this share of its area is no neighbour: its mean is of
 # little use to others.
 MIN_SHARE = 0.25
@@ -97,56 +101,92 @@ class Moments:
         return np.einsum("nsd,n...de,nte->n...st", frame, matrices, frame)
 
 
-def moments(
-    macro: Sequence[np.ndarray],
-    places: Sequence[np.ndarray],
-    weights: Sequence[np.ndarray],
-    area: np.ndarray,
-    centre: np.ndarray,
-    normal: np.ndarray,
-) -> Moments:
-    """Moments of macro-elements from quadrature points on their covered parts.
+def moments(found: Sequence[Segments], surface: Surface) -> Moments:
+    """Moments of macro-elements (m,) from the segments that cover them.
 
-    By block of segments: `macro` (s,) the macro-element, `places` (s, q, d), `weights` (s, q).
-    `area`, `centre`, `normal` (m,), (m, d), (m, d): whole macro-elements. One that is not covered
-    keeps its centre and has no spread.
-
-    Two points that integrate cubics on a macro-element from −1 to 1:
-
-    >>> at = np.array([[[-1 / 3**0.5, 0.0], [1 / 3**0.5, 0.0]]])
-    >>> found = moments([np.array([0])], [at], [np.ones((1, 2))], np.array([2.0]),
-    ...                 np.zeros((1, 2)), np.array([[0.0, 1.0]]))
-    >>> found.measure, found.spread[0, 0, 0].round(12)
-    (array([2.]), np.float64(0.333333333333))
+    One that is not covered keeps its centre and has no spread.
     """
-    m, dim = centre.shape
+    m, dim = surface.centre.shape
     measure, first, second = np.zeros(m), np.zeros((m, dim)), np.zeros((m, dim, dim))
-    for owner, x, w in zip(macro, places, weights, strict=True):
-        away = x - centre[owner][:, None]
-        np.add.at(measure, owner, w.sum(axis=1))
+    for segments in found:
+        owner, w = segments.macro, segments.weight
+        away = segments.points - surface.centre[owner][:, None]
+        np.add.at(measure, owner, segments.area)
         np.add.at(first, owner, np.einsum("sq,sqd->sd", w, away))
         np.add.at(second, owner, np.einsum("sq,sqd,sqe->sde", w, away, away))
     covered = np.where(measure > 0, measure, 1.0)
     shift = first / covered[:, None]
     spread = second / covered[:, None, None] - shift[:, :, None] * shift[:, None]
     return Moments(
-        measure=np.where(measure > 0, measure, area),
-        share=measure / area,
-        centre=centre + shift,
+        measure=np.where(measure > 0, measure, surface.area),
+        share=measure / surface.area,
+        centre=surface.centre + shift,
         spread=spread,
-        normal=normal,
-        tangents=_frames(normal),
+        normal=surface.normal,
+        tangents=tangents_of(surface.normal),
     )
 
 
-def _frames(normal: np.ndarray) -> np.ndarray:
-    if normal.shape[1] == 2:
-        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
-    axis = np.zeros_like(normal)
-    axis[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
-    first = np.cross(axis, normal)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(normal, first)], axis=1)
+@dataclass(frozen=True, kw_only=True)
+class Recovery:
+    """What recovers the pressure on m macro-elements by functions ψ, k on each.
+
+    `near` (m, m): which of them share a vertex; `loads` (m · k, n_dofs): ∫ ψ (N_master − N_slave) n;
+    `products` (m, k, k): ∫ ψ ψᵀ.
+    """
+
+    form: Form
+    moments: Moments
+    near: sparse.csr_matrix
+    loads: sparse.csr_matrix
+    products: np.ndarray
+
+    def reconstruction(self, closed: np.ndarray) -> "Reconstruction":
+        """The reconstruction among closed macro-elements (m,)."""
+        return reconstruct(self.moments, self.near, closed, self.form)
+
+    def error(self, coefficients: np.ndarray) -> np.ndarray:
+        """η (m,), the L2 norm of p* − p on each, for `coefficients` (m · k,)."""
+        c = coefficients.reshape(len(self.products), -1)
+        return np.sqrt(np.maximum(np.einsum("mk,mkl,ml->m", c, self.products, c), 0.0))
+
+    def values(
+        self, pressure: np.ndarray, coefficients: np.ndarray, macro: np.ndarray, places: np.ndarray
+    ) -> np.ndarray:
+        """p* (s, q) on macro-elements (s,) at points (s, q, d)."""
+        c = coefficients.reshape(len(pressure), -1)[macro]
+        psi = shapes(self.moments, macro, places, self.form)
+        return pressure[macro][:, None] + np.einsum("sqk,sk->sq", psi, c)
+
+
+def recovery(
+    form: Form,
+    found: Sequence[Segments],
+    surface: Surface,
+    near: sparse.csr_matrix,
+    n_nodes: int,
+) -> Recovery:
+    """What recovers the pressure of macro-elements from the segments that cover them."""
+    at, (m, dim) = moments(found, surface), surface.centre.shape
+    k = form.count(dim)
+    products = np.zeros((m, k, k))
+    rows, columns, values = [], [], []
+    for segments in found:
+        psi = shapes(at, segments.macro, segments.points, form)
+        weighted = segments.weight[..., None] * psi
+        np.add.at(products, segments.macro, np.einsum("sqk,sql->skl", weighted, psi))
+        if not form.sweeps:
+            continue
+        for sign, side in zip((-1.0, 1.0), segments.sides, strict=True):
+            part = np.einsum("sqk,sqa,sqd->skad", sign * weighted, side.values, segments.normal)
+            row = segments.macro[:, None] * k + np.arange(k)
+            column = dim * side.nodes[:, :, None] + np.arange(dim)
+            rows.append(np.broadcast_to(row[:, :, None, None], part.shape).ravel())
+            columns.append(np.broadcast_to(column[:, None], part.shape).ravel())
+            values.append(part.ravel())
+    entries = [np.concatenate(part or [np.empty(0, int)]) for part in (values, rows, columns)]
+    loads = sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=(m * k, dim * n_nodes))
+    return Recovery(form=form, moments=at, near=near, loads=loads.tocsr(), products=products)
 
 
 def shapes(at: Moments, macro: np.ndarray, places: np.ndarray, form: Form) -> np.ndarray:
