@@ -162,7 +162,7 @@ class Solved:
         return np.concatenate([np.empty(0), *(zone.gap for zone in self.solution.zones)])
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the result file, as `solve -o` does: whole or not at all; name it `.vtkhdf`."""
+        """Write the result file, as `solve -o` does: whole or not at all, named `.vtkhdf`."""
         write_result(Path(path), self.solution, self.checks, self.provenance)
 
     def picture(self) -> str:

@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.case.descriptions import require_file
 from solver.case.expressions import Expression
 from solver.case.material import Material
 from solver.case.model import EXACT, LOAD_KINDS, Case, Load, Observation, Support, Zone
@@ -16,6 +15,7 @@ from solver.case.rules import check_rules
 from solver.case.schemas import CASE_SCHEMA, validate
 from solver.case.yaml import parse_mapping, read_text
 from solver.system.errors import InputError, key_path
+from solver.system.files import is_file
 
 if TYPE_CHECKING:
     from solver.case.solutions import ExactSolution
@@ -51,8 +51,8 @@ def parse_case(text: str, path: Path) -> Case:
 def check_mesh_file(case: Case) -> None:
     """Raise `InputError` where the case names a mesh file that is not there."""
     path = case.mesh.get("path")
-    if path:
-        require_file(case.path, "mesh.file", path, str(path))
+    if path and not is_file(path):
+        raise InputError(case.path, "mesh.file", str(path), "no such file")
 
 
 class _Reader:

@@ -10,8 +10,9 @@ refused with its key and what is allowed. The words for that are the `descriptio
 `Meta`; a type without one is described by its parts. The `title` says what a key is.
 """
 
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Callable, Collection, Iterable, Iterator
+from functools import cache, partial
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -19,6 +20,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from solver.system.errors import InputError, hint, key_path
+from solver.system.files import is_file
 
 Text = Annotated[str, Meta(min_length=1, description="text")]
 Version = Annotated[str, Meta(min_length=1, description="text (in quotes if it is a number)")]
@@ -27,8 +29,15 @@ Positive = Annotated[float, Meta(gt=0, le=1e30, description="a positive number u
 ONCE = Meta(min_length=1, extra_json_schema={"uniqueItems": True})
 """Of a list: it has items, and they differ."""
 
-_WORDS = {str: "text", bool: "true or false", int: "a whole number", float: "a number"}
+_WORDS = {
+    Path: "the path of a file",
+    str: "text",
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+}
 Keys = tuple[str | int, ...]
+Convert = Callable[[Any, Any], Any]
 AnySection = TypeVar("AnySection", bound="Section")
 
 
@@ -54,21 +63,49 @@ class Section(Struct, frozen=True, forbid_unknown_fields=True):
                 raise FieldError((name,), allowed)
 
 
-def read_as(kind: type[AnySection], content: object, where: object) -> AnySection:
-    """An object of the class from plain values; raises `InputError` under the name `where`."""
+def read_as(kind: type[AnySection], content: object, where: Path) -> AnySection:
+    """An object of the class from the content of the file `where`; raises `InputError`.
+
+    A `Path` in the class is a file that has to be there, named relative to `where`.
+    """
+    convert = partial(msgspec.convert, dec_hook=partial(_file_beside, where))
     try:
         if not _has_null(content):
-            return msgspec.convert(content, kind)
+            return convert(content, kind)
     except msgspec.ValidationError:
         pass
-    fault = _fault(content, kind, ())
+    fault = _fault(convert, content, kind, ())
     raise InputError(where, key_path(fault.keys) or "file", fault.value, fault.problem)
+
+
+def _file_beside(where: Path, kind: type, value: object) -> Path:
+    if kind is not Path or not isinstance(value, str) or not value:
+        raise FieldError((), f"must be {_WORDS[Path]}")
+    file = where.parent / value
+    if not is_file(file):
+        raise FieldError((), "no such file")
+    return file
+
+
+def refuse_twins(key: str, items: Iterable[Any]) -> None:
+    """Raise `FieldError` for the first name in a list, under `key`, that occurs twice."""
+    seen: set[str] = set()
+    for i, item in enumerate(items):
+        if item.name in seen:
+            raise FieldError((key, i, "name"), "the name is given twice; each needs its own")
+        seen.add(item.name)
+
+
+def refuse_unknown(keys: Keys, name: str, kind: str, known: Collection[str]) -> None:
+    """Raise `FieldError` where a name is none of the known ones of its kind."""
+    if name not in known:
+        raise FieldError(keys, f"no such {kind}; {hint(name, known)}")
 
 
 def json_schema(kind: type[Section]) -> dict[str, Any]:
     """The JSON Schema of a class, for editors."""
     draft = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": draft, **msgspec.json.schema(kind)}
+    return {"$schema": draft, **msgspec.json.schema(kind, schema_hook=lambda _: {"type": "string"})}
 
 
 @cache
@@ -132,7 +169,11 @@ def _parts(kind: Any) -> list[Any]:
 @cache
 def _different(kind: type[Section]) -> list[str]:
     """The fields whose items must differ."""
-    return [f.name for f in fields(kind).values() if ONCE in getattr(f.type, "__metadata__", ())]
+    return [
+        field.name
+        for field in fields(kind).values()
+        if any(meta.extra_json_schema for meta in getattr(field.type, "__metadata__", ()))
+    ]
 
 
 def _has_null(value: object) -> bool:
@@ -142,34 +183,34 @@ def _has_null(value: object) -> bool:
     return isinstance(value, list) and any(map(_has_null, value))
 
 
-def _fits(value: object, kind: Any) -> bool:
+def _fits(convert: Convert, value: object, kind: Any) -> bool:
     try:
-        msgspec.convert(value, kind)
+        convert(value, kind)
     except msgspec.ValidationError:
         return False
     return not _has_null(value)
 
 
-def _fault(value: Any, kind: Any, keys: Keys) -> FieldError:
+def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
     """The innermost value that does not fit its type, and why."""
     for part in _parts(kind):
         if not _is_like(part, value):
             continue
         if is_section(part) and (fault := _wrong_key(value, fields(part), keys)):
             return fault
-        for key, item, inner in _children(value, part):
+        for key, item, inner in _children(convert, value, part):
             if inner is None:
                 names = get_args(_bare(get_args(part)[0]))
                 return FieldError((*keys, key), f"unknown key; {hint(str(key), names)}", item)
-            if (item is None and isinstance(value, dict)) or not _fits(item, inner):
-                return _fault(item, inner, (*keys, key))
-        try:
-            msgspec.convert(value, part)
-        except msgspec.ValidationError as error:
-            if isinstance(own := error.__cause__, FieldError):
-                for key in own.keys:
-                    value = value[key]
-                return FieldError((*keys, *own.keys), own.problem, value)
+            if (item is None and isinstance(value, dict)) or not _fits(convert, item, inner):
+                return _fault(convert, item, inner, (*keys, key))
+    try:
+        convert(value, kind)
+    except msgspec.ValidationError as error:
+        if isinstance(own := error.__cause__, FieldError):
+            for key in own.keys:
+                value = value[key]
+            return FieldError((*keys, *own.keys), own.problem, value)
     return FieldError(keys, f"must be {described(kind)}", value)
 
 
@@ -190,14 +231,14 @@ def _wrong_key(value: Any, known: Any, keys: Keys) -> FieldError | None:
     return name and FieldError((*keys, name), "this key is needed")
 
 
-def _children(value: Any, kind: Any) -> Iterator[tuple[str | int, object, Any]]:
+def _children(convert: Convert, value: Any, kind: Any) -> Iterator[tuple[str | int, object, Any]]:
     """The keys of a value, what each holds, and its type; None as the type of an unknown key."""
     if is_section(kind):
         yield from ((key, item, fields(kind)[key].type) for key, item in value.items())
     elif get_origin(kind) is dict:
         of_key, of_item = get_args(kind)
         for key, item in value.items():
-            yield key, item, of_item if _fits(key, of_key) else None
+            yield key, item, of_item if _fits(convert, key, of_key) else None
     else:
         inner = get_args(kind)
         for i, item in enumerate(value):

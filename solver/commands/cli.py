@@ -281,11 +281,15 @@ def _new(options: argparse.Namespace) -> int:
 
 def _accept(options: argparse.Namespace) -> int:
     from solver.verification.checks import run_checks
-    from solver.verification.regression import accept, accepted_values
+    from solver.verification.regression import accept, accepted_values, regression_file
     from solver.verification.results import read_result
 
     for path in options.results:
         solution = read_result(path).solution
+        case, target = solution.case.path, regression_file(solution).resolve()
+        if not (case.is_file() and target.is_relative_to(Path.cwd())):
+            allowed = "must be a file below the current folder, where its accepted values lie"
+            raise InputError(path, "case", str(case), allowed)
         checks = run_checks(solution, accepted_values(solution))
         changes = accept(solution, checks)
         print(f"{solution.job}: {len(changes)} values accepted anew of {len(checks)}")

@@ -12,7 +12,13 @@ from solver.system.files import write_text
 
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
+    "benchmark": "solver.studies.benchmark.description:BenchmarkFile",
     "family": "solver.report.families:FamilyFile",
+    "infsup": "solver.studies.infsup.description:InfSupFile",
+    "ladders": "solver.studies.orders.description:LaddersFile",
+    "scaling": "solver.studies.scaling.description:ScalingFile",
+    "study": "solver.studies.work_precision.description:StudyFile",
+    "sweep": "solver.studies.stability.sweeps:SweepFile",
 }
 
 

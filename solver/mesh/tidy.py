@@ -4,6 +4,7 @@ import meshio
 import numpy as np
 
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME, CellType
+from solver.mesh.keys import LARGEST
 from solver.mesh.orient import right_side_out
 from solver.system.errors import InputError
 
@@ -139,8 +140,9 @@ def _flattened(points: np.ndarray, dim: int, where: object) -> np.ndarray:
         found = f"{points.dtype} {points.shape}"
         raise InputError(where, "node coordinates", found, "must be two or three numbers a node")
     points = points.astype(float)
-    if not np.isfinite(points).all():
-        raise InputError(where, "node coordinates", None, "must be finite numbers")
+    if not (np.abs(points) <= LARGEST).all():
+        allowed = f"must be finite numbers, at most {LARGEST:g}"
+        raise InputError(where, "node coordinates", None, allowed)
     if dim == 2 and points.shape[1] == 3:
         if np.ptp(points[:, 2]) > _PLANE * np.ptp(points, axis=0).max():
             raise InputError(where, "node coordinates", None, "a mesh of 2D cells must have z = 0")

@@ -20,10 +20,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from solver.case.descriptions import point_of
 from solver.studies import FULL
 from solver.system.clock import now
-from solver.system.errors import InputError, SolveError
+from solver.system.errors import InputError, SolveError, hint
 from solver.system.process import run_apart
 
 SOLVED, REFUSED, FAILED, CRASHED, MISSING = "solved", "refused", "failed", "crashed", "missing"
@@ -54,7 +53,10 @@ class PointStudy:
 
     def point(self, name: str) -> Any:
         """The point of that name; InputError where there is none."""
-        return point_of(self.path, self.points, name)
+        known = {point.name: point for point in self.points}
+        if name not in known:
+            raise InputError(self.path, "point", name, f"no such point; {hint(name, known)}")
+        return known[name]
 
 
 @dataclass(frozen=True)

@@ -115,3 +115,11 @@ def _lives(process: int) -> bool:
     except OSError:  # of another user
         return True
     return True
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file of that name, which may be too long for any."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False

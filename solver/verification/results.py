@@ -33,7 +33,7 @@ import numpy as np
 from solver.case.model import Case
 from solver.case.reader import parse_case
 from solver.mesh.catalogue import cell_type
-from solver.mesh.files.vtkhdf import read_grid, write_grid
+from solver.mesh.files.vtkhdf import check_name, read_grid, write_grid
 from solver.simulation.consistency import inconsistency
 from solver.simulation.solution import (
     BodyInfo,
@@ -45,7 +45,7 @@ from solver.simulation.solution import (
 )
 from solver.system.errors import InputError
 from solver.system.files import replacing, seal, seal_of
-from solver.system.hdf5 import column, new_file, read_table, write_table
+from solver.system.hdf5 import column, new_file, read_file, read_table, write_table
 from solver.verification.units import label_fields
 from solver.verification.verdict import CheckResult
 
@@ -98,6 +98,7 @@ def write_result(
     provenance: Mapping[str, Any],
 ) -> str:
     """Write a solution, its checks and its provenance to a `.vtkhdf` file; the file's hash."""
+    check_name(Path(path))
     with replacing(path) as temporary:
         with new_file(temporary) as file:
             _write(file, solution, checks, provenance)
@@ -137,7 +138,7 @@ def read_result(path: str | Path) -> Result:
     if not (sha256 := seal_of(path)):
         raise _no_result(path, "damaged, of another version, or none at all")
     try:
-        with h5py.File(path) as file:
+        with read_file(path) as file:
             file.visititems(_refuse_complex)
             result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)

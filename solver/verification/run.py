@@ -12,6 +12,7 @@ import meshio
 from solver.case.model import Case
 from solver.case.reader import check_mesh_file, load_case
 from solver.mesh import generate, read_mesh, transform
+from solver.mesh.files.vtkhdf import check_name
 from solver.mesh.size import check_memory
 from solver.simulation.options import LEAN, Options
 from solver.simulation.simulate import simulate
@@ -164,7 +165,9 @@ def _death(status: int) -> str:
 def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> Verdict:
     """The verdict of a solve that comes to its end; `beside` lies where the verdict will."""
     started, clock = processor_time(), Clock()
-    output.parent.mkdir(parents=True, exist_ok=True)  # better refused now than after the solve
+    # Better refused now than after the solve.
+    check_name(output)
+    output.parent.mkdir(parents=True, exist_ok=True)
     with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
     if job.memory_check:

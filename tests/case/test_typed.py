@@ -13,8 +13,17 @@ from solver.case.yaml import parse_mapping, read_mapping
 from solver.commands.schemas import FOLDER, TYPES, schema_text
 from solver.system.errors import InputError
 
+WHERE = Path("box.yaml")
 CASES = Path(__file__).parents[2] / "cases"
-FILES = {"family": "*/family.yaml"}
+FILES = {
+    "benchmark": "scaling/benchmark.yaml",
+    "family": "*/family.yaml",
+    "infsup": "stability/infsup/*.yaml",
+    "ladders": "*/orders.yaml",
+    "scaling": "scaling/scaling.yaml",
+    "study": "study/study.yaml",
+    "sweep": "stability/sweeps/*.yaml",
+}
 
 
 class Bolt(Section, frozen=True):
@@ -38,7 +47,7 @@ class Box(Section, frozen=True):
 
 def test_a_file_becomes_an_object():
     text = "bolts: [{name: a, size: 3, turns: [1, 2]}]\nlimits: [1, null]"
-    box = read_as(Box, parse_mapping(text, "box.yaml"), "box.yaml")
+    box = read_as(Box, parse_mapping(text, WHERE), WHERE)
     assert box == Box(bolts=(Bolt("a", 3.0, "hex", (1, 2)),), limits=(1.0, None))
 
 
@@ -69,7 +78,8 @@ def test_a_file_becomes_an_object():
         ("by_place: {top: 1}\nbolts: []", "by_place.top = 1: unknown key; allowed: left, right"),
         ("by_place: {left: {name: a}}\nbolts: []", "by_place.left.size: this key is needed"),
         ("by_place: {left: null}\nbolts: []", "by_place.left: must be {name, size, head, turns}"),
-        ("sizes: [1, 2, 1.0]\nbolts: []", "sizes = [1, 2, 1.0]: must be a list of a positive"),
+        ("sizes: [1, 2, 1.0]\nbolts: []", "= [1, 2, 1.0]: must be a list of a positive number"),
+        ("sizes: [1, 1]\nbolts: []", "a positive number up to 1e30, each once"),
         ("sizes: []\nbolts: []", "sizes = []: must be a list of a positive number up to 1e30"),
         (
             "bolts: [{name: a, size: 1}, {name: b, size: 1}, {name: c, size: 1}]",
@@ -79,7 +89,7 @@ def test_a_file_becomes_an_object():
 )
 def test_a_refusal_names_the_innermost_key(text, message):
     with pytest.raises(InputError) as refusal:
-        read_as(Box, parse_mapping(text, "box.yaml"), "box.yaml")
+        read_as(Box, parse_mapping(text, WHERE), WHERE)
     assert str(refusal.value).startswith("box.yaml: ")
     assert message in str(refusal.value)
 

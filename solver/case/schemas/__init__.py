@@ -10,14 +10,7 @@ from typing import Any
 
 from solver.system.errors import InputError, hint, key_path
 
-BENCHMARK_SCHEMA = Path(__file__).with_name("benchmark.schema.json")
 CASE_SCHEMA = Path(__file__).with_name("case.schema.json")
-INFSUP_SCHEMA = Path(__file__).with_name("infsup.schema.json")
-LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")
-FAMILY_SCHEMA = Path(__file__).with_name("family.schema.json")
-SCALING_SCHEMA = Path(__file__).with_name("scaling.schema.json")
-STUDY_SCHEMA = Path(__file__).with_name("study.schema.json")
-SWEEP_SCHEMA = Path(__file__).with_name("sweep.schema.json")
 
 
 def validate(content: object, schema: Path, where: object) -> None:

@@ -136,7 +136,7 @@ def intersect(
     near = _above_each_other(slave, master, i, j)
     pairs = _Pairs(slave=slave, index=index, masters=masters, outline=master, i=i[near], j=j[near])
     hidden, nearer = _hidden(pairs)
-    found = []
+    found: list[Segments] = []
     for start in range(0, len(pairs.i), _PAIRS_AT_ONCE):
         end = start + _PAIRS_AT_ONCE
         low, high = np.searchsorted(hidden, [start, end])

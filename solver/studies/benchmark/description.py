@@ -23,29 +23,62 @@
 `most` is the number of seconds that all cases of the batch together should not exceed.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
-from solver.case.descriptions import file_beside, refuse_unknown
-from solver.case.schemas import BENCHMARK_SCHEMA
+from msgspec import Meta
+
+from solver.case.typed import Section, Text, read_as
 from solver.case.yaml import read_mapping
 from solver.studies import QUICK
+from solver.studies.keys import Count, Seconds, Unknowns
 from solver.studies.scaling.description import ScalingPoint, read_scaling
+from solver.system.errors import InputError, hint
 
 
-@dataclass(frozen=True)
-class Way:
+class Way(Section, frozen=True):
     """One way to solve; see the module's text."""
 
-    title: str
-    solver: str = "auto"
+    title: Text
+    solver: Literal["auto", "multigrid", "pardiso", "rslab", "cholmod", "superlu"] = "auto"
     free: bool = False
-    treatment: str = "lac"
+    treatment: Text = "lac"
     cures: bool = True
     everything: bool = False
-    program: str = ""
+    program: Literal["", "calculix"] = ""
+
+
+class _Comparison(Section, frozen=True):
+    title: Text
+    series: Text
+    size: Unknowns
+    repetitions: Annotated[int, Meta(ge=0, le=100, description="a whole number, 0 to 100")]
+    ways: Annotated[tuple[Way, ...], Meta(min_length=1)]
+
+
+class WarmBatch(Section, frozen=True):
+    """Cases solved in one process and in one each; `most` seconds are the goal."""
+
+    title: Text
+    most: Seconds
+    cases: Annotated[tuple[Path, ...], Meta(min_length=1)]
+
+
+class _Quick(Section, frozen=True):
+    size: Unknowns
+
+
+class BenchmarkFile(Section, frozen=True):
+    """The keys of `benchmark.yaml`."""
+
+    title: Text
+    threads: Count
+    limit: Seconds
+    scaling: Path
+    comparisons: tuple[_Comparison, ...]
+    batch: WarmBatch
+    quick: _Quick
 
 
 @dataclass(frozen=True)
@@ -56,15 +89,6 @@ class WayComparison:
     point: ScalingPoint
     repetitions: int
     ways: tuple[Way, ...]
-
-
-@dataclass(frozen=True)
-class WarmBatch:
-    """Cases solved in one process and in one each; `most` seconds are the goal."""
-
-    title: str
-    most: float
-    cases: tuple[Path, ...]
 
 
 @dataclass(frozen=True)
@@ -81,29 +105,21 @@ class Benchmark:
 
 def read_benchmark(path: Path, size: str) -> Benchmark:
     """The benchmark in a file, or its quick version; InputError says what is refused."""
-    content = read_mapping(path, BENCHMARK_SCHEMA)
-    small = int(content["quick"]["size"]) if size == QUICK else None
-    known = {
-        series.name: series for series in read_scaling(path.parent / content["scaling"]).series
-    }
+    content = read_as(BenchmarkFile, read_mapping(path), path)
+    small = int(content.quick.size) if size == QUICK else None
+    known = {series.name: series for series in read_scaling(content.scaling).series}
     comparisons = []
-    for i, item in enumerate(content["comparisons"]):
-        refuse_unknown(path, f"comparisons[{i}].series", item["series"], "series", known)
-        point = ScalingPoint(known[item["series"]], small or int(item["size"]))
-        ways = tuple(Way(**way) for way in item["ways"])
-        comparisons.append(WayComparison(item["title"], point, item["repetitions"], ways))
+    for i, item in enumerate(content.comparisons):
+        if item.series not in known:
+            problem = f"no such series; {hint(item.series, known)}"
+            raise InputError(path, f"comparisons[{i}].series", item.series, problem)
+        point = ScalingPoint(known[item.series], small or int(item.size))
+        comparisons.append(WayComparison(item.title, point, item.repetitions, item.ways))
     return Benchmark(
         path=path,
-        title=content["title"],
-        threads=content["threads"],
-        limit=float(content["limit"]),
+        title=content.title,
+        threads=content.threads,
+        limit=content.limit,
         comparisons=tuple(comparisons),
-        batch=_batch(path, content["batch"]),
+        batch=content.batch,
     )
-
-
-def _batch(path: Path, item: Mapping[str, Any]) -> WarmBatch:
-    cases = tuple(
-        file_beside(path, f"batch.cases[{i}]", case) for i, case in enumerate(item["cases"])
-    )
-    return WarmBatch(item["title"], float(item["most"]), cases)

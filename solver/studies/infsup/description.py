@@ -20,17 +20,23 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
-from solver.case.schemas import INFSUP_SCHEMA
+from msgspec import Meta
+
+from solver.case.typed import Section, read_as
 from solver.case.yaml import read_mapping
 from solver.mesh.catalogue import BY_NAME
 from solver.studies.fits import fit_power
+from solver.studies.keys import Cell
 
 LEVEL = 0.4
 """β_h falls with the size of the faces to this power at most."""
 ZERO = 1e-6
 """β_h below is zero but for round-off."""
+
+Level = Annotated[int, Meta(ge=1, description="a whole number, 1 or more")]
+Levels = Annotated[tuple[Level, ...], Meta(min_length=1)]
 
 
 @dataclass
@@ -105,29 +111,55 @@ class InfSupLadder:
         return not self.reason and bool(self.order <= LEVEL)
 
 
+class _Levels(Section, frozen=True):
+    plane: Levels
+    space: Levels
+
+
+class _Ladder(Section, frozen=True):
+    cells: Cell
+    contact: Literal["", "TRIA3", "TRIA6", "QUAD4", "QUAD8"] = ""
+    hexahedra: Literal["", "pyramids", "hexahedra"] = ""
+    cut: bool = True
+    levels: Levels = ()
+
+
+class InfSupFile(Section, frozen=True):
+    """The keys of `infsup.yaml`."""
+
+    levels: _Levels
+    quick: _Levels
+    coarser: _Levels
+    cells: Annotated[tuple[_Ladder, ...], Meta(min_length=1)]
+
+
 def read_ladders(path: Path, quick: bool = False) -> list[InfSupLadder]:
     """The ladders that a file asks for, none of them run; InputError says what is refused."""
-    content = read_mapping(path, INFSUP_SCHEMA)
-    return list(_ladders(content, quick))
+    return list(_ladders(read_as(InfSupFile, read_mapping(path), path), quick))
 
 
-def _ladders(content: dict[str, Any], quick: bool) -> Iterator[InfSupLadder]:
+def _ladders(content: InfSupFile, quick: bool) -> Iterator[InfSupLadder]:
     uncut: set[tuple[str, str]] = set()
-    for item in content["cells"]:
-        space = "plane" if BY_NAME[item["cells"]].dim == 2 else "space"
-        levels = content["quick" if quick else "levels"][space]
-        levels = levels if quick else item.get("levels", levels)
-        chosen = {key: item[key] for key in ("cells", "contact", "hexahedra") if key in item}
+    for item in content.cells:
+        space = "plane" if BY_NAME[item.cells].dim == 2 else "space"
+        levels = getattr(content.quick if quick else content.levels, space)
+        levels = levels if quick else item.levels or levels
         ways = [True]
-        kind = (item["cells"], item.get("contact", ""))
-        if item.get("cut", True) and kind not in uncut:
+        kind = (item.cells, item.contact)
+        if item.cut and kind not in uncut:
             uncut.add(kind)
             ways.append(False)
-        masters = content["coarser"][space]
+        masters = getattr(content.coarser, space)
         for coarser in masters[-1:] if quick else masters:
             for clamped in (True,) if quick else (True, False):
                 for cut in ways:
-                    ladder = InfSupLadder(**chosen, cut=cut, clamped=clamped, coarser=coarser)
-                    ladder.needs_cut = item.get("cut", True)
-                    ladder.levels = list(levels)
-                    yield ladder
+                    yield InfSupLadder(
+                        cells=item.cells,
+                        cut=cut,
+                        clamped=clamped,
+                        coarser=coarser,
+                        contact=item.contact,
+                        hexahedra=item.hexahedra,
+                        needs_cut=item.cut,
+                        levels=list(levels),
+                    )

@@ -24,38 +24,59 @@ solve`. A point is one series and size; its name is the path of its record: `hex
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from solver.case.descriptions import file_beside, refuse_twins, refuse_unknown
+from msgspec import Meta, field, structs
+
 from solver.case.model import Case
 from solver.case.reader import parse_case
-from solver.case.schemas import SCALING_SCHEMA
+from solver.case.typed import (
+    ONCE,
+    Positive,
+    Section,
+    Text,
+    read_as,
+    refuse_twins,
+    refuse_unknown,
+)
 from solver.case.yaml import read_mapping
 from solver.mesh.catalogue import BY_NAME
 from solver.mesh.size import Size, of_bodies, of_body
 from solver.studies import FULL, QUICK
+from solver.studies.keys import Count, Name, Seconds, Unknowns
 from solver.studies.points import PointStudy
 
 GROWTH = "growth of "
 _START = 5.0  # seconds: three interpreters, libraries loaded, small mesh
+Division = Annotated[int, Meta(ge=1, le=1000)]
+Fit = Annotated[tuple[Unknowns, Unknowns], Meta(description="a list of two sizes, from and to")]
+_What = Annotated[
+    str,
+    Meta(
+        pattern=r"^(cpu|wall|memory|pressure|growth of [a-z]+)$(?!\n)",
+        description="cpu, wall, memory, pressure, or `growth of` and a stage",
+    ),
+]
 
 
-@dataclass(frozen=True)
-class SizeSeries:
+class SizeSeries(Section, frozen=True, dict=True):
     """One mesh of two blocks at all sizes; `divisions` the proportion of slave and master."""
 
-    name: str
-    title: str
+    name: Name
+    title: Text
     case: Path
-    cells: str
-    divisions: tuple[int, int]
-    slab: bool
-    sizes: tuple[int, ...]
-    fit: tuple[float, float]
+    cells: Literal["TRIA3", "TRIA6", "QUAD4", "QUAD8", "TETRA4", "TETRA10", "HEXA8", "HEXA20"]
+    divisions: Annotated[
+        tuple[Division, Division], Meta(description="a list of two whole numbers, 1 to 1000")
+    ]
+    sizes: Annotated[tuple[Unknowns, ...], ONCE]
+    slab: bool = False
+    fit: Fit = (0, 0)
 
     @cached_property
     def template(self) -> dict[str, Any]:
@@ -128,17 +149,42 @@ class ScalingPoint:
         return parse_case(self.source(), path)
 
 
-@dataclass(frozen=True)
-class Goal:
+class Goal(Section, frozen=True):
     """A number to reach; `others` has what other codes needed for the same work."""
 
-    title: str
-    series: str
-    size: int | None
-    what: str
-    most: float
+    title: Text
+    series: Name
+    what: _What
+    most: Positive
     unit: str
-    others: Mapping[str, float]
+    size: Unknowns | None = None
+    others: dict[str, float] = field(default_factory=dict)
+
+
+class _Quick(Section, frozen=True):
+    largest: Unknowns
+    series: Annotated[tuple[Name, ...], ONCE]
+
+
+class ScalingFile(Section, frozen=True):
+    """The keys of `scaling.yaml`."""
+
+    title: Text
+    threads: Count
+    limit: Seconds
+    fit: Fit
+    series: Annotated[tuple[SizeSeries, ...], Meta(min_length=1)]
+    quick: _Quick
+    goals: tuple[Goal, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        refuse_twins("series", self.series)
+        names = {series.name for series in self.series}
+        for i, goal in enumerate(self.goals):
+            refuse_unknown(("goals", i, "series"), goal.series, "series", names)
+        for i, name in enumerate(self.quick.series):
+            refuse_unknown(("quick", "series", i), name, "series", names)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,64 +197,29 @@ class Scaling(PointStudy):
     @cached_property
     def points(self) -> tuple[ScalingPoint, ...]:
         """Every point, small ones of all series first: a run that is interrupted shows most."""
-        every = [ScalingPoint(series, size) for series in self.series for size in series.sizes]
+        every = [ScalingPoint(series, int(size)) for series in self.series for size in series.sizes]
         return tuple(sorted(every, key=lambda point: point.size))
 
 
 def read_scaling(path: Path, size: str = FULL) -> Scaling:
     """The family in a file, or its quick part; InputError says what is refused, what allowed."""
-    content = read_mapping(path, SCALING_SCHEMA)
-    series = tuple(
-        _series(path, i, item, content["fit"]) for i, item in enumerate(content["series"])
-    )
-    names = [one.name for one in series]
-    refuse_twins(path, "series", series)
+    content = read_as(ScalingFile, read_mapping(path), path)
+    largest = content.quick.largest if size == QUICK else math.inf
+    series = [
+        structs.replace(
+            one,
+            sizes=tuple(sorted(int(n) for n in one.sizes if n <= largest)),
+            fit=one.fit if any(one.fit) else content.fit,
+        )
+        for one in content.series
+        if size != QUICK or one.name in content.quick.series
+    ]
     return Scaling(
         path=path,
-        title=content["title"],
+        title=content.title,
         size=size,
-        threads=content["threads"],
-        limit=float(content["limit"]),
-        series=tuple(_quick(path, content["quick"], series)) if size == QUICK else series,
-        goals=tuple(_goals(path, content.get("goals", ()), names)),
+        threads=content.threads,
+        limit=content.limit,
+        series=tuple(series),
+        goals=content.goals,
     )
-
-
-def _series(path: Path, index: int, item: Mapping[str, Any], fit: Sequence[float]) -> SizeSeries:
-    slave, master = item["divisions"]
-    low, high = item.get("fit", fit)
-    return SizeSeries(
-        name=item["name"],
-        title=item["title"],
-        case=file_beside(path, f"series[{index}].case", item["case"]),
-        cells=item["cells"],
-        divisions=(slave, master),
-        slab=item.get("slab", False),
-        sizes=tuple(sorted(int(size) for size in item["sizes"])),
-        fit=(float(low), float(high)),
-    )
-
-
-def _quick(
-    path: Path, quick: Mapping[str, Any], series: Sequence[SizeSeries]
-) -> Iterator[SizeSeries]:
-    """The small sizes of some series."""
-    known = {one.name: one for one in series}
-    for i, name in enumerate(quick["series"]):
-        refuse_unknown(path, f"quick.series[{i}]", name, "series", known)
-        small = tuple(size for size in known[name].sizes if size <= quick["largest"])
-        yield replace(known[name], sizes=small)
-
-
-def _goals(path: Path, items: Sequence[Mapping[str, Any]], names: Sequence[str]) -> Iterator[Goal]:
-    for i, item in enumerate(items):
-        refuse_unknown(path, f"goals[{i}].series", item["series"], "series", names)
-        yield Goal(
-            title=item["title"],
-            series=item["series"],
-            size=int(item["size"]) if "size" in item else None,
-            what=item["what"],
-            most=float(item["most"]),
-            unit=item["unit"],
-            others=item.get("others", {}),
-        )

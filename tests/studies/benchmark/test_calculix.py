@@ -30,7 +30,7 @@ def small(cells):
     """Two blocks of few cells: the case and its mesh."""
     template = ROOT / "cases/scaling/templates/space.yaml"
     point = ScalingPoint(
-        SizeSeries("few", cells, template, cells, (3, 2), False, (200,), (100, 1000)), 200
+        SizeSeries("few", cells, template, cells, (3, 2), (200,), fit=(100, 1000)), 200
     )
     case = point.parsed(Path("few.yaml"))
     return case, generate(case.mesh, "few")

@@ -59,7 +59,7 @@ def test_ladders_as_their_file_gives_them(file):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("levels: [1, 2, 4]", "levels: [0, 1]", r"levels\[0\] = 0: .*positive whole number"),
+        ("levels: [1, 2, 4]", "levels: [0, 1]", r"levels\[0\] = 0: .*whole number from 1 to 1024"),
         ("levels: [1, 2, 4]", "levels: [2, 2]", r"levels = \[2, 2\]: .*each once"),
         ("displacement_l2: 1.9}", "displacment_l2: 1.9}", "did you mean displacement_l2"),
         ("- {case: tria3.yaml,", "- {", r"ladders\[0\].case: this key is needed"),

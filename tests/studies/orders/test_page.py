@@ -2,10 +2,10 @@
 
 import csv
 import json
-from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
+from msgspec import structs
 
 from solver.commands.cli import main
 from solver.studies.orders import page as orders
@@ -112,7 +112,7 @@ def test_levels_without_a_result_are_points_and_failures_too(page, tmp_path):
 
 
 def test_where_no_slope_is_asked_for_none_is_counted(family, results):
-    asks_nothing = replace(family, least={})
+    asks_nothing = structs.replace(family, least={})
     curves = read_curves(asks_nothing, results)
     assert orders.outcome(curves).startswith("No slope is asked for, on 4 ladders")
 

@@ -102,7 +102,7 @@ def test_an_unknown_point(read):
         (lambda c: c["series"][0].update(cells="PYRA5"), "must be TRIA3, TRIA6, QUAD4"),
         (
             lambda c: c["goals"][0].update(series="hexa"),
-            r"goals\[0\].series .* there is no such ser",
+            r"goals\[0\].series .* no such ser",
         ),
         (lambda c: c["goals"][0].update(what="speed"), "must be cpu, wall, memory, pressure, or"),
     ],
@@ -115,5 +115,5 @@ def test_what_is_refused(content, read, change, message):
 
 def test_the_quick_part_names_series_that_there_are(content, read):
     content["quick"]["series"] = ["hexa9"]
-    with pytest.raises(InputError, match=r"quick.series\[0\] .* there is no such series; did you"):
+    with pytest.raises(InputError, match=r"quick.series\[0\] .* no such series; did you"):
         read("quick")

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from solver.studies.scaling.description import read_scaling
 from solver.studies.scaling.page import write_scaling
@@ -87,7 +88,7 @@ def test_goals_are_compared_with_what_was_measured(scaling, results):
 
 
 def test_an_exponent_of_small_sizes_answers_no_goal(scaling, results):
-    series = tuple(replace(s, sizes=s.sizes[:2]) for s in scaling.series)
+    series = tuple(structs.replace(s, sizes=s.sizes[:2]) for s in scaling.series)
     small = replace(scaling, series=series)
     growth = [r for r in reached(small, read_series(small, results)) if "growth" in r.goal.what]
     assert all(r.value is None for r in growth)

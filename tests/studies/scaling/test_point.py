@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from solver.commands.cli import main
 from solver.studies.scaling import point as measuring
@@ -20,7 +21,9 @@ FILE = Path(__file__).parents[3] / "cases/scaling/scaling.yaml"
 def scaling():
     """The project's family with its plane series small."""
     full = read_scaling(FILE)
-    small = [replace(s, sizes=(500,)) for s in full.series if s.name in ("quad4", "fine-master")]
+    small = [
+        structs.replace(s, sizes=(500,)) for s in full.series if s.name in ("quad4", "fine-master")
+    ]
     return replace(full, series=tuple(small), threads=1)
 
 
