@@ -21,6 +21,9 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2) or 1.0
     result: dict[str, float] = {}
+    if state.correction.any():
+        by_zone["correction of the pressure"] = state.correction
+        contact += state.correction
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length)
     unbalanced = (state.iterate.internal - state.force - contact).astype(float).ravel()

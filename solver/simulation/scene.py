@@ -16,7 +16,9 @@ from solver.mechanics.fem.supports import FreeMotion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
 from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from solver.mechanics.mortar.held import merge_fixed_multipliers
+from solver.mechanics.mortar.multipliers import constants
 from solver.mechanics.mortar.operator import GapOperator, gap_operator
+from solver.mechanics.mortar.recovery import FORMS, Asked, automatic, vertex_neighbours
 from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.attributes import Attributes
@@ -131,7 +133,7 @@ def build_scene(
     with clock.stage("pairing"):
         for zone, (slave, master), faces in zip(zones, surfaces, sub_faces, strict=True):
             count = sum(len(block.nodes) for block in slave)
-            operator = _operator(points, zone, faces, master, count, options)
+            operator = _operator(points, zone, faces, master, slave, options)
             noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
             initial = _initial_gaps(zone, operator, points, faces, origin, noise)
             operator = replace(operator, initial=initial)
@@ -264,7 +266,7 @@ def _operator(
     zone: Zone,
     sub_faces: list[SubFaces],
     master_faces: list[FaceBlock],
-    count: int,
+    slave_faces: list[FaceBlock],
     options: Options,
 ) -> GapOperator:
     slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
@@ -278,7 +280,17 @@ def _operator(
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
-    return gap_operator(slaves, masters, count, len(points), search, scheme)
+    count = sum(len(block.nodes) for block in slave_faces)
+    asked = _recovery(zone, slave_faces, count) if scheme.space is constants else None
+    return gap_operator(slaves, masters, count, len(points), search, scheme, asked)
+
+
+def _recovery(zone: Zone, slave_faces: list[FaceBlock], count: int) -> Asked:
+    """How a zone's pressure is recovered, and which of its macro-elements share a vertex."""
+    quadratic = all(block.owner_type.order == 2 for block in slave_faces)
+    name = automatic(quadratic) if zone.recovery == "automatic" else zone.recovery
+    vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
+    return Asked(FORMS[name], vertex_neighbours(vertices, count))
 
 
 def _as_bent(block: Facets) -> Facets:

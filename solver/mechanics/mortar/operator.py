@@ -6,6 +6,7 @@ Source: Abbas, Drouet, Hild, CMAME 339 (2018) 488–513, §2–4.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -19,7 +20,7 @@ from solver.mechanics.mortar.multipliers import (
     Space,
     constants,
 )
-from solver.mechanics.mortar.recovery import Form, Recovery, recovery
+from solver.mechanics.mortar.recovery import Asked, Recovery, recovery
 from solver.mechanics.mortar.segments import Segments, intersect
 from solver.mechanics.mortar.surface_points import Samples, Surface, face_samples
 
@@ -47,7 +48,8 @@ class GapOperator:
     multipliers belong to, None for macro-elements; `segments`: how many there are; `closed_faces`:
     on how many faces the closure of integrals was used; `plain`: whether plain Gauss rules are
     exact on all of them. `at_nodes` (n, k): the values at `nodes`, then (n,), by multiplier, where
-    some nodes have no multiplier of their own; `recovery`: what recovers the pressure, if asked for.
+    some nodes have no multiplier of their own. `recovery`: what recovers the pressure, if asked
+    for.
     """
 
     matrix: sparse.csr_matrix
@@ -110,17 +112,18 @@ def gap_operator(
     n_nodes: int,
     search: float,
     scheme: Scheme = LAC,
-    form: Form | None = None,
-    near: sparse.csr_matrix | None = None,
+    asked: Asked | None = None,
 ) -> GapOperator:
     """Gap operator of slave sub-faces (numbered by macro-element) over master faces.
 
     `search` is the largest distance (a length) at which surfaces are looked for. They are first
     looked for nearby, and farther away only for sub-faces that found no partner there. What is out
     of reach of contact does not count as covered. Faces that meet along directions other than
-    their own normals have no closure. `form` asks for what recovers the pressure, `near` (m, m)
-    being which macro-elements share a vertex.
+    their own normals have no closure. `asked`: how the pressure is recovered, for the multipliers
+    of macro-elements alone.
     """
+    if asked is not None:
+        scheme = replace(scheme, meet=partial(scheme.meet, degree=asked.form.degree))
     if any(block.directions is not None for block in slaves):
         scheme = replace(scheme, closure=False)
     samples = scheme.sample(slaves)
@@ -147,7 +150,7 @@ def gap_operator(
         segments=sum(len(segments.gap) for segments in found),
         closed_faces=closed,
         plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
-        recovery=None if form is None else recovery(form, found, surface, near, n_nodes),
+        recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
     )
 
 
