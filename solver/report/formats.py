@@ -73,5 +73,5 @@ def digits(value: float | None) -> str:
 
 def formula(text: str) -> Markup:
     """Text with what follows `_` set lower and what follows `^` higher: `σ_xx`, `r^(1/3)`."""
-    lowered = re.sub(r"_(\w+)", r"<sub>\1</sub>", str(escape(text)))
+    lowered = re.sub(r"_([^\W⁰¹²³⁴-⁹]+)", r"<sub>\1</sub>", str(escape(text)))
     return Markup(re.sub(r"\^(?:\(([^)]*)\)|(\w+))", r"<sup>\1\2</sup>", lowered))

@@ -1,10 +1,11 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy import sparse
+from scipy.optimize import nnls
 
 from solver.mechanics.fem.bodies import (
     nodes_of_unknowns,
@@ -32,6 +33,8 @@ from solver.system.errors import SolveError
 _EXTEND = 3e-11
 # How exactly the change of a sweep of recovery is solved for; its own error is far larger.
 _CHANGE = 1e-4
+# A share of the loads: what contact pressure may leave of them on free rigid motions.
+_BALANCED = 1e-9
 # Columns solved at once for the stiffness that gaps see.
 _COLUMNS = 64
 
@@ -82,13 +85,15 @@ class ContactProblem:
         self.motions = rigid_motions(scene.points, scene.body)
         refuse_unsolvable(scene, self.motions, self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
-        free = unsupported(self.motions, scene.free.basis)
-        self.at_rest = Displacement.zero(free, surface, scene.options.safeguards.remainder)
+        self.unsupported = unsupported(self.motions, scene.free.basis)
+        self.at_rest = Displacement.zero(
+            self.unsupported, surface, scene.options.safeguards.remainder
+        )
         self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
-        self.parts = parts_of(on_free, unknowns.body, len(scene.asleep))
+        self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
 
     @cached_property
@@ -144,9 +149,10 @@ class ContactProblem:
             attempt(eligible)
             return latest[0]
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
-        status = find_status(attempt, start, eligible, area, self._gap_stiffness, confirm)
+        stiffness = partial(self._gap_stiffness, factor)
+        status = find_status(attempt, start, eligible, area, stiffness, confirm)
         trial = latest[0].trial
-        touching = scene.resting & (trial.gap <= trial.gap_limit)
+        touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
         return replace(latest[0], status=replace(status, closed=status.closed | touching))
 
     def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
@@ -246,12 +252,18 @@ class ContactProblem:
         internal = internal_force(self.scene.points, self.scene.blocks, imposed)
         return float(max(np.abs(force).max(), np.abs(internal).max())) or 1.0
 
-    def _gap_stiffness(self) -> np.ndarray:
+    def _gap_stiffness(self, factor: float) -> np.ndarray:
         """The forces (e, e) that average gaps bring up, each imposed with all others closed.
 
-        Of the e multipliers that may close; symmetric, positive semidefinite.
+        Of the e multipliers that may close; symmetric, positive semidefinite. Raises SolveError
+        where no contact pressure balances the loads on a rigid motion that supports leave free.
         """
         eligible = self.constraints.eligible
+        push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
+        loads = factor * self.unsupported.T @ self.scene.force.ravel()
+        largest = np.abs(loads).max(initial=0.0)
+        if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
+            raise SolveError("no contact pressure balances the loads")
         system, area = self._systems.closed(eligible), self.constraints.covered[eligible]
         found = np.zeros((len(area), len(area)))
         for first in range(0, len(area), _COLUMNS):
@@ -277,6 +289,6 @@ def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
     """What the free unknowns of a scene stand for, given the rigid motions of its bodies."""
     basis, dim = scene.free.basis, scene.points.shape[1]
     node = nodes_of_unknowns(basis, dim)
-    together = basis.T @ whole_motions(motions, len(scene.asleep))
+    together = basis.T @ whole_motions(motions, scene.n_bodies)
     quadratic = any(block.type.order == 2 for block in scene.blocks)
     return Unknowns(dim, node, together, scene.body[node], quadratic)

@@ -46,21 +46,18 @@ _HALF = 0.5 - 1e-9
 def simulate(
     case: Case,
     mesh: meshio.Mesh,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    log: Log = lambda _: None,
     options: Options = LEAN,
     clock: Clock | None = None,
+    log: Log = lambda _: None,
 ) -> Solution:
-    """Solve a case on its mesh.
+    """Solve a case on its mesh; the case may be swapped (see `Case.as_solved`).
 
-    `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
-    The time of every stage is added to `clock`, where one is given.
-    Raises InputError where the case and its mesh do not fit, SolveError where no solution is found.
+    The time of every stage is added to `clock`, where one is given. Raises InputError where the
+    case and its mesh do not fit, SolveError where no solution is found.
     """
     started = processor_time()
-    clock = Clock() if clock is None else clock
-    scene = build_scene(case, mesh, swapped, hexahedra, clock, options)
+    clock = clock or Clock()
+    scene = build_scene(case, mesh, options, clock)
     check_geometry(scene)
     if options.shortcuts.unloaded:
         with clock.stage("assembly"):
@@ -68,19 +65,13 @@ def simulate(
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
     with clock.stage("assembly"):
         problem = ContactProblem(scene)
-    solution = solve_problem(problem, clock, swapped, hexahedra, log)
+    solution = solve_problem(problem, clock, log)
     solution.cpu_seconds = processor_time() - started
     solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
 
 
-def solve_problem(
-    problem: ContactProblem,
-    clock: Clock,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    log: Log = lambda _: None,
-) -> Solution:
+def solve_problem(problem: ContactProblem, clock: Clock, log: Log = lambda _: None) -> Solution:
     """Solve an assembled problem at all load factors; how it was assembled goes on record."""
     plan = list(decided(problem))
     for line in plan:
@@ -89,7 +80,7 @@ def solve_problem(
         states, recovered = _walk(problem, problem.scene.case.steps, log)
     plan += noted(problem, states)
     with clock.stage("recovery"):
-        solution = _recover(problem, states, recovered, plan, swapped, hexahedra)
+        solution = _recover(problem, states, recovered, plan)
     solution.plan += strained(solution)
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
@@ -121,12 +112,7 @@ def _walk(
 
 
 def _recover(
-    problem: ContactProblem,
-    states: list[Equilibrium],
-    fields: Recovered,
-    plan: list[Line],
-    swapped: bool,
-    hexahedra: str | None,
+    problem: ContactProblem, states: list[Equilibrium], fields: Recovered, plan: list[Line]
 ) -> Solution:
     scene = problem.scene
     last = states[-1]
@@ -141,8 +127,6 @@ def _recover(
     ]
     return Solution(
         case=scene.case,
-        swapped=swapped,
-        hexahedra=hexahedra,
         mesh=_output_mesh(scene),
         displacement=last.displacement,
         stress=stress,
@@ -172,7 +156,7 @@ def _output_mesh(scene: Scene) -> meshio.Mesh:
     cells = [(_meshio_name(name), data) for name, data in scene.mesh.cells.items()]
     sets = {
         group: [np.flatnonzero(scene.mesh.members(name, mask)) for name in scene.mesh.cells]
-        for group, mask in scene.volume_groups.items()
+        for group, mask in scene.given.groups.items()
         if any(m.any() for m in mask.values())
     }
     return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)

@@ -171,8 +171,6 @@ class Solution:
     """
 
     case: Case
-    swapped: bool
-    hexahedra: str | None
     mesh: meshio.Mesh
     displacement: np.ndarray
     stress: np.ndarray
@@ -200,6 +198,16 @@ class Solution:
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")
+
+    @property
+    def swapped(self) -> bool:
+        """Whether slave and master were exchanged."""
+        return self.case.swapped
+
+    @property
+    def hexahedra(self) -> str | None:
+        """How slave hexahedra were cut, where the case was overruled."""
+        return self.case.hexahedra
 
     @property
     def job(self) -> str:

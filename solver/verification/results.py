@@ -174,8 +174,6 @@ def _read_solution(file: h5py.File) -> Solution:
     case = file["case"]
     return Solution(
         case=_read_case(case),
-        swapped=bool(case.attrs["swapped"]),
-        hexahedra=case.attrs["hexahedra"] or None,
         mesh=meshio.Mesh(
             grid.points,
             [grid.cells[i] for i in volumes],
@@ -295,7 +293,8 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
 
 
 def _read_case(group: h5py.Group) -> Case:
-    return parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+    case = parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+    return case.as_solved(bool(group.attrs["swapped"]), group.attrs["hexahedra"] or None)
 
 
 def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:

@@ -80,6 +80,9 @@ def meet_in_segments(
     `among`: by block, the slave faces that are looked at, all of them by default; `weighted`: with
     quadrature for integrands weighted by linear shape functions of the slave, or by polynomials of
     a `degree`.
+
+    >>> [s.area.tolist() for s in meet_in_segments([slave], [], [master], 1.0)]
+    [[1.0, 1.0]]
     """
     found = []
     for a, slave in enumerate(slaves):
@@ -121,6 +124,14 @@ def gap_operator(
     of reach of contact does not count as covered. Faces that meet along directions other than
     their own normals have no closure. `asked`: how the pressure is recovered, for the multipliers
     of macro-elements alone.
+
+    A slave edge of length 2 under two master edges, open by 1/2:
+
+    >>> operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    >>> operator.matrix.toarray().reshape(5, 2)[:, 1].round(15).tolist()
+    [-1.0, -1.0, 0.5, 1.0, 0.5]
+    >>> operator.initial.round(15).tolist(), operator.covered.round(15).tolist()
+    ([1.0], [2.0])
     """
     if asked is not None:
         scheme = replace(scheme, meet=partial(scheme.meet, degree=asked.form.degree))

@@ -35,7 +35,11 @@ class Outlines:
 
 
 def outlines(blocks: Sequence[Facets], reverse: bool = False) -> Outlines:
-    """The outlines of all faces; in `reverse`, they go round as seen from the other side."""
+    """The outlines of all faces; in `reverse`, they go round as seen from the other side.
+
+    >>> outlines([slave, master]).vertices.tolist()
+    [[1, 0], [2, 3], [3, 4]]
+    """
     width = max(block.type.n_vertices for block in blocks)
     corner, bulge, vertices = [], [], []
     for block in blocks:
@@ -78,6 +82,11 @@ def facing_pairs(
     """Pairs (slave number, master number) of faces within `reach` that look at each other.
 
     `among`: the slave faces that are looked at, all of them by default.
+
+    >>> [pair.tolist() for pair in facing_pairs(slave, master, 0.1)]
+    [[0, 0], [0, 1]]
+    >>> [pair.tolist() for pair in facing_pairs(slave, slave, 0.1)]
+    [[], []]
     """
     some = np.arange(len(slave.number)) if among is None else among
     i, j = candidate_pairs(
@@ -100,6 +109,11 @@ def candidate_pairs(
     Centres (n, dim), radii (n,), in units of length. Each side is sorted into classes of similar
     radius, so that a few large faces do not make every small one search far: the work stays
     near-linear in the number of faces also where one side is much finer.
+
+    >>> one, radius = np.array([[0.0]]), np.array([1.0])
+    >>> others, radii = np.array([[2.4], [2.6]]), np.array([1.0, 1.0])
+    >>> [pair.tolist() for pair in candidate_pairs(one, radius, others, radii, 0.5)]
+    [[0], [0]]
     """
     found = [(np.empty(0, dtype=int), np.empty(0, dtype=int))]
     masters = [(members, cKDTree(master_centre[members])) for members in _classes(master_radius)]

@@ -129,6 +129,10 @@ def intersect(
     Their quadrature is exact for shape functions of affine faces times polynomials of degree
     `more`. `reach` is a length. `among`: the slave faces that are looked at, all by default.
     Raises SolveError for points that have no place on a face.
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> segments.master.face.tolist(), segments.area.tolist(), segments.gap[:, 0].tolist()
+    ([0, 1], [1.0, 1.0], [0.5, 0.5])
     """
     slave = slaves[index]
     master = outlines(masters, reverse=True)

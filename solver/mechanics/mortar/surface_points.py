@@ -36,12 +36,22 @@ class Samples:
 
 
 def face_samples(slaves: list[Facets]) -> list[Samples]:
-    """Points that integrate shape functions over whole planar faces exactly, by block."""
+    """Points that integrate shape functions over whole planar faces exactly, by block.
+
+    >>> (sample,) = face_samples([slave])
+    >>> round(float(sample.weight.sum()), 15)
+    2.0
+    """
     return [sampled(block, face_rule(block.type.name)) for block in slaves]
 
 
 def sampled(block: Facets, rule: Rule) -> Samples:
-    """The points of a rule on the reference face."""
+    """The points of a rule on the reference face.
+
+    >>> sample = sampled(slave, (np.array([[0.5]]), np.array([1.0])))
+    >>> sample.weight.tolist(), sample.values.tolist(), sample.normal.tolist()
+    ([[2.0]], [[0.5, 0.5]], [[[0.0, 1.0]]])
+    """
     places, weights = rule
     values, slopes = shape_functions(block.type.name).both(places)
     vectors = surface_vectors(block, slopes)
