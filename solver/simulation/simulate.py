@@ -19,7 +19,7 @@ from solver.simulation.consistency import inconsistency
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
 from solver.simulation.options import LEAN, Options
-from solver.simulation.plan import decided, noted, strained
+from solver.simulation.plan import decided, estimated, noted, strained
 from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.recovery import Recovered, RecoveredZone, recovered
 from solver.simulation.scene import Scene, ZoneScene, build_scene
@@ -81,7 +81,7 @@ def solve_problem(problem: ContactProblem, clock: Clock, log: Log = lambda _: No
     plan += noted(problem, states)
     with clock.stage("recovery"):
         solution = _recover(problem, states, recovered, plan)
-    solution.plan += strained(solution)
+    solution.plan += [*estimated(solution), *strained(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
