@@ -73,15 +73,13 @@ def solve_case(
     """
     if hexahedra not in (None, *_CUTS):
         raise InputError("solve_case", "hexahedra", hexahedra, f"allowed: {', '.join(_CUTS)}")
-    given = _case(case, mesh)
+    given = _case(case, mesh).as_solved(swapped, hexahedra)
     made = mesh_of(given) if mesh is None else _mesh(mesh)
     if memory_check:
         check_memory(len(made.points), made.points.shape[1], given.path, log)
     accepted = mesh is None and given.path.is_file()
     options = Options.everything() if everything else Options()
-    solution, checks = solve_checked(
-        given, made, swapped, hexahedra, log, accepted, options=options
-    )
+    solution, checks = solve_checked(given, made, options, accepted, log=log)
     file = given.mesh.get("path") if mesh is None else mesh
     provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
     return Solved(solution, checks, provenance)

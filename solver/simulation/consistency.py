@@ -80,6 +80,8 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
         yield from _numbers(f"macro-elements of {kind}", owner, (len(owner),), m)
     for kind, faces in zone.master_faces:
         yield from _numbers(f"master faces {kind}", faces, (len(faces), None), n)
+    if zone.pressure_of_forces is not None:
+        yield from _values("pressure of forces", zone.pressure_of_forces, (m,))
     if zone.nodal:
         yield from _nodal(zone.nodal, n)
 

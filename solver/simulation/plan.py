@@ -24,7 +24,7 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
     scene = problem.scene
     if scene.options.shortcuts == Options.everything().shortcuts:
         yield Line("everything is done", "as asked for by --everything, needed or not")
-    groups, cells = scene.unnamed
+    groups, cells = scene.given.unnamed
     if groups or cells:
         many = "s" * (groups != 1)
         what = f"left behind: {groups} group{many}, {cells} faces and edges of the mesh"
@@ -35,15 +35,15 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
     yield from _cells(scene)
     for zone in scene.zones:
         yield from _zone(zone, scene, problem.constraints.inactive_multipliers)
-    asleep = np.flatnonzero(scene.asleep)
-    if len(asleep):
+    unloaded = np.flatnonzero(scene.rest.unloaded_bodies)
+    if len(unloaded):
         names = body_names(scene)
-        what = f"left out, at rest without pressure: {', '.join(names[b] for b in asleep)}"
+        what = f"left out, at rest without pressure: {', '.join(names[b] for b in unloaded)}"
         yield Line(what, "no load, displacement imposed or overlap reaches them", "unloaded")
-    held = np.flatnonzero(scene.held)
-    if len(held):
+    fixed = np.flatnonzero(scene.rest.fixed_bodies)
+    if len(fixed):
         names = body_names(scene)
-        what = f"no stiffness of {', '.join(names[b] for b in held)}"
+        what = f"no stiffness of {', '.join(names[b] for b in fixed)}"
         yield Line(what, "supports or rigidity hold all of it where it is", "unloaded")
     if len(problem.parts) > 1:
         why = "no contact joins them"

@@ -91,7 +91,7 @@ class ContactProblem:
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
-        self.parts = parts_of(on_free, unknowns.body, len(scene.asleep))
+        self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
 
     @cached_property
@@ -145,7 +145,7 @@ class ContactProblem:
         stiffness = partial(self._gap_stiffness, factor)
         status = find_status(attempt, start, eligible, area, stiffness, confirm)
         trial = latest[0].trial
-        touching = scene.resting & (trial.gap <= trial.gap_limit)
+        touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
         return replace(latest[0], status=replace(status, closed=status.closed | touching))
 
     def loaded_further(self, state: Equilibrium, force: np.ndarray) -> Equilibrium:
@@ -259,6 +259,6 @@ def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
     """What the free unknowns of a scene stand for, given the rigid motions of its bodies."""
     basis, dim = scene.free.basis, scene.points.shape[1]
     node = nodes_of_unknowns(basis, dim)
-    together = basis.T @ whole_motions(motions, len(scene.asleep))
+    together = basis.T @ whole_motions(motions, scene.n_bodies)
     quadratic = any(block.type.order == 2 for block in scene.blocks)
     return Unknowns(dim, node, together, scene.body[node], quadratic)

@@ -13,7 +13,7 @@ from solver.mechanics.fem.elasticity import largest_strain, nodal_stress
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.stress import normal_stress
 from solver.mesh.catalogue import BY_NAME
-from solver.simulation.balance import imbalances
+from solver.simulation.balance import imbalances, pressures_of_forces
 from solver.simulation.consistency import inconsistency
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
@@ -37,21 +37,18 @@ _HALF = 0.5 - 1e-9
 def simulate(
     case: Case,
     mesh: meshio.Mesh,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    log: Log = lambda _: None,
     options: Options = LEAN,
     clock: Clock | None = None,
+    log: Log = lambda _: None,
 ) -> Solution:
-    """Solve a case on its mesh.
+    """Solve a case on its mesh; the case may be swapped (see `Case.as_solved`).
 
-    `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
-    The time of every stage is added to `clock`, where one is given.
-    Raises InputError where the case and its mesh do not fit, SolveError where no solution is found.
+    The time of every stage is added to `clock`, where one is given. Raises InputError where the
+    case and its mesh do not fit, SolveError where no solution is found.
     """
     started = processor_time()
-    clock = Clock() if clock is None else clock
-    scene = build_scene(case, mesh, swapped, hexahedra, clock, options)
+    clock = clock or Clock()
+    scene = build_scene(case, mesh, options, clock)
     check_geometry(scene)
     if options.shortcuts.unloaded:
         with clock.stage("assembly"):
@@ -59,19 +56,13 @@ def simulate(
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
     with clock.stage("assembly"):
         problem = ContactProblem(scene)
-    solution = solve_problem(problem, clock, swapped, hexahedra, log)
+    solution = solve_problem(problem, clock, log)
     solution.cpu_seconds = processor_time() - started
     solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
 
 
-def solve_problem(
-    problem: ContactProblem,
-    clock: Clock,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    log: Log = lambda _: None,
-) -> Solution:
+def solve_problem(problem: ContactProblem, clock: Clock, log: Log = lambda _: None) -> Solution:
     """Solve an assembled problem at all load factors; how it was assembled goes on record."""
     plan = list(decided(problem))
     for line in plan:
@@ -80,7 +71,7 @@ def solve_problem(
         states = _walk(problem, problem.scene.case.steps, log)
     plan += noted(problem, states)
     with clock.stage("recovery"):
-        solution = _recover(problem, states, plan, swapped, hexahedra)
+        solution = _recover(problem, states, plan)
     solution.plan += strained(solution)
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
@@ -104,13 +95,7 @@ def _walk(problem: ContactProblem, steps: tuple[float, ...], log: Log) -> list[E
     return states
 
 
-def _recover(
-    problem: ContactProblem,
-    states: list[Equilibrium],
-    plan: list[Line],
-    swapped: bool,
-    hexahedra: str | None,
-) -> Solution:
+def _recover(problem: ContactProblem, states: list[Equilibrium], plan: list[Line]) -> Solution:
     scene = problem.scene
     last = states[-1]
     stress = nodal_stress(
@@ -119,11 +104,12 @@ def _recover(
     stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
     scale = _stress_scale(scene, stress)
     strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
-    zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
+    zones = [
+        _zone_result(scene, zone, last, stress, forces)
+        for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
+    ]
     return Solution(
         case=scene.case,
-        swapped=swapped,
-        hexahedra=hexahedra,
         mesh=_output_mesh(scene),
         displacement=last.displacement,
         stress=stress,
@@ -153,7 +139,7 @@ def _output_mesh(scene: Scene) -> meshio.Mesh:
     cells = [(_meshio_name(name), data) for name, data in scene.mesh.cells.items()]
     sets = {
         group: [np.flatnonzero(scene.mesh.members(name, mask)) for name in scene.mesh.cells]
-        for group, mask in scene.volume_groups.items()
+        for group, mask in scene.given.groups.items()
         if any(m.any() for m in mask.values())
     }
     return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)
@@ -174,7 +160,11 @@ def _contact_direction(scene: Scene) -> np.ndarray:
 
 
 def _zone_result(
-    scene: Scene, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
+    scene: Scene,
+    zone: ZoneScene,
+    state: Equilibrium,
+    stress: np.ndarray,
+    pressure_of_forces: np.ndarray | None,
 ) -> ZoneResult:
     surface = zone.operator.surface
     slave_nodes, slave_normal = _nodal_normals(
@@ -198,6 +188,7 @@ def _zone_result(
         slave_nodes=slave_nodes,
         master_nodes=master_nodes,
         nodal=_nodal_contact(zone, state),
+        pressure_of_forces=pressure_of_forces,
     )
 
 

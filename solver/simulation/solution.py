@@ -72,6 +72,8 @@ class ZoneResult:
     (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
     `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
     belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
+    `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
+    these do not determine it (see `solver.simulation.balance`).
     """
 
     name: str
@@ -89,6 +91,7 @@ class ZoneResult:
     slave_nodes: np.ndarray
     master_nodes: np.ndarray
     nodal: NodalContact | None = None
+    pressure_of_forces: np.ndarray | None = None
 
 
 @dataclass
@@ -131,8 +134,6 @@ class Solution:
     """
 
     case: Case
-    swapped: bool
-    hexahedra: str | None
     mesh: meshio.Mesh
     displacement: np.ndarray
     stress: np.ndarray
@@ -160,6 +161,16 @@ class Solution:
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")
+
+    @property
+    def swapped(self) -> bool:
+        """Whether slave and master were exchanged."""
+        return self.case.swapped
+
+    @property
+    def hexahedra(self) -> str | None:
+        """How slave hexahedra were cut, where the case was overruled."""
+        return self.case.hexahedra
 
     @property
     def job(self) -> str:

@@ -171,8 +171,6 @@ def _read_solution(file: h5py.File) -> Solution:
     case = file["case"]
     return Solution(
         case=_read_case(case),
-        swapped=bool(case.attrs["swapped"]),
-        hexahedra=case.attrs["hexahedra"] or None,
         mesh=meshio.Mesh(
             grid.points,
             [grid.cells[i] for i in volumes],
@@ -281,7 +279,8 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
 
 
 def _read_case(group: h5py.Group) -> Case:
-    return parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+    case = parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+    return case.as_solved(bool(group.attrs["swapped"]), group.attrs["hexahedra"] or None)
 
 
 def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
@@ -294,6 +293,8 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     # Faces of one type may be in several blocks, one for each type of cell behind them.
     for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
         faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
+    if zone.pressure_of_forces is not None:
+        group["pressure_of_forces"] = zone.pressure_of_forces
     if zone.nodal:
         nodal = group.create_group("nodal")
         for name, attribute in _AT_MULTIPLIER_NODES.items():
@@ -310,7 +311,12 @@ def _read_zone(
         **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
         **{key: group[key][()] for key in _BY_NODE},
         nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
+        pressure_of_forces=_optional(group, "pressure_of_forces"),
     )
+
+
+def _optional(group: h5py.Group, name: str) -> np.ndarray | None:
+    return group[name][()] if name in group else None
 
 
 def _read_nodal(group: h5py.Group) -> NodalContact:

@@ -85,7 +85,7 @@ def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> Verdic
     """
     case: Case | None = None
     try:
-        case = refined(load_case(job.case), job.refine)
+        case = refined(load_case(job.case), job.refine).as_solved(job.swapped, job.hexahedra)
         verdict = _solve(job, case, output, verdict_file or output, log)
     except Exception as error:
         if verdict_file:
@@ -104,19 +104,17 @@ def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> Verdic
 def solve_checked(
     case: Case,
     mesh: meshio.Mesh,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    log: Log = lambda _: None,
+    options: Options = LEAN,
     accepted: bool = True,
     clock: Clock | None = None,
-    options: Options = LEAN,
+    log: Log = lambda _: None,
 ) -> tuple[Solution, list[CheckResult]]:
     """Solve a case on its mesh and run its checks, those of `accepted` values too if asked.
 
     The time of every stage is added to `clock`, where one is given.
     """
-    clock = Clock() if clock is None else clock
-    solution = simulate(case, mesh, swapped, hexahedra, log, options, clock)
+    clock = clock or Clock()
+    solution = simulate(case, mesh, options, clock, log)
     with clock.stage("checks"):
         solution.errors = errors(solution)
         checks = run_checks(solution, accepted_values(solution) if accepted else {})
@@ -139,7 +137,7 @@ def record_crash(
     The reason is its exit status, as far as known, and the last line of the log.
     """
     try:
-        case: Case | Path = load_case(job.case)
+        case: Case | Path = load_case(job.case).as_solved(job.swapped, job.hexahedra)
     except InputError:
         case = job.case
     said = last_line(log_file)
@@ -175,9 +173,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> Verdic
     # What was accepted is a result on the case's own mesh.
     accepted = job.refine == 1
     options = Options.everything() if job.everything else Options()
-    solution, checks = solve_checked(
-        case, mesh, job.swapped, job.hexahedra, log, accepted, clock, options
-    )
+    solution, checks = solve_checked(case, mesh, options, accepted, clock, log)
     solution.cpu_seconds = processor_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
     with clock.stage("write"):

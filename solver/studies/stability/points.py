@@ -126,16 +126,14 @@ def _attempt(point: _Point, meshes: _Meshes, safeguards: Safeguards) -> dict[str
 
 
 def _measured(point: _Point, meshes: _Meshes, safeguards: Safeguards) -> dict[str, Any]:
-    case = point.sweep.case(point.series.mesh, point.value)
+    case = point.sweep.case(point.series.mesh, point.value).as_solved(point.series.swapped)
     raw = meshes.raw(case)
     mesh = transform(raw, case.transform, str(case.path)) if case.transform else raw
     state = exact_state(case, point.sweep.state, raw)
     clock = Clock()
-    scene = build_scene(
-        case, mesh, point.series.swapped, None, clock, Options(safeguards=safeguards)
-    )
+    scene = build_scene(case, mesh, Options(safeguards=safeguards), clock)
     problem = ContactProblem(scene)
-    solution = solve_problem(problem, clock, point.series.swapped)
+    solution = solve_problem(problem, clock)
     zones = solution.zones
     balance = solution.balance
     # Of rounding alone: the strain of a sweep's points is that of no body.

@@ -13,7 +13,6 @@ from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.studies.stability.floor import floor, misplaced, upper_nodes
 from solver.studies.stability.states import exact_state
-from solver.system.clock import Clock
 from tests.scenes import block_case, block_mesh
 
 MESHES = {2: ("TRIA3", "QUAD4"), 3: ("TETRA4", "HEXA8")}
@@ -27,7 +26,7 @@ def solved(dim, spec="", poisson=0.3, cells=None):
     case = parse_case(text + (f"transform: {spec}\n" if spec else ""), Path("point.yaml"))
     raw = block_mesh(*(cells or MESHES[dim]))
     mesh = transform(raw, case.transform) if case.transform else raw
-    problem = ContactProblem(build_scene(case, mesh, False, None, Clock()))
+    problem = ContactProblem(build_scene(case, mesh))
     return case, raw, mesh, problem, problem.solve(1.0)
 
 
@@ -98,7 +97,7 @@ def solved_with_form(poisson):
     text = block_case(2).source.replace("poisson: 0.3", f"poisson: {poisson}")
     case = parse_case(text, Path("point.yaml"))
     raw = block_mesh(*MESHES[2])
-    problem = ContactProblem(build_scene(case, raw, False, None, Clock()))
+    problem = ContactProblem(build_scene(case, raw))
     return case, raw, raw, problem, problem.solve(1.0)
 
 
