@@ -85,6 +85,8 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
         yield from _values("pressure_error", zone.pressure_error, (m,))
     if zone.recovered:
         yield from _recovered(zone.recovered, n, m, dim)
+    if zone.pressure_of_forces is not None:
+        yield from _values("pressure of forces", zone.pressure_of_forces, (m,))
     if zone.nodal:
         yield from _nodal(zone.nodal, n)
 

@@ -43,14 +43,16 @@ _COLUMNS = 64
 class Equilibrium:
     """A solved load factor: pressure (k,) and gap with their round-off, status, residual.
 
-    `residual` is relative to the forces at work. Fields are those of the `iterate`. `correction`
-    (n, dim) are the contact forces beside those of the pressures, of a recovered pressure.
+    `residual` is relative to `force_scale`, the size of the forces at work. Fields are those of the
+    `iterate`. `correction` (n, dim) are the contact forces beside those of the pressures, of a
+    recovered pressure.
     """
 
     iterate: ContactIterate
     trial: Trial
     status: StatusResult
     residual: float
+    force_scale: float
     accuracy: Accuracy
     correction: np.ndarray
 
@@ -161,7 +163,7 @@ class ContactProblem:
         Solved from the state for the change alone, on the factor kept since.
         """
         start = replace(state.iterate, force=state.force + correction)
-        scale = self._force_scale(start.force, 0 * correction)
+        scale = max(state.force_scale, np.abs(correction).max())
         return self._refined(start, scale, state.status, correction)
 
     def pressure_change(self, closed: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -240,6 +242,7 @@ class ContactProblem:
             trial=judged(iterate, pressure, self.diagonal),
             status=status,
             residual=residual,
+            force_scale=scale,
             accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
             correction=correction,
         )

@@ -14,7 +14,7 @@ from solver.mechanics.fem.elasticity import largest_strain, nodal_stress
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.stress import normal_stress
 from solver.mesh.catalogue import BY_NAME
-from solver.simulation.balance import imbalances
+from solver.simulation.balance import imbalances, pressures_of_forces
 from solver.simulation.consistency import inconsistency
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
@@ -123,7 +123,8 @@ def _recover(
     scale = _stress_scale(scene, stress)
     strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
     zones = [
-        _zone_result(scene, zone, last, stress, fields.get(zone.zone.name)) for zone in scene.zones
+        _zone_result(scene, zone, last, stress, forces, fields.get(zone.zone.name))
+        for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
     ]
     return Solution(
         case=scene.case,
@@ -181,6 +182,7 @@ def _zone_result(
     zone: ZoneScene,
     state: Equilibrium,
     stress: np.ndarray,
+    pressure_of_forces: np.ndarray | None,
     field: RecoveredZone | None,
 ) -> ZoneResult:
     surface = zone.operator.surface
@@ -205,6 +207,7 @@ def _zone_result(
         slave_nodes=slave_nodes,
         master_nodes=master_nodes,
         nodal=_nodal_contact(zone, state),
+        pressure_of_forces=pressure_of_forces,
         pressure_error=None if field is None else field.error,
         recovered=_recovered_pressure(scene, zone, state, field),
     )

@@ -99,9 +99,11 @@ class ZoneResult:
     (m, dim), `area`, `multiplier` (pressure ≥ 0), `gap`, `closed` (bool) and `coverage`
     (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
     `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
-    belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs; else
-    `pressure_error` (m,) estimates ‖p − multiplier‖ in L2 on each macro-element, by ‖p* −
-    multiplier‖ with a reconstruction p*, and `recovered` is p* where the case asks for one.
+    belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
+    `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
+    these do not determine it (see `solver.simulation.balance`). `pressure_error` (m,) estimates the
+    L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
+    where multipliers belong to nodes. `recovered` is p* where the case asks for one.
     """
 
     name: str
@@ -119,6 +121,7 @@ class ZoneResult:
     slave_nodes: np.ndarray
     master_nodes: np.ndarray
     nodal: NodalContact | None = None
+    pressure_of_forces: np.ndarray | None = None
     pressure_error: np.ndarray | None = None
     recovered: RecoveredPressure | None = None
 

@@ -314,6 +314,8 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
         recovered.attrs["form"] = zone.recovered.form
         for name in _RECOVERED:
             recovered[name] = getattr(zone.recovered, name)
+    if zone.pressure_of_forces is not None:
+        group["pressure_of_forces"] = zone.pressure_of_forces
     if zone.nodal:
         nodal = group.create_group("nodal")
         for name, attribute in _AT_MULTIPLIER_NODES.items():
@@ -330,9 +332,14 @@ def _read_zone(
         **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
         **{key: group[key][()] for key in _BY_NODE},
         nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
-        pressure_error=group["pressure_error"][()] if "pressure_error" in group else None,
+        pressure_of_forces=_optional(group, "pressure_of_forces"),
+        pressure_error=_optional(group, "pressure_error"),
         recovered=_read_recovered(group["recovered"]) if "recovered" in group else None,
     )
+
+
+def _optional(group: h5py.Group, name: str) -> np.ndarray | None:
+    return group[name][()] if name in group else None
 
 
 def _read_recovered(group: h5py.Group) -> RecoveredPressure:

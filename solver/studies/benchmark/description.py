@@ -65,7 +65,7 @@ class WarmBatch(Section, frozen=True):
     cases: Annotated[tuple[Path, ...], Meta(min_length=1)]
 
 
-class _Quick(Section, frozen=True):
+class _QuickBenchmark(Section, frozen=True):
     size: Unknowns
 
 
@@ -78,7 +78,7 @@ class BenchmarkFile(Section, frozen=True):
     scaling: Path
     comparisons: tuple[_Comparison, ...]
     batch: WarmBatch
-    quick: _Quick
+    quick: _QuickBenchmark
 
 
 @dataclass(frozen=True)
