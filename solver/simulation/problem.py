@@ -41,13 +41,15 @@ _COLUMNS = 64
 class Equilibrium:
     """A solved load factor: pressure (k,) and gap with their round-off, status, residual.
 
-    `residual` is relative to the forces at work. Fields are those of the `iterate`.
+    `residual` is relative to `force_scale`, the size of the forces at work. Fields are those of the
+    `iterate`.
     """
 
     iterate: ContactIterate
     trial: Trial
     status: StatusResult
     residual: float
+    force_scale: float
     accuracy: Accuracy
 
     @property
@@ -152,7 +154,7 @@ class ContactProblem:
         Solved from the state for the change alone, on the factor kept since.
         """
         start = replace(state.iterate, force=state.force + force)
-        return self._refined(start, self._force_scale(start.force, 0 * force), state.status)
+        return self._refined(start, max(state.force_scale, np.abs(force).max()), state.status)
 
     def _first_guess(self, factor: float) -> np.ndarray:
         """Macro-elements (k,) that loads and imposed displacements are likely to close."""
@@ -208,6 +210,7 @@ class ContactProblem:
             trial=judged(iterate, pressure, self.diagonal),
             status=status,
             residual=residual,
+            force_scale=scale,
             accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
         )
 

@@ -150,13 +150,17 @@ def build_scene(
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
     ]
     groups = Attributes(case, local, cut_mesh, cut_zones, origin)
+    with clock.stage("pairing"):
+        noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
+        operators = [
+            _operator(groups, zone, faces, master, noise, options)
+            for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
+        ]
     with clock.stage("assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
         force = groups.forces()
-    with clock.stage("pairing"):
-        noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
-        zones = _zones(case, groups, surfaces, free, noise, options)
+        zones = _zones(case, cut_zones, surfaces, operators, free)
     body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
     n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
     return Scene(
@@ -188,30 +192,26 @@ def build_scene(
 
 def _zones(
     case: Case,
-    groups: Attributes,
+    cut_zones: Sequence[CutZone],
     surfaces: Surfaces,
+    operators: Sequence[GapOperator],
     free: FreeMotion,
-    noise: float,
-    options: Options,
 ) -> list[ZoneScene]:
-    """The zones with their gap operators; initial gaps below `noise` (a length) are none."""
+    """The zones, multipliers of fixed nodes merged with others where the treatment does so."""
     found: list[ZoneScene] = []
     first = 0
-    for zone, (slave, master), part in zip(case.zones, surfaces, groups.zones, strict=True):
-        count = sum(len(block.nodes) for block in slave)
-        operator = _operator(groups.points, zone, part.sub_faces, master, count, options)
-        initial = _initial_gaps(zone, operator, groups, part.sub_faces, noise)
-        operator = replace(operator, initial=initial)
+    for i, zone in enumerate(case.zones):
+        operator, (slave, master) = operators[i], surfaces[i]
         if TREATMENTS[zone.treatment].joins:
             operator = merge_fixed_multipliers(operator, free.basis)
         found.append(
             ZoneScene(
                 zone=zone,
                 first=first,
-                count=count,
+                count=sum(len(block.nodes) for block in slave),
                 slave_faces=slave,
                 master_faces=master,
-                sub_faces=part.sub_faces,
+                sub_faces=cut_zones[i].sub_faces,
                 operator=operator,
             )
         )
@@ -291,14 +291,16 @@ def _cut(
 
 
 def _operator(
-    points: np.ndarray,
+    groups: Attributes,
     zone: Zone,
-    sub_faces: list[SubFaces],
+    faces: CutZone,
     master_faces: list[FaceBlock],
-    count: int,
+    noise: float,
     options: Options,
 ) -> GapOperator:
-    slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
+    """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
+    points, count = groups.points, sum(len(block.nodes) for block in faces.slave_faces)
+    slaves = [facets(points, f.type, f.nodes, f.macro) for f in faces.sub_faces]
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
     masters = _master_facets(points, master_faces)
@@ -309,7 +311,8 @@ def _operator(
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
-    return gap_operator(slaves, masters, count, len(points), search, scheme)
+    operator = gap_operator(slaves, masters, count, len(points), search, scheme)
+    return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
 
 
 def _as_bent(block: Facets) -> Facets:
