@@ -95,14 +95,15 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
         centre=centre,
         radius=radius,
         normal=normal,
-        tangents=_tangents(normal),
+        tangents=tangents_of(normal),
         flat=flat,
         straight=straight,
         affine=affine,
     )
 
 
-def _tangents(normal: np.ndarray) -> np.ndarray:
+def tangents_of(normal: np.ndarray) -> np.ndarray:
+    """Unit tangents (n, dim − 1, dim) that complete unit normals (n, dim) to frames."""
     if normal.shape[1] == 2:
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
     axis = np.zeros_like(normal)
