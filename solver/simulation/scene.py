@@ -17,7 +17,9 @@ from solver.mechanics.fem.supports import FreeMotion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
 from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from solver.mechanics.mortar.held import merge_fixed_multipliers
+from solver.mechanics.mortar.multipliers import constants
 from solver.mechanics.mortar.operator import GapOperator, gap_operator
+from solver.mechanics.mortar.recovery import FORMS, Asked, automatic, vertex_neighbours
 from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.attributes import Attributes, CutZone, faces_of
@@ -150,13 +152,17 @@ def build_scene(
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
     ]
     groups = Attributes(case, local, cut_mesh, cut_zones, origin)
+    with clock.stage("pairing"):
+        noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
+        operators = [
+            _operator(groups, zone, faces, master, noise, options)
+            for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
+        ]
     with clock.stage("assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
         force = groups.forces()
-    with clock.stage("pairing"):
-        noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
-        zones = _zones(case, groups, surfaces, free, noise, options)
+        zones = _zones(case, cut_zones, surfaces, operators, free)
     body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
     n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
     return Scene(
@@ -188,30 +194,26 @@ def build_scene(
 
 def _zones(
     case: Case,
-    groups: Attributes,
+    cut_zones: Sequence[CutZone],
     surfaces: Surfaces,
+    operators: Sequence[GapOperator],
     free: FreeMotion,
-    noise: float,
-    options: Options,
 ) -> list[ZoneScene]:
-    """The zones with their gap operators; initial gaps below `noise` (a length) are none."""
+    """The zones, multipliers of fixed nodes merged with others where the treatment does so."""
     found: list[ZoneScene] = []
     first = 0
-    for zone, (slave, master), part in zip(case.zones, surfaces, groups.zones, strict=True):
-        count = sum(len(block.nodes) for block in slave)
-        operator = _operator(groups.points, zone, part.sub_faces, master, count, options)
-        initial = _initial_gaps(zone, operator, groups, part.sub_faces, noise)
-        operator = replace(operator, initial=initial)
+    for i, zone in enumerate(case.zones):
+        operator, (slave, master) = operators[i], surfaces[i]
         if TREATMENTS[zone.treatment].joins:
             operator = merge_fixed_multipliers(operator, free.basis)
         found.append(
             ZoneScene(
                 zone=zone,
                 first=first,
-                count=count,
+                count=sum(len(block.nodes) for block in slave),
                 slave_faces=slave,
                 master_faces=master,
-                sub_faces=part.sub_faces,
+                sub_faces=cut_zones[i].sub_faces,
                 operator=operator,
             )
         )
@@ -291,14 +293,16 @@ def _cut(
 
 
 def _operator(
-    points: np.ndarray,
+    groups: Attributes,
     zone: Zone,
-    sub_faces: list[SubFaces],
+    faces: CutZone,
     master_faces: list[FaceBlock],
-    count: int,
+    noise: float,
     options: Options,
 ) -> GapOperator:
-    slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
+    """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
+    points, count = groups.points, sum(len(block.nodes) for block in faces.slave_faces)
+    slaves = [facets(points, f.type, f.nodes, f.macro) for f in faces.sub_faces]
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
     masters = _master_facets(points, master_faces)
@@ -309,7 +313,17 @@ def _operator(
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
-    return gap_operator(slaves, masters, count, len(points), search, scheme)
+    asked = _recovery(zone, faces.slave_faces, count) if scheme.space is constants else None
+    operator = gap_operator(slaves, masters, count, len(points), search, scheme, asked)
+    return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
+
+
+def _recovery(zone: Zone, slave_faces: list[FaceBlock], count: int) -> Asked:
+    """How a zone's pressure is recovered, and which of its macro-elements share a vertex."""
+    quadratic = all(block.owner_type.order == 2 for block in slave_faces)
+    name = automatic(quadratic) if zone.recovery == "automatic" else zone.recovery
+    vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
+    return Asked(FORMS[name], vertex_neighbours(vertices, count))
 
 
 def _as_bent(block: Facets) -> Facets:

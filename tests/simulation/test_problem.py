@@ -184,7 +184,7 @@ def bent():
 def test_a_further_load_is_solved_with_the_status_kept(bent):
     """A tenth of the load more is a tenth more of all, gaps of the closed ones apart."""
     assembled, state = bent
-    found = assembled.loaded_further(state, 0.1 * state.force)
+    found = assembled.corrected(state, 0.1 * state.force)
     closed = state.status.closed
     assert 0 < closed.sum() < len(closed)
     assert (found.status.closed == closed).all()
