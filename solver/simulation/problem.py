@@ -35,8 +35,8 @@ _EXTEND = 3e-11
 _CHANGE = 1e-4
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
-# Columns solved at once for the stiffness that gaps see.
-_COLUMNS = 64
+# Entries of the solutions that are kept at once for the stiffness that gaps see.
+_AT_ONCE = 1 << 23
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -268,13 +268,13 @@ class ContactProblem:
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")
         system, area = self._systems.closed(eligible), self.constraints.covered[eligible]
-        found = np.zeros((len(area), len(area)))
-        for first in range(0, len(area), _COLUMNS):
-            imposed = np.diag(area)[:, first : first + _COLUMNS]
-            nothing = np.zeros((self.matrix.shape[0], imposed.shape[1]))
-            change = system.correction(nothing, imposed)
-            found[:, first : first + _COLUMNS] = system.multiplier(-(self.matrix @ change))
-        return area[:, None] * found
+        found, size = np.zeros((len(area), len(area))), self.matrix.shape[0]
+        for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
+            imposed = np.zeros((len(area), len(some)))
+            imposed[some, np.arange(len(some))] = area[some]
+            change = system.correction(np.zeros((size, len(some))), imposed)
+            found[:, some] = area[:, None] * system.multiplier(-(self.matrix @ change))
+        return found
 
 
 def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
