@@ -47,7 +47,8 @@ class Zone:
     """One contact zone: its slave and master face groups, and how the interface is treated.
 
     `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
-    gap; None: what lies between the faces as meshed.
+    gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
+    quadratic, smooth or automatic.
     """
 
     slave: str
@@ -59,6 +60,7 @@ class Zone:
     interference: float = 0.0
     points: int | None = None
     clearance: Scalar | None = None
+    recovery: str = "none"
 
 
 @dataclass(frozen=True)

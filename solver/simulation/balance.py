@@ -29,6 +29,9 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2) or 1.0
     result: dict[str, float] = {}
+    if state.correction.any():
+        by_zone["correction of the pressure"] = state.correction
+        contact += state.correction
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length)
     unbalanced = (state.iterate.internal - state.force - contact).astype(float).ravel()
@@ -78,7 +81,8 @@ def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | N
     determined[alone.indices[np.abs(alone.data) > _OWN]] = True
     if not determined.all():
         return nothing
-    forces = rows @ (state.iterate.internal - state.force).astype(float).ravel()
+    known = state.force + state.correction
+    forces = rows @ (state.iterate.internal - known).astype(float).ravel()
     matrix = integrals.T @ integrals + sparse.diags_array((size == 0).astype(float))
     pressure = np.atleast_1d(spsolve(matrix.tocsc(), integrals.T @ forces)) * scale
     return list(np.split(pressure, np.cumsum([zone.count for zone in scene.zones])[:-1]))

@@ -18,6 +18,9 @@ from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene
 from solver.simulation.solution import Line, Solution
 
+# An estimated error below this is rounding.
+_ROUNDING = 1e-10
+
 
 def decided(problem: ContactProblem) -> Iterator[Line]:
     """What the scene alone decides, before the solve, in the order of the work."""
@@ -96,6 +99,19 @@ def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Li
         why = "the same multipliers are closed as at another load factor"
         yield Line("no new factor for each load factor", why, "status")
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
+
+
+def estimated(solution: Solution) -> Iterator[Line]:
+    """How far constant pressures are from the exact one, as a reconstruction shows it."""
+    for zone in solution.zones:
+        error = zone.relative_pressure_error
+        if error is not None and error > _ROUNDING:
+            how = f"a {zone.recovered.form} one" if zone.recovered else "a linear one"
+            what = f"{zone.name}: estimated error of the constant pressure {error:.1e} in L2"
+            yield Line(what, f"it differs so much from {how}, reconstructed from neighbours")
+        if zone.recovered and (left := int((zone.closed & (zone.recovered.degree == 0)).sum())):
+            what = f"{zone.name}: pressure constant on {left} macro-elements"
+            yield Line(what, "too few closed neighbours to recover it from")
 
 
 def strained(solution: Solution) -> Iterator[Line]:

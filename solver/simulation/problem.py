@@ -31,10 +31,12 @@ from solver.system.errors import SolveError
 
 # An estimated error of the pressure from which residuals are summed in extended precision.
 _EXTEND = 3e-11
+# How exactly the change of a sweep of recovery is solved for; its own error is far larger.
+_CHANGE = 1e-4
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
-# Columns solved at once for the stiffness that gaps see.
-_COLUMNS = 64
+# Entries of the solutions that are kept at once for the stiffness that gaps see.
+_AT_ONCE = 1 << 23
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +44,8 @@ class Equilibrium:
     """A solved load factor: pressure (k,) and gap with their round-off, status, residual.
 
     `residual` is relative to `force_scale`, the size of the forces at work. Fields are those of the
-    `iterate`.
+    `iterate`. `correction` (n, dim) are the contact forces beside those of the pressures, of a
+    recovered pressure.
     """
 
     iterate: ContactIterate
@@ -51,6 +54,7 @@ class Equilibrium:
     residual: float
     force_scale: float
     accuracy: Accuracy
+    correction: np.ndarray
 
     @property
     def pressure(self) -> np.ndarray:
@@ -70,7 +74,7 @@ class Equilibrium:
     @property
     def force(self) -> np.ndarray:
         """Loads (n, dim)."""
-        return self.iterate.force
+        return self.iterate.force - self.correction
 
 
 class ContactProblem:
@@ -119,12 +123,17 @@ class ContactProblem:
         return self.system.factor.iterations if self.system else 0
 
     def solve(
-        self, factor: float, start: np.ndarray | None = None, bilateral: bool = False
+        self,
+        factor: float,
+        start: np.ndarray | None = None,
+        bilateral: bool = False,
+        correction: np.ndarray | float = 0.0,
     ) -> Equilibrium:
         """Equilibrium at a load factor, the status search starting from `start` (k,), a guess.
 
-        `bilateral`: no status is sought, all macro-elements stay closed, in tension too. Raises
-        SolveError where no status fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0, or a system is singular.
+        `bilateral`: no status is sought, all macro-elements stay closed, in tension too.
+        `correction` (n, dim): see `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0,
+        ḡ ≥ 0, p ḡ = 0, or a system is singular.
         """
         scene, eligible = self.scene, self.constraints.eligible
         if not scene.options.shortcuts.status:
@@ -135,7 +144,7 @@ class ContactProblem:
         def attempt(closed: np.ndarray) -> Trial:
             if not scene.options.shortcuts.status:
                 self._systems.forget()
-            latest[:] = [self._solve_closed(closed, factor)]
+            latest[:] = [self._solve_closed(closed, factor, correction)]
             return latest[0].trial
 
         if bilateral:
@@ -148,13 +157,25 @@ class ContactProblem:
         touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
         return replace(latest[0], status=replace(status, closed=status.closed | touching))
 
-    def loaded_further(self, state: Equilibrium, force: np.ndarray) -> Equilibrium:
-        """The state with a further load `force` (n, dim), its solved status kept.
+    def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
+        """The state with another `correction` (n, dim), its status kept.
 
         Solved from the state for the change alone, on the factor kept since.
         """
-        start = replace(state.iterate, force=state.force + force)
-        return self._refined(start, max(state.force_scale, np.abs(force).max()), state.status)
+        start = replace(state.iterate, force=state.force + correction)
+        scale = max(state.force_scale, np.abs(correction).max())
+        return self._refined(start, scale, state.status, correction)
+
+    def pressure_change(self, closed: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The change of pressure (k,) by forces (n_dofs,), with the `closed` (k,) kept closed.
+
+        Two digits more than the change has, for a factor that iterates.
+        """
+        system, pushed = self._constrained(closed), self.scene.free.basis.T @ force
+        change = system.correction(pushed, np.zeros(int(closed.sum())), _CHANGE)
+        found = np.zeros(len(closed))
+        found[closed] = system.multiplier(pushed - self.matrix @ change)
+        return found
 
     def _first_guess(self, factor: float) -> np.ndarray:
         """Macro-elements (k,) that loads and imposed displacements are likely to close."""
@@ -171,12 +192,15 @@ class ContactProblem:
     def _free_motion(self, closed: np.ndarray) -> str:
         return free_motion(self.scene, self.motions, self.constraints, closed)
 
-    def _solve_closed(self, closed: np.ndarray, factor: float) -> Equilibrium:
+    def _solve_closed(
+        self, closed: np.ndarray, factor: float, correction: np.ndarray | float
+    ) -> Equilibrium:
         """Equilibrium with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
             raise SolveError(f"{moves} once {int((~closed).sum())} macro-elements are open")
-        offset, force = factor * scene.free.offset, factor * scene.force
+        correction = np.zeros(scene.force.shape) + correction
+        offset, force = factor * scene.free.offset, factor * scene.force + correction
         scale = self._force_scale(force, offset.reshape(scene.points.shape))
         start = ContactIterate(
             scene=scene,
@@ -186,18 +210,26 @@ class ContactProblem:
             displacement=self.at_rest.moved(offset),
             mean_stress=np.zeros(scene.mean.size),
         )
-        return self._refined(start, scale, StatusResult(closed, 1, []))
+        return self._refined(start, scale, StatusResult(closed, 1, []), correction)
 
-    def _refined(self, start: ContactIterate, scale: float, status: StatusResult) -> Equilibrium:
+    def _refined(
+        self, start: ContactIterate, scale: float, status: StatusResult, correction: np.ndarray
+    ) -> Equilibrium:
         """Solved from an iterate; in extended precision where that gains digits."""
         system, cures = self._constrained(start.closed), self.scene.options.safeguards
-        found = self._once(system, start, scale, status)
+        found = self._once(system, start, scale, status, correction)
         if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
-            found = self._once(system, replace(found.iterate, extended=True), scale, status)
+            extended = replace(found.iterate, extended=True)
+            found = self._once(system, extended, scale, status, correction)
         return found
 
     def _once(
-        self, system: ConstrainedSystem, start: ContactIterate, scale: float, status: StatusResult
+        self,
+        system: ConstrainedSystem,
+        start: ContactIterate,
+        scale: float,
+        status: StatusResult,
+        correction: np.ndarray,
     ) -> Equilibrium:
         refine = self.scene.options.safeguards.refinement
         # In a stretched model a force of the size of round-off may be a large one elsewhere.
@@ -212,6 +244,7 @@ class ContactProblem:
             residual=residual,
             force_scale=scale,
             accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
+            correction=correction,
         )
 
     def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
@@ -235,13 +268,13 @@ class ContactProblem:
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")
         system, area = self._systems.closed(eligible), self.constraints.covered[eligible]
-        found = np.zeros((len(area), len(area)))
-        for first in range(0, len(area), _COLUMNS):
-            imposed = np.diag(area)[:, first : first + _COLUMNS]
-            nothing = np.zeros((self.matrix.shape[0], imposed.shape[1]))
-            change = system.correction(nothing, imposed)
-            found[:, first : first + _COLUMNS] = system.multiplier(-(self.matrix @ change))
-        return area[:, None] * found
+        found, size = np.zeros((len(area), len(area))), self.matrix.shape[0]
+        for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
+            imposed = np.zeros((len(area), len(some)))
+            imposed[some, np.arange(len(some))] = area[some]
+            change = system.correction(np.zeros((size, len(some))), imposed)
+            found[:, some] = area[:, None] * system.multiplier(-(self.matrix @ change))
+        return found
 
 
 def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:

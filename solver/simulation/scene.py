@@ -17,7 +17,9 @@ from solver.mechanics.fem.supports import FreeMotion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
 from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from solver.mechanics.mortar.held import merge_fixed_multipliers
+from solver.mechanics.mortar.multipliers import constants
 from solver.mechanics.mortar.operator import GapOperator, gap_operator
+from solver.mechanics.mortar.recovery import FORMS, Asked, automatic, vertex_neighbours
 from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.attributes import Attributes, CutZone, faces_of
@@ -311,8 +313,17 @@ def _operator(
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
-    operator = gap_operator(slaves, masters, count, len(points), search, scheme)
+    asked = _recovery(zone, faces.slave_faces, count) if scheme.space is constants else None
+    operator = gap_operator(slaves, masters, count, len(points), search, scheme, asked)
     return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
+
+
+def _recovery(zone: Zone, slave_faces: list[FaceBlock], count: int) -> Asked:
+    """How a zone's pressure is recovered, and which of its macro-elements share a vertex."""
+    quadratic = all(block.owner_type.order == 2 for block in slave_faces)
+    name = automatic(quadratic) if zone.recovery == "automatic" else zone.recovery
+    vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
+    return Asked(FORMS[name], vertex_neighbours(vertices, count))
 
 
 def _as_bent(block: Facets) -> Facets:

@@ -2,6 +2,7 @@
 
 import logging
 import resource
+from dataclasses import replace
 
 import meshio
 import numpy as np
@@ -16,10 +17,18 @@ from solver.simulation.consistency import inconsistency
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
 from solver.simulation.options import LEAN, Options
-from solver.simulation.plan import decided, noted, strained
+from solver.simulation.plan import decided, estimated, noted, strained
 from solver.simulation.problem import ContactProblem, Equilibrium
+from solver.simulation.recovery import Recovered, RecoveredZone, recovered
 from solver.simulation.scene import Scene, ZoneScene, build_scene
-from solver.simulation.solution import Line, NodalContact, Solution, StepResult, ZoneResult
+from solver.simulation.solution import (
+    Line,
+    NodalContact,
+    RecoveredPressure,
+    Solution,
+    StepResult,
+    ZoneResult,
+)
 from solver.simulation.unloaded import without_unloaded
 from solver.system.clock import Clock, processor_time
 from solver.system.errors import SolveError
@@ -65,33 +74,40 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
     with clock.stage("solve"):
-        states = _walk(problem, problem.scene.case.steps)
+        states, recovered = _walk(problem, problem.scene.case.steps)
     plan += noted(problem, states)
     with clock.stage("recovery"):
-        solution = _recover(problem, states, plan)
-    solution.plan += strained(solution)
+        solution = _recover(problem, states, recovered, plan)
+    solution.plan += [*estimated(solution), *strained(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
     return solution
 
 
-def _walk(problem: ContactProblem, steps: tuple[float, ...]) -> list[Equilibrium]:
-    """Solve the load factors in turn, each from the status of the one before."""
+def _walk(problem: ContactProblem, steps: tuple[float, ...]) -> tuple[list[Equilibrium], Recovered]:
+    """Solve the load factors in turn, each from the status of the one before.
+
+    With the states the pressure recovered in the last one.
+    """
     states: list[Equilibrium] = []
+    fields: Recovered = {}
     for factor in steps:
         start = states[-1].status.closed if states else None
         state = problem.solve(factor, start)
         if (state.trial.offence(state.iterate.closed) > 1).any():
             raise SolveError(f"load factor {factor:g}: contact bears tension or surfaces overlap")
+        state, fields = recovered(problem, state, factor)
         states.append(state)
         closed = int(state.status.closed.sum())
         told = factor, state.status.iterations, closed, state.residual
         _LOG.log(OUTCOME, "load factor %g: %d iterations, %d closed, residual %.1e", *told)
-    return states
+    return states, fields
 
 
-def _recover(problem: ContactProblem, states: list[Equilibrium], plan: list[Line]) -> Solution:
+def _recover(
+    problem: ContactProblem, states: list[Equilibrium], fields: Recovered, plan: list[Line]
+) -> Solution:
     scene = problem.scene
     last = states[-1]
     stress = nodal_stress(
@@ -101,7 +117,7 @@ def _recover(problem: ContactProblem, states: list[Equilibrium], plan: list[Line
     scale = _stress_scale(scene, stress)
     strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
     zones = [
-        _zone_result(scene, zone, last, stress, forces)
+        _zone_result(scene, zone, last, stress, forces, fields.get(zone.zone.name))
         for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
     ]
     return Solution(
@@ -161,6 +177,7 @@ def _zone_result(
     state: Equilibrium,
     stress: np.ndarray,
     pressure_of_forces: np.ndarray | None,
+    field: RecoveredZone | None,
 ) -> ZoneResult:
     surface = zone.operator.surface
     slave_nodes, slave_normal = _nodal_normals(
@@ -185,7 +202,36 @@ def _zone_result(
         master_nodes=master_nodes,
         nodal=_nodal_contact(zone, state),
         pressure_of_forces=pressure_of_forces,
+        pressure_error=None if field is None else field.error,
+        recovered=_recovered_pressure(scene, zone, state, field),
     )
+
+
+def _recovered_pressure(
+    scene: Scene, zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
+) -> RecoveredPressure | None:
+    """The recovered pressure of a zone, and its mean at each node over the faces around."""
+    if field is None or field.name == "none":
+        return None
+    local, pressure = field.recovery.moments.local, state.pressure[zone.numbers]
+    nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
+    found = RecoveredPressure(
+        form=field.name,
+        coefficients=field.coefficients.reshape(len(pressure), -1),
+        degree=field.degree,
+        centre=local.centre + scene.origin,
+        axes=local.axes,
+        spread=local.spread,
+        nodes=nodes,
+        at_nodes=np.zeros(len(nodes)),
+    )
+    total, count = np.zeros((2, len(nodes)))
+    for faces in zone.sub_faces:
+        places = scene.points[faces.nodes] + scene.origin
+        at = np.searchsorted(nodes, faces.nodes)
+        np.add.at(total, at, found.values(pressure, faces.macro, places))
+        np.add.at(count, at, 1.0)
+    return replace(found, at_nodes=total / count)
 
 
 def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:

@@ -161,7 +161,7 @@ def _first_of(reasons: Sequence[str]) -> str:
     return f"{reasons[0]} (and {len(reasons) - 1} more)"
 
 
-def _extremes(arrays: Iterable[np.ndarray]) -> list[float] | None:
+def _extremes(arrays: Iterable[np.ndarray]) -> list[Any] | None:
     values = [array for array in arrays if len(array)]
     if not values:
         return None

@@ -9,7 +9,8 @@ the checks need again, so that a file can be judged without solving:
     /errors        norms of the error against the case's exact solution, if it names one
     /mean_stress   by cell type, that of cells in mixed form at their nodes
     /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces; in `nodal` those
-                   of nodes where the treatment has its multipliers there
+                   of nodes where the treatment has its multipliers there; in `recovered` the
+                   coefficients of a recovered pressure and its values at nodes
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
     /provenance    versions, revision, hashes, machine
 
@@ -39,6 +40,7 @@ from solver.simulation.solution import (
     BodyInfo,
     Line,
     NodalContact,
+    RecoveredPressure,
     Solution,
     StepResult,
     ZoneResult,
@@ -78,6 +80,7 @@ _AT_MULTIPLIER_NODES = {
     "gap": "gap",
     "status": "closed",
 }
+_RECOVERED = ("coefficients", "degree", "centre", "axes", "spread", "nodes", "at_nodes")
 _ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
@@ -220,9 +223,20 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
         "normal_stress": solution.nodal_normal_stress,
         "body": solution.body,
     }
+    if any(zone.recovered for zone in solution.zones):
+        point_data["recovered_pressure"] = _recovered_at_nodes(solution)
     write_grid(
         group, meshio.Mesh(mesh.points, cells + faces, cell_sets=sets), point_data, cell_data
     )
+
+
+def _recovered_at_nodes(solution: Solution) -> np.ndarray:
+    """The recovered pressure (n,) at slave nodes, NaN at all others."""
+    values = np.full(len(solution.mesh.points), np.nan)
+    for zone in solution.zones:
+        if zone.recovered:
+            values[zone.recovered.nodes] = zone.recovered.at_nodes
+    return values
 
 
 def _face_blocks(
@@ -293,6 +307,13 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     # Faces of one type may be in several blocks, one for each type of cell behind them.
     for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
         faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
+    if zone.pressure_error is not None:
+        group["pressure_error"] = zone.pressure_error
+    if zone.recovered:
+        recovered = group.create_group("recovered")
+        recovered.attrs["form"] = zone.recovered.form
+        for name in _RECOVERED:
+            recovered[name] = getattr(zone.recovered, name)
     if zone.pressure_of_forces is not None:
         group["pressure_of_forces"] = zone.pressure_of_forces
     if zone.nodal:
@@ -312,11 +333,18 @@ def _read_zone(
         **{key: group[key][()] for key in _BY_NODE},
         nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
         pressure_of_forces=_optional(group, "pressure_of_forces"),
+        pressure_error=_optional(group, "pressure_error"),
+        recovered=_read_recovered(group["recovered"]) if "recovered" in group else None,
     )
 
 
 def _optional(group: h5py.Group, name: str) -> np.ndarray | None:
     return group[name][()] if name in group else None
+
+
+def _read_recovered(group: h5py.Group) -> RecoveredPressure:
+    fields = {name: group[name][()] for name in _RECOVERED}
+    return RecoveredPressure(form=group.attrs["form"], **fields)
 
 
 def _read_nodal(group: h5py.Group) -> NodalContact:

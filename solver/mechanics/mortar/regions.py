@@ -270,8 +270,11 @@ def quadrature(regions: Regions, degree: int) -> list[Pieces]:
     for which, points, weights in _fan(regions, middle, 1):
         area += np.bincount(which, weights.sum(axis=1), minlength=len(middle))
         np.add.at(moment, which, np.einsum("sq,sqd->sd", weights, points - middle[which][:, None]))
-    area[area == 0] = 1.0
-    return _fan(regions, middle + moment / area[:, None], degree)
+    shift = moment / np.where(area == 0, 1.0, area)[:, None]
+    # That of a sliver may be lost in round-off, and lie anywhere.
+    size = np.where(regions.used[..., None], np.abs(regions.start - middle[:, None]), 0.0)
+    shift[(np.abs(shift) > size.max(axis=1)).any(axis=1)] = 0.0
+    return _fan(regions, middle + shift, degree)
 
 
 def _fan(regions: Regions, middle: np.ndarray, degree: int) -> list[Pieces]:

@@ -1,4 +1,4 @@
-"""Quadrature points on whole slave faces, with their share of the surface and their normals."""
+"""Whole slave surfaces: quadrature points on their faces, and their macro-elements."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,19 @@ import numpy as np
 from solver.mechanics.fem import face_rule, shape_functions
 from solver.mechanics.fem.quadrature import Rule
 from solver.mechanics.mortar.facets import Facets, surface_vectors
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """The m macro-elements of a slave surface.
+
+    `area`, `covered` (m,): whole and intersected area; `centre`, `normal` (m, dim).
+    """
+
+    area: np.ndarray
+    covered: np.ndarray
+    centre: np.ndarray
+    normal: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
