@@ -166,7 +166,7 @@ def test_a_load_that_bends_them_between_the_macro_elements_is_refused():
 
 def test_a_body_that_its_loads_pull_away_is_not_searched_for_long(monkeypatch):
     """The load on the whole is a pull: no macro-element system of unit gaps is worth forming."""
-    monkeypatch.setattr(problem, "_COLUMNS", 0)
+    monkeypatch.setattr(problem, "_AT_ONCE", 0)
     pull = PRESSED.replace("25.0", "'25.0 - 60*x'")
     with pytest.raises(SolveError, match="nothing keeps top from a free motion"):
         simulate(blocks(pull), block_mesh("QUAD4", "TRIA3", (6, 4)))
