@@ -12,8 +12,8 @@ from solver.mesh import generate, transform
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.accuracy import Accuracy
 from solver.simulation.simulate import simulate
+from solver.studies.stability.description import read_sweep
 from solver.studies.stability.states import exact_state
-from solver.studies.stability.sweeps import read_sweep
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from tests.scenes import POISSON, YOUNG, block_case, block_mesh

@@ -103,7 +103,11 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
 
 
 def tangents_of(normal: np.ndarray) -> np.ndarray:
-    """Unit tangents (n, dim − 1, dim) that complete unit normals (n, dim) to frames."""
+    """Unit tangents (n, dim − 1, dim) that complete unit normals (n, dim) to frames.
+
+    >>> tangents_of(np.array([[0.0, 1.0]])).tolist()
+    [[[-1.0, 0.0]]]
+    """
     if normal.shape[1] == 2:
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
     axis = np.zeros_like(normal)

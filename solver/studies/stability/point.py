@@ -26,9 +26,9 @@ from solver.simulation.options import Options, Safeguards
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import solve_problem
+from solver.studies.stability.description import Sweep, SweepSeries, Value
 from solver.studies.stability.floor import floor, stress_error
 from solver.studies.stability.states import State, exact_state
-from solver.studies.stability.sweeps import Sweep, SweepSeries, Value
 from solver.system.clock import Clock
 from solver.system.errors import InputError, SolveError
 from solver.system.files import write_text
