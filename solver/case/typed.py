@@ -2,7 +2,7 @@
 
     class Way(Section, frozen=True):
         title: Text
-        solver: Literal["auto", "rslab"] = "auto"
+        solver: Literal["auto", "cholmod"] = "auto"
         sizes: Annotated[tuple[Size, ...], ONCE] = ()
 
 `read_as` turns the content of a file into an object of the class. A value that does not fit is

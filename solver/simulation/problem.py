@@ -109,12 +109,12 @@ class ContactProblem:
 
     @property
     def linear_solver(self) -> str:
-        """The name of what solved the last system."""
+        """The name of the solver of the last system."""
         return self.system.factor.name if self.system else "none"
 
     @property
     def why_solver(self) -> str:
-        """Why that was chosen."""
+        """Why it was chosen."""
         return self.system.why if self.system else ""
 
     @property
@@ -160,7 +160,7 @@ class ContactProblem:
     def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
         """The state with another `correction` (n, dim), its status kept.
 
-        Solved from the state for the change alone, on the factor kept since.
+        Only the change is solved for, on the factor that the state was solved with.
         """
         start = replace(state.iterate, force=state.force + correction)
         scale = max(state.force_scale, np.abs(correction).max())
@@ -278,7 +278,7 @@ class ContactProblem:
 
 
 def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """The stiffness of the free unknowns, and its diagonal (n_dofs,), that of held ones too."""
+    """The stiffness of the free unknowns, and the diagonal (n_dofs,) for all degrees of freedom."""
     free, mean = scene.free, scene.mean
     matrix, diagonal = stiffness(scene.points, scene.blocks, free.selection)
     if free.selection is None:
@@ -289,7 +289,7 @@ def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
 
 
 def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
-    """What the free unknowns of a scene stand for, given the rigid motions of its bodies."""
+    """The meaning of a scene's free unknowns, given the rigid motions of its bodies."""
     basis, dim = scene.free.basis, scene.points.shape[1]
     node = nodes_of_unknowns(basis, dim)
     together = basis.T @ whole_motions(motions, scene.n_bodies)

@@ -133,7 +133,7 @@ def gap_operator(
     >>> operator.initial.round(15).tolist(), operator.covered.round(15).tolist()
     ([1.0], [2.0])
     """
-    if asked is not None:
+    if asked is not None and scheme.meet is meet_in_segments:
         scheme = replace(scheme, meet=partial(scheme.meet, degree=asked.form.degree))
     if any(block.directions is not None for block in slaves):
         scheme = replace(scheme, closure=False)
