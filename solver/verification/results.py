@@ -1,7 +1,7 @@
 """The result file: one HDF5 file that is also a VTKHDF grid, written whole or not at all.
 
-`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; beside it lies everything that
-the checks need again, so that a file can be judged without solving:
+`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; the file has everything else
+that the checks need, so that it can be judged without solving:
 
     /case          source text, name, family, path, swapped, hexahedra
     /solve         lengths, sizes, cost and the linear solver of the solve
@@ -148,7 +148,7 @@ def read_result(path: str | Path) -> Result:
     except InputError:
         raise
     except Exception as error:
-        # Whatever the reader trips over lies in the file, as where another version wrote it.
+        # Any error of the reader is caused by the file, which another version may have written.
         fault = " ".join(f"{type(error).__name__}: {error}".split())
         raise _no_result(path, fault) from error
     if fault:

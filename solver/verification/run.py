@@ -151,16 +151,16 @@ def record_crash(
 
 def _death(status: int) -> str:
     """What an exit status says of how a process ended; shells add 128 to a signal's number."""
-    told = f"died with exit status {status}"
+    died = f"died with exit status {status}"
     names = {128 + number: number.name for number in signal.Signals}
     if status not in names:
-        return told
+        return died
     hint = ", as a system does that runs out of memory" * (names[status] == "SIGKILL")
-    return f"{told}, ended by {names[status]}{hint}"
+    return f"{died}, ended by {names[status]}{hint}"
 
 
 def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
-    """The verdict of a solve that comes to its end; `beside` lies where the verdict will."""
+    """The verdict of a solve that comes to its end; `beside` is the path of the verdict."""
     started, clock = processor_time(), Clock()
     # Better refused now than after the solve.
     check_name(output)

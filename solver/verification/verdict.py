@@ -132,7 +132,7 @@ class Verdict:
 
     `worst` is the check with the largest relative error, `closest_to_tolerance` the one nearest to
     its tolerance or furthest past it. Pairs are minimum and maximum over all zones; `seconds` has
-    wall times by stage and their `total`. `transient`: the reason lies in the machine (memory,
+    wall times by stage and their `total`. `transient`: the machine is the reason (memory,
     disk, a kill), so that the same solve may succeed another time.
     """
 
@@ -227,9 +227,9 @@ def read_verdict(path: str | Path) -> Verdict:
 def flaw(path: str | Path, case: str | Path | None = None) -> str:
     """Why a verdict file cannot be relied on, in one line; empty where it can.
 
-    It must be as it was written and lie in the folder of its own family and job (where that is in
-    `results`), its result beside it as it was then. `case` is the case file that it must be of, as
-    the file is now. Reads the whole result.
+    It must be as it was written, in the folder of its own family and job (where that is in
+    `results`), and its result must be the one it names. `case` is the case file that it must be
+    of, in its present state. Reads the whole result.
     """
     path = Path(path)
     try:

@@ -16,7 +16,7 @@ from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import SolveError
-from tests.scenes import block_mesh
+from tests.scenes import block_case, block_mesh
 from tests.simulation.test_unloaded import SCENE, side_by_side
 
 CASE = """
@@ -162,6 +162,14 @@ def test_a_load_that_bends_them_between_the_macro_elements_is_refused():
     wave = PRESSED.replace("25.0", "'25 + 10*cos(8e-5*3.141592653589793*x)'")
     with pytest.raises(SolveError, match=r"singular|not positive definite"):
         simulate(blocks(wave), slender(1e5))
+
+
+def test_a_slender_body_in_space_does_not_turn_about_its_own_axis():
+    """10⁷ times as long as thick; contact holds the upper body against that turn as well."""
+    mesh = block_mesh("HEXA8", "HEXA8", (2, 3))
+    mesh.points[:, 0] *= 1e7
+    zone = simulate(block_case(3), mesh).zones[0]
+    assert np.abs(zone.multiplier / 25 - 1).max() < 1e-9
 
 
 def test_a_body_that_its_loads_pull_away_is_not_searched_for_long(monkeypatch):
