@@ -72,11 +72,10 @@ def test_quick_points_hold(name, tmp_path):
     assert all(point["holds"] for point in run(name, tmp_path))
 
 
-def test_the_map_without_cures_is_of_a_plain_implementation(tmp_path):
+def test_the_map_without_safeguards_is_of_a_plain_implementation(tmp_path):
     """What the two columns differ by: a tiny pressure is lost in gaps that are none."""
     sweep = read_sweep(SWEEPS / "tiny-pressure.yaml")
-    made = measuring._Meshes()
     point = measuring._Point(sweep, sweep.series[0], 1e-12, "tiny")
-    assert measuring._measured(point, made, Safeguards())["pressure"] < 1e-12
-    without = measuring._measured(point, made, Safeguards(gap_threshold=False))
+    assert measuring._measured(point, Safeguards())["pressure"] < 1e-12
+    without = measuring._measured(point, Safeguards(gap_threshold=False))
     assert without["pressure"] > 1e-3
