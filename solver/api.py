@@ -31,6 +31,7 @@ from solver.mesh.tidy import tidy
 from solver.simulation.options import Options
 from solver.simulation.solution import Solution, ZoneResult
 from solver.system.errors import InputError, key_path
+from solver.system.progress import saying
 from solver.system.provenance import gather
 from solver.verification.judge import judge
 from solver.verification.results import write_result
@@ -73,15 +74,14 @@ def solve_case(
     """
     if hexahedra not in (None, *_CUTS):
         raise InputError("solve_case", "hexahedra", hexahedra, f"allowed: {', '.join(_CUTS)}")
-    given = _case(case, mesh)
+    given = _case(case, mesh).as_solved(swapped, hexahedra)
     made = mesh_of(given) if mesh is None else _mesh(mesh)
-    if memory_check:
-        check_memory(len(made.points), made.points.shape[1], given.path, log)
     accepted = mesh is None and given.path.is_file()
     options = Options.everything() if everything else Options()
-    solution, checks = solve_checked(
-        given, made, swapped, hexahedra, log, accepted, options=options
-    )
+    with saying(log):
+        if memory_check:
+            check_memory(len(made.points), made.points.shape[1], given.path)
+        solution, checks = solve_checked(given, made, options, accepted)
     file = given.mesh.get("path") if mesh is None else mesh
     provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
     return Solved(solution, checks, provenance)

@@ -35,7 +35,8 @@ Poisson = Annotated[
 CheckName = Literal[
     "all", "multiplier", "nodal_stress", "surface_stress_slave", "surface_stress_master",
     "element_pressure", "element_gap", "element_status", "coverage", "covered_pressure",
-    "displacement", "stress_components", "balance", "counts", "observation", "observation_gap",
+    "displacement", "stress_components", "integration_stress", "balance", "counts", "observation",
+    "observation_gap",
     "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2", "pressure_max",
     "pressure_means", "pressure_oscillation", "half_width", "peak",
 ]  # fmt: skip
@@ -236,6 +237,7 @@ class ZoneKeys(Section, frozen=True):
     treatment: how the interface is treated
     points: points each way on a slave face, for the treatment quadrature alone
     normal: along what gaps are measured: normals of the faces, or their means at the nodes
+    recovery: how a pressure of higher order is recovered from the constants
     interference: overlap at the start of bodies modelled apart: taken off the gap
     clearance: the gap at the start, in place of the one between the faces as meshed
     """
@@ -248,6 +250,7 @@ class ZoneKeys(Section, frozen=True):
         "lac"
     )
     normal: Literal["element", "nodal"] = "element"
+    recovery: Literal["none", "linear", "quadratic", "smooth", "automatic"] = "none"
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
     clearance: Scalar | None = None

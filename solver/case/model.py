@@ -1,6 +1,6 @@
 """What a case is, as typed objects: supports, loads, contact zones, references."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,7 +47,8 @@ class Zone:
     """One contact zone: its slave and master face groups, and how the interface is treated.
 
     `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
-    gap; None: what lies between the faces as meshed.
+    gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
+    quadratic, smooth or automatic.
     """
 
     slave: str
@@ -59,6 +60,7 @@ class Zone:
     interference: float = 0.0
     points: int | None = None
     clearance: Scalar | None = None
+    recovery: str = "none"
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class Case:
     `tolerance` holds the overrides by check name, under `all` where one number was given. `units`
     names those of length and stress, for labels alone. `source` is the file's text. `family` is the
     name of the file's folder. `reference_uncertainty` is relative, `reference_code` has the keys
-    name and version.
+    name and version. `swapped` and `hexahedra`: how the case is solved, as `as_solved` was told.
     """
 
     name: str
@@ -105,3 +107,24 @@ class Case:
     tolerance: dict[str, float] = field(default_factory=dict)
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    swapped: bool = False
+    hexahedra: str | None = None
+
+    def as_solved(self, swapped: bool = False, hexahedra: str | None = None) -> "Case":
+        """The case with slave and master exchanged, or with slave hexahedra cut in another way."""
+        zones = tuple(
+            replace(
+                zone,
+                slave=zone.master if swapped else zone.slave,
+                master=zone.slave if swapped else zone.master,
+                hexahedra=hexahedra or zone.hexahedra,
+            )
+            for zone in self.zones
+        )
+        return replace(self, zones=zones, swapped=swapped, hexahedra=hexahedra)
+
+    def zone_key(self, number: int, side: str) -> str:
+        """The key of the file under which the group stands that is solved as slave or master."""
+        if self.swapped:
+            side = {"slave": "master", "master": "slave"}[side]
+        return f"contact[{number}].{side}"

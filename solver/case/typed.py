@@ -2,7 +2,7 @@
 
     class Way(Section, frozen=True):
         title: Text
-        solver: Literal["auto", "rslab"] = "auto"
+        solver: Literal["auto", "cholmod"] = "auto"
         sizes: Annotated[tuple[Size, ...], ONCE] = ()
 
 `read_as` turns the content of a file into an object of the class. A value that does not fit is
@@ -112,7 +112,7 @@ def json_schema(kind: type[Section]) -> dict[str, Any]:
         for name, key in part["properties"].items():
             if "default" in key and key["default"] is None:  # the key may be left out
                 others = [one for one in key.pop("anyOf") if one != {"type": "null"}]
-                key |= others[0] if len(others) == 1 else {"anyOf": others}
+                key.update(others[0] if len(others) == 1 else {"anyOf": others})
                 del key["default"]
             if name in titles:
                 key["title"] = titles[name]

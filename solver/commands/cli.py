@@ -164,14 +164,14 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from solver.system.progress import telling
+    from solver.system.progress import saying, telling
     from solver.verification.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
-    with telling(options.verbose, options.quiet):
-        verdict = solve(job, options.output, options.verdict, log)
+    with telling(options.verbose, options.quiet), saying(log):
+        verdict = solve(job, options.output, options.verdict)
     return PASSED if verdict.sound else FAILED
 
 

@@ -19,7 +19,7 @@ TYPES = {
     "ladders": "solver.studies.orders.description:LaddersFile",
     "scaling": "solver.studies.scaling.description:ScalingFile",
     "study": "solver.studies.work_precision.description:StudyFile",
-    "sweep": "solver.studies.stability.sweeps:SweepFile",
+    "sweep": "solver.studies.stability.description:SweepFile",
 }
 
 

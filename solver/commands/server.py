@@ -24,7 +24,7 @@ import solver
 from solver.commands.warm import GREETING, LIMIT, THREADS, outcome
 
 # What the solver imports only where it is needed; what is missing here, the command will say.
-_LATE = ("gmsh", "jsonschema.validators", "skfem.element", "rslab", "cvxopt")
+_LATE = ("gmsh", "jsonschema.validators", "skfem.element", "cvxopt")
 _INPUT = 0
 _BUG = 70
 

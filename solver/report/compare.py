@@ -46,7 +46,7 @@ def verdict(found: Comparison) -> str:
 
 
 def sections(found: Comparison) -> dict[str, list[Pair]]:
-    """The solves whose verdicts are told, under their headings, new failures first."""
+    """The solves with a verdict to report, by heading, new failures first."""
     named = {
         "Worse than before": found.worse,
         "Not passed, as before": found.still,

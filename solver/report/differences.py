@@ -16,9 +16,8 @@ from solver.report import formats, stages
 from solver.report.rows import Row, natural
 from solver.report.tables import outcome
 from solver.system.errors import InputError
-from solver.system.records import read_record
 from solver.verification.checks import ROUND_OFF
-from solver.verification.verdict import WORDS, CheckResult, Verdict
+from solver.verification.verdict import WORDS, CheckResult, Verdict, typed
 
 SUMMARY = "summary.json"
 # A solve whose time changed is worth a line from this ratio on, and from these seconds.
@@ -208,7 +207,7 @@ def read_batch(path: Path) -> Batch:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(file, "file", None, f"must be JSON ({error})") from None
-    verdicts = read_record(list[Verdict], content, file)
+    verdicts = typed(list[Verdict], content, file)
     rows = [Row(verdict, file.parent.parent / verdict.family) for verdict in verdicts]
     return Batch(file, {(row.group, row.name): row for row in rows})
 

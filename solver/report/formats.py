@@ -21,20 +21,21 @@ def error(value: float | None) -> str:
     return NOTHING if value is None or math.isnan(value) else "0" if value == 0 else f"{value:.1e}"
 
 
-def extremes(pair: Sequence[float] | None, scale: float | None = None) -> str:
+def extremes(pair: Sequence[float | None] | None, scale: float | None = None) -> str:
     """Minimum … maximum; one number where both show alike; round-off of `scale` shown as such."""
     return " … ".join(both(pair, scale))
 
 
-def both(pair: Sequence[float] | None, scale: float | None = None) -> list[str]:
+def both(pair: Sequence[float | None] | None, scale: float | None = None) -> list[str]:
     """Minimum and maximum, or the one number where both show alike."""
     if not pair:
         return [NOTHING]
     return list(dict.fromkeys(_near_zero(value, scale) for value in pair))
 
 
-def _near_zero(value: float, scale: float | None) -> str:
-    return f"{value:.1e}" if scale and 0 < abs(value) < 1e-6 * scale else number(value)
+def _near_zero(value: float | None, scale: float | None) -> str:
+    near = value is not None and scale and 0 < abs(value) < 1e-6 * scale
+    return f"{value:.1e}" if near else number(value)
 
 
 def seconds(value: float | None) -> str:
@@ -73,5 +74,5 @@ def digits(value: float | None) -> str:
 
 def formula(text: str) -> Markup:
     """Text with what follows `_` set lower and what follows `^` higher: `σ_xx`, `r^(1/3)`."""
-    lowered = re.sub(r"_(\w+)", r"<sub>\1</sub>", str(escape(text)))
+    lowered = re.sub(r"_([^\W⁰¹²³⁴-⁹]+)", r"<sub>\1</sub>", str(escape(text)))
     return Markup(re.sub(r"\^(?:\(([^)]*)\)|(\w+))", r"<sup>\1\2</sup>", lowered))

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from solver.simulation.solution import NodalContact, Solution, ZoneResult
+from solver.mechanics.mortar.recovery import FORMS
+from solver.simulation.solution import NodalContact, RecoveredPressure, Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
 # roundings of coordinates and displacements, a pressure by its estimated error and by what so many
@@ -80,8 +81,25 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
         yield from _numbers(f"macro-elements of {kind}", owner, (len(owner),), m)
     for kind, faces in zone.master_faces:
         yield from _numbers(f"master faces {kind}", faces, (len(faces), None), n)
+    if zone.pressure_error is not None:
+        yield from _values("pressure_error", zone.pressure_error, (m,))
+    if zone.recovered:
+        yield from _recovered(zone.recovered, n, m, dim)
+    if zone.pressure_of_forces is not None:
+        yield from _values("pressure of forces", zone.pressure_of_forces, (m,))
     if zone.nodal:
         yield from _nodal(zone.nodal, n)
+
+
+def _recovered(field: RecoveredPressure, n: int, m: int, dim: int) -> Iterator[str]:
+    k = len(field.nodes)
+    yield from _numbers("nodes of the recovered pressure", field.nodes, (k,), n)
+    yield from _numbers("degree of the recovered pressure", field.degree, (m,), 3)
+    count = FORMS[field.form].count(dim) if field.form in FORMS else -1
+    shapes = {"coefficients": (m, count), "centre": (m, dim), "axes": (m, dim - 1, dim)}
+    shapes |= {"spread": (m, dim - 1, dim - 1), "at_nodes": (k,)}
+    for name, shape in shapes.items():
+        yield from _values(f"{name} of the recovered pressure", getattr(field, name), shape)
 
 
 def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:

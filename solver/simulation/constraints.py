@@ -71,7 +71,7 @@ def contact_constraints(scene: Scene) -> ContactConstraints:
         initial=initial,
         area=area,
         covered=covered,
-        eligible=touching & active & ~scene.resting,
+        eligible=touching & active & ~scene.rest.unloaded_multipliers,
         inactive_multipliers=touching & ~active,
         slave=slave,
         own=np.asarray(abs(scene.free.basis).T @ slave.astype(float)) > 0,
@@ -102,8 +102,7 @@ def free_motion(
     `motions` (n_dofs, r): the rigid motions of all bodies.
     """
     per_area = sparse.diags(1 / constraints.covered[closed]) @ constraints.gaps[closed]
-    n_bodies = int(scene.body.max()) + 1
-    found = unheld_motion(motions, scene.free.basis, per_area, n_bodies)
+    found = unheld_motion(motions, scene.free.basis, per_area, scene.n_bodies)
     if found is None:
         return ""
     return f"nothing keeps {body_names(scene)[found[0]]} from a free motion ({found[1]})"
@@ -132,7 +131,7 @@ def refuse_unsolvable(
 
 def _refuse_surfaces(scene: Scene, touching: np.ndarray) -> None:
     for i, zone in enumerate(scene.zones):
-        key, master, slave = f"contact[{i}].master", zone.zone.master, zone.zone.slave
+        key, master, slave = scene.case.zone_key(i, "master"), zone.zone.master, zone.zone.slave
         surface = zone.operator.surface
         worst = float((surface.covered / surface.area).max())
         if worst > 1 + _TWICE:

@@ -17,7 +17,7 @@ ALL = "all"
 _EMPTY = "is empty, or none of its members touches a volume cell"
 
 
-def check_groups(case: Case, mesh: meshio.Mesh, swapped: bool = False) -> None:
+def check_groups(case: Case, mesh: meshio.Mesh) -> None:
     """Raise `InputError` where the case does not fit the mesh."""
     dim = mesh.points.shape[1]
     if dim == 2 and case.plane is None:
@@ -31,7 +31,7 @@ def check_groups(case: Case, mesh: meshio.Mesh, swapped: bool = False) -> None:
     groups.check_supports()
     groups.check_bodies()
     for i, zone in enumerate(case.zones):
-        groups.check_zone(f"contact[{i}]", zone, swapped)
+        groups.check_zone(i, zone)
     groups.check_loads()
 
 
@@ -199,21 +199,16 @@ class _Groups:
         for group in self.case.counts:
             self.cells(f"counts.{group}", group, self.dim)
 
-    def check_zone(self, key: str, zone: Zone, swapped: bool) -> None:
+    def check_zone(self, number: int, zone: Zone) -> None:
         """Two surfaces without a common face, the slave's not on a rigid body."""
-        slave, master = (
-            self.cells(f"{key}.{side}", getattr(zone, side), self.dim - 1)
-            for side in ("slave", "master")
-        )
-        common = self.shared(slave, master)
+        keys = {side: self.case.zone_key(number, side) for side in ("slave", "master")}
+        parts = {s: self.cells(key, getattr(zone, s), self.dim - 1) for s, key in keys.items()}
+        common = self.shared(parts["slave"], parts["master"])
         if common:
             allowed = f"{common} of its faces are slave faces too; a slave cannot be its own master"
-            raise self.error(f"{key}.master", zone.master, allowed)
-        sides = {"slave": slave} if not swapped else {"master": master}
-        if self.case.directions == "both":
-            sides = {"slave": slave, "master": master}
-        for side, parts in sides.items():
-            self.check_deformable(f"{key}.{side}", getattr(zone, side), parts)
+            raise self.error(keys["master"], zone.master, allowed)
+        for side in ("slave", "master") if self.case.directions == "both" else ("slave",):
+            self.check_deformable(keys[side], getattr(zone, side), parts[side])
 
     def check_deformable(self, key: str, group: str, parts: list[np.ndarray]) -> None:
         for rigid in self.case.rigid:

@@ -57,7 +57,7 @@ class ContactIterate:
     @property
     def gap(self) -> np.ndarray:
         """The average gap (k,); zero for multipliers that are out of contact."""
-        known = self.constraints.eligible | self.scene.resting
+        known = self.constraints.eligible | self.scene.rest.unloaded_multipliers
         covered = np.where(known, self.constraints.covered, np.inf)
         return (self.constraints.initial + self._opening(self.constraints.gaps)) / covered
 

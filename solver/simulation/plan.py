@@ -18,13 +18,16 @@ from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene
 from solver.simulation.solution import Line, Solution
 
+# An estimated error below this is rounding.
+_ROUNDING = 1e-10
+
 
 def decided(problem: ContactProblem) -> Iterator[Line]:
     """What the scene alone decides, before the solve, in the order of the work."""
     scene = problem.scene
     if scene.options.shortcuts == Options.everything().shortcuts:
         yield Line("everything is done", "as asked for by --everything, needed or not")
-    groups, cells = scene.unnamed
+    groups, cells = scene.given.unnamed
     if groups or cells:
         many = "s" * (groups != 1)
         what = f"left behind: {groups} group{many}, {cells} faces and edges of the mesh"
@@ -35,15 +38,15 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
     yield from _cells(scene)
     for zone in scene.zones:
         yield from _zone(zone, scene, problem.constraints.inactive_multipliers)
-    asleep = np.flatnonzero(scene.asleep)
-    if len(asleep):
+    unloaded = np.flatnonzero(scene.rest.unloaded_bodies)
+    if len(unloaded):
         names = body_names(scene)
-        what = f"left out, at rest without pressure: {', '.join(names[b] for b in asleep)}"
+        what = f"left out, at rest without pressure: {', '.join(names[b] for b in unloaded)}"
         yield Line(what, "no load, displacement imposed or overlap reaches them", "unloaded")
-    held = np.flatnonzero(scene.held)
-    if len(held):
+    fixed = np.flatnonzero(scene.rest.fixed_bodies)
+    if len(fixed):
         names = body_names(scene)
-        what = f"no stiffness of {', '.join(names[b] for b in held)}"
+        what = f"no stiffness of {', '.join(names[b] for b in fixed)}"
         yield Line(what, "supports or rigidity hold all of it where it is", "unloaded")
     if len(problem.parts) > 1:
         why = "no contact joins them"
@@ -96,6 +99,19 @@ def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Li
         why = "the same multipliers are closed as at another load factor"
         yield Line("no new factor for each load factor", why, "status")
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
+
+
+def estimated(solution: Solution) -> Iterator[Line]:
+    """How far constant pressures are from the exact one, as a reconstruction shows it."""
+    for zone in solution.zones:
+        error = zone.relative_pressure_error
+        if error is not None and error > _ROUNDING:
+            how = f"a {zone.recovered.form} one" if zone.recovered else "a linear one"
+            what = f"{zone.name}: estimated error of the constant pressure {error:.1e} in L2"
+            yield Line(what, f"it differs so much from {how}, reconstructed from neighbours")
+        if zone.recovered and (left := int((zone.closed & (zone.recovered.degree == 0)).sum())):
+            what = f"{zone.name}: pressure constant on {left} macro-elements"
+            yield Line(what, "too few closed neighbours to recover it from")
 
 
 def strained(solution: Solution) -> Iterator[Line]:

@@ -1,10 +1,11 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy import sparse
+from scipy.optimize import nnls
 
 from solver.mechanics.fem.bodies import (
     nodes_of_unknowns,
@@ -30,22 +31,30 @@ from solver.system.errors import SolveError
 
 # An estimated error of the pressure from which residuals are summed in extended precision.
 _EXTEND = 3e-11
-# Columns solved at once for the stiffness that gaps see.
-_COLUMNS = 64
+# How exactly the change of a sweep of recovery is solved for; its own error is far larger.
+_CHANGE = 1e-4
+# A share of the loads: what contact pressure may leave of them on free rigid motions.
+_BALANCED = 1e-9
+# Entries of the solutions that are kept at once for the stiffness that gaps see.
+_AT_ONCE = 1 << 23
 
 
 @dataclass(frozen=True, kw_only=True)
 class Equilibrium:
     """A solved load factor: pressure (k,) and gap with their round-off, status, residual.
 
-    `residual` is relative to the forces at work. Fields are those of the `iterate`.
+    `residual` is relative to `force_scale`, the size of the forces at work. Fields are those of the
+    `iterate`. `correction` (n, dim) are the contact forces beside those of the pressures, of a
+    recovered pressure.
     """
 
     iterate: ContactIterate
     trial: Trial
     status: StatusResult
     residual: float
+    force_scale: float
     accuracy: Accuracy
+    correction: np.ndarray
 
     @property
     def pressure(self) -> np.ndarray:
@@ -65,7 +74,7 @@ class Equilibrium:
     @property
     def force(self) -> np.ndarray:
         """Loads (n, dim)."""
-        return self.iterate.force
+        return self.iterate.force - self.correction
 
 
 class ContactProblem:
@@ -78,13 +87,15 @@ class ContactProblem:
         self.motions = rigid_motions(scene.points, scene.body)
         refuse_unsolvable(scene, self.motions, self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
-        free = unsupported(self.motions, scene.free.basis)
-        self.at_rest = Displacement.zero(free, surface, scene.options.safeguards.remainder)
+        self.unsupported = unsupported(self.motions, scene.free.basis)
+        self.at_rest = Displacement.zero(
+            self.unsupported, surface, scene.options.safeguards.remainder
+        )
         self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
-        self.parts = parts_of(on_free, unknowns.body, len(scene.asleep))
+        self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
 
     @cached_property
@@ -98,12 +109,12 @@ class ContactProblem:
 
     @property
     def linear_solver(self) -> str:
-        """The name of what solved the last system."""
+        """The name of the solver of the last system."""
         return self.system.factor.name if self.system else "none"
 
     @property
     def why_solver(self) -> str:
-        """Why that was chosen."""
+        """Why it was chosen."""
         return self.system.why if self.system else ""
 
     @property
@@ -112,12 +123,17 @@ class ContactProblem:
         return self.system.factor.iterations if self.system else 0
 
     def solve(
-        self, factor: float, start: np.ndarray | None = None, bilateral: bool = False
+        self,
+        factor: float,
+        start: np.ndarray | None = None,
+        bilateral: bool = False,
+        correction: np.ndarray | float = 0.0,
     ) -> Equilibrium:
         """Equilibrium at a load factor, the status search starting from `start` (k,), a guess.
 
-        `bilateral`: no status is sought, all macro-elements stay closed, in tension too. Raises
-        SolveError where no status fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0, or a system is singular.
+        `bilateral`: no status is sought, all macro-elements stay closed, in tension too.
+        `correction` (n, dim): see `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0,
+        ḡ ≥ 0, p ḡ = 0, or a system is singular.
         """
         scene, eligible = self.scene, self.constraints.eligible
         if not scene.options.shortcuts.status:
@@ -128,25 +144,38 @@ class ContactProblem:
         def attempt(closed: np.ndarray) -> Trial:
             if not scene.options.shortcuts.status:
                 self._systems.forget()
-            latest[:] = [self._solve_closed(closed, factor)]
+            latest[:] = [self._solve_closed(closed, factor, correction)]
             return latest[0].trial
 
         if bilateral:
             attempt(eligible)
             return latest[0]
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
-        status = find_status(attempt, start, eligible, area, self._gap_stiffness, confirm)
+        stiffness = partial(self._gap_stiffness, factor)
+        status = find_status(attempt, start, eligible, area, stiffness, confirm)
         trial = latest[0].trial
-        touching = scene.resting & (trial.gap <= trial.gap_limit)
+        touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
         return replace(latest[0], status=replace(status, closed=status.closed | touching))
 
-    def loaded_further(self, state: Equilibrium, force: np.ndarray) -> Equilibrium:
-        """The state with a further load `force` (n, dim), its solved status kept.
+    def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
+        """The state with another `correction` (n, dim), its status kept.
 
-        Solved from the state for the change alone, on the factor kept since.
+        Only the change is solved for, on the factor that the state was solved with.
         """
-        start = replace(state.iterate, force=state.force + force)
-        return self._refined(start, self._force_scale(start.force, 0 * force), state.status)
+        start = replace(state.iterate, force=state.force + correction)
+        scale = max(state.force_scale, np.abs(correction).max())
+        return self._refined(start, scale, state.status, correction)
+
+    def pressure_change(self, closed: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The change of pressure (k,) by forces (n_dofs,), with the `closed` (k,) kept closed.
+
+        Two digits more than the change has, for a factor that iterates.
+        """
+        system, pushed = self._constrained(closed), self.scene.free.basis.T @ force
+        change = system.correction(pushed, np.zeros(int(closed.sum())), _CHANGE)
+        found = np.zeros(len(closed))
+        found[closed] = system.multiplier(pushed - self.matrix @ change)
+        return found
 
     def _first_guess(self, factor: float) -> np.ndarray:
         """Macro-elements (k,) that loads and imposed displacements are likely to close."""
@@ -163,12 +192,15 @@ class ContactProblem:
     def _free_motion(self, closed: np.ndarray) -> str:
         return free_motion(self.scene, self.motions, self.constraints, closed)
 
-    def _solve_closed(self, closed: np.ndarray, factor: float) -> Equilibrium:
+    def _solve_closed(
+        self, closed: np.ndarray, factor: float, correction: np.ndarray | float
+    ) -> Equilibrium:
         """Equilibrium with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
             raise SolveError(f"{moves} once {int((~closed).sum())} macro-elements are open")
-        offset, force = factor * scene.free.offset, factor * scene.force
+        correction = np.zeros(scene.force.shape) + correction
+        offset, force = factor * scene.free.offset, factor * scene.force + correction
         scale = self._force_scale(force, offset.reshape(scene.points.shape))
         start = ContactIterate(
             scene=scene,
@@ -178,18 +210,26 @@ class ContactProblem:
             displacement=self.at_rest.moved(offset),
             mean_stress=np.zeros(scene.mean.size),
         )
-        return self._refined(start, scale, StatusResult(closed, 1, []))
+        return self._refined(start, scale, StatusResult(closed, 1, []), correction)
 
-    def _refined(self, start: ContactIterate, scale: float, status: StatusResult) -> Equilibrium:
+    def _refined(
+        self, start: ContactIterate, scale: float, status: StatusResult, correction: np.ndarray
+    ) -> Equilibrium:
         """Solved from an iterate; in extended precision where that gains digits."""
         system, cures = self._constrained(start.closed), self.scene.options.safeguards
-        found = self._once(system, start, scale, status)
+        found = self._once(system, start, scale, status, correction)
         if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
-            found = self._once(system, replace(found.iterate, extended=True), scale, status)
+            extended = replace(found.iterate, extended=True)
+            found = self._once(system, extended, scale, status, correction)
         return found
 
     def _once(
-        self, system: ConstrainedSystem, start: ContactIterate, scale: float, status: StatusResult
+        self,
+        system: ConstrainedSystem,
+        start: ContactIterate,
+        scale: float,
+        status: StatusResult,
+        correction: np.ndarray,
     ) -> Equilibrium:
         refine = self.scene.options.safeguards.refinement
         # In a stretched model a force of the size of round-off may be a large one elsewhere.
@@ -202,7 +242,9 @@ class ContactProblem:
             trial=judged(iterate, pressure, self.diagonal),
             status=status,
             residual=residual,
+            force_scale=scale,
             accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
+            correction=correction,
         )
 
     def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
@@ -213,24 +255,30 @@ class ContactProblem:
         internal = internal_force(self.scene.points, self.scene.blocks, imposed)
         return float(max(np.abs(force).max(), np.abs(internal).max())) or 1.0
 
-    def _gap_stiffness(self) -> np.ndarray:
+    def _gap_stiffness(self, factor: float) -> np.ndarray:
         """The forces (e, e) that average gaps bring up, each imposed with all others closed.
 
-        Of the e multipliers that may close; symmetric, positive semidefinite.
+        Of the e multipliers that may close; symmetric, positive semidefinite. Raises SolveError
+        where no contact pressure balances the loads on a rigid motion that supports leave free.
         """
         eligible = self.constraints.eligible
+        push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
+        loads = factor * self.unsupported.T @ self.scene.force.ravel()
+        largest = np.abs(loads).max(initial=0.0)
+        if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
+            raise SolveError("no contact pressure balances the loads")
         system, area = self._systems.closed(eligible), self.constraints.covered[eligible]
-        found = np.zeros((len(area), len(area)))
-        for first in range(0, len(area), _COLUMNS):
-            imposed = np.diag(area)[:, first : first + _COLUMNS]
-            nothing = np.zeros((self.matrix.shape[0], imposed.shape[1]))
-            change = system.correction(nothing, imposed)
-            found[:, first : first + _COLUMNS] = system.multiplier(-(self.matrix @ change))
-        return area[:, None] * found
+        found, size = np.zeros((len(area), len(area))), self.matrix.shape[0]
+        for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
+            imposed = np.zeros((len(area), len(some)))
+            imposed[some, np.arange(len(some))] = area[some]
+            change = system.correction(np.zeros((size, len(some))), imposed)
+            found[:, some] = area[:, None] * system.multiplier(-(self.matrix @ change))
+        return found
 
 
 def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """The stiffness of the free unknowns, and its diagonal (n_dofs,), that of held ones too."""
+    """The stiffness of the free unknowns, and the diagonal (n_dofs,) for all degrees of freedom."""
     free, mean = scene.free, scene.mean
     matrix, diagonal = stiffness(scene.points, scene.blocks, free.selection)
     if free.selection is None:
@@ -241,9 +289,9 @@ def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
 
 
 def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
-    """What the free unknowns of a scene stand for, given the rigid motions of its bodies."""
+    """The meaning of a scene's free unknowns, given the rigid motions of its bodies."""
     basis, dim = scene.free.basis, scene.points.shape[1]
     node = nodes_of_unknowns(basis, dim)
-    together = basis.T @ whole_motions(motions, len(scene.asleep))
+    together = basis.T @ whole_motions(motions, scene.n_bodies)
     quadratic = any(block.type.order == 2 for block in scene.blocks)
     return Unknowns(dim, node, together, scene.body[node], quadratic)

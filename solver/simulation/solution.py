@@ -63,6 +63,34 @@ class NodalContact:
 
 
 @dataclass
+class RecoveredPressure:
+    """A pressure p* = p + Σ c ψ by macro-element (m,), recovered from the constants p.
+
+    `form`: linear, quadratic or smooth (see `mechanics.mortar.recovery`); `coefficients` c (m, k),
+    `degree` (m,) of the polynomials; `centre`, `axes`, `spread` are those of the local coordinates
+    that ψ is written in. `nodes` (n,) of the slave surface and `at_nodes` (n,), the mean there of
+    p* on the faces around.
+    """
+
+    form: str
+    coefficients: np.ndarray
+    degree: np.ndarray
+    centre: np.ndarray
+    axes: np.ndarray
+    spread: np.ndarray
+    nodes: np.ndarray
+    at_nodes: np.ndarray
+
+    def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
+        from solver.mechanics.mortar.recovery import FORMS, Local
+
+        local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
+        psi = local.shapes(macro, places, FORMS[self.form])
+        return mean[macro][:, None] + np.einsum("sqk,sk->sq", psi, self.coefficients[macro])
+
+
+@dataclass
 class ZoneResult:
     """The contact state of one zone, by macro-element, and the stress on both surfaces.
 
@@ -72,6 +100,10 @@ class ZoneResult:
     (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
     `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
     belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
+    `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
+    these do not determine it (see `solver.simulation.balance`). `pressure_error` (m,) estimates the
+    L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
+    where multipliers belong to nodes. `recovered` is p* where the case asks for one.
     """
 
     name: str
@@ -89,6 +121,17 @@ class ZoneResult:
     slave_nodes: np.ndarray
     master_nodes: np.ndarray
     nodal: NodalContact | None = None
+    pressure_of_forces: np.ndarray | None = None
+    pressure_error: np.ndarray | None = None
+    recovered: RecoveredPressure | None = None
+
+    @property
+    def relative_pressure_error(self) -> float | None:
+        """The estimated L2 error of the constants over their norm; None where there is none."""
+        if self.pressure_error is None:
+            return None
+        whole = float(np.sqrt((self.area * self.coverage) @ self.multiplier**2))
+        return float(np.linalg.norm(self.pressure_error)) / whole if whole else 0.0
 
 
 @dataclass
@@ -131,8 +174,6 @@ class Solution:
     """
 
     case: Case
-    swapped: bool
-    hexahedra: str | None
     mesh: meshio.Mesh
     displacement: np.ndarray
     stress: np.ndarray
@@ -160,6 +201,16 @@ class Solution:
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")
+
+    @property
+    def swapped(self) -> bool:
+        """Whether slave and master were exchanged."""
+        return self.case.swapped
+
+    @property
+    def hexahedra(self) -> str | None:
+        """How slave hexahedra were cut, where the case was overruled."""
+        return self.case.hexahedra
 
     @property
     def job(self) -> str:

@@ -133,7 +133,7 @@ def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[s
         name, family = case.name, case.family
         found |= {
             "title": case.title,
-            "zones": [_sides(z.name, z.slave, z.master, swapped) for z in case.zones],
+            "zones": [Sides(name=z.name, slave=z.slave, master=z.master) for z in case.zones],
             "reference_kind": case.reference_kind,
             "reference_uncertainty": case.reference_uncertainty,
             "reference_code": case.reference_code,
@@ -141,11 +141,6 @@ def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[s
             "reference_solution": case.solution.name if case.solution else None,
         }
     return found | {"case": name, "family": family, "job": job_name(name, swapped, hexahedra)}
-
-
-def _sides(name: str, slave: str, master: str, swapped: bool) -> Sides:
-    slave, master = (master, slave) if swapped else (slave, master)
-    return Sides(name=name, slave=slave, master=master)
 
 
 def _bodies(solution: Solution) -> list[Body]:
@@ -166,7 +161,7 @@ def _first_of(reasons: Sequence[str]) -> str:
     return f"{reasons[0]} (and {len(reasons) - 1} more)"
 
 
-def _extremes(arrays: Iterable[np.ndarray]) -> list[float] | None:
+def _extremes(arrays: Iterable[np.ndarray]) -> list[Any] | None:
     values = [array for array in arrays if len(array)]
     if not values:
         return None

@@ -1,7 +1,7 @@
 """The result file: one HDF5 file that is also a VTKHDF grid, written whole or not at all.
 
-`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; beside it lies everything that
-the checks need again, so that a file can be judged without solving:
+`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; the file has everything else
+that the checks need, so that it can be judged without solving:
 
     /case          source text, name, family, path, swapped, hexahedra
     /solve         lengths, sizes, cost and the linear solver of the solve
@@ -9,7 +9,8 @@ the checks need again, so that a file can be judged without solving:
     /errors        norms of the error against the case's exact solution, if it names one
     /mean_stress   by cell type, that of cells in mixed form at their nodes
     /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces; in `nodal` those
-                   of nodes where the treatment has its multipliers there
+                   of nodes where the treatment has its multipliers there; in `recovered` the
+                   coefficients of a recovered pressure and its values at nodes
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
     /provenance    versions, revision, hashes, machine
 
@@ -39,6 +40,7 @@ from solver.simulation.solution import (
     BodyInfo,
     Line,
     NodalContact,
+    RecoveredPressure,
     Solution,
     StepResult,
     ZoneResult,
@@ -78,6 +80,7 @@ _AT_MULTIPLIER_NODES = {
     "gap": "gap",
     "status": "closed",
 }
+_RECOVERED = ("coefficients", "degree", "centre", "axes", "spread", "nodes", "at_nodes")
 _ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
@@ -145,7 +148,7 @@ def read_result(path: str | Path) -> Result:
     except InputError:
         raise
     except Exception as error:
-        # Whatever the reader trips over lies in the file, as where another version wrote it.
+        # Any error of the reader is caused by the file, which another version may have written.
         fault = " ".join(f"{type(error).__name__}: {error}".split())
         raise _no_result(path, fault) from error
     if fault:
@@ -171,8 +174,6 @@ def _read_solution(file: h5py.File) -> Solution:
     case = file["case"]
     return Solution(
         case=_read_case(case),
-        swapped=bool(case.attrs["swapped"]),
-        hexahedra=case.attrs["hexahedra"] or None,
         mesh=meshio.Mesh(
             grid.points,
             [grid.cells[i] for i in volumes],
@@ -222,9 +223,20 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
         "normal_stress": solution.nodal_normal_stress,
         "body": solution.body,
     }
+    if any(zone.recovered for zone in solution.zones):
+        point_data["recovered_pressure"] = _recovered_at_nodes(solution)
     write_grid(
         group, meshio.Mesh(mesh.points, cells + faces, cell_sets=sets), point_data, cell_data
     )
+
+
+def _recovered_at_nodes(solution: Solution) -> np.ndarray:
+    """The recovered pressure (n,) at slave nodes, NaN at all others."""
+    values = np.full(len(solution.mesh.points), np.nan)
+    for zone in solution.zones:
+        if zone.recovered:
+            values[zone.recovered.nodes] = zone.recovered.at_nodes
+    return values
 
 
 def _face_blocks(
@@ -281,7 +293,8 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
 
 
 def _read_case(group: h5py.Group) -> Case:
-    return parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+    case = parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+    return case.as_solved(bool(group.attrs["swapped"]), group.attrs["hexahedra"] or None)
 
 
 def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
@@ -294,6 +307,15 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     # Faces of one type may be in several blocks, one for each type of cell behind them.
     for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
         faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
+    if zone.pressure_error is not None:
+        group["pressure_error"] = zone.pressure_error
+    if zone.recovered:
+        recovered = group.create_group("recovered")
+        recovered.attrs["form"] = zone.recovered.form
+        for name in _RECOVERED:
+            recovered[name] = getattr(zone.recovered, name)
+    if zone.pressure_of_forces is not None:
+        group["pressure_of_forces"] = zone.pressure_of_forces
     if zone.nodal:
         nodal = group.create_group("nodal")
         for name, attribute in _AT_MULTIPLIER_NODES.items():
@@ -310,7 +332,19 @@ def _read_zone(
         **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
         **{key: group[key][()] for key in _BY_NODE},
         nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
+        pressure_of_forces=_optional(group, "pressure_of_forces"),
+        pressure_error=_optional(group, "pressure_error"),
+        recovered=_read_recovered(group["recovered"]) if "recovered" in group else None,
     )
+
+
+def _optional(group: h5py.Group, name: str) -> np.ndarray | None:
+    return group[name][()] if name in group else None
+
+
+def _read_recovered(group: h5py.Group) -> RecoveredPressure:
+    fields = {name: group[name][()] for name in _RECOVERED}
+    return RecoveredPressure(form=group.attrs["form"], **fields)
 
 
 def _read_nodal(group: h5py.Group) -> NodalContact:

@@ -13,19 +13,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+import msgspec
 import numpy as np
 
 from solver.system.errors import InputError
 from solver.system.files import seal_of, write_text
-from solver.system.records import read_record
 
 PASSED, SOLVED, FAILED, UNRELIABLE = "passed", "solved", "failed", "unreliable"
 REFUSED, CRASHED = "refused", "crashed"
 # The worst first, as in every table.
 WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, SOLVED, PASSED)
-NAME = "verdict.json"
+T = TypeVar("T")
 _DIGEST = "digest"
 
 
@@ -33,9 +33,9 @@ _DIGEST = "digest"
 class Regression:
     """How far a check's extremes lie from the accepted ones, over the check's scale."""
 
-    minimum: float
-    maximum: float
-    change: float
+    minimum: float = math.nan
+    maximum: float = math.nan
+    change: float = math.nan
     tolerance: float
     passed: bool
 
@@ -132,7 +132,7 @@ class Verdict:
 
     `worst` is the check with the largest relative error, `closest_to_tolerance` the one nearest to
     its tolerance or furthest past it. Pairs are minimum and maximum over all zones; `seconds` has
-    wall times by stage and their `total`. `transient`: the reason lies in the machine (memory,
+    wall times by stage and their `total`. `transient`: the machine is the reason (memory,
     disk, a kill), so that the same solve may succeed another time.
     """
 
@@ -168,11 +168,11 @@ class Verdict:
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float | None = None
     peak_memory_mb: float | None = None
-    pressure: list[float] | None = None
-    stress: list[float] | None = None
-    gap: list[float] | None = None
-    status: list[float] | None = None
-    coverage: list[float] | None = None
+    pressure: list[float | None] | None = None
+    stress: list[float | None] | None = None
+    gap: list[float | None] | None = None
+    status: list[int] | None = None
+    coverage: list[float | None] | None = None
     worst: CheckError | None = None
     closest_to_tolerance: CheckError | None = None
     bodies: list[Body] = field(default_factory=list)
@@ -216,7 +216,7 @@ def read_verdict(path: str | Path) -> Verdict:
         content = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError) as error:
         raise _damaged(path, " ".join(str(error).split())) from None
-    verdict = read_record(Verdict, content, path)
+    verdict = typed(Verdict, content, path)
     if content.pop(_DIGEST, None) != _digest(content):
         raise _damaged(path, "it is not as it was written")
     if verdict.verdict not in WORDS:
@@ -227,9 +227,9 @@ def read_verdict(path: str | Path) -> Verdict:
 def flaw(path: str | Path, case: str | Path | None = None) -> str:
     """Why a verdict file cannot be relied on, in one line; empty where it can.
 
-    It must be as it was written and lie in the folder of its own family and job (where that is in
-    `results`), its result beside it as it was then. `case` is the case file that it must be of, as
-    the file is now. Reads the whole result.
+    It must be as it was written, in the folder of its own family and job (where that is in
+    `results`), and its result must be the one it names. `case` is the case file that it must be
+    of, in its present state. Reads the whole result.
     """
     path = Path(path)
     try:
@@ -254,6 +254,25 @@ def unbound(verdict: Verdict, path: Path, case: str | Path | None = None) -> str
     if case is not None and known and known != hashlib.sha256(Path(case).read_bytes()).hexdigest():
         return "the case file has changed"
     return ""
+
+
+def typed(kind: type[T], content: object, where: Path) -> T:
+    """Plain values, as `json.loads` returns them, as verdicts; `InputError` where they are none.
+
+    Unknown keys are ignored. A key that is missing or null has its default, NaN for a number.
+    """
+    try:
+        return msgspec.convert(_without_nulls(content), kind)
+    except msgspec.ValidationError as error:
+        said, _, place = str(error).partition(" - at ")
+        key = place.strip("`").removeprefix("$").removeprefix(".")
+        raise InputError(where, key or "file", None, f"not as in a verdict: {said}") from None
+
+
+def _without_nulls(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nulls(item) for key, item in value.items() if item is not None}
+    return [_without_nulls(item) for item in value] if isinstance(value, list) else value
 
 
 def to_json(content: Any) -> str:

@@ -68,6 +68,14 @@ def test_passed_is_0(small, capsys):
     assert capsys.readouterr().out.splitlines()[-1].startswith("small: passed, worst error ")
 
 
+def test_without_a_reference_a_solve_is_solved_with_0_and_not_passed(small, capsys):
+    (small / "c.yaml").write_text(PLANE[: PLANE.index("reference:")])
+    status, verdict = solve(small)
+    assert (status, verdict["verdict"], verdict["passed"]) == (0, "solved", False)
+    assert capsys.readouterr().out.splitlines()[-1] == f"small: solved: {verdict['reason']}"
+    assert main(["check", str(small / "out/r.vtkhdf")]) == 0
+
+
 def test_a_failed_check_is_1_and_leaves_its_result(small):
     change(small, "contact_pressure: 25.0", "contact_pressure: 26.0")
     status, verdict = solve(small)

@@ -18,6 +18,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from solver.case.model import Material
 from solver.case.reader import load_case
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError, SolveError
@@ -26,6 +27,7 @@ from solver.verification.judge import judge
 from solver.verification.norms import errors
 from solver.verification.regression import accepted_values
 from solver.verification.run import mesh_of
+from solver.verification.verdict import CheckResult
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 PLANE, SOLID = "ssnp170/c", "opening/overlap-tetra10-hexa8"
@@ -64,6 +66,12 @@ class Mutant:
     case: str
     place: str
     patch: Callable[[Wrapped], Any]
+
+
+def checks(case: str) -> dict[str, CheckResult]:
+    """The checks of a case of the batch by name."""
+    loaded, mesh = _case(case)
+    return {check.name: check for check in run_checks(simulate(loaded, mesh))}
 
 
 def verdict(case: str) -> dict[str, Any]:
@@ -177,6 +185,25 @@ def _stays_closed(true: Wrapped) -> Wrapped:
     return status
 
 
+def _every_third_off(stress: np.ndarray) -> np.ndarray:
+    stress[::3, 0] -= 9e-4 * 25  # between the extremes: accepted values notice nothing
+    return stress
+
+
+def _lower_half_softer(true: Wrapped) -> Wrapped:
+    def by_material(self: Any, value: Callable[[Any], float], otherwise: float) -> Any:
+        found, height = true(self, value, otherwise), self.points[:, -1]
+        if value(Material(1.0, 0.3)) != 0.3:
+            return found
+        middle = (height.min() + height.max()) / 2
+        lower = {
+            kind: height[cells].mean(axis=1) < middle for kind, cells in self.cut.cells.items()
+        }
+        return {kind: np.where(lower[kind], 0.2991, values) for kind, values in found.items()}
+
+    return by_material
+
+
 def _rolled_sub_faces(result: Any) -> Any:
     faces = [replace(f, macro=np.roll(f.macro, 1)) for f in result.sub_faces]
     return replace(result, sub_faces=faces)
@@ -260,6 +287,9 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared among a face's nodes alike", BENT,
            "solver.mechanics.fem.loads:shape_functions",
            lambda true: lambda name: _Alike(true(name))),
+    Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
+           "solver.simulation.scene:gap_operator",
+           changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
     Mutant("coverage-lost", "the part that is covered is taken for the whole face", PARTLY,
            "solver.simulation.scene:gap_operator",
            changed(lambda o: replace(o, covered=o.area,
@@ -267,6 +297,13 @@ MUTANTS = (
     Mutant("stress-mean", "stress at nodes is the plain mean over the cell's quadrature", LAYERS,
            "solver.mechanics.fem.elasticity:_extrapolation",
            changed(lambda fit: np.full(fit.shape, 1 / fit.shape[1]))),
+    Mutant("stress-rows", "every node of a cell gets the stress of its neighbour", VARYING,
+           "solver.mechanics.fem.elasticity:_extrapolation",
+           changed(lambda fit: np.roll(fit, 1, axis=0))),
+    Mutant("stress-bits", "σ_xx is off by 9e-4 of the load at every third node", PLANE,
+           "solver.simulation.simulate:nodal_stress", changed(_every_third_off)),
+    Mutant("poisson-digits", "ν of the lower block is 0.2991 in place of 0.3", PLANE,
+           "solver.simulation.attributes:Attributes._by_material", _lower_half_softer),
     Mutant("stale-system", "the factored system is that of the first status", CLOSING,
            "solver.simulation.problem:ContactProblem._constrained", _first_system_kept),
     Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,

@@ -170,15 +170,18 @@ def test_a_file_and_a_page_elsewhere(tmp_path, capsys):
     [
         (None, "must be a folder of results with a report, or its summary.json"),
         ('[{"job": ', "must be JSON ("),
-        ("{}", "must be a list"),
-        ('[{"job": "a", "family": "b"}]', "[0].verdict: this key is needed"),
+        ("{}", "Expected `array`, got `object`"),
+        (
+            '[{"job": "a", "family": "b"}]',
+            "[0]: not as in a verdict: Object missing",
+        ),
         (
             '[{"job": "a", "family": "b", "verdict": "passed", "seconds": 3}]',
-            "[0].seconds = 3: must be a mapping",
+            "[0].seconds: not as in a verdict: Expected `object`, got `int`",
         ),
         (
             '[{"job": "a", "family": "b", "verdict": "passed", "checks": [1]}]',
-            "[0].checks[0] = 1: must be a mapping",
+            "[0].checks[0]: not as in a verdict: Expected `object`, got `int`",
         ),
     ],
 )

@@ -65,6 +65,7 @@ def test_paragraphs_that_are_indented_are_formulas(file):
     ]
     assert formats.formula("q^d < p_rr") == "q<sup>d</sup> &lt; p<sub>rr</sub>"
     assert formats.formula("r^(1/3)") == "r<sup>1/3</sup>"
+    assert formats.formula("ν_1²/E_1") == "ν<sub>1</sub>²/E<sub>1</sub>"
 
 
 def test_a_family_without_a_file_has_its_folder_s_name(tmp_path):

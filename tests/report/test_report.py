@@ -258,6 +258,45 @@ def test_a_batch_that_passed_leaves_no_failures(tmp_path):
     assert logged[0].startswith("The one solve passed.")
 
 
+def test_a_solve_without_a_reference_has_its_own_word_and_is_no_failure(tmp_path):
+    made = [verdict("fam-a", "passed"), verdict("fam-free", "solved", "not verified: no reference")]
+    paths = [put(tmp_path / each["job"] / "verdict.json", each) for each in made]
+    logged, out = [], tmp_path / "report"
+    write_report(paths, out, logged.append)
+    assert (out / "failures.txt").read_text() == ""
+    assert logged[0].startswith("2 solves: 1 solved, 1 passed.")
+    assert '<span class="badge solved">solved</span>' in (out / "fam.html").read_text()
+    told = {each["job"]: each for each in json.loads((out / "summary.json").read_text())}
+    assert (told["fam-free"]["verdict"], told["fam-free"]["passed"]) == ("solved", False)
+    assert 'failures="0"' in (out / "junit.xml").read_text()
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"[" * 100_000, b"[]", b'{"family": 1}', b""])
+def test_a_damaged_verdict_is_a_row_of_the_report(tmp_path, content):
+    path = put(tmp_path / "fam" / "fam-a" / "verdict.json", verdict("fam-a", "passed"))
+    path.write_bytes(content)
+    write_report([path], tmp_path / "report", lambda _: None)
+    failures = (tmp_path / "report" / "failures.txt").read_text()
+    assert failures.startswith("fam-a: crashed: ")
+    assert failures.endswith("solve again\n")
+
+
+def test_exchanged_verdicts_are_found_out(tmp_path):
+    one, two = (
+        put(tmp_path / "results" / "fam" / job / "verdict.json", verdict(job, "passed"))
+        for job in ("fam-a", "fam-b")
+    )
+    content = one.read_bytes()
+    one.write_bytes(two.read_bytes())
+    two.write_bytes(content)
+    write_report([one, two], tmp_path / "report", lambda _: None)
+    failures = (tmp_path / "report" / "failures.txt").read_text()
+    assert failures == (
+        "fam-a: crashed: the verdict is that of fam/fam-b; solve again\n"
+        "fam-b: crashed: the verdict is that of fam/fam-a; solve again\n"
+    )
+
+
 def test_a_batch_of_nothing_is_no_success(tmp_path):
     logged = []
     write_report([], tmp_path / "report", logged.append)

@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
-from solver.system.records import read_record
-from solver.verification.verdict import Verdict, write_verdict
+from solver.verification.verdict import Verdict, typed, write_verdict
 
 
 def record(content):
     """The typed verdict of a mapping; family, job and word are made up where they are missing."""
     base = {"family": "fam", "job": "job", "verdict": "passed"}
-    return read_record(Verdict, base | content, Path("verdict.json"))
+    return typed(Verdict, base | content, Path("verdict.json"))
 
 
 def put(path, content):

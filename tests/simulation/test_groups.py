@@ -64,7 +64,7 @@ def two_squares():
 
 def test_a_case_that_fits_is_accepted():
     check_groups(parse_case(PLANE, PATH), two_squares())
-    check_groups(parse_case(PLANE, PATH), two_squares(), swapped=True)
+    check_groups(parse_case(PLANE, PATH).as_solved(True), two_squares())
 
 
 def test_materials_for_all_and_for_rigid_bodies():
@@ -124,7 +124,7 @@ def test_a_rigid_side_is_master_in_every_direction_solved():
     check_groups(parse_case(RIGID, PATH), two_squares())
     message = re.escape("contact[0].master = 'top_contact': lies on the rigid body upper; a rigid")
     with pytest.raises(InputError, match=message):
-        check_groups(parse_case(RIGID, PATH), two_squares(), swapped=True)
+        check_groups(parse_case(RIGID, PATH).as_solved(True), two_squares())
     with pytest.raises(InputError, match=message):
         check_groups(parse_case(RIGID + "directions: both\n", PATH), two_squares())
 

@@ -45,7 +45,7 @@ def assert_exact(solution, size=1.0, **scaled):
 @pytest.mark.parametrize("bottom", PLANE)
 def test_plane_pairs(bottom, top, swapped):
     mesh = block_mesh(bottom, top, (4, 3))
-    assert_exact(simulate(block_case(2), mesh, swapped))
+    assert_exact(simulate(block_case(2).as_solved(swapped), mesh))
 
 
 @pytest.mark.parametrize("hexahedra", ["pyramids", "hexahedra"])
@@ -54,7 +54,7 @@ def test_plane_pairs(bottom, top, swapped):
 def test_solid_pairs(bottom, top, hexahedra):
     """Each pair stands twice in the table, once with either block below: the slave."""
     mesh = block_mesh(bottom, top)
-    assert_exact(simulate(block_case(3), mesh, hexahedra=hexahedra))
+    assert_exact(simulate(block_case(3).as_solved(hexahedra=hexahedra), mesh))
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -66,7 +66,7 @@ def test_blocks_of_many_boxes_of_prisms_and_pyramids(cells, contact, swapped):
     top = {"cells": cells, "contact": contact, "divisions": [2, 3, 2]}
     bottom = {"cells": "HEXA8", "divisions": [3, 2, 1]}
     mesh = generate({"recipe": "blocks", "size": 1.0, "bottom": bottom, "top": top}, "case.yaml")
-    assert_exact(simulate(block_case(3), mesh, swapped))
+    assert_exact(simulate(block_case(3).as_solved(swapped), mesh))
 
 
 @pytest.mark.parametrize("hexahedra", ["pyramids", "hexahedra"])
@@ -77,15 +77,16 @@ def test_moved_nodes(bottom, top, hexahedra, bent):
     """Skew cells; with every node moved for itself, cells and faces with bent edges as well."""
     mesh = moved(block_mesh(bottom, top), 0.02)
     mesh = mesh if bent else straightened(mesh)
-    assert_exact(simulate(block_case(3), mesh, hexahedra=hexahedra))
-    assert_exact(simulate(block_case(3), mesh, True, hexahedra))
+    assert_exact(simulate(block_case(3).as_solved(hexahedra=hexahedra), mesh))
+    assert_exact(simulate(block_case(3).as_solved(True, hexahedra), mesh))
 
 
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("share", [0.08, 0.15])
 def test_strongly_bent_faces(share, swapped):
     """Nodes moved by a share of an edge: coverage, which nothing corrects, stays one."""
-    assert_exact(simulate(block_case(3), moved(block_mesh("HEXA20", "HEXA20"), share / 3), swapped))
+    mesh = moved(block_mesh("HEXA20", "HEXA20"), share / 3)
+    assert_exact(simulate(block_case(3).as_solved(swapped), mesh))
 
 
 @pytest.mark.parametrize("share", [0.02, 0.08])
@@ -107,7 +108,7 @@ def test_segments_that_are_lost_are_seen(monkeypatch, share):
 def test_moved_nodes_in_the_plane(bottom):
     mesh = moved(block_mesh(bottom, "QUAD8", (5, 4)), 0.02)
     for swapped in (False, True):
-        assert_exact(simulate(block_case(2), mesh, swapped))
+        assert_exact(simulate(block_case(2).as_solved(swapped), mesh))
 
 
 @pytest.mark.parametrize("shift", [0.0, 1e-15, 1e-12, 1e-8, 1e-4])

@@ -13,7 +13,6 @@ from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.simulation.unloaded import without_unloaded
-from solver.system.clock import Clock
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
 from tests.scenes import PRESSURE, block_mesh
@@ -112,7 +111,7 @@ def test_it_is_the_answer_that_solving_it_gives(mesh):
 
 def test_only_what_is_left_in_is_factored(mesh):
     case = parse_case(SCENE, Path("beside.yaml"))
-    whole = build_scene(case, mesh, False, None, Clock())
+    whole = build_scene(case, mesh)
     short = without_unloaded(whole)
     near = short.points[:, 0] < 1.5
     assert {int(b) for block in short.blocks for b in near[block.cells].ravel()} == {1}

@@ -95,7 +95,7 @@ def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
         if unknown not in settable:
             allowed = f"{name} has no such parameter; {hint(unknown, settable)}"
             raise InputError(known.where, f"{key}.{unknown}", values[unknown], allowed)
-    reader = _Reader(known, key)
+    reader = _ParameterReader(known, key)
     taken = {n: reader.value(f, values.get(n)) for n, f in parameters.items()}
     try:
         solution = cls(**{n: value for n, value in taken.items() if value is not None})
@@ -108,7 +108,7 @@ def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
     return solution
 
 
-class _Reader:
+class _ParameterReader:
     """Turns what a case file gives for a parameter, or what the case knows, into a value."""
 
     def __init__(self, known: Known, key: str):

@@ -1,15 +1,15 @@
-"""Bodies: connected parts of a mesh, their rigid motions, and what holds them."""
+"""Bodies: connected parts of a mesh, their rigid motions and their supports."""
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-# Eigenvalues below this share of the largest belong to motions that nothing resists.
+# Eigenvalues below this share of the largest belong to unresisted motions.
 _FREE = 1e-12
 
 
 def body_numbers(n_nodes: int, cells: dict[str, np.ndarray]) -> np.ndarray:
-    """Body number (n_nodes,) of each node: parts that share no node are different bodies."""
+    """Body number (n_nodes,) of each node: parts without a common node are different bodies."""
     first = np.concatenate([np.repeat(c[:, 0], c.shape[1] - 1) for c in cells.values()])
     others = np.concatenate([c[:, 1:].ravel() for c in cells.values()])
     graph = sparse.coo_matrix((np.ones(len(first)), (first, others)), shape=(n_nodes, n_nodes))
@@ -19,20 +19,19 @@ def body_numbers(n_nodes: int, cells: dict[str, np.ndarray]) -> np.ndarray:
 def rigid_motions(points: np.ndarray, body: np.ndarray) -> sparse.csc_matrix:
     """Rigid motions (n_dofs, n_bodies · 3 or 6): translations, then turns about body centres.
 
-    Turns are scaled by the body's size, so that all columns are of the same order.
+    The largest displacement of each column is one: a slender body is turned about its own axis by a
+    larger angle than about others.
     """
     n, dim = points.shape
     count = np.bincount(body)
     centre = np.stack([np.bincount(body, points[:, d]) / count for d in range(dim)], axis=1)
     arm = points - centre[body]
-    size = np.zeros(len(count))
-    np.maximum.at(size, body, np.linalg.norm(arm, axis=1))
-    arm /= size[body][:, None]
     fields = [np.tile(np.eye(dim)[d], (n, 1)) for d in range(dim)]
-    if dim == 2:
-        fields.append(np.stack([-arm[:, 1], arm[:, 0]], axis=1))
-    else:
-        fields += [np.cross(np.eye(3)[d], arm) for d in range(3)]
+    turns = [np.stack([-arm[:, 1], arm[:, 0]], axis=1)]
+    for turn in turns if dim == 2 else [np.cross(np.eye(3)[d], arm) for d in range(3)]:
+        size = np.zeros(len(count))
+        np.maximum.at(size, body, np.linalg.norm(turn, axis=1))
+        fields.append(turn / np.where(size > 0, size, 1.0)[body][:, None])
     per_body = len(fields)
     rows = np.tile(np.arange(n * dim), per_body)
     columns = np.concatenate([np.repeat(body * per_body + k, dim) for k in range(per_body)])
@@ -87,8 +86,8 @@ def unheld_motion(
 ) -> tuple[int, str] | None:
     """A rigid motion that neither supports nor `constraints` resist: (body, description), or None.
 
-    `basis` spans the displacements that the supports leave free; `constraints` (m, n_dofs) are
-    those of closed contact, per unit of area.
+    `basis` spans the displacements that the supports leave free; `constraints` (m, n_dofs) are the
+    rows of closed contact per unit of area.
     """
     held = motions - basis @ (basis.T @ motions)
     contact = constraints @ motions

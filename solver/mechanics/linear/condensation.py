@@ -1,8 +1,8 @@
 """Elasticity under closed contact constraints, condensed to a positive definite system.
 
-Each closed macro-element owns a degree of freedom that no other constraint sees. It is expressed by
-the others through the constraint, x = Z v + c, and the multiplier follows from the equilibrium of
-that degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
+Each closed macro-element owns a degree of freedom that no other constraint contains. The constraint
+expresses it by the others, x = Z v + c, and the multiplier follows from the equilibrium of that
+degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
 """
 
 import logging
@@ -42,11 +42,11 @@ class ConstrainedSystem(Protocol):
 
     @property
     def factor(self) -> LinearSolver | Factor:
-        """What solves the system."""
+        """The solver of the system."""
 
     @property
     def why(self) -> str:
-        """Why that was chosen."""
+        """Why it was chosen."""
 
     @property
     def doubt(self) -> str:
@@ -58,7 +58,7 @@ class ConstrainedSystem(Protocol):
         """The change of x (n,) that removes f − K x = `force` and b − G x = `violation`.
 
         Several at once by columns (n, c) and (m, c), as for the multipliers.
-        What is left of the forces may be `accuracy` of them, where another correction follows.
+        The forces left may be `accuracy` of those given, where another correction follows.
         """
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
@@ -84,7 +84,7 @@ class CondensedSystem:
 
     @property
     def why(self) -> str:
-        """Why that was chosen."""
+        """Why it was chosen."""
         return self.factor.why
 
     @property
@@ -102,7 +102,7 @@ class CondensedSystem:
         return change + self.expansion @ self.factor.solve(self.expansion.T @ moved, accuracy)
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
-        """From the equilibrium of the pivots, which one multiplier each acts on."""
+        """From the equilibrium of the pivots: one multiplier acts on each."""
         return (-force[self.pivot].T / self.coefficient).T
 
     def imbalance(self, force: np.ndarray) -> float:
@@ -167,8 +167,8 @@ def choose_pivots(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """For each row the largest entry in a column that is its own: pivot, coefficient, found (m,).
 
-    `own` (n,) marks the columns that may serve (unknowns of slave nodes). Rows without one, or with
-    a negligible one, have found = False.
+    `own` (n,) marks the columns that may be pivots (unknowns of slave nodes). Rows without a column
+    of their own, or with a negligible coefficient there, have found = False.
     """
     m, n = constraints.shape
     seen = np.bincount(constraints.indices, minlength=n)
@@ -197,8 +197,8 @@ def condense(
 ) -> CondensedSystem:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
-    `own` (n,) marks what may be eliminated, `unknowns` tells what each is, `gave_up` why multigrid
-    is not tried again (see `prepare`).
+    `own` (n,) marks the unknowns that may be eliminated, `unknowns` describes all, `gave_up` says
+    why multigrid is not tried again (see `prepare`).
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """

@@ -1,7 +1,7 @@
 """The systems that a contact problem solves: one for each group of bodies that contact joins.
 
-A group is factored anew only when its own closed multipliers change: a body outside every zone once
-and for all, whatever the contact status of the others does.
+A group is factored again only when its own closed multipliers change. A body outside every zone is
+factored once, whatever the contact status of the others.
 """
 
 from collections.abc import Sequence
@@ -52,7 +52,7 @@ def parts_of(constraints: sparse.csr_matrix, bodies: np.ndarray, n_bodies: int) 
 
 @dataclass(frozen=True)
 class IndependentSystems:
-    """Systems that share nothing, as one: `parts` with their unknowns and closed multipliers."""
+    """Systems without common unknowns: `parts` with their unknowns and closed multipliers."""
 
     parts: Sequence[tuple[np.ndarray, np.ndarray, ConstrainedSystem]]
     n_multipliers: int
@@ -63,12 +63,12 @@ class IndependentSystems:
 
     @property
     def factor(self) -> Factor | LinearSolver:
-        """That of the largest system."""
+        """The solver of the largest system."""
         return self._largest.factor
 
     @property
     def why(self) -> str:
-        """Why that was chosen."""
+        """Why it was chosen."""
         return f"{self._largest.why}; largest of {len(self.parts)} systems"
 
     @property
@@ -125,7 +125,7 @@ class Systems:
             self._drop(number)
 
     def _drop(self, number: int) -> None:
-        """Keep of a part's system only why multigrid gave up on it, if it did."""
+        """Drop a part's system, and remember why multigrid failed on it, if it did."""
         system = self._kept.pop(number)[1]
         if isinstance(system, CondensedSystem) and system.factor.gave_up:
             self._gave_up[number] = system.factor.gave_up
@@ -147,7 +147,7 @@ class Systems:
         """The system of one part, of the `chosen` unknowns; None: of all."""
         key = closed.tobytes()
         if number not in self._kept or self._kept[number][0] != key:
-            # The factor before it gives its memory back first.
+            # The previous factor releases its memory first.
             if number in self._kept:
                 self._drop(number)
             self._kept[number] = key, self._factored(number, chosen, closed)

@@ -14,6 +14,11 @@ def clip(
 
     Windows are convex with all w vertices in use. Source: Sutherland, Hodgman, Reentrant polygon
     clipping, CACM 17 (1974) 32–42.
+
+    >>> square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
+    >>> part, count = clip(square + 0.5, np.array([4]), square)
+    >>> part[0, : count[0]].tolist()
+    [[0.5, 0.5], [1.0, 0.5], [1.0, 1.0], [0.5, 1.0]]
     """
     for k in range(window.shape[1]):
         start, end = window[:, k], window[:, (k + 1) % window.shape[1]]
@@ -52,6 +57,11 @@ def triangles(polygon: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.nd
     """Fans of triangles: polygon number (t,), corners (t, 3, 2), signed areas (t,).
 
     Signs are kept: the fan of a polygon that is not convex then still sums to the polygon.
+
+    >>> square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
+    >>> which, corner, area = triangles(square, np.array([4]))
+    >>> which.tolist(), area.tolist()
+    ([0, 0], [0.5, 0.5])
     """
     v = polygon.shape[1]
     fan = np.arange(1, max(v - 1, 1))
@@ -67,7 +77,12 @@ def triangles(polygon: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def overlap(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Common part (n, 2) of intervals (n, 2) with ascending ends, and its length (n,)."""
+    """Common part (n, 2) of intervals (n, 2) with ascending ends, and its length (n,).
+
+    >>> ends, length = overlap(np.array([[0.0, 2.0]]), np.array([[1.5, 3.0]]))
+    >>> ends.tolist(), length.tolist()
+    ([[1.5, 2.0]], [0.5])
+    """
     low = np.maximum(first[:, 0], second[:, 0])
     high = np.minimum(first[:, 1], second[:, 1])
     return np.stack([low, high], axis=1), high - low

@@ -39,7 +39,16 @@ class Integrals:
 
 
 def integrals(space: Multipliers, segments: Segments) -> Integrals:
-    """The integrals over segments of one pair of blocks."""
+    """The integrals over segments of one pair of blocks.
+
+    Each master node of the two edges gets half of its length:
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
+    >>> part = integrals(constants(data), segments)
+    >>> part.vectors[MASTER][..., 1].round(15).tolist(), part.gap.tolist()
+    ([[[0.5, 0.5]], [[0.5, 0.5]]], [[0.5], [0.5]])
+    """
     side = segments.slave
     functions = space.at(side.index, side.face, side.values)
     weights = segments.weight[..., None] * functions
@@ -60,6 +69,11 @@ def close_faces(parts: Sequence[Integrals]) -> tuple[list[Integrals], int]:
     In proportion to area, and in each segment to the integrals of the multipliers, which sum to
     the area. The defect sums to zero, and so does its first moment, since both integrals are exact
     for linear functions. Also the number of faces treated.
+
+    Edges are affine, where nothing is missing:
+
+    >>> close_faces([])
+    ([], 0)
     """
     closed, count = list(parts), 0
     for side in (SLAVE, MASTER):
@@ -107,7 +121,11 @@ def _close_block(parts: Sequence[Integrals], side: int) -> tuple[list[Integrals]
 
 
 def shape_integrals(block: Facets) -> np.ndarray:
-    """∫ N_a dS (n, n_nodes) of flat faces, exact."""
+    """∫ N_a dS (n, n_nodes) of flat faces, exact.
+
+    >>> shape_integrals(slave).round(15).tolist()
+    [[1.0, 1.0]]
+    """
     reference, weights = face_rule(block.type.name)
     values, slopes = shape_functions(block.type.name).both(reference)
     vectors = surface_vectors(block, slopes)

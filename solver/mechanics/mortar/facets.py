@@ -52,6 +52,11 @@ def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]
     On a plane these are the face's own, and the faces stay as they are. Source: Yang, Laursen,
     Meng, Two dimensional mortar contact methods for large deformation frictional sliding, Int. J.
     Numer. Meth. Engng 62 (2005) 1183–1225, §3.
+
+    On a plane nothing changes:
+
+    >>> with_nodal_normals([master], points)[0].directions is None
+    True
     """
     normals = nodal_normals(points, [(block.type.name, block.nodes) for block in blocks])
     differ = max(np.abs(normals[b.nodes] - b.normal[:, None]).max(initial=0.0) for b in blocks)
@@ -64,6 +69,11 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
     """Faces of one type from points (n_points, dim) and node numbers (n, n_nodes).
 
     Raises SolveError for faces of no size, as beside a node that lies beyond all measure.
+
+    >>> ends = np.array([[4.0, 0.0], [1.0, 0.0]])
+    >>> edge = facets(ends, BY_NAME["SEG2"], np.array([[0, 1]]), np.array([0]))
+    >>> edge.centre.tolist(), edge.radius.tolist(), edge.normal.tolist()
+    ([[2.5, 0.0]], [1.5], [[0.0, 1.0]])
     """
     corner = points[nodes]
     centre = corner[:, : kind.n_vertices].mean(axis=1)
@@ -85,14 +95,19 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
         centre=centre,
         radius=radius,
         normal=normal,
-        tangents=_tangents(normal),
+        tangents=tangents_of(normal),
         flat=flat,
         straight=straight,
         affine=affine,
     )
 
 
-def _tangents(normal: np.ndarray) -> np.ndarray:
+def tangents_of(normal: np.ndarray) -> np.ndarray:
+    """Unit tangents (n, dim − 1, dim) that complete unit normals (n, dim) to frames.
+
+    >>> tangents_of(np.array([[0.0, 1.0]])).tolist()
+    [[[-1.0, 0.0]]]
+    """
     if normal.shape[1] == 2:
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
     axis = np.zeros_like(normal)
@@ -125,7 +140,13 @@ def _shape(
 
 
 def surface_vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
-    """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`."""
+    """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`.
+
+    The edge from (2, 0) to (0, 0):
+
+    >>> surface_vectors(slave, np.array([[[-1.0], [1.0]]])).tolist()
+    [[[0.0, 2.0]]]
+    """
     n, n_nodes, dim = block.corner.shape
     nodes = np.arange(n * n_nodes).reshape(n, n_nodes)
     return area_vectors(block.corner.reshape(-1, dim), nodes, slopes)
@@ -145,6 +166,15 @@ def project_along(
     through the vertices, which is exact at once for affine faces. Raises SolveError where it does
     not converge; points of an `outline` around the face then keep their place on the affine face
     (they lie outside the face, and all that matters is that neighbours agree on them).
+
+    Up from (3/4, 0) to the edge from (0, 1/2) to (1, 1/2):
+
+    >>> up = np.array([[[0.0, 1.0]]])
+    >>> place, distance = project_along(
+    ...     master.type, master.corner[:1], np.array([[[0.75, 0.0]]]), up
+    ... )
+    >>> place.tolist(), distance.tolist()
+    ([[[0.75]]], [[0.5]])
     """
     start, distance = _on_affine_face(kind, corner, target, direction)
     place, distance, size = _newton(kind, corner, target, direction, start, distance)
@@ -170,13 +200,19 @@ def _newton(
     place: np.ndarray,
     distance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places, distances, and the sizes (f, q) of the last steps."""
-    for _ in range(_NEWTON_STEPS):
-        step = _newton_step(kind, corner, target, direction, place, distance)
-        place, distance = place - step[..., :-1], distance - step[..., -1]
-        size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
-        if not (size > _CONVERGED).any():
+    """Places, distances, and the sizes (f, q) of the last steps; done faces are left alone."""
+    step = _newton_step(kind, corner, target, direction, place, distance)
+    place, distance = place - step[..., :-1], distance - step[..., -1]
+    size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+    for _ in range(_NEWTON_STEPS - 1):
+        rows = np.flatnonzero(~(size <= _CONVERGED).all(axis=1))
+        if not len(rows):
             break
+        given = (values[rows] for values in (corner, target, direction, place, distance))
+        step = _newton_step(kind, *given)
+        place[rows] -= step[..., :-1]
+        distance[rows] -= step[..., -1]
+        size[rows] = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
     return place, distance, size
 
 

@@ -81,7 +81,13 @@ Space = Callable[[InterfaceData], Multipliers]
 
 
 def constants(data: InterfaceData) -> Multipliers:
-    """One multiplier for each macro-element, constant on it."""
+    """One multiplier for each macro-element, constant on it.
+
+    >>> data = InterfaceData(slaves=[slave], samples=[], found=[], n_macro=1)
+    >>> space = constants(data)
+    >>> space.count, space.at(0, np.array([0]), np.array([[[0.25, 0.75]]])).tolist()
+    (1, [[[1.0]]])
+    """
     ones = [np.ones((block.type.n_nodes, 1)) for block in data.slaves]
     number = [block.number[:, None] for block in data.slaves]
     return Multipliers(

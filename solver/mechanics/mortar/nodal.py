@@ -21,7 +21,12 @@ _FEW = 0.01
 
 
 def linear(data: InterfaceData) -> Multipliers:
-    """A multiplier at each slave vertex, its function the linear hat."""
+    """A multiplier at each slave vertex, its function the linear hat.
+
+    >>> space = linear(InterfaceData(slaves=[slave], samples=[], found=[], n_macro=1))
+    >>> space.nodes.tolist(), space.number[0].tolist(), space.shapes[0].tolist()
+    ([0, 1], [[1, 0]], [[1.0, 0.0], [0.0, 1.0]])
+    """
     vertices = [block.nodes[:, : block.type.n_vertices] for block in data.slaves]
     nodes = np.unique(np.concatenate([v.ravel() for v in vertices]))
     number = [np.searchsorted(nodes, v) for v in vertices]
@@ -43,6 +48,12 @@ def dual(data: InterfaceData) -> Multipliers:
     spaces for the Lagrange multiplier, SIAM J. Numer. Anal. 38 (2000) 989–1012; on the covered
     part: Cichosz, Bischoff, Consistent treatment of boundaries with mortar contact formulations
     using dual Lagrange multipliers, CMAME 200 (2011) 1317–1332.
+
+    The functions of an edge are 2 N₁ − N₂ and 2 N₂ − N₁:
+
+    >>> data = InterfaceData(slaves=[slave], samples=face_samples([slave]), found=[], n_macro=1)
+    >>> dual(data).coefficients[0].round(12).tolist()
+    [[[2.0, -1.0], [-1.0, 2.0]]]
     """
     plain = linear(data)
     coefficients = []

@@ -6,6 +6,7 @@ Source: Abbas, Drouet, Hild, CMAME 339 (2018) 488–513, §2–4.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -19,8 +20,9 @@ from solver.mechanics.mortar.multipliers import (
     Space,
     constants,
 )
+from solver.mechanics.mortar.recovery import Asked, Recovery, recovery
 from solver.mechanics.mortar.segments import Segments, intersect
-from solver.mechanics.mortar.surface_points import Samples, face_samples
+from solver.mechanics.mortar.surface_points import Samples, Surface, face_samples
 
 # Slave-side entries of dual multipliers below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
@@ -37,19 +39,6 @@ Meet = Callable[..., list[Segments]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Surface:
-    """The m macro-elements of a slave surface.
-
-    `area`, `covered` (m,): whole and intersected area; `centre`, `normal` (m, dim).
-    """
-
-    area: np.ndarray
-    covered: np.ndarray
-    centre: np.ndarray
-    normal: np.ndarray
-
-
-@dataclass(frozen=True, kw_only=True)
 class GapOperator:
     """Gap integrals seen by k multipliers φ; LAC has one on each macro-element, φ = 1.
 
@@ -59,7 +48,8 @@ class GapOperator:
     multipliers belong to, None for macro-elements; `segments`: how many there are; `closed_faces`:
     on how many faces the closure of integrals was used; `plain`: whether plain Gauss rules are
     exact on all of them. `at_nodes` (n, k): the values at `nodes`, then (n,), by multiplier, where
-    some nodes have no multiplier of their own.
+    some nodes have no multiplier of their own. `recovery`: what recovers the pressure, if asked
+    for.
     """
 
     matrix: sparse.csr_matrix
@@ -73,6 +63,7 @@ class GapOperator:
     closed_faces: int
     plain: bool = False
     at_nodes: sparse.csr_matrix | None = None
+    recovery: Recovery | None = None
 
 
 def meet_in_segments(
@@ -82,15 +73,20 @@ def meet_in_segments(
     reach: float,
     among: Sequence[np.ndarray] | None = None,
     weighted: bool = False,
+    degree: int = 0,
 ) -> list[Segments]:
     """Segments between all pairs of blocks.
 
     `among`: by block, the slave faces that are looked at, all of them by default; `weighted`: with
-    quadrature for integrands weighted by linear shape functions of the slave.
+    quadrature for integrands weighted by linear shape functions of the slave, or by polynomials of
+    a `degree`.
+
+    >>> [s.area.tolist() for s in meet_in_segments([slave], [], [master], 1.0)]
+    [[1.0, 1.0]]
     """
     found = []
     for a, slave in enumerate(slaves):
-        more = mortar_degree(slave.type.skeleton) if weighted else 0
+        more = mortar_degree(slave.type.skeleton) if weighted else degree
         found += intersect(slaves, a, masters, reach, more, None if among is None else among[a])
     return found
 
@@ -119,14 +115,26 @@ def gap_operator(
     n_nodes: int,
     search: float,
     scheme: Scheme = LAC,
+    asked: Asked | None = None,
 ) -> GapOperator:
     """Gap operator of slave sub-faces (numbered by macro-element) over master faces.
 
     `search` is the largest distance (a length) at which surfaces are looked for. They are first
     looked for nearby, and farther away only for sub-faces that found no partner there. What is out
     of reach of contact does not count as covered. Faces that meet along directions other than
-    their own normals have no closure.
+    their own normals have no closure. `asked`: how the pressure is recovered, for the multipliers
+    of macro-elements alone.
+
+    A slave edge of length 2 under two master edges, open by 1/2:
+
+    >>> operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    >>> operator.matrix.toarray().reshape(5, 2)[:, 1].round(15).tolist()
+    [-1.0, -1.0, 0.5, 1.0, 0.5]
+    >>> operator.initial.round(15).tolist(), operator.covered.round(15).tolist()
+    ([1.0], [2.0])
     """
+    if asked is not None and scheme.meet is meet_in_segments:
+        scheme = replace(scheme, meet=partial(scheme.meet, degree=asked.form.degree))
     if any(block.directions is not None for block in slaves):
         scheme = replace(scheme, closure=False)
     samples = scheme.sample(slaves)
@@ -140,6 +148,7 @@ def gap_operator(
     for part in parts:
         np.add.at(initial, part.number, part.gap)
         np.add.at(covered, part.number, part.weight)
+    surface = _surface(data)
     averages = space.averages(samples, [block.number for block in slaves], n_macro)
     return GapOperator(
         matrix=(master - (_diagonal(slave) if space.dual else slave)).tocsr(),
@@ -148,10 +157,11 @@ def gap_operator(
         covered=covered,
         mean=averages.mean,
         nodes=space.nodes,
-        surface=_surface(data),
+        surface=surface,
         segments=sum(len(segments.gap) for segments in found),
         closed_faces=closed,
         plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
+        recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
     )
 
 

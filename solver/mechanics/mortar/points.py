@@ -36,12 +36,20 @@ _CHUNK = 1 << 20
 
 
 def gauss(slaves: list[Facets], n: int) -> list[Samples]:
-    """Gauss points, n each way on each face, collapsed ones on triangles: degree 2 n − 1."""
+    """Gauss points, n each way on each face, collapsed ones on triangles: degree 2 n − 1.
+
+    >>> gauss([slave], 1)[0].weight.tolist()
+    [[2.0]]
+    """
     return [sampled(block, gauss_rule(block.type.name, n)) for block in slaves]
 
 
 def at_nodes(slaves: list[Facets]) -> list[Samples]:
-    """The nodes, weighted with ∫ N over each face, their normals the mean around them."""
+    """The nodes, weighted with ∫ N over each face, their normals the mean around them.
+
+    >>> at_nodes([master])[0].weight.round(15).tolist()
+    [[0.5, 0.5], [0.5, 0.5]]
+    """
     nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slaves]))
     places = np.empty((len(nodes), slaves[0].centre.shape[1]))
     numbers = [np.searchsorted(nodes, block.nodes) for block in slaves]
@@ -60,7 +68,11 @@ def at_nodes(slaves: list[Facets]) -> list[Samples]:
 
 
 def one_each(data: InterfaceData) -> Multipliers:
-    """A multiplier at each slave node: its pressure is the node's force over tributary area."""
+    """A multiplier at each slave node: its pressure is the node's force over tributary area.
+
+    >>> one_each(InterfaceData(slaves=[master], samples=[], found=[], n_macro=2)).number[0].tolist()
+    [[0, 1], [1, 2]]
+    """
     nodes = np.unique(np.concatenate([block.nodes.ravel() for block in data.slaves]))
     number = [np.searchsorted(nodes, block.nodes) for block in data.slaves]
     shapes = [np.eye(block.type.n_nodes) for block in data.slaves]
@@ -85,6 +97,12 @@ def meet_at_points(
 
     A point that no face holds goes to one that it misses by at most `beyond`, in parts of the
     face's reference face: slave nodes at the end of a bent surface look past the master's end.
+
+    One Gauss point at x = 1, where it meets the first of two edges that end there:
+
+    >>> (segments,) = meet_at_points([slave], gauss([slave], 1), [master], 1.0)
+    >>> segments.weight.tolist(), segments.gap.tolist(), segments.master.values.tolist()
+    ([[2.0]], [[0.5]], [[[0.0, 1.0]]])
     """
     found = []
     for a, (slave, sample) in enumerate(zip(slaves, samples, strict=True)):

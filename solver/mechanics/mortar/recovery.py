@@ -23,6 +23,10 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy import sparse
 
+from solver.mechanics.mortar.facets import tangents_of
+from solver.mechanics.mortar.segments import Segments
+from solver.mechanics.mortar.surface_points import Surface
+
 # A macro-element covered by less than this share of its area is no neighbour: its mean is of
 # little use to others.
 MIN_SHARE = 0.25
@@ -38,9 +42,11 @@ _AT_ONCE = 4096
 class Form:
     """A kind of reconstruction: its degree, whether it keeps the means, how often it is applied.
 
-    `sweeps`: solves with the loads that it adds; 0 where it only reads the means.
+    `sweeps`: solves with the loads that it adds; 0 where it only reads the means. The form `none`
+    estimates the error of the constants and recovers nothing.
     """
 
+    name: str
     degree: int
     keeps_means: bool
     sweeps: int
@@ -56,116 +62,167 @@ class Form:
 
 
 FORMS = {
-    "linear": Form(degree=1, keeps_means=True, sweeps=2),
-    "quadratic": Form(degree=2, keeps_means=True, sweeps=3),
-    "smooth": Form(degree=1, keeps_means=False, sweeps=0),
+    form.name: form
+    for form in (
+        Form("none", degree=1, keeps_means=True, sweeps=0),
+        Form("linear", degree=1, keeps_means=True, sweeps=2),
+        Form("quadratic", degree=2, keeps_means=True, sweeps=3),
+        Form("smooth", degree=1, keeps_means=False, sweeps=0),
+    )
 }
+
+
+def automatic(quadratic: bool) -> str:
+    """The form that measurement shows to be best, by the degree of the slave's cells.
+
+    >>> automatic(True), automatic(False)
+    ('quadratic', 'smooth')
+    """
+    return "quadratic" if quadratic else "smooth"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The form of a recovery, and which of the m macro-elements share a vertex, `near` (m, m)."""
+
+    form: Form
+    near: sparse.csr_matrix
+
+
+@dataclass(frozen=True, kw_only=True)
+class Local:
+    """Local coordinates y = axes · (x − centre) on m macro-elements in d dimensions.
+
+    `centre` (m, d); `axes` (m, d − 1, d), unit tangents over the size of the macro-element;
+    `spread` (m, d − 1, d − 1), the mean of y yᵀ over its covered part.
+    """
+
+    centre: np.ndarray
+    axes: np.ndarray
+    spread: np.ndarray
+
+    def along(self, vectors: np.ndarray, macro: np.ndarray) -> np.ndarray:
+        """Vectors (n, …, d) in the axes of macro-elements (n,): (n, …, d − 1)."""
+        return np.einsum("n...d,ntd->n...t", vectors, self.axes[macro])
+
+    def shapes(self, macro: np.ndarray, places: np.ndarray, form: Form) -> np.ndarray:
+        """ψ (s, q, k) of macro-elements (s,) at points (s, q, d): linear, squares, a constant.
+
+        >>> one = Local(centre=np.zeros((1, 2)), axes=np.array([[[0.5, 0.0]]]),
+        ...             spread=np.array([[[1 / 12]]]))
+        >>> one.shapes(np.array([0]), np.array([[[1.0, 0.0]]]), FORMS["quadratic"]).round(6)
+        array([[[0.5     , 0.166667]]])
+
+        On an interval from −1 to 1, y = 1/2 at its end, and y² less its mean is 1/4 − 1/12.
+        """
+        y = self.along(places - self.centre[macro][:, None], macro)
+        return _powers(y, y[..., :, None] * y[..., None, :] - self.spread[macro][:, None], form)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Moments:
     """Moments of the covered parts of m macro-elements, d dimensions.
 
-    `measure` (m,) of the covered part; `share` (m,) of the whole; `centre` (m, d), its centroid;
-    `spread` (m, d, d), the mean of (x − centre)(x − centre)ᵀ; `normal` (m, d); `tangents`
-    (m, d − 1, d), one orthonormal frame for each macro-element.
+    `share` (m,) of the area; `spread` (m, d, d), the mean of (x − centre)(x − centre)ᵀ; `normal`
+    (m, d); `local` coordinates, their origin at the centroid.
     """
 
-    measure: np.ndarray
     share: np.ndarray
-    centre: np.ndarray
     spread: np.ndarray
     normal: np.ndarray
-    tangents: np.ndarray
-
-    @property
-    def size(self) -> np.ndarray:
-        """The length (m,) that coordinates on a macro-element are relative to."""
-        return self.measure ** (1 / self.tangents.shape[1])
-
-    def along(self, vectors: np.ndarray, macro: np.ndarray) -> np.ndarray:
-        """Vectors (n, …, d) in the frames of macro-elements (n,), relative to their size.
-
-        Returns (n, …, d − 1).
-        """
-        frame = self.tangents[macro] / self.size[macro, None, None]
-        return np.einsum("n...d,ntd->n...t", vectors, frame)
-
-    def second(self, matrices: np.ndarray, macro: np.ndarray) -> np.ndarray:
-        """Matrices (n, …, d, d) in the frames of macro-elements (n,): (n, …, d − 1, d − 1)."""
-        frame = self.tangents[macro] / self.size[macro, None, None]
-        return np.einsum("nsd,n...de,nte->n...st", frame, matrices, frame)
+    local: Local
 
 
-def moments(
-    macro: Sequence[np.ndarray],
-    places: Sequence[np.ndarray],
-    weights: Sequence[np.ndarray],
-    area: np.ndarray,
-    centre: np.ndarray,
-    normal: np.ndarray,
-) -> Moments:
-    """Moments of macro-elements from quadrature points on their covered parts.
+def moments(found: Sequence[Segments], surface: Surface) -> Moments:
+    """Moments of macro-elements (m,) from the segments that cover them.
 
-    By block of segments: `macro` (s,) the macro-element, `places` (s, q, d), `weights` (s, q).
-    `area`, `centre`, `normal` (m,), (m, d), (m, d): whole macro-elements. One that is not covered
-    keeps its centre and has no spread.
+    One that is not covered keeps its centre and has no spread.
 
-    Two points that integrate cubics on a macro-element from −1 to 1:
+    A slave edge from 0 to 2: the mean of (x − 1)² is 1/3, whatever the master edges over it.
 
-    >>> at = np.array([[[-1 / 3**0.5, 0.0], [1 / 3**0.5, 0.0]]])
-    >>> found = moments([np.array([0])], [at], [np.ones((1, 2))], np.array([2.0]),
-    ...                 np.zeros((1, 2)), np.array([[0.0, 1.0]]))
-    >>> found.measure, found.spread[0, 0, 0].round(12)
-    (array([2.]), np.float64(0.333333333333))
+    >>> found = meet_in_segments([slave], [], [master], 1.0, degree=1)
+    >>> at = Surface(area=np.array([2.0]), covered=np.array([2.0]), centre=np.array([[1.0, 0.0]]),
+    ...              normal=np.array([[0.0, 1.0]]))
+    >>> moments(found, at).spread[0, 0, 0].round(12)
+    np.float64(0.333333333333)
     """
-    m, dim = centre.shape
+    m, dim = surface.centre.shape
     measure, first, second = np.zeros(m), np.zeros((m, dim)), np.zeros((m, dim, dim))
-    for owner, x, w in zip(macro, places, weights, strict=True):
-        away = x - centre[owner][:, None]
-        np.add.at(measure, owner, w.sum(axis=1))
+    for segments in found:
+        owner, w = segments.macro, segments.weight
+        away = segments.points - surface.centre[owner][:, None]
+        np.add.at(measure, owner, segments.area)
         np.add.at(first, owner, np.einsum("sq,sqd->sd", w, away))
         np.add.at(second, owner, np.einsum("sq,sqd,sqe->sde", w, away, away))
     covered = np.where(measure > 0, measure, 1.0)
     shift = first / covered[:, None]
     spread = second / covered[:, None, None] - shift[:, :, None] * shift[:, None]
-    return Moments(
-        measure=np.where(measure > 0, measure, area),
-        share=measure / area,
-        centre=centre + shift,
-        spread=spread,
-        normal=normal,
-        tangents=_frames(normal),
-    )
+    size = np.where(measure > 0, measure, surface.area) ** (1 / (dim - 1))
+    axes = tangents_of(surface.normal) / size[:, None, None]
+    own = np.einsum("nsd,nde,nte->nst", axes, spread, axes)
+    local = Local(centre=surface.centre + shift, axes=axes, spread=own)
+    return Moments(share=measure / surface.area, spread=spread, normal=surface.normal, local=local)
 
 
-def _frames(normal: np.ndarray) -> np.ndarray:
-    if normal.shape[1] == 2:
-        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
-    axis = np.zeros_like(normal)
-    axis[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
-    first = np.cross(axis, normal)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(normal, first)], axis=1)
+@dataclass(frozen=True, kw_only=True)
+class Recovery:
+    """What recovers the pressure on m macro-elements by functions ψ, k on each.
 
-
-def shapes(at: Moments, macro: np.ndarray, places: np.ndarray, form: Form) -> np.ndarray:
-    """ψ (s, q, k) of macro-elements (s,) at points (s, q, d): linear, squares, a constant.
-
-    >>> one = Moments(measure=np.array([2.0]), share=np.ones(1), centre=np.zeros((1, 2)),
-    ...               spread=np.diag([1 / 3, 0.0])[None], normal=np.array([[0.0, 1.0]]),
-    ...               tangents=np.array([[[1.0, 0.0]]]))
-    >>> shapes(one, np.array([0]), np.array([[[1.0, 0.0]]]), FORMS["quadratic"]).round(6).tolist()
-    [[[0.5, 0.166667]]]
-
-    At its end y = 1/2, and y² less the mean of y² is 1/4 − 1/12.
+    `near` (m, m): which of them share a vertex; `loads` (m · k, n_dofs): ∫ ψ (N_master − N_slave) n
+    dS; `products` (m, k, k): ∫ ψ ψᵀ dS.
     """
-    y = at.along(places - at.centre[macro][:, None], macro)
-    return _powers(y, y[..., :, None] * y[..., None, :] - _own_spread(at, macro), form)
+
+    form: Form
+    moments: Moments
+    near: sparse.csr_matrix
+    loads: sparse.csr_matrix
+    products: np.ndarray
+
+    def reconstruction(self, closed: np.ndarray) -> "Reconstruction":
+        """The reconstruction among closed macro-elements (m,)."""
+        return reconstruct(self.moments, self.near, closed, self.form)
+
+    def error(self, coefficients: np.ndarray) -> np.ndarray:
+        """η (m,), the L2 norm of p* − p on each, for `coefficients` (m · k,)."""
+        c = coefficients.reshape(len(self.products), -1)
+        return np.sqrt(np.maximum(np.einsum("mk,mkl,ml->m", c, self.products, c), 0.0))
 
 
-def _own_spread(at: Moments, macro: np.ndarray) -> np.ndarray:
-    return at.second(at.spread[macro], macro)[:, None]
+def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes: int) -> Recovery:
+    """What recovers the pressure of macro-elements from the segments that cover them.
+
+    A slave edge from 0 to 2 under two master edges, with ψ = (1 − x) / 2: ∫ ψ N is ±1/6 at the two
+    slave nodes, 1/6, 0, −1/6 at the three master nodes, and ∫ ψ² is 1/6.
+
+    >>> found = meet_in_segments([slave], [], [master], 1.0, degree=1)
+    >>> at = Surface(area=np.array([2.0]), covered=np.array([2.0]), centre=np.array([[1.0, 0.0]]),
+    ...              normal=np.array([[0.0, 1.0]]))
+    >>> alone = Asked(FORMS["linear"], sparse.identity(1, dtype=bool, format="csr"))
+    >>> one = recovery(alone, found, at, len(points))
+    >>> one.loads.toarray().reshape(5, 2)[:, 1].round(4).tolist(), one.products.round(4).tolist()
+    ([-0.1667, 0.1667, 0.1667, 0.0, -0.1667], [[[0.1667]]])
+    """
+    form = asked.form
+    at, (m, dim) = moments(found, surface), surface.centre.shape
+    k = form.count(dim)
+    products = np.zeros((m, k, k))
+    rows, columns, values = [], [], []
+    for segments in found:
+        psi = at.local.shapes(segments.macro, segments.points, form)
+        weighted = segments.weight[..., None] * psi
+        np.add.at(products, segments.macro, np.einsum("sqk,sql->skl", weighted, psi))
+        if not form.sweeps:
+            continue
+        for sign, side in zip((-1.0, 1.0), segments.sides, strict=True):
+            part = np.einsum("sqk,sqa,sqd->skad", sign * weighted, side.values, segments.normal)
+            row = segments.macro[:, None] * k + np.arange(k)
+            column = dim * side.nodes[:, :, None] + np.arange(dim)
+            rows.append(np.broadcast_to(row[:, :, None, None], part.shape).ravel())
+            columns.append(np.broadcast_to(column[:, None], part.shape).ravel())
+            values.append(part.ravel())
+    entries = [np.concatenate(part or [np.empty(0, int)]) for part in (values, rows, columns)]
+    loads = sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=(m * k, dim * n_nodes))
+    return Recovery(form=form, moments=at, near=asked.near, loads=loads.tocsr(), products=products)
 
 
 def _powers(linear: np.ndarray, squares: np.ndarray, form: Form) -> np.ndarray:
@@ -218,15 +275,16 @@ def reconstruct(
     A linear pressure on a row of three intervals of length 1; its mean falls by 2 per interval:
 
     >>> x = np.array([[0.5, 0.0], [1.5, 0.0], [2.5, 0.0]])
-    >>> row = Moments(measure=np.ones(3), share=np.ones(3), centre=x,
-    ...               spread=np.tile(np.diag([1 / 12, 0.0]), (3, 1, 1)),
-    ...               normal=np.tile([0.0, 1.0], (3, 1)), tangents=np.tile([[1.0, 0.0]], (3, 1, 1)))
+    >>> local = Local(centre=x, axes=np.tile([[1.0, 0.0]], (3, 1, 1)),
+    ...               spread=np.full((3, 1, 1), 1 / 12))
+    >>> row = Moments(share=np.ones(3), spread=np.tile(np.diag([1 / 12, 0.0]), (3, 1, 1)),
+    ...               normal=np.tile([0.0, 1.0], (3, 1)), local=local)
     >>> near = vertex_neighbours([(np.arange(3), np.array([[0, 1], [1, 2], [2, 3]]))], 3)
     >>> found = reconstruct(row, near, np.ones(3, dtype=bool), FORMS["linear"])
     >>> (found.matrix @ [9.0, 7.0, 5.0]).round(12)
     array([-2., -2., -2.])
     """
-    m, dim = at.centre.shape
+    m, dim = at.local.centre.shape
     useful = _useful(at, near, closed)
     degree, parts = np.zeros(m, dtype=int), []
     for lower in range(form.degree, 0, -1):
@@ -311,8 +369,10 @@ def _means(
     at: Moments, chosen: np.ndarray, other: np.ndarray, counts: np.ndarray, form: Form
 ) -> tuple[np.ndarray, np.ndarray]:
     """Means of the chosen ones' ψ (n, w, k) over their neighbours, and the weights of these."""
-    y = at.along(at.centre[other] - at.centre[chosen][:, None], chosen)
-    spread = at.second(at.spread[other] - at.spread[chosen][:, None], chosen)
+    local, centre = at.local, at.local.centre
+    y = local.along(centre[other] - centre[chosen][:, None], chosen)
+    more, axes = at.spread[other] - at.spread[chosen][:, None], local.axes[chosen]
+    spread = np.einsum("nsd,nwde,nte->nwst", axes, more, axes)
     distance = np.linalg.norm(y, axis=-1)
     weight = np.where(distance > 0, counts / np.where(distance > 0, distance, 1.0), 0.0)
     return _powers(y, y[..., :, None] * y[..., None, :] + spread, form), weight

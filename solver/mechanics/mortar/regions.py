@@ -18,6 +18,8 @@ from solver.mechanics.fem.gauss import gauss_rule
 
 # Edges whose middle is off the chord by less than this share of it are straight.
 _BENT = 1e-13
+# The centroid of a region with less than this share of the square of its extent is not looked for.
+_THIN = 1e-3
 # Halvings after which an interval within [0, 1] is as short as rounding allows.
 _HALVINGS = 54
 
@@ -106,7 +108,7 @@ class Curves:
         return replace(self, inside=not self.inside)
 
 
-def clip(regions: Regions, curves: Curves) -> Regions:
+def clip_by(regions: Regions, curves: Curves) -> Regions:
     """The parts of the regions on one side of their curves.
 
     The unit square is bisected by the diagonal from (0, 0) to (1, 1); what is left of it stays:
@@ -115,8 +117,8 @@ def clip(regions: Regions, curves: Curves) -> Regions:
     ...                  bulge=np.zeros((1, 4, 2)), count=np.array([4]))
     >>> diagonal = Curves(origin=np.zeros((1, 2)), along=np.ones((1, 2)),
     ...                   idle=np.array([False]))
-    >>> (_, _, weights), = quadrature(clip(square, diagonal), 1)
-    >>> float(weights.sum())
+    >>> (_, _, weights), = quadrature(clip_by(square, diagonal), 1)
+    >>> round(float(weights.sum()), 15)
     0.5
     """
     first, last = regions.start, regions.end
@@ -161,6 +163,13 @@ def clip_to_face(regions: Regions, corner: np.ndarray, bulge: np.ndarray) -> Par
 
     Returns parts without common area: which regions (m,) they are of, and themselves. The corners
     of a face must form a convex polygon, counter-clockwise.
+
+    >>> low = Regions(start=np.array([[[0, 0], [1, 0], [1, 0.5], [0, 0.5]]]),
+    ...               bulge=np.zeros((1, 4, 2)), count=np.array([4]))
+    >>> left = np.array([[[0, 0], [0.5, 0], [0.5, 1], [0, 1]]])
+    >>> (which, part), = clip_to_face(low, left, np.zeros((1, 4, 2)))
+    >>> [float(weight.sum()) for _, _, weight in quadrature(part, 1)]
+    [0.25]
     """
     inner, caps = _boundary(corner, bulge)
     which, part = _filled(np.arange(len(regions.count)), regions)
@@ -168,13 +177,21 @@ def clip_to_face(regions: Regions, corner: np.ndarray, bulge: np.ndarray) -> Par
     for rows, cap in [(which, inner), *caps]:
         mine, inside = rows, part.of(rows)
         for curve in cap:
-            mine, inside = _filled(mine, clip(inside, curve.of(mine)))
+            mine, inside = _filled(mine, clip_by(inside, curve.of(mine)))
         parts.append((mine, inside))
     return parts
 
 
 def without_face(regions: Regions, corner: np.ndarray, bulge: np.ndarray) -> Parts:
-    """What of n regions lies outside faces, as `clip_to_face` has them."""
+    """What of n regions lies outside faces, as `clip_to_face` has them.
+
+    >>> low = Regions(start=np.array([[[0, 0], [1, 0], [1, 0.5], [0, 0.5]]]),
+    ...               bulge=np.zeros((1, 4, 2)), count=np.array([4]))
+    >>> left = np.array([[[0, 0], [0.4, 0], [0.4, 1], [0, 1]]])
+    >>> parts = [part for _, part in without_face(low, left, np.zeros((1, 4, 2)))]
+    >>> round(sum(float(w.sum()) for part in parts for _, _, w in quadrature(part, 1)), 15)
+    0.3
+    """
     inner, caps = _boundary(corner, bulge)
     parts = _outside(np.arange(len(regions.count)), regions, inner)
     for rows, cap in caps:
@@ -194,8 +211,8 @@ def _outside(which: np.ndarray, regions: Regions, curves: Sequence[Curves]) -> P
     for curve in curves:
         mine = curve.of(which)
         cuts = ~mine.idle
-        parts.append(_filled(which[cuts], clip(regions.of(cuts), mine.of(cuts).reversed())))
-        which, regions = _filled(which, clip(regions, mine))
+        parts.append(_filled(which[cuts], clip_by(regions.of(cuts), mine.of(cuts).reversed())))
+        which, regions = _filled(which, clip_by(regions, mine))
     return parts
 
 
@@ -255,8 +272,10 @@ def quadrature(regions: Regions, degree: int) -> list[Pieces]:
     for which, points, weights in _fan(regions, middle, 1):
         area += np.bincount(which, weights.sum(axis=1), minlength=len(middle))
         np.add.at(moment, which, np.einsum("sq,sqd->sd", weights, points - middle[which][:, None]))
-    area[area == 0] = 1.0
-    return _fan(regions, middle + moment / area[:, None], degree)
+    extent = np.where(regions.used[..., None], np.abs(regions.start - middle[:, None]), 0.0)
+    thin = np.abs(area) <= _THIN * extent.max(axis=(1, 2)) ** 2
+    shift = np.where(thin[:, None], 0.0, moment / np.where(thin, 1.0, area)[:, None])
+    return _fan(regions, middle + shift, degree)
 
 
 def _fan(regions: Regions, middle: np.ndarray, degree: int) -> list[Pieces]:
@@ -285,7 +304,13 @@ def _fan(regions: Regions, middle: np.ndarray, degree: int) -> list[Pieces]:
 
 
 def joined(parts: Sequence[Regions]) -> Regions:
-    """All regions in one batch."""
+    """All regions in one batch.
+
+    >>> one = Regions(start=np.zeros((1, 3, 2)), bulge=np.zeros((1, 3, 2)), count=np.array([3]))
+    >>> two = Regions(start=np.zeros((2, 4, 2)), bulge=np.zeros((2, 4, 2)), count=np.array([4, 4]))
+    >>> joined([one, two]).count.tolist()
+    [3, 4, 4]
+    """
     width = max(part.start.shape[1] for part in parts)
     start, bulge = (
         np.concatenate([np.pad(a, ((0, 0), (0, width - a.shape[1]), (0, 0))) for a in arrays])

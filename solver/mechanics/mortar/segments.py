@@ -20,7 +20,14 @@ import numpy as np
 from solver.mechanics.fem import mortar_degree, shape_functions, simplex_rule
 from solver.mechanics.mortar.clipping import clip, overlap, triangles
 from solver.mechanics.mortar.facets import Facets, project_along
-from solver.mechanics.mortar.pairing import Outlines, facing_pairs, outlines
+from solver.mechanics.mortar.pairing import (
+    Outlines,
+    Pairs,
+    face_pairs,
+    hidden_pairs,
+    outlines,
+    seen_along,
+)
 from solver.mechanics.mortar.regions import (
     Pieces,
     Regions,
@@ -33,16 +40,10 @@ from solver.mechanics.mortar.regions import (
 # Extra degrees where a face is not the affine image of its reference face: its functions are then
 # no polynomials in the plane.
 _BENT_DEGREES = 6
-# More than what rounding makes of a distance, as a share of it.
-_ROUNDING = 1e-9
 # Pairs cut at once: few enough for their polygons to stay in the processor's cache.
 _PAIRS_AT_ONCE = 4096
 # Edges whose middle is off the chord by less than this share of it look straight.
 _STRAIGHT = 1e-12
-# Master faces overlap, one behind the other, by more than this share of the slave face's radius.
-_OVERLAP = 1e-9
-# Master faces whose corners lie in one plane, to this share of their extent, hide nothing.
-_ONE_PLANE = 1e-9
 # The ends of a line are looked for this far beyond a bent face, in parts of its length.
 _MARGIN = 0.05
 
@@ -129,13 +130,13 @@ def intersect(
     Their quadrature is exact for shape functions of affine faces times polynomials of degree
     `more`. `reach` is a length. `among`: the slave faces that are looked at, all by default.
     Raises SolveError for points that have no place on a face.
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> segments.master.face.tolist(), segments.area.tolist(), segments.gap[:, 0].tolist()
+    ([0, 1], [1.0, 1.0], [0.5, 0.5])
     """
-    slave = slaves[index]
-    master = outlines(masters, reverse=True)
-    i, j = facing_pairs(slave, master, reach, among)
-    near = _above_each_other(slave, master, i, j)
-    pairs = _Pairs(slave=slave, index=index, masters=masters, outline=master, i=i[near], j=j[near])
-    hidden, nearer = _hidden(pairs)
+    pairs = face_pairs(slaves, index, masters, reach, among)
+    hidden, nearer = hidden_pairs(pairs)
     found: list[Segments] = []
     for start in range(0, len(pairs.i), _PAIRS_AT_ONCE):
         end = start + _PAIRS_AT_ONCE
@@ -145,115 +146,12 @@ def intersect(
     return found
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Pairs:
-    """Pairs of slave faces `i` (p,) of one block and master faces `j` (p,) of all blocks."""
-
-    slave: Facets
-    index: int
-    masters: Sequence[Facets]
-    outline: Outlines
-    i: np.ndarray
-    j: np.ndarray
-
-    def of(self, chosen: np.ndarray | slice) -> Self:
-        return replace(self, i=self.i[chosen], j=self.j[chosen])
-
-    @property
-    def corner(self) -> np.ndarray:
-        """Nodes (p, n_nodes, dim) of the slave faces, counted from their centres."""
-        return self.slave.corner[self.i] - self.slave.centre[self.i][:, None]
-
-    def seen(self, outline: Outlines, j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Corners and bulges (p, v, dim − 1) of outlines seen along the slave's normal."""
-        tangents = self.slave.tangents[self.i]
-        corner = outline.corner[j] - self.slave.centre[self.i][:, None]
-        return _plane(corner, tangents), _plane(outline.bulge[j], tangents)
-
-    def distance(self, place: np.ndarray) -> np.ndarray:
-        """How far (p,) the planes of the master faces are from places (p, dim − 1), at most."""
-        origin = self.slave.centre[self.i]
-        origin = origin + np.einsum("pt,ptd->pd", place, self.slave.tangents[self.i])
-        normal = self.outline.normal[self.j]
-        height = np.einsum("pd,pd->p", self.outline.centre[self.j] - origin, normal)
-        return np.abs(height / np.einsum("pd,pd->p", self.slave.normal[self.i], normal))
-
-
-def _above_each_other(slave: Facets, master: Outlines, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Which pairs (p,) may overlap, seen along the slave's normal: their balls do."""
-    between = master.centre[j] - slave.centre[i]
-    beside = np.einsum("pd,ptd->pt", between, slave.tangents[i])
-    return np.linalg.norm(beside, axis=1) <= (1 + _ROUNDING) * (slave.radius[i] + master.radius[j])
-
-
-def _plane(vectors: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-    return np.einsum("fad,ftd->fat", vectors, tangents)
-
-
-# Master faces behind others
-
-
-def _hidden(pairs: _Pairs) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (c,), ascending, whose master face lies behind that of other pairs (c,), in part.
-
-    Seen from one slave face; of faces that cross each other the one that is nearer in the middle of
-    what they share counts as nearer. Faces that share a node do not overlap.
-    """
-    none = np.empty(0, dtype=int)
-    if len(pairs.i) < 2 or _in_one_plane(pairs.outline):
-        return none, none
-    own, _ = pairs.seen(outlines([pairs.slave]), pairs.i)
-    corner, bulge = pairs.seen(pairs.outline, pairs.j)
-    control = np.concatenate([corner, corner + bulge, np.roll(corner, -1, axis=1) + bulge], axis=1)
-    low = np.maximum(control.min(axis=1), own.min(axis=1))
-    high = np.minimum(control.max(axis=1), own.max(axis=1))
-    shared = _OVERLAP * pairs.slave.radius[pairs.i][:, None]
-    found = []
-    for step in range(1, int(np.bincount(pairs.i).max())):
-        a = np.flatnonzero(pairs.i[:-step] == pairs.i[step:])
-        both = np.minimum(high[a], high[a + step]) - np.maximum(low[a], low[a + step])
-        a = a[(both > shared[a]).all(axis=1)]
-        one, other = pairs.outline.vertices[pairs.j[a]], pairs.outline.vertices[pairs.j[a + step]]
-        apart = (one[:, :, None] != other[:, None]).all(axis=(1, 2))
-        found.append((a[apart], a[apart] + step))
-    first, second = (np.concatenate(part) for part in zip((none, none), *found, strict=True))
-    if corner.shape[2] == 1:
-        middle = np.maximum(low[first], low[second]) + np.minimum(high[first], high[second])
-        middle = middle / 2
-    else:
-        area, middle = _shared(own[first], corner[first], corner[second])
-        large = area > shared[first, 0] * pairs.slave.radius[pairs.i[first]]
-        first, second, middle = first[large], second[large], middle[large]
-    behind = pairs.of(first).distance(middle) > pairs.of(second).distance(middle)
-    hidden, nearer = np.where(behind, first, second), np.where(behind, second, first)
-    order = np.argsort(hidden, kind="stable")
-    return hidden[order], nearer[order]
-
-
-def _in_one_plane(outline: Outlines) -> bool:
-    points = outline.corner.reshape(-1, outline.corner.shape[2])
-    offset = points - points.mean(axis=0)
-    size = np.abs(offset).max()
-    flat = np.abs(offset @ outline.normal[0]).max() <= _ONE_PLANE * size
-    return bool(flat and np.abs(outline.bulge @ outline.normal[0]).max() <= _ONE_PLANE * size)
-
-
-def _shared(own: np.ndarray, one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Area (c,) and middle (c, 2) of what polygons (c, v, 2) have in common."""
-    count = np.full(len(one), one.shape[1])
-    which, corner, area = triangles(*clip(*clip(one, count, other), own))
-    total = np.bincount(which, area, minlength=len(one))
-    middle = np.zeros((len(one), 2))
-    np.add.at(middle, which, area[:, None] * corner.mean(axis=1))
-    return total, middle / np.where(total > 0, total, 1.0)[:, None]
-
-
 # Pieces of slave faces: pair numbers (s,), places (s, q, dim − 1), weights (s, q)
 
 Behind = tuple[np.ndarray, np.ndarray]
 
 
-def _segments(pairs: _Pairs, behind: Behind, reach: float, more: int) -> Iterator[Segments]:
+def _segments(pairs: Pairs, behind: Behind, reach: float, more: int) -> Iterator[Segments]:
     degree = _degree(pairs) + more
     if pairs.slave.centre.shape[1] == 2:
         straight = pairs.slave.straight[pairs.i]
@@ -292,7 +190,7 @@ def _looks_straight(corner: np.ndarray, bulge: np.ndarray) -> np.ndarray:
     return (np.abs(sideways) <= _STRAIGHT * (chord**2).sum(axis=2)).all(axis=1)
 
 
-def _degree(pairs: _Pairs) -> int:
+def _degree(pairs: Pairs) -> int:
     kinds = [pairs.slave.type, *(block.type for block in pairs.masters)]
     degree = max(mortar_degree(kind.name) for kind in kinds)
     affine = pairs.slave.affine[pairs.i].all() and pairs.outline.affine[pairs.j].all()
@@ -308,7 +206,7 @@ def _polygons(window: np.ndarray, subject: np.ndarray, degree: int) -> Pieces:
     return which, np.einsum("qk,skt->sqt", barycentric, corner), 2 * area[:, None] * weights
 
 
-def _bent(pairs: _Pairs, behind: Behind, degree: int) -> list[Pieces]:
+def _bent(pairs: Pairs, behind: Behind, degree: int) -> list[Pieces]:
     """Fans of what faces have in common where edges are bent, or where others hide some of it."""
     corner, bulge = pairs.seen(outlines([pairs.slave]), pairs.i)
     slave = Regions(start=corner, bulge=bulge, count=np.full(len(corner), corner.shape[1]))
@@ -337,7 +235,7 @@ def _layers(behind: Behind, count: int) -> Iterator[tuple[np.ndarray, np.ndarray
         yield nearer, rows
 
 
-def _intervals(pairs: _Pairs, behind: Behind, degree: int) -> Pieces:
+def _intervals(pairs: Pairs, behind: Behind, degree: int) -> Pieces:
     """Intervals of what edges have in common: on straight slaves along them, else in reference."""
     reference, weights = simplex_rule(1, degree)
     window = _ends(pairs, outlines([pairs.slave]), pairs.i)
@@ -355,12 +253,12 @@ def _intervals(pairs: _Pairs, behind: Behind, degree: int) -> Pieces:
     return which[real], points[..., None], length[real, None] * weights
 
 
-def _ends(pairs: _Pairs, outline: Outlines, j: np.ndarray) -> np.ndarray:
+def _ends(pairs: Pairs, outline: Outlines, j: np.ndarray) -> np.ndarray:
     """The ends (p, 2) of edges `j`, ascending, in the coordinate that the slave is cut in."""
     ends, _ = pairs.seen(outline, j)
     if not pairs.slave.straight[pairs.i].all():
         corner = pairs.corner
-        own = _plane(corner, pairs.slave.tangents[pairs.i])
+        own = seen_along(corner, pairs.slave.tangents[pairs.i])
         low, high = own.min(axis=1), own.max(axis=1)
         margin = _MARGIN * (high - low)
         # Far from a bent face, points have no place in its reference face, or a wrong one.
@@ -374,7 +272,7 @@ def _ends(pairs: _Pairs, outline: Outlines, j: np.ndarray) -> np.ndarray:
 # Points on both faces
 
 
-def _with_master(pairs: _Pairs, pieces: Pieces, reach: float) -> Iterator[Segments]:
+def _with_master(pairs: Pairs, pieces: Pieces, reach: float) -> Iterator[Segments]:
     """The segments of pieces; those with points beyond the reach are left out."""
     which, points, weight = pieces
     pairs = pairs.of(which)

@@ -73,8 +73,19 @@ def find_status(
 
     `area` (k,) turns pressures into forces. `stiffness()` is asked for where the quick search
     fails: the forces (e, e) that average gaps of the eligible multipliers bring up, each imposed
-    with all others closed. `confirm`: the set that is found is solved once more. Raises SolveError
-    where no status fulfils the conditions.
+    with all others closed. It may raise SolveError where no pressure makes equilibrium. `confirm`:
+    the set that is found is solved once more. Raises SolveError where no status fulfils the
+    conditions.
+
+    Two macro-elements, of which the second one would be pulled:
+
+    >>> tiny, both = np.full(2, 1e-9), np.array([True, True])
+    >>> def solve(closed):
+    ...     pressure, gap = np.where(closed, [1.0, -1.0], 0.0), np.where(closed, 0.0, 0.5)
+    ...     return Trial(pressure=pressure, gap=gap, pressure_limit=tiny, gap_limit=tiny)
+    >>> result = find_status(solve, both, both, np.ones(2), lambda: np.eye(2))
+    >>> result.closed.tolist(), result.iterations
+    ([True, False], 2)
     """
     closed, seen = start & eligible, set()
     changes: list[int] = []
@@ -124,11 +135,14 @@ def _certain(
     Raises `failure`, why the quick search ended, where this one ends without a status too.
     """
     _LOG.info("contact status: complementarity problem of %d multipliers", eligible.sum())
-    closed, matrix = eligible, None
+    closed = eligible
+    try:
+        matrix = stiffness()
+    except SolveError as error:
+        raise failure or error from None
     for _ in range(_MAX_CORRECTIONS):
         try:
             trial = solve(closed)
-            matrix = stiffness() if matrix is None else matrix
         except SolveError as error:
             raise failure or error from None
         wrong = eligible & (trial.offence(closed) > 1)
@@ -158,6 +172,12 @@ def likely_closed(
     the plane by F/E*; `push` is F/E*, F per thickness in the plane. Macro-elements close in the
     order of their gaps up to that approach, from where bodies that are apart first touch. A first
     guess that is too small grows in one iteration; one that is too large shrinks step by step.
+
+    In the plane, an approach of 2 closes gaps of 0 and 1, but not of 3:
+
+    >>> gap, eligible = np.array([0.0, 1.0, 3.0]), np.ones(3, dtype=bool)
+    >>> likely_closed(gap, np.ones(3), eligible, 2.0, 2).tolist()
+    [True, True, False]
     """
     if not eligible.any():
         return eligible

@@ -77,5 +77,9 @@ TREATMENTS: dict[str, Treatment] = {
 
 
 def scheme_of(name: str, points: int | None) -> Scheme:
-    """The integration of a treatment, by as many points each way where it has them."""
+    """The integration of a treatment, by as many points each way where it has them.
+
+    >>> scheme_of("quadrature", 2).closure, scheme_of("lac", None).closure
+    (False, True)
+    """
     return TREATMENTS[name].scheme(points or DEFAULT_POINTS)

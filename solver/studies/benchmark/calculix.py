@@ -115,7 +115,7 @@ def _elements(start: int, cells: np.ndarray) -> Iterator[str]:
 
 def _faces(mesh: meshio.Mesh, group: str, starts: dict[str, int]) -> Iterator[tuple[int, int]]:
     """Element and face number of every face of a group."""
-    for block in boundary_faces(mesh, group, "deck", group):
+    for block in boundary_faces(mesh, group):
         numbers = np.array(
             [_label(block.owner_type, i) for i in range(len(block.owner_type.faces))]
         )

@@ -11,7 +11,7 @@
         repetitions: 1            # after the first solve, in one process; 0: the first one counts
         ways:
           - {title: as chosen}
-          - {title: rslab, solver: rslab}            # the linear solver
+          - {title: CHOLMOD, solver: cholmod}        # the linear solver
           - {title: without MKL, free: true}         # free software alone
           - {title: not cut, treatment: uncut}       # of the interface
           - {title: no cures, cures: false}          # see `solver.simulation.options`
@@ -41,7 +41,7 @@ class Way(Section, frozen=True):
     """One way to solve; see the module's text."""
 
     title: Text
-    solver: Literal["auto", "multigrid", "pardiso", "rslab", "cholmod", "superlu"] = "auto"
+    solver: Literal["auto", "multigrid", "pardiso", "cholmod", "superlu"] = "auto"
     free: bool = False
     treatment: Text = "lac"
     cures: bool = True
@@ -65,7 +65,7 @@ class WarmBatch(Section, frozen=True):
     cases: Annotated[tuple[Path, ...], Meta(min_length=1)]
 
 
-class _Quick(Section, frozen=True):
+class _QuickBenchmark(Section, frozen=True):
     size: Unknowns
 
 
@@ -78,7 +78,7 @@ class BenchmarkFile(Section, frozen=True):
     scaling: Path
     comparisons: tuple[_Comparison, ...]
     batch: WarmBatch
-    quick: _Quick
+    quick: _QuickBenchmark
 
 
 @dataclass(frozen=True)

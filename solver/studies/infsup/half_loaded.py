@@ -19,7 +19,6 @@ from solver.case.reader import parse_case
 from solver.mesh import generate
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
-from solver.system.clock import Clock
 
 PRESSURE, FACES, COARSER = 25.0, 64, 4
 CELLS = {"TRIA3": True, "QUAD4": True, "TRIA6": False, "QUAD8": False, "QUAD9": False}
@@ -71,7 +70,7 @@ def profile_pair(cells: str, cut: bool, faces: int = FACES) -> list[PressureProf
     }
     mesh = generate(recipe, "half-loaded block")
     case = parse_case(json.dumps(_case(cut)), Path("half-loaded.yaml"))
-    scene = build_scene(case, mesh, False, None, Clock())
+    scene = build_scene(case, mesh)
     problem = ContactProblem(scene)
     place = scene.zones[0].operator.surface.centre[:, 0] + scene.origin[0]
     order = np.argsort(place)

@@ -16,7 +16,6 @@ from solver.studies.infsup.constant import inf_sup_constant
 from solver.studies.infsup.description import InfSupLadder, read_ladders
 from solver.studies.infsup.half_loaded import FACES, profiles
 from solver.studies.infsup.records import write_record
-from solver.system.clock import Clock
 from solver.system.errors import InputError, SolveError
 
 
@@ -42,7 +41,7 @@ def run(ladder: InfSupLadder, log: Callable[[str], Any]) -> InfSupLadder:
 def _add_level(ladder: InfSupLadder, n: int) -> None:
     mesh = _mesh(ladder.cells, ladder.contact, n, max(1, n // ladder.coarser))
     case = parse_case(json.dumps(_case(ladder)), Path("infsup.yaml"))
-    scene = build_scene(case, mesh, False, None, Clock())
+    scene = build_scene(case, mesh)
     ladder.constants.append(inf_sup_constant(scene))
     ladder.macro_elements.append(sum(zone.count for zone in scene.zones))
     ladder.unknowns.append(scene.n_dofs)

@@ -54,7 +54,9 @@ from solver.studies.points import PointStudy
 GROWTH = "growth of "
 _START = 5.0  # seconds: three interpreters, libraries loaded, small mesh
 Division = Annotated[int, Meta(ge=1, le=1000)]
-Fit = Annotated[tuple[Unknowns, Unknowns], Meta(description="a list of two sizes, from and to")]
+SizeRange = Annotated[
+    tuple[Unknowns, Unknowns], Meta(description="a list of two sizes, from and to")
+]
 _What = Annotated[
     str,
     Meta(
@@ -76,7 +78,7 @@ class SizeSeries(Section, frozen=True, dict=True):
     ]
     sizes: Annotated[tuple[Unknowns, ...], ONCE]
     slab: bool = False
-    fit: Fit = (0, 0)
+    fit: SizeRange = (0, 0)
 
     @cached_property
     def template(self) -> dict[str, Any]:
@@ -161,7 +163,7 @@ class Goal(Section, frozen=True):
     others: dict[str, float] = field(default_factory=dict)
 
 
-class _Quick(Section, frozen=True):
+class _QuickScaling(Section, frozen=True):
     largest: Unknowns
     series: Annotated[tuple[Name, ...], ONCE]
 
@@ -172,9 +174,9 @@ class ScalingFile(Section, frozen=True):
     title: Text
     threads: Count
     limit: Seconds
-    fit: Fit
+    fit: SizeRange
     series: Annotated[tuple[SizeSeries, ...], Meta(min_length=1)]
-    quick: _Quick
+    quick: _QuickScaling
     goals: tuple[Goal, ...] = ()
 
     def __post_init__(self) -> None:

@@ -79,7 +79,7 @@ def upper_nodes(scene: Scene) -> np.ndarray:
     """Which nodes (n,) of the cut mesh belong to the upper body."""
     upper = np.zeros(len(scene.points), dtype=bool)
     for name, cells in scene.mesh.cells.items():
-        upper[cells[scene.mesh.members(name, scene.volume_groups[UPPER])].ravel()] = True
+        upper[cells[scene.mesh.members(name, scene.given.groups[UPPER])].ravel()] = True
     return upper
 
 

@@ -178,10 +178,10 @@ class _SolverChoice(Section, frozen=True):
     problem: Name
     pair: Pair
     treatment: Name
-    solvers: Annotated[tuple[Literal["pardiso", "cholmod", "rslab", "superlu"], ...], ONCE]
+    solvers: Annotated[tuple[Literal["pardiso", "cholmod", "superlu"], ...], ONCE]
 
 
-class _Quick(Section, frozen=True):
+class _QuickStudy(Section, frozen=True):
     repetitions: Count
     levels: Count
     pairs: Annotated[dict[str, Annotated[tuple[Pair, ...], ONCE]], Meta(min_length=1)]
@@ -197,7 +197,7 @@ class StudyFile(Section, frozen=True):
     treatments: Annotated[tuple[StudyTreatment, ...], Meta(min_length=1)]
     problems: Annotated[tuple[Problem, ...], Meta(min_length=1)]
     linear_solvers: tuple[_SolverChoice, ...] = ()
-    quick: _Quick | None = None
+    quick: _QuickStudy | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -42,7 +42,7 @@ def one_cell(name, faces, distortion=0.05):
 
 def cut_cell(name, faces, into_hexahedra=False, distortion=0.05):
     mesh = one_cell(name, faces, distortion)
-    blocks = [b for f in faces for b in boundary_faces(mesh, f"face{f}", "test", "slave")]
+    blocks = [b for f in faces for b in boundary_faces(mesh, f"face{f}")]
     macro = [np.array([k]) for k in range(len(blocks))]
     hexahedra = [into_hexahedra] * len(blocks)
     cells = volume_cells(mesh)

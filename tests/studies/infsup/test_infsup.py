@@ -9,7 +9,6 @@ from solver.simulation.scene import build_scene
 from solver.studies.infsup.constant import inf_sup_constant
 from solver.studies.infsup.description import InfSupLadder
 from solver.studies.infsup.point import run
-from solver.system.clock import Clock
 from tests.scenes import block_case, block_mesh
 
 
@@ -28,7 +27,7 @@ def constants(cells, counts, coarser=4, treatment="lac", hexahedra="pyramids", c
             held = f"  - {{group: base, fix: {axes}}}\n  - {{group: press, fix: {axes}}}\n"
             text = text.replace(free, held)
         case = parse_case(text, Path("infsup.yaml"))
-        found.append(inf_sup_constant(build_scene(case, mesh, False, None, Clock())))
+        found.append(inf_sup_constant(build_scene(case, mesh)))
     return found
 
 

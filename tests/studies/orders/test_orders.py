@@ -83,7 +83,7 @@ MANUFACTURED = Path(__file__).parents[3] / "cases" / "manufactured"
 
 def solved(case):
     """Size of the macro-elements, and errors, of a case."""
-    solution = simulate(case, mesh_of(case), log=lambda line: None)
+    solution = simulate(case, mesh_of(case))
     return {"size": element_size(solution.macro_elements, 2)} | errors(solution)
 
 
