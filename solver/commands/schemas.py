@@ -13,6 +13,7 @@ from solver.system.files import write_text
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
     "benchmark": "solver.studies.benchmark.description:BenchmarkFile",
+    "case": "solver.case.file:CaseFile",
     "family": "solver.report.families:FamilyFile",
     "infsup": "solver.studies.infsup.description:InfSupFile",
     "ladders": "solver.studies.orders.description:LaddersFile",
