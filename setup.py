@@ -1,4 +1,4 @@
-"""The folder solver/ is installed as the package mortarcheck; pyproject.toml has everything else."""
+"""Installs the folder solver/ as the package mortarcheck; pyproject.toml has everything else."""
 
 from setuptools import find_packages, setup
 

@@ -25,7 +25,9 @@ TYPES = {
 def schema_text(name: str) -> str:
     """The JSON Schema of a kind of file, as written to disk."""
     module, kind = TYPES[name].split(":")
-    return json.dumps(json_schema(getattr(import_module(module, __package__), kind)), indent=2) + "\n"
+    return (
+        json.dumps(json_schema(getattr(import_module(module, __package__), kind)), indent=2) + "\n"
+    )
 
 
 if __name__ == "__main__":

@@ -56,7 +56,10 @@ def _reap(options: int = 0) -> None:
 
 def load() -> None:
     """Import all of the solver, and keep it out of the collector's way: forks share it."""
-    ours = [module.name for module in pkgutil.walk_packages(sys.modules[PACKAGE].__path__, f"{PACKAGE}.")]
+    ours = [
+        module.name
+        for module in pkgutil.walk_packages(sys.modules[PACKAGE].__path__, f"{PACKAGE}.")
+    ]
     for name in (*_LATE, *ours):
         if not name.endswith("__main__"):
             with suppress(ImportError, OSError):

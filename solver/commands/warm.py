@@ -18,7 +18,7 @@ from contextlib import suppress
 from datetime import timedelta
 
 # The package's folder; this file runs as a script, which knows no package.
-PACKAGE = os.path.abspath(__file__).split(os.sep)[-3]  # noqa: PTH100 -- pathlib is long to import
+PACKAGE = os.path.abspath(__file__).rsplit("/", 3)[1]  # noqa: PTH100 -- pathlib is long to import
 SOCKET = "WARM_SOLVER"
 LIMIT = 1 << 16  # bytes of a message
 # A fork keeps the threads that its libraries were loaded with.

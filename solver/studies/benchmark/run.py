@@ -1,6 +1,5 @@
 """Runs the benchmark: each way in a process of its own, one after the other, nothing beside it."""
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
