@@ -13,6 +13,7 @@ from solver.system.files import write_text
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
     "benchmark": "..studies.benchmark.description:BenchmarkFile",
+    "case": "..case.file:CaseFile",
     "family": "..report.families:FamilyFile",
     "infsup": "..studies.infsup.description:InfSupFile",
     "ladders": "..studies.orders.description:LaddersFile",

@@ -22,12 +22,15 @@ def in_project() -> bool:
 
 
 def project_version() -> str:
-    """The version in pyproject.toml: of the file itself, or as it was installed."""
+    """The version in pyproject.toml: of the file itself, or as installed; else `unknown`."""
     if in_project():
         import tomllib
 
         content = tomllib.loads((_SOURCES / "pyproject.toml").read_text(encoding="utf-8"))
         return str(content["project"]["version"])
-    from importlib.metadata import version
+    from importlib.metadata import PackageNotFoundError, version
 
-    return version(PROJECT)
+    try:
+        return version(PROJECT)
+    except PackageNotFoundError:  # a copy of the folder alone
+        return "unknown"
