@@ -130,8 +130,11 @@ class ZoneResult:
         """The estimated L2 error of the constants over their norm; None where there is none."""
         if self.pressure_error is None:
             return None
-        whole = float(np.sqrt((self.area * self.coverage) @ self.multiplier**2))
-        return float(np.linalg.norm(self.pressure_error)) / whole if whole else 0.0
+        largest = float(np.abs(self.multiplier).max(initial=0.0))
+        if not largest:
+            return 0.0
+        whole = (self.area * self.coverage) @ (self.multiplier / largest) ** 2
+        return float(np.linalg.norm(self.pressure_error / largest) / np.sqrt(whole))
 
 
 @dataclass

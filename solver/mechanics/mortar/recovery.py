@@ -184,8 +184,9 @@ class Recovery:
 
     def error(self, coefficients: np.ndarray) -> np.ndarray:
         """η (m,), the L2 norm of p* − p on each, for `coefficients` (m · k,)."""
-        c = coefficients.reshape(len(self.products), -1)
-        return np.sqrt(np.maximum(np.einsum("mk,mkl,ml->m", c, self.products, c), 0.0))
+        scale = float(np.abs(coefficients).max(initial=0.0)) or 1.0
+        c = coefficients.reshape(len(self.products), -1) / scale
+        return scale * np.sqrt(np.maximum(np.einsum("mk,mkl,ml->m", c, self.products, c), 0.0))
 
 
 def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes: int) -> Recovery:
