@@ -7,6 +7,7 @@ open, stress is positive in tension.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,9 +20,11 @@ if TYPE_CHECKING:
     from solver.mechanics.mortar.edge import Edges
 
 
-def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
+def job_name(
+    name: str, swapped: bool, hexahedra: str | None = None, recovery: str | None = None
+) -> str:
     """The name of one solve of a case: direction and variant, where they are not the case's own."""
-    return "-".join([name, *(["swapped"] if swapped else []), *([hexahedra] if hexahedra else [])])
+    return "-".join(filter(None, [name, "swapped" * swapped, hexahedra, recovery]))
 
 
 class Line(NamedTuple):
@@ -159,10 +162,20 @@ class ZoneResult:
     @property
     def relative_pressure_error(self) -> float | None:
         """The estimated L2 error of the constants over their norm; None where there is none."""
-        if self.pressure_error is None:
-            return None
-        whole = float(np.sqrt((self.area * self.coverage) @ self.multiplier**2))
-        return float(np.linalg.norm(self.pressure_error)) / whole if whole else 0.0
+        return pressure_error([self])
+
+
+def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
+    """The estimated L2 error of the constants of zones over their norm; None where unknown."""
+    known = [zone for zone in zones if zone.pressure_error is not None]
+    if not known:
+        return None
+    scale = max(float(zone.multiplier.max(initial=0.0)) for zone in known)
+    if not scale > 0:
+        return 0.0
+    errors = [np.asarray(zone.pressure_error) / scale for zone in known]
+    whole = [zone.area * zone.coverage * (zone.multiplier / scale) ** 2 for zone in known]
+    return float(np.linalg.norm(np.concatenate(errors)) / np.sqrt(np.concatenate(whole).sum()))
 
 
 @dataclass
@@ -244,6 +257,11 @@ class Solution:
         return self.case.hexahedra
 
     @property
+    def pressure_error_estimate(self) -> float | None:
+        """The estimated L2 error of constant pressures, over all zones and relative."""
+        return pressure_error(self.zones)
+
+    @property
     def job(self) -> str:
         """The name of this solve, as of its folder and its file of accepted values."""
-        return job_name(self.case.name, self.swapped, self.hexahedra)
+        return job_name(self.case.name, self.swapped, self.hexahedra, self.case.recovery)

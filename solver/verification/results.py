@@ -3,7 +3,7 @@
 `/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; the file has everything else
 that the checks need, so that it can be judged without solving:
 
-    /case          source text, name, family, path, swapped, hexahedra
+    /case          source text, name, family, path, swapped, hexahedra, recovery
     /solve         lengths, sizes, cost and the linear solver of the solve
     /accuracy      what rounding alone may change, relative, by cause
     /errors        norms of the error against the case's exact solution, if it names one
@@ -271,12 +271,16 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
         path=str(case.path.resolve()),
         swapped=solution.swapped,
         hexahedra=solution.hexahedra or "",
+        recovery=case.recovery or "",
     )
 
 
 def _read_case(group: h5py.Group) -> Case:
     case = parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
-    return case.as_solved(bool(group.attrs["swapped"]), group.attrs["hexahedra"] or None)
+    told = group.attrs
+    return case.as_solved(
+        bool(told["swapped"]), told["hexahedra"] or None, told["recovery"] or None
+    )
 
 
 def _write_bodies(group: h5py.Group, bodies: Sequence[BodyInfo]) -> None:

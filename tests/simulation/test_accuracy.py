@@ -57,6 +57,11 @@ def test_faces_that_count_as_flat(height):
     assert 1 / USELESS < share < 1
 
 
+@pytest.mark.parametrize("height", [0.2, 0.3, 0.4])
+def test_warped_faces(height):
+    assert error_over_estimate("warp", "3D", height, state="hydrostatic") < 1
+
+
 @pytest.mark.parametrize("sweep", ["rotation", "tiny-pressure", "poisson", "warp"])
 def test_plain_rounding(sweep):
     found = read_sweep(SWEEPS / f"{sweep}.yaml")
