@@ -158,14 +158,15 @@ def project_along(
     target: np.ndarray,
     direction: np.ndarray,
     outline: bool = False,
+    affine: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where lines through points meet faces: reference points (f, q, dim − 1), distances (f, q).
 
     One face `corner` (f, n_nodes, dim) for each row of `target` (f, q, dim) and unit `direction`
-    (f, q, dim); the meeting point is target + distance · direction. Newton from the affine face
-    through the vertices, which is exact at once for affine faces. Raises SolveError where it does
-    not converge; points of an `outline` around the face then keep their place on the affine face
-    (they lie outside the face, and all that matters is that neighbours agree on them).
+    (f, q or 1, dim); the meeting point is target + distance · direction. Newton from the affine
+    face through the vertices, where the faces known to be `affine` (f,) stay. Raises SolveError
+    where it does not converge; points of an `outline` around the face then keep their place on the
+    affine face (they lie outside the face, and all that matters is that neighbours agree on them).
 
     Up from (3/4, 0) to the edge from (0, 1/2) to (1, 1/2):
 
@@ -177,7 +178,10 @@ def project_along(
     ([[[0.75]]], [[0.5]])
     """
     start, distance = _on_affine_face(kind, corner, target, direction)
-    place, distance, size = _newton(kind, corner, target, direction, start, distance)
+    if kind.n_nodes == kind.dim + 1:
+        affine = np.ones(len(corner), dtype=bool)
+    direction = np.broadcast_to(direction, target.shape)
+    place, distance, size = _newton(kind, corner, target, direction, start, distance, affine)
     lost = ~(size <= _ACCEPTED)
     if outline:
         return np.where(lost[..., None], start, place), distance
@@ -199,12 +203,14 @@ def _newton(
     direction: np.ndarray,
     place: np.ndarray,
     distance: np.ndarray,
+    done: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places, distances, and the sizes (f, q) of the last steps; done faces are left alone."""
-    step = _newton_step(kind, corner, target, direction, place, distance)
-    place, distance = place - step[..., :-1], distance - step[..., -1]
-    size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
-    for _ in range(_NEWTON_STEPS - 1):
+    """Places, distances, and the sizes (f, q) of the last steps; faces once `done` are left."""
+    size = np.full(distance.shape, np.inf)
+    if done is not None:
+        size[np.isfinite(distance) & done[:, None]] = 0.0
+    place, distance = np.array(place), np.array(distance)
+    for _ in range(_NEWTON_STEPS):
         rows = np.flatnonzero(~(size <= _CONVERGED).all(axis=1))
         if not len(rows):
             break
@@ -238,7 +244,7 @@ def _on_affine_face(
     n = kind.n_vertices
     sides = corner[:, [1, n - 1]] if kind.dim == 2 else corner[:, [1]]
     sides = np.swapaxes(sides - corner[:, :1], 1, 2)[:, None]
-    sides = np.broadcast_to(sides, (*target.shape[:2], *sides.shape[2:]))
+    sides = np.broadcast_to(sides, (*direction.shape[:2], *sides.shape[2:]))
     _, inverse = invert(np.concatenate([sides, -direction[..., None]], axis=-1))
     found = np.einsum("fqij,fqj->fqi", inverse, target - corner[:, :1])
     return found[..., :-1], found[..., -1]
