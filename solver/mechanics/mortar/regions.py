@@ -278,9 +278,9 @@ def quadrature(regions: Regions, degree: int) -> list[Pieces]:
     barycentric = np.column_stack([1 - reference.sum(axis=1), reference])
     points = np.einsum("qk,skt->sqt", barycentric, corner)
     pieces = [(which[polygon], points, 2 * area[:, None] * weights)]
-    if bent.any():
-        which = np.flatnonzero(bent)
-        fans = _fans(regions.of(bent), degree)
+    which = np.flatnonzero(bent)
+    if len(which):
+        fans = _fans(regions.of(which), degree)
         pieces += [(which[arc], points, weights) for arc, points, weights in fans]
     return pieces
 

@@ -2,8 +2,9 @@
 
 Both faces are seen along the normal at the slave's centre. Where their edges look straight,
 polygons are clipped; where they look bent they are parabolas, and so are the edges of the segments:
-areas in that plane are exact to round-off either way. In 2D, bent slave faces are cut in their
-reference face. Of two master faces behind each other the nearer one counts. Every quadrature point
+areas in that plane are exact to round-off either way. The pieces of slave faces that are not flat
+are integrated in their reference face, where shape functions are polynomials; in 2D bent faces are
+cut there. Of two master faces behind each other the nearer one counts. Every quadrature point
 knows its place on both faces, found along the slave's normal at that point (the face's own, or one
 interpolated between the mean normals at its nodes), so that both sides of an integral share one
 normal and one surface measure.
@@ -314,7 +315,9 @@ def _with_master(pairs: Pairs, pieces: Pieces, reach: float, curved: bool) -> It
     else:
         normal = slave.normal[i][:, None]
         points = np.einsum("sqt,std->sqd", points, slave.tangents[i])
-        place, height = project_along(kind, corner, points, normal, affine=slave.affine[i])
+        place, height = project_along(
+            kind, corner, points, normal, affine=bool(slave.affine[i].all())
+        )
         points = points + height[..., None] * normal
         values = shape_functions(kind.name).values(place)
     if slave.directions is not None:
@@ -324,7 +327,7 @@ def _with_master(pairs: Pairs, pieces: Pieces, reach: float, curved: bool) -> It
         mine = np.flatnonzero(pairs.outline.block[pairs.j] == index)
         face = pairs.outline.face[pairs.j[mine]]
         corner = master.corner[face] - slave.centre[i[mine]][:, None]
-        affine = master.affine[face]
+        affine = bool(master.affine[face].all())
         partner, gap = project_along(master.type, corner, points[mine], normal[mine], affine=affine)
         near = np.abs(gap).max(axis=1, initial=0.0) <= reach
         mine = mine[near]
