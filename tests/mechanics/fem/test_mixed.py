@@ -183,7 +183,8 @@ def nested(cells, poisson, form, n):
         + "".join(f"  - {{group: {side}, fix: [normal]}}\n" for side in sides)
         + "loads: [{group: base, pressure: 25.0}]\n"
         + "contact: [{slave: bottom_contact, master: top_contact}]\n"
-        + f"reference: {{kind: analytical, solution: {{name: {name}, radii: [20, 30, 40]}}}}\n"
+        + f"reference: {{kind: analytical, solution: {{name: {name}, radii: [20, 30, 40]}}, "
+        + "contact_pressure: solution}\n"
     )
     sections = {
         side: {"cells": cells, "divisions": [2 * k] * (dim - 1) + [k]}
