@@ -57,6 +57,8 @@ contact:
     normal: element                      # gaps are measured along: element (normals of faces),
                                          # nodal (their means at the nodes)
     interference: 0.0                    # overlap at the start, of bodies modelled apart
+    recovery: none                       # of a pressure of higher order from constants: none,
+                                         # linear, quadratic, smooth, or automatic by the cells
 #   clearance: 0.0                       # the gap at the start, a number or an expression, in place
                                          # of the one between the faces as meshed
 

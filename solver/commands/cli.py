@@ -165,6 +165,11 @@ def _add_job(command: argparse.ArgumentParser) -> None:
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
     command.add_argument("--hexahedra", choices=("pyramids", "hexahedra"), help="how they are cut")
     command.add_argument(
+        "--recovery",
+        choices=("none", "linear", "quadratic", "smooth", "automatic"),
+        help="how constant pressures are recovered from, in place of what the case says",
+    )
+    command.add_argument(
         "--refine", type=int, default=1, metavar="N", help="multiply the recipe's divisions"
     )
 
@@ -181,7 +186,9 @@ def _mesh(options: argparse.Namespace) -> int:
 def _job(options: argparse.Namespace) -> "Job":
     from solver.verification.run import Job
 
-    return Job(options.case, options.mesh, options.swap, options.hexahedra, options.refine)
+    given = vars(options)
+    told = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
+    return Job(swapped=options.swap, **told)
 
 
 def _solve(options: argparse.Namespace) -> int:
