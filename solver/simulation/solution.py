@@ -7,6 +7,7 @@ open, stress is positive in tension.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,11 +17,14 @@ if TYPE_CHECKING:
     import meshio
 
     from solver.case.model import Case
+    from solver.mechanics.mortar.edge import Edges
 
 
-def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
+def job_name(
+    name: str, swapped: bool, hexahedra: str | None = None, recovery: str | None = None
+) -> str:
     """The name of one solve of a case: direction and variant, where they are not the case's own."""
-    return "-".join([name, *(["swapped"] if swapped else []), *([hexahedra] if hexahedra else [])])
+    return "-".join(filter(None, [name, "swapped" * swapped, hexahedra, recovery]))
 
 
 class Line(NamedTuple):
@@ -91,6 +95,34 @@ class RecoveredPressure:
 
 
 @dataclass
+class Resultants:
+    """What contact comes to in a zone.
+
+    `area` (3,): that of contact, and bounds below and above; `force` (dim,) on the slave and its
+    `moment` (3,) about the origin of the coordinates; `edges`: where contact ends in 2D. In 3D the
+    edge is known to one macro-element only: the area is that of the closed ones, its bounds those
+    without their rim and with the open ones around it.
+    """
+
+    area: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+    edges: Edges | None = None
+
+    def __str__(self) -> str:
+        area, low, high = (f"{value:.5g}" for value in self.area)
+        force = ", ".join(f"{value:.6g}" for value in self.force)
+        text = f"contact area {area} ({low} to {high}), force ({force}) on the slave"
+        if self.edges is None or not len(self.edges.better):
+            return text
+        places = (
+            f"({', '.join(f'{x:.5g}' for x in place)})" + ("" if better else " to one face only")
+            for place, better in zip(self.edges.position, self.edges.better, strict=True)
+        )
+        return f"{text}, edge at {' and '.join(places)}"
+
+
+@dataclass
 class ZoneResult:
     """The contact state of one zone, by macro-element, and the stress on both surfaces.
 
@@ -103,7 +135,8 @@ class ZoneResult:
     `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
     these do not determine it (see `solver.simulation.balance`). `pressure_error` (m,) estimates the
     L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
-    where multipliers belong to nodes. `recovered` is p* where the case asks for one.
+    where multipliers belong to nodes. `recovered` is p* where the case asks for one. `resultants`:
+    area, force, moment and edges of contact; None in files of earlier versions.
     """
 
     name: str
@@ -124,14 +157,25 @@ class ZoneResult:
     pressure_of_forces: np.ndarray | None = None
     pressure_error: np.ndarray | None = None
     recovered: RecoveredPressure | None = None
+    resultants: Resultants | None = None
 
     @property
     def relative_pressure_error(self) -> float | None:
         """The estimated L2 error of the constants over their norm; None where there is none."""
-        if self.pressure_error is None:
-            return None
-        whole = float(np.sqrt((self.area * self.coverage) @ self.multiplier**2))
-        return float(np.linalg.norm(self.pressure_error)) / whole if whole else 0.0
+        return pressure_error([self])
+
+
+def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
+    """The estimated L2 error of the constants of zones over their norm; None where unknown."""
+    known = [zone for zone in zones if zone.pressure_error is not None]
+    if not known:
+        return None
+    scale = max(float(zone.multiplier.max(initial=0.0)) for zone in known)
+    if not scale > 0:
+        return 0.0
+    errors = [np.asarray(zone.pressure_error) / scale for zone in known]
+    whole = [zone.area * zone.coverage * (zone.multiplier / scale) ** 2 for zone in known]
+    return float(np.linalg.norm(np.concatenate(errors)) / np.sqrt(np.concatenate(whole).sum()))
 
 
 @dataclass
@@ -213,6 +257,11 @@ class Solution:
         return self.case.hexahedra
 
     @property
+    def pressure_error_estimate(self) -> float | None:
+        """The estimated L2 error of constant pressures, over all zones and relative."""
+        return pressure_error(self.zones)
+
+    @property
     def job(self) -> str:
         """The name of this solve, as of its folder and its file of accepted values."""
-        return job_name(self.case.name, self.swapped, self.hexahedra)
+        return job_name(self.case.name, self.swapped, self.hexahedra, self.case.recovery)

@@ -3,7 +3,7 @@
 Modules log to the logger of their own name: outcomes at the level `OUTCOME`, which `saying` hands
 to a function, and details (each stage, each solution and its residual) as information, which
 `telling` writes with the time. Without either nothing is written, unless the program that uses the
-solver listens to the logger `solver`.
+solver listens to the package's logger, `solver` or `mortarcheck`.
 """
 
 import logging
@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from logging.handlers import MemoryHandler
 from threading import Timer, get_ident
+
+from solver.system.package import PACKAGE
 
 OUTCOME = 25
 """The level of what a solve says of its course, between information and warnings."""
@@ -34,7 +36,7 @@ class _Saying(logging.Handler):
 @contextmanager
 def saying(say: Callable[[str], object]) -> Iterator[None]:
     """Hand each outcome that is logged to a function, such as `print`."""
-    logger, handler = logging.getLogger("solver"), _Saying(say)
+    logger, handler = logging.getLogger(PACKAGE), _Saying(say)
     before = logger.level
     logger.setLevel(min(logger.getEffectiveLevel(), OUTCOME))
     logger.addHandler(handler)
@@ -60,7 +62,7 @@ def telling(verbose: bool, quiet: bool = False) -> Iterator[None]:
     held = MemoryHandler(0 if verbose else sys.maxsize, sys.maxsize, lines, flushOnClose=False)
     patience = Timer(PATIENCE, _release, [held])
     patience.daemon = True
-    logger = logging.getLogger("solver")
+    logger = logging.getLogger(PACKAGE)
     before = logger.level, logger.propagate
     logger.addHandler(held)
     logger.setLevel(logging.INFO)

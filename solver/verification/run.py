@@ -40,7 +40,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Job:
-    """One solve of a case: which mesh, which direction, which way to cut hexahedra.
+    """One solve of a case: which mesh, which direction, which cut of hexahedra, which recovery.
 
     `mesh` is a mesh file taken as it is; None means the case's own, its transform applied.
     `refine` multiplies the divisions of the case's recipe. `memory_check`: refused where its memory
@@ -51,9 +51,19 @@ class Job:
     mesh: Path | None = None
     swapped: bool = False
     hexahedra: str | None = None
+    recovery: str | None = None
     refine: int = 1
     memory_check: bool = True
     everything: bool = False
+
+    @property
+    def told(self) -> tuple[bool, str | None, str | None]:
+        """What `Case.as_solved` is told."""
+        return self.swapped, self.hexahedra, self.recovery
+
+    def of(self, case: Case) -> Case:
+        """The case as this job solves it."""
+        return case.as_solved(*self.told)
 
 
 def refined(case: Case, factor: int) -> Case:
@@ -85,14 +95,12 @@ def solve(job: Job, output: Path, verdict_file: Path | None) -> Verdict:
     """
     case: Case | None = None
     try:
-        case = refined(load_case(job.case), job.refine).as_solved(job.swapped, job.hexahedra)
+        case = job.of(refined(load_case(job.case), job.refine))
         verdict = _solve(job, case, output, verdict_file or output)
     except Exception as error:
         if verdict_file:
             word, reason, transient = _ending(error)
-            ended = without_result(
-                word, reason, case or job.case, job.swapped, job.hexahedra, transient
-            )
+            ended = without_result(word, reason, case or job.case, job.told, transient)
             write_verdict(verdict_file, ended)
         raise
     if verdict_file:
@@ -136,7 +144,7 @@ def record_crash(
     The reason is its exit status, as far as known, and the last line of the log.
     """
     try:
-        case: Case | Path = load_case(job.case).as_solved(job.swapped, job.hexahedra)
+        case: Case | Path = job.of(load_case(job.case))
     except InputError:
         case = job.case
     said = last_line(log_file)
@@ -144,7 +152,7 @@ def record_crash(
         reason = _death(status) + (f"; last words: {said}" if said else "")
     else:
         reason = said or "the process died without a word"
-    verdict = without_result(CRASHED, reason, case, job.swapped, job.hexahedra, transient=True)
+    verdict = without_result(CRASHED, reason, case, job.told, transient=True)
     write_verdict(verdict_file, verdict)
     return verdict
 

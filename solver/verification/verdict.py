@@ -2,7 +2,7 @@
 
 `verdict.json` holds it as a JSON object with the same keys. It is bound to what it judges: `digest`
 is the hash of all other keys, `result_sha256` that of the result file, and family and job are those
-of its folder. A file that was damaged, edited or moved is found out by `flaw`.
+of its folder. `read_verdict` finds a file damaged or edited, `unbound` one that was moved.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ REFUSED, CRASHED = "refused", "crashed"
 WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, SOLVED, PASSED)
 T = TypeVar("T")
 _DIGEST = "digest"
+# An estimate of the pressure's error below this one is not worth a word.
+_NEGLIGIBLE = 1e-10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +134,8 @@ class Verdict:
 
     `worst` is the check with the largest relative error, `closest_to_tolerance` the one nearest to
     its tolerance or furthest past it. Pairs are minimum and maximum over all zones; `seconds` has
-    wall times by stage and their `total`. `transient`: the machine is the reason (memory,
+    wall times by stage and their `total`. `pressure_error_estimate` is relative and in L2: how far
+    constant pressures are from a reconstruction. `transient`: the machine is the reason (memory,
     disk, a kill), so that the same solve may succeed another time.
     """
 
@@ -143,6 +146,7 @@ class Verdict:
     swapped: bool = False
     direction: str = ""
     variant: str = ""
+    recovery: str = ""
     zones: list[Sides] = field(default_factory=list)
     reference_kind: str | None = None
     reference_uncertainty: float | None = None
@@ -162,6 +166,7 @@ class Verdict:
     matrix_entries: int | None = None
     length: float | None = None
     load_scale: float | None = None
+    pressure_error_estimate: float | None = None
     strain: float | None = None
     rotation: float | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -196,6 +201,8 @@ class Verdict:
         if self.reason:
             return f"{line}: {self.reason}"
         error = f", worst error {self.worst.error:.1e} ({self.worst.name})" if self.worst else ""
+        if (self.pressure_error_estimate or 0.0) > _NEGLIGIBLE:
+            error += f", constant pressures within {self.pressure_error_estimate:.1e} (estimated)"
         return f"{line}{error}, {self.seconds['total']:.2f} s"
 
     def plain(self) -> dict[str, Any]:
@@ -224,23 +231,11 @@ def read_verdict(path: str | Path) -> Verdict:
     return verdict
 
 
-def flaw(path: str | Path, case: str | Path | None = None) -> str:
-    """Why a verdict file cannot be relied on, in one line; empty where it can.
+def unbound(verdict: Verdict, path: Path) -> str:
+    """What of folder (in `results`) and result is not the verdict's own; empty where both are.
 
-    It must be as it was written, in the folder of its own family and job (where that is in
-    `results`), and its result must be the one it names. `case` is the case file that it must be
-    of, in its present state. Reads the whole result.
+    Reads the whole result.
     """
-    path = Path(path)
-    try:
-        verdict = read_verdict(path)
-    except InputError as error:
-        return error.told
-    return unbound(verdict, path, case)
-
-
-def unbound(verdict: Verdict, path: Path, case: str | Path | None = None) -> str:
-    """What of folder, result and case is not the verdict's own; empty where all is."""
     *_, root, family, job = ("", "", *path.absolute().parts[:-1])
     if root == "results" and (family, job) != (verdict.family, verdict.job):
         return f"the verdict is that of {verdict.family}/{verdict.job}"
@@ -250,9 +245,6 @@ def unbound(verdict: Verdict, path: Path, case: str | Path | None = None) -> str
             return f"the result {verdict.result} is missing or damaged"
         if seal != verdict.result_sha256:
             return f"the result {verdict.result} is that of another solve"
-    known = verdict.provenance.get("case_sha256")
-    if case is not None and known and known != hashlib.sha256(Path(case).read_bytes()).hexdigest():
-        return "the case file has changed"
     return ""
 
 

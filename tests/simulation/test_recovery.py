@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 import yaml
 
+from solver import solve_case
 from solver.case.reader import parse_case
+from solver.commands.cli import main
 from solver.mechanics.mortar import recovery as mortar
 from solver.mechanics.mortar.recovery import FORMS
 from solver.mesh import generate
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
+from solver.system.errors import InputError
 from solver.verification.norms import errors
 from solver.verification.results import read_result, write_result
 from tests.scenes import PRESSURE, block_case, block_mesh
@@ -246,6 +249,24 @@ def test_a_recovered_pressure_is_read_back(tmp_path):
     for name in ("coefficients", "degree", "centre", "axes", "spread", "nodes", "at_nodes"):
         assert (getattr(back.recovered, name) == getattr(zone.recovered, name)).all()
     assert (back.pressure_error == zone.pressure_error).all()
+
+
+def test_the_recovery_asked_for_takes_the_place_of_the_cases_own(tmp_path):
+    """As a solve of its own name; the estimate is the one of the case, and is in the verdict."""
+    case = tmp_path / "waves.yaml"
+    case.write_text(yaml.safe_dump(waves("TRIA6", "QUAD8", 10, "none") | {"tolerance": 0.1}))
+    given, asked = (solve_case(case, recovery=form) for form in (None, "linear"))
+    assert given.zones["contact"].recovered is None
+    assert asked.zones["contact"].recovered.form == "linear"
+    assert [given.record["job"], asked.record["job"]] == ["recovered", "recovered-linear"]
+    estimates = [given.outcome.pressure_error_estimate, asked.outcome.pressure_error_estimate]
+    assert estimates == pytest.approx([0.0116] * 2, rel=0.05)
+    assert "constant pressures within 1.2e-02 (estimated)" in str(given)
+    assert main(["solve", str(case), "--recovery", "linear", "-o", str(tmp_path / "r.vtkhdf")]) == 0
+    [zone] = read_result(tmp_path / "r.vtkhdf").solution.zones
+    assert (zone.recovered.coefficients == asked.zones["contact"].recovered.coefficients).all()
+    with pytest.raises(InputError, match="recovery = 'cubic': allowed: none, linear"):
+        solve_case(case, recovery="cubic")
 
 
 def test_multipliers_at_nodes_have_no_estimate():

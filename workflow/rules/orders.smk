@@ -19,7 +19,7 @@ def ladders():
                 if job.hexahedra is None:
                     name = ladder.folder(job.swap)
                     job = job._replace(name=name, hexahedra=ladder.hexahedra, mesh=None)
-                    found[family.name, name] = job, ladder.levels
+                    found[family.name, name] = job, ladder
     return found
 
 
@@ -29,11 +29,12 @@ def level_file(w):
 
 def level_options(w):
     """How the command line is told which level of which ladder this is."""
-    job, _ = ladders()[w.family, w.job]
+    job, ladder = ladders()[w.family, w.job]
     return (
         f"--refine {w.level}"
         + " --swap" * job.swap
         + (f" --hexahedra {job.hexahedra}" if job.hexahedra else "")
+        + (f" --recovery {ladder.recovery}" if ladder.recovery else "")
     )
 
 
@@ -61,8 +62,8 @@ rule orders_page:
     input:
         verdicts=lambda w: [
             f"results/orders/{family}/{name}/{level}/verdict.json"
-            for (family, name), (_, levels) in ladders().items()
-            for level in levels
+            for (family, name), (_, ladder) in ladders().items()
+            for level in ladder.levels
         ],
         ladders=LADDER_FILES,
         families=[
