@@ -273,7 +273,7 @@ def _report(options: argparse.Namespace) -> int:
 def _compare(options: argparse.Namespace) -> int:
     from solver.report.compare import compare
 
-    return FAILED if compare(options.base, options.this, options.output).worse else PASSED
+    return FAILED if compare(options.base, options.this, options.output).groups["worse"] else PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:
