@@ -74,7 +74,10 @@ def error(bottom: str, top: str, n: int, recovery: str, swapped: bool = False) -
 @pytest.mark.parametrize("form", APPLIED)
 @pytest.mark.parametrize(
     ("bottom", "top"),
-    [("TRIA3", "QUAD8"), ("TRIA6", "QUAD4"), ("TETRA10", "HEXA8"), ("HEXA27", "TETRA4")],
+    [
+        *[("TRIA3", "QUAD8"), ("TRIA6", "QUAD4"), ("QUAD9", "TRIA3"), ("TETRA10", "HEXA8")],
+        *[("HEXA27", "TETRA4"), ("HEXA20", "PENTA6"), ("PENTA15", "PYRA5"), ("PYRA13", "TETRA4")],
+    ],
 )
 def test_a_uniform_pressure_stays_exact(bottom, top, form):
     """The patch test: nothing is added to the constants, on any neighbours."""
