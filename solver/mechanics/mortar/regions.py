@@ -13,8 +13,8 @@ from typing import Self
 
 import numpy as np
 
-from solver.mechanics.fem import simplex_rule
-from solver.mechanics.fem.gauss import gauss_rule
+from ..fem import simplex_rule
+from ..fem.gauss import gauss_rule
 
 # Edges whose middle is off the chord by less than this share of it are straight.
 _BENT = 1e-13

@@ -17,10 +17,10 @@ from typing import Self
 
 import numpy as np
 
-from solver.mechanics.fem import mortar_degree, shape_functions, simplex_rule
-from solver.mechanics.mortar.clipping import clip, overlap, triangles
-from solver.mechanics.mortar.facets import Facets, project_along
-from solver.mechanics.mortar.pairing import (
+from ..fem import mortar_degree, shape_functions, simplex_rule
+from .clipping import clip, overlap, triangles
+from .facets import Facets, project_along
+from .pairing import (
     Outlines,
     Pairs,
     face_pairs,
@@ -28,7 +28,7 @@ from solver.mechanics.mortar.pairing import (
     outlines,
     seen_along,
 )
-from solver.mechanics.mortar.regions import (
+from .regions import (
     Pieces,
     Regions,
     clip_to_face,

@@ -26,10 +26,10 @@ import gmsh
 import meshio
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME, CellType
-from solver.mesh.keys import Keys
-from solver.mesh.recipes.gmsh_session import current_model, session
-from solver.mesh.recipes.hybrid import cube, side_name
+from ..catalogue import BY_NAME, CellType
+from ..keys import Keys
+from .gmsh_session import current_model, session
+from .hybrid import cube, side_name
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
 _ALGORITHMS = {"frontal": 6, "delaunay": 5, "meshadapt": 1}
