@@ -12,6 +12,7 @@ from solver.commands.cli import main
 from solver.mechanics.mortar import recovery as mortar
 from solver.mechanics.mortar.recovery import FORMS
 from solver.mesh import generate
+from solver.mesh.catalogue import BY_NAME
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -81,7 +82,7 @@ def error(bottom: str, top: str, n: int, recovery: str, swapped: bool = False) -
 )
 def test_a_uniform_pressure_stays_exact(bottom, top, form):
     """The patch test: nothing is added to the constants, on any neighbours."""
-    dim = 2 if bottom.startswith("TRIA") else 3
+    dim = BY_NAME[bottom].dim
     case = block_case(dim, zone=f", recovery: {form}")
     for swapped in (False, True):
         [zone] = simulate(case.as_solved(swapped), block_mesh(bottom, top)).zones

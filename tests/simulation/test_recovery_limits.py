@@ -1,6 +1,5 @@
 """Recovery where it gains little or nothing: it must do no harm there, and leave the status."""
 
-import numpy as np
 import pytest
 
 from solver.mechanics.linear import choice
