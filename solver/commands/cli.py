@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.commands import benchmark, scaling, stability, study
+from solver.commands import benchmark, jobs, scaling, stability, study
 from solver.commands.options import add_command, add_threads, limit_threads
 from solver.system.errors import InputError, SolveError, of_machine
 
@@ -88,6 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
     command.add_argument("--log", type=Path, help="its last line tells the reason")
     command.add_argument("--status", type=int, metavar="N", help="its exit status")
+    command.add_argument("--refusal", help="it was not started, for this reason: refused")
 
     command = add_command(commands, "check", _check, "run the checks of stored results again")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
@@ -127,6 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     scaling.add_commands(command)
     benchmark.add_commands(commands)
     stability.add_commands(commands)
+    jobs.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "say whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -189,8 +191,11 @@ def _silent(line: str) -> None:
 
 
 def _crashed(options: argparse.Namespace) -> int:
-    from solver.verification.run import record_crash, summary
+    from solver.verification.run import record_crash, record_refusal, summary
 
+    if options.refusal:
+        print(summary(record_refusal(options.case, options.verdict, options.refusal)))
+        return PASSED
     print(summary(record_crash(_job(options), options.verdict, options.log, options.status)))
     return PASSED
 

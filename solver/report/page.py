@@ -11,6 +11,9 @@ from solver.report.rows import Row, counted
 from solver.report.sections import Section
 from solver.report.tables import outcome
 
+# Pages beside the report that other commands write.
+_PAGES = ("orders", "study", "stability", "gallery")
+
 
 def main_page(sections: Sequence[Section], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
@@ -21,10 +24,7 @@ def main_page(sections: Sequence[Section], folder: Path) -> str:
         .get_template("summary.html.jinja")
         .render(
             rows=rows,
-            orders=(folder / "orders.html").is_file(),
-            study=(folder / "study.html").is_file(),
-            stability=(folder / "stability.html").is_file(),
-            gallery=(folder / "gallery.html").is_file(),
+            pages={name for name in _PAGES if (folder / f"{name}.html").is_file()},
             bad=[row for row in rows if row.word != "passed"],
             outcome=outcome(rows),
             counts=counted(rows),

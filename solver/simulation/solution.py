@@ -12,15 +12,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from solver.case import job_name
+
 if TYPE_CHECKING:
     import meshio
 
     from solver.case.reader import Case
-
-
-def job_name(name: str, swapped: bool, hexahedra: str | None) -> str:
-    """The name of one solve of a case: direction and variant, where they are not the case's own."""
-    return "-".join([name, *(["swapped"] if swapped else []), *([hexahedra] if hexahedra else [])])
 
 
 class Line(NamedTuple):

@@ -148,6 +148,17 @@ def record_crash(
     return verdict
 
 
+def record_refusal(case: Path, verdict_file: Path, reason: str) -> dict[str, Any]:
+    """Write the verdict of a case that is refused before any solve, and return it.
+
+    Its job is called as the folder of the verdict.
+    """
+    known_as = case.with_name(f"{verdict_file.resolve().parent.name}.yaml")
+    verdict = without_result(REFUSED, reason, known_as)
+    write_verdict(verdict_file, verdict)
+    return verdict
+
+
 def _death(status: int) -> str:
     """What an exit status says of how a process ended; shells add 128 to a signal's number."""
     told = f"died with exit status {status}"

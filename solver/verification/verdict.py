@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from solver.case import job_name
 from solver.case.reader import Case
 from solver.simulation.accuracy import Accuracy
-from solver.simulation.solution import Solution, job_name
+from solver.simulation.solution import Solution
 from solver.system.files import write_text
 from solver.verification.checks import CheckResult
 

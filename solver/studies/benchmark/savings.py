@@ -18,10 +18,10 @@ from typing import Any
 
 import meshio
 
+from solver.case import job_name
 from solver.case.reader import Case, load_case
 from solver.simulation.simulate import simulate
 from solver.simulation.skips import EVERYTHING, NEEDED, Skips
-from solver.simulation.solution import job_name
 from solver.studies.timing import TOTAL, repeated
 from solver.system.clock import Clock
 from solver.system.files import write_text

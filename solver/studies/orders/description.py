@@ -23,10 +23,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from solver.case import job_name
 from solver.case.descriptions import file_beside
 from solver.case.schemas import LADDERS_SCHEMA
 from solver.case.yaml import read_mapping
-from solver.simulation.solution import job_name
 
 FILE_NAME = "orders.yaml"
 
