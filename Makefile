@@ -33,8 +33,8 @@ SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 
 .PHONY: help all-cases family case report summary compare gallery orders study stability infsup
 .PHONY: scaling benchmark test accept
-.PHONY: format lint lock faults mutants kills cluster-test docs bill clean clean-all
-.PHONY: environment study-environment gallery-environment test-environment lint-environment docs-environment
+.PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
+.PHONY: environment gallery-environment test-environment lint-environment docs-environment
 .PHONY: bill-environment
 
 help: ## list the targets
@@ -75,7 +75,7 @@ orders: environment ## refine step by step and fit orders of convergence: all or
 	@$(SNAKEMAKE) orders
 
 study: override CONFIG += $(if $(LEVEL),study=$(LEVEL))
-study: study-environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
+study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
 	@$(SNAKEMAKE) study
 
 stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
@@ -87,13 +87,9 @@ scaling: environment ## growth with size, to a million unknowns; the small in a 
 	@$(SNAKEMAKE) scaling
 
 BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
-PLANNED = $(if $(filter quick,$(LEVEL)),cases/ssnp170/e.yaml,$(foreach case,b c k m o, \
-  cases/ssnp170/$(case).yaml) cases/hydrostatic/coincident-hexa27.yaml)
 benchmark: environment ## ratios side by side: linear solvers, cut, cures, batch, CalculiX
 	@$(OURS) solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
 	  $(if $(filter quick,$(LEVEL)),--quick)
-	@$(OURS) solver savings $(PLANNED) \
-	  -o results/benchmark/savings$(if $(LEVEL),-$(LEVEL)).json
 
 infsup: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 infsup: environment ## the inf-sup test of every cell type, and the half-loaded block
@@ -136,9 +132,6 @@ lint: lint-environment ## check format, style and types of the sources
 environment:
 	@$(INSTALL) run
 
-study-environment:
-	@$(INSTALL) run pictures
-
 gallery-environment:
 	@$(INSTALL) run gallery
 
@@ -172,9 +165,12 @@ LOCK := $(ALONE) uv pip compile --quiet --universal --python-version 3.11 \
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
-	@for group in build mkl slurm pictures gallery test lint docs bill lock; do \
+	@for group in build mkl slurm gallery test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
+
+schemas: environment ## write the JSON Schemas of the typed files anew, for editors
+	@.venv/bin/python -m solver.commands.schemas
 
 clean: ## remove results and caches
 	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +

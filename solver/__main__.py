@@ -2,6 +2,7 @@
 
 import io
 import sys
+import warnings
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,6 +12,9 @@ with suppress(OSError):
 # Lines leave as they are written, so that the last line of a log is what was said last.
 if isinstance(sys.stdout, io.TextIOWrapper):
     sys.stdout.reconfigure(line_buffering=True)
+# A result that is not sound is refused in one line; what libraries warn of before says no more.
+if not sys.warnoptions:
+    warnings.simplefilter("ignore")
 
 from solver.commands.cli import main
 

@@ -23,19 +23,19 @@ import meshio
 import numpy as np
 
 from solver.case.expressions import Expression
-from solver.case.reader import Case, load_case, parse_case
-from solver.case.schemas import key_path
+from solver.case.model import Case
+from solver.case.reader import load_case, parse_case
 from solver.mesh import read_mesh
+from solver.mesh.size import check_memory
 from solver.mesh.tidy import tidy
-from solver.simulation.skips import EVERYTHING, NEEDED
+from solver.simulation.options import Options
 from solver.simulation.solution import Solution, ZoneResult
-from solver.system.errors import InputError
-from solver.system.memory import check_memory
+from solver.system.errors import InputError, key_path
 from solver.system.provenance import gather
-from solver.verification.checks import CheckResult
+from solver.verification.judge import judge
 from solver.verification.results import write_result
-from solver.verification.run import mesh_of, solve_checked, summary
-from solver.verification.verdict import of_solution
+from solver.verification.run import mesh_of, solve_checked
+from solver.verification.verdict import CheckResult, Verdict
 
 CaseLike: TypeAlias = Case | Mapping[str, Any] | str | os.PathLike[str]
 MeshLike: TypeAlias = meshio.Mesh | str | os.PathLike[str]
@@ -62,7 +62,7 @@ def solve_case(
     `meshio.Mesh` with named cell sets, is taken as it is in place of the case's own, and a
     mapping then needs no key `mesh`. `swapped` exchanges slave and master, `hexahedra` (pyramids
     or hexahedra) overrides how slave hexahedra are cut. `everything`: what the scene does not need
-    is done all the same (see `solver.simulation.skips`). With `memory_check` a solve that cannot
+    is done all the same (see `solver.simulation.options`). With `memory_check` a solve that cannot
     fit into memory is not begun. `log` is given lines on how it goes: `log=print`.
 
     A case of a file on its own mesh is held against its accepted values too.
@@ -73,13 +73,13 @@ def solve_case(
     """
     if hexahedra not in (None, *_CUTS):
         raise InputError("solve_case", "hexahedra", hexahedra, f"allowed: {', '.join(_CUTS)}")
-    given = _case(case, mesh)
+    given = _case(case, mesh).as_solved(swapped, hexahedra)
     made = mesh_of(given) if mesh is None else _mesh(mesh)
     if memory_check:
         check_memory(len(made.points), made.points.shape[1], given.path, log)
     accepted = mesh is None and given.path.is_file()
-    skips = EVERYTHING if everything else NEEDED
-    solution, checks = solve_checked(given, made, swapped, hexahedra, log, accepted, skips=skips)
+    options = Options.everything() if everything else Options()
+    solution, checks = solve_checked(given, made, options, accepted, log=log)
     file = given.mesh.get("path") if mesh is None else mesh
     provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
     return Solved(solution, checks, provenance)
@@ -99,24 +99,29 @@ class Solved:
     provenance: dict[str, str | int]
 
     @cached_property
+    def outcome(self) -> Verdict:
+        """The verdict as a typed record."""
+        return judge(self.solution, self.checks, None, self.provenance)
+
+    @property
     def record(self) -> dict[str, Any]:
         """All that the report would show, plain values as `check --json` prints them."""
-        return of_solution(self.solution, self.checks, None, self.provenance)
+        return self.outcome.plain()
 
     @property
     def verdict(self) -> str:
-        """One of passed, failed and unreliable, as in the report."""
-        return self.record["verdict"]
+        """One of passed, solved (without a reference), failed, unreliable, as in the report."""
+        return self.outcome.verdict
 
     @property
     def passed(self) -> bool:
-        """Whether all checks hold and rounding has left digits enough."""
-        return self.record["passed"]
+        """Whether all checks hold, one of them against a reference, with digits enough."""
+        return self.outcome.passed
 
     @property
     def reason(self) -> str:
         """Why it did not pass, in one line; empty where it did."""
-        return self.record["reason"]
+        return self.outcome.reason
 
     @property
     def points(self) -> np.ndarray:
@@ -155,7 +160,7 @@ class Solved:
         return np.concatenate([np.empty(0), *(zone.gap for zone in self.solution.zones)])
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the result file, as `solve -o` does: whole or not at all; name it `.vtkhdf`."""
+        """Write the result file, as `solve -o` does: whole or not at all, named `.vtkhdf`."""
         write_result(Path(path), self.solution, self.checks, self.provenance)
 
     def picture(self) -> str:
@@ -176,7 +181,7 @@ class Solved:
         return str(draw_pressure(self.solution, self.solution.job, over, zone))
 
     def __str__(self) -> str:
-        return summary(self.record)
+        return self.outcome.summary
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the picture, and the verdict in one line."""

@@ -80,8 +80,6 @@ def plane(folder: Path, text: str = PLANE) -> Solution:
     seen = {"zone": "interface", "macro_element": 0, "gap": 0.0, "status": 1, "coverage": 1.0}
     return Solution(
         case=_case(folder, text),
-        swapped=False,
-        hexahedra=None,
         mesh=meshio.Mesh(
             x,
             [("quad", np.array(cells))],
@@ -146,9 +144,7 @@ def solid(folder: Path) -> Solution:
     )
     wedges = np.array([(8, 9, 10, 12, 13, 14), (8, 10, 11, 12, 14, 15)])
     return Solution(
-        case=_case(folder, SOLID),
-        swapped=True,
-        hexahedra="hexahedra",
+        case=_case(folder, SOLID).as_solved(True, "hexahedra"),
         mesh=meshio.Mesh(
             x,
             [("hexahedron", np.arange(8)[None]), ("wedge", wedges)],

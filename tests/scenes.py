@@ -5,7 +5,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME, cell_type
 

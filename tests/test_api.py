@@ -144,8 +144,8 @@ def test_a_saved_result_is_that_of_the_command_line(tmp_path):
     solved = patch()
     solved.save(tmp_path / "r.vtkhdf")
     again = check(tmp_path / "r.vtkhdf")
-    assert again["checks"] == solved.record["checks"]
-    assert again["verdict"] == "passed"
+    assert again.checks == solved.checks
+    assert again.verdict == "passed"
 
 
 def test_figures_are_svg_and_a_notebook_shows_one():

@@ -10,9 +10,10 @@ from types import SimpleNamespace
 import pytest
 
 from solver.commands.cli import main
+from solver.mesh.size import Size, check_memory
 from solver.system.errors import MachineError
 from solver.system.files import replacing
-from solver.system.memory import available, check_memory, needed, peak_mb
+from solver.system.memory import available, peak_mb
 from tests.machine import obeying_permissions, small_disk
 from tests.workflow.projects import CASE, ROOT, without_times
 
@@ -103,10 +104,10 @@ def test_peak_memory_is_told_in_megabytes():
 
 def test_memory_needed_is_below_what_was_measured():
     for unknowns, measured in ((516_360, 1.30), (1_044_690, 2.47)):
-        need = needed(unknowns // 3, 3)
+        need = Size(unknowns // 3, 3).memory
         assert need.least < measured * GIGABYTE
         assert need.usual == pytest.approx(measured * GIGABYTE, rel=0.1)
-    of_tetra4 = needed(1_087_281 // 3, 3)  # the smallest
+    of_tetra4 = Size(1_087_281 // 3, 3).memory  # the smallest
     assert of_tetra4.least < 0.9 * 2.20 * GIGABYTE
 
 

@@ -10,7 +10,8 @@ from importlib import import_module
 from inspect import getdoc
 from typing import Any
 
-from solver.case.reader import Case, Material, Zone
+from solver.case.material import Material
+from solver.case.model import Case, Zone
 from solver.case.schemas import CASE_SCHEMA
 from solver.case.solutions import SOLUTIONS
 from solver.report.html import MEANING

@@ -111,7 +111,7 @@ class Expression:
                 return [left, right]
             case ast.Call(func=ast.Name(id="sqrt" | "sin" | "cos"), args=[argument], keywords=[]):
                 return [argument]
-        shown = ast.unparse(node)
+        shown = ast.get_source_segment(self.text.strip(), node) or ""
         shown = f"`{shown}` is not allowed in it; " if len(shown) < 40 else ""
         raise self._error(f"{shown}it must be {ALLOWED}")
 

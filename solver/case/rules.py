@@ -1,15 +1,102 @@
-"""Whether vectors, directions and expressions of a case fit the dimension of its mesh."""
-
-from __future__ import annotations
+"""The rules of a case file that go beyond single keys; none of them needs the mesh itself."""
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from solver.case.expressions import Expression
-from solver.system.errors import InputError
+from solver.case.model import SWAPPED, Case, Scalar
+from solver.system.errors import InputError, hint
 
-if TYPE_CHECKING:
-    from solver.case.reader import Case, Scalar
+
+def check_rules(case: Case) -> None:
+    """Raise `InputError` for what neither the types of the keys nor the mesh decide."""
+    if case.name.endswith(SWAPPED):
+        allowed = f"must not end in {SWAPPED}: that is the name of the other direction"
+        raise InputError(case.path, "name", case.name, allowed)
+    _check_names(case)
+    for before, after in zip(case.steps, case.steps[1:], strict=False):
+        if after <= before:
+            allowed = "load factors must increase"
+            raise InputError(case.path, "steps", list(case.steps), allowed)
+    _check_listed_twice(case)
+    _check_errors(case)
+    _check_reference(case)
+    if case.plane:
+        check_dimension(case, 2)
+
+
+def _check_names(case: Case) -> None:
+    names: set[str] = set()
+    for i, zone in enumerate(case.zones):
+        if zone.slave == zone.master:
+            allowed = "the slave is its own master: they must be two groups"
+            raise InputError(case.path, f"contact[{i}].master", zone.master, allowed)
+        if zone.name in names:
+            allowed = "the name is given to two zones; each needs its own"
+            raise InputError(case.path, f"contact[{i}].name", zone.name, allowed)
+        if zone.points and zone.treatment != "quadrature":
+            allowed = "only the treatment quadrature has points"
+            raise InputError(case.path, f"contact[{i}].points", zone.points, allowed)
+        if zone.normal == "nodal" and zone.treatment in ("quadrature", "node_to_segment"):
+            allowed = f"the treatment {zone.treatment} has normals of its own; allowed: element"
+            raise InputError(case.path, f"contact[{i}].normal", zone.normal, allowed)
+        names.add(zone.name)
+    for i, item in enumerate(case.observe):
+        if item.zone not in names:
+            allowed = f"no such zone; {hint(item.zone, names)}"
+            raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
+
+
+def _check_errors(case: Case) -> None:
+    """An error against an exact solution can have a tolerance only where there is such a one."""
+    if not case.tolerance:
+        return
+    from solver.case.solutions import ERRORS
+
+    for error in case.tolerance.keys() & ERRORS.keys():
+        if case.solution is None:
+            allowed = "needs an exact solution: reference.solution names none"
+        elif ERRORS[error] not in case.solution.quantities:
+            allowed = f"{case.solution.name} has no {ERRORS[error]}"
+        else:
+            continue
+        raise InputError(case.path, f"tolerance.{error}", case.tolerance[error], allowed)
+
+
+def _check_reference(case: Case) -> None:
+    """Every value of the reference feeds a check; no tolerance admits any result at all."""
+    from solver.case.solutions import ERRORS
+
+    for check, tolerance in case.tolerance.items():
+        if tolerance > 1:
+            allowed = "must be at most 1: then the error is as large as the reference"
+            raise InputError(case.path, f"tolerance.{check}", tolerance, allowed)
+    for key in case.reference.keys() & {"contact_pressure", "gap"} if not case.zones else ():
+        allowed = "cannot be compared: the case has no contact"
+        raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+    if case.reference_kind and not case.reference and case.solution is None:
+        allowed = "gives no value to compare with, such as contact_pressure"
+        raise InputError(case.path, "reference.kind", case.reference_kind, allowed)
+    if case.solution and not case.reference and not case.tolerance.keys() & ERRORS.keys():
+        known = [name for name, what in ERRORS.items() if what in case.solution.quantities]
+        allowed = "nothing is compared with it; give a value (`contact_pressure: solution`) or a "
+        allowed += f"tolerance for one of {', '.join(known)}"
+        raise InputError(case.path, "reference.solution", case.solution.name, allowed)
+
+
+def _check_listed_twice(case: Case) -> None:
+    """A direction of a group is fixed once, a kind of load on a group is given once."""
+    fixed = [
+        (f"supports[{i}]", s.group, axis) for i, s in enumerate(case.supports) for axis in s.fix
+    ]
+    loaded = [(f"loads[{i}]", load.group, load.kind) for i, load in enumerate(case.loads)]
+    for given in (fixed, loaded):
+        seen: set[tuple[str, str]] = set()
+        for key, group, what in given:
+            if (group, what) in seen:
+                allowed = f"the group is listed twice with {what}"
+                raise InputError(case.path, f"{key}.group", group, allowed)
+            seen.add((group, what))
 
 
 def check_dimension(case: Case, dim: int) -> None:

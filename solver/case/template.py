@@ -75,7 +75,7 @@ reference:
   contact_pressure: 25.0                 # >= 0 in compression
   normal_stress: -25.0                   # > 0 in tension
   gap: 0.0                               # >= 0 open
-  displacement: [0.00375 * x, 0.00375 * y, -0.0125 * (z + 50)]
+  displacement: solution                 # or expressions: [0.00375 * x, …]
 
 tolerance: 1.0e-3                        # or by check: {{multiplier: 1.0e-6, element_gap: 1.0e-8}}
 """

@@ -14,8 +14,7 @@ from typing import Any
 
 import yaml
 
-from solver.case.schemas import key_path, validate
-from solver.system.errors import InputError
+from solver.system.errors import InputError, key_path
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 20
@@ -67,12 +66,9 @@ def parse_mapping(text: str, where: Path) -> dict[str, Any]:
     return content
 
 
-def read_mapping(path: Path, schema: Path | None = None) -> dict[str, Any]:
-    """The mapping in a file; `InputError` says what is refused, also by the schema where given."""
-    content = parse_mapping(read_text(path), path)
-    if schema:
-        validate(content, schema, path)
-    return content
+def read_mapping(path: Path) -> dict[str, Any]:
+    """The mapping in a file; `InputError` says what is refused."""
+    return parse_mapping(read_text(path), path)
 
 
 def _place(error: yaml.YAMLError) -> tuple[str, None, str]:

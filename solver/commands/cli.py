@@ -13,14 +13,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from solver.commands import benchmark, jobs, scaling, stability, study
+from solver.commands import jobs, studies
 from solver.commands.options import add_command, add_threads, limit_threads
 from solver.system.errors import InputError, SolveError, of_machine
 
 if TYPE_CHECKING:
     from solver.verification.run import Job
+    from solver.verification.verdict import CheckResult
 
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
@@ -117,17 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
-    command = add_command(commands, "orders", _orders, "write the page of orders of convergence")
-    command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
-    command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the levels")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-
-    command = commands.add_parser("study", help="error against run time: points and their page")
-    study.add_commands(command)
-    command = commands.add_parser("scaling", help="growth with size: points and their page")
-    scaling.add_commands(command)
-    benchmark.add_commands(commands)
-    stability.add_commands(commands)
+    studies.add_commands(commands)
     jobs.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "say whether case files are valid")
@@ -183,7 +174,7 @@ def _solve(options: argparse.Namespace) -> int:
     job = replace(_job(options), memory_check=checked, everything=everything)
     with telling(options.verbose, options.quiet):
         verdict = solve(job, options.output, options.verdict, log)
-    return PASSED if verdict["passed"] else FAILED
+    return PASSED if verdict.sound else FAILED
 
 
 def _silent(line: str) -> None:
@@ -191,35 +182,35 @@ def _silent(line: str) -> None:
 
 
 def _crashed(options: argparse.Namespace) -> int:
-    from solver.verification.run import record_crash, record_refusal, summary
+    from solver.verification.run import record_crash, record_refusal
 
     if options.refusal:
-        print(summary(record_refusal(options.case, options.verdict, options.refusal)))
+        print(record_refusal(options.case, options.verdict, options.refusal).summary)
         return PASSED
-    print(summary(record_crash(_job(options), options.verdict, options.log, options.status)))
+    print(record_crash(_job(options), options.verdict, options.log, options.status).summary)
     return PASSED
 
 
 def _check(options: argparse.Namespace) -> int:
-    from solver.verification.run import check, summary
+    from solver.verification.run import check
     from solver.verification.verdict import to_json
 
     verdicts = [check(result) for result in options.results]
     if options.json:
-        print(to_json(verdicts))
+        print(to_json([verdict.plain() for verdict in verdicts]))
     else:
         for verdict in verdicts:
-            print(summary(verdict))
-            for row in verdict["checks"]:
+            print(verdict.summary)
+            for row in verdict.checks:
                 print("  " + _row(row))
-    return PASSED if all(verdict["passed"] for verdict in verdicts) else FAILED
+    return PASSED if all(verdict.sound for verdict in verdicts) else FAILED
 
 
-def _row(check: dict[str, Any]) -> str:
-    name = f"{check['name']} {check['zone'] or ''}"
-    extremes = f"{check['minimum']:.10g} … {check['maximum']:.10g}"
-    error = f"error {check['error']:.1e} (allowed {check['tolerance']:.0e})"
-    return f"{'ok' if check['passed'] else 'FAILED':<7}{name:<40}{extremes:<36}{error}"
+def _row(check: "CheckResult") -> str:
+    extremes = f"{check.minimum:.10g} … {check.maximum:.10g}"
+    error = f"error {check.error:.1e} (allowed {check.tolerance:.0e})"
+    word = "ok" if check.passed else "FAILED"
+    return f"{word:<7}{check.name + ' ' + (check.zone or ''):<40}{extremes:<36}{error}"
 
 
 def _verdicts(options: argparse.Namespace) -> list[Path]:
@@ -256,14 +247,6 @@ def _compare(options: argparse.Namespace) -> int:
     from solver.report.compare import compare
 
     return FAILED if compare(options.base, options.this, options.output).worse else PASSED
-
-
-def _orders(options: argparse.Namespace) -> int:
-    from solver.studies.orders.description import read_ladders
-    from solver.studies.orders.page import write_orders
-
-    write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
-    return PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:
@@ -303,11 +286,15 @@ def _new(options: argparse.Namespace) -> int:
 
 def _accept(options: argparse.Namespace) -> int:
     from solver.verification.checks import run_checks
-    from solver.verification.regression import accept, accepted_values
+    from solver.verification.regression import accept, accepted_values, regression_file
     from solver.verification.results import read_result
 
     for path in options.results:
         solution = read_result(path).solution
+        case, target = solution.case.path, regression_file(solution).resolve()
+        if not (case.is_file() and target.is_relative_to(Path.cwd())):
+            allowed = "must be a file below the current folder, where its accepted values lie"
+            raise InputError(path, "case", str(case), allowed)
         checks = run_checks(solution, accepted_values(solution))
         changes = accept(solution, checks)
         print(f"{solution.job}: {len(changes)} values accepted anew of {len(checks)}")

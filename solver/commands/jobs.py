@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from solver.case import job_name
-from solver.case.reader import Case, load_case
+from solver.case.model import Case
+from solver.case.reader import load_case
 from solver.commands.options import add_command
 from solver.mesh.size import Size, of_mesh
 from solver.system.errors import InputError

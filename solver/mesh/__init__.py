@@ -16,7 +16,6 @@ import meshio
 from meshio._mesh import topological_dimension
 
 from solver.mesh.catalogue import BY_NAME
-from solver.system.errors import InputError
 from solver.system.files import replacing
 
 # meshio knows the nodes of PENTA15 and PYRA13, but its table of dimensions has no line for them.
@@ -52,7 +51,6 @@ def write_mesh(mesh: meshio.Mesh, path: str | os.PathLike[str]) -> None:
     from solver.mesh.files import vtkhdf
 
     path = Path(path)
-    if path.suffix != ".vtkhdf":
-        raise InputError(path, "extension", path.suffix, "must be .vtkhdf")
+    vtkhdf.check_name(path)
     with replacing(path) as temporary:
         vtkhdf.write(mesh, temporary)

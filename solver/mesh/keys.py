@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
 from solver.system.errors import InputError
+
+LARGEST = 1e150
+"""The largest magnitude of a coordinate or length: the square of twice it is finite."""
+_MOST = 100_000  # pieces of an edge
 
 
 class Keys:
@@ -54,7 +57,7 @@ class Keys:
         return value
 
     def numbers(self, key: str, count: int, default: float | None = None) -> list[float]:
-        """Positive numbers; a single one stands for all `count` of them."""
+        """Positive numbers up to 1e150; a single one stands for all `count` of them."""
         value = self._get(key)
         value = default if value is None else value
         values: list[Any] = value if isinstance(value, list) else [value] * count
@@ -65,14 +68,15 @@ class Keys:
     def integers(
         self, key: str, count: int, default: list[int] | None = None, least: int = 1
     ) -> list[int]:
-        """Whole numbers from `least` on; a single one stands for all `count` of them."""
+        """Whole numbers from `least` to 100,000; a single one stands for all `count` of them."""
         value = self._get(key)
         value = default if value is None else value
         values: list[Any] = value if isinstance(value, list) else [value] * count
-        if len(values) != count or any(type(v) is not int or v < least for v in values):
-            raise self.refuse(
-                key, value, f"must be a whole number from {least} on{_or_list(count)}"
-            )
+        if len(values) != count or any(
+            type(v) is not int or not least <= v <= _MOST for v in values
+        ):
+            allowed = f"must be a whole number from {least} to {_MOST}{_or_list(count)}"
+            raise self.refuse(key, value, allowed)
         return values
 
     def number(self, key: str) -> float:
@@ -122,7 +126,9 @@ class Keys:
 
 
 def _finite(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """Whether a value is a number of a magnitude that can be squared."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and abs(value) <= LARGEST
 
 
 def _or_list(count: int) -> str:

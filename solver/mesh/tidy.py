@@ -4,6 +4,7 @@ import meshio
 import numpy as np
 
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME, CellType
+from solver.mesh.keys import LARGEST
 from solver.mesh.orient import right_side_out
 from solver.system.errors import InputError
 
@@ -20,7 +21,8 @@ def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
     `raw` has any blocks, groups in its cell and point sets, and, if its file numbers the cells,
     these numbers as cell data `number`. Cells written twice become one. Cells of lower dimension
     stay when their nodes belong to volume cells and they are faces or in a group; nodes of no cell
-    go. Point cells become node groups. Raises InputError naming the file `where`.
+    go. A group none of whose members stay is kept, empty. Point cells become node groups. Raises
+    InputError naming the file `where`.
     """
     table = _Table(raw, where)
     dim = max((cell.dim for cell in table.cells), default=0)
@@ -28,14 +30,15 @@ def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
         raise InputError(where, "cells", None, "the mesh has no cells of dimension 2 or 3")
     points = _flattened(raw.points, dim, where)
     blocks = [table.merged(cell) for cell in sorted(table.cells, key=lambda c: _order(c, dim))]
+    names = sorted({name for block in blocks for name in block.groups})
     blocks = _attached(blocks, dim, len(points), where)
     for block in blocks:
         if block.cell.dim == dim:
             block.turn(points, where)
-    return _compact(points, blocks, table.node_groups)
+    return _compact(points, blocks, names, table.node_groups)
 
 
-class _Block:
+class _CellBlock:
     """All cells of one type: connectivity, numbers in the file, and a mask per group."""
 
     def __init__(
@@ -43,9 +46,9 @@ class _Block:
     ):
         self.cell, self.nodes, self.number, self.groups = cell, nodes, number, groups
 
-    def taken(self, keep: np.ndarray) -> "_Block":
+    def taken(self, keep: np.ndarray) -> "_CellBlock":
         groups = {name: mask[keep] for name, mask in self.groups.items()}
-        return _Block(self.cell, self.nodes[keep], self.number[keep], groups)
+        return _CellBlock(self.cell, self.nodes[keep], self.number[keep], groups)
 
     def named(self) -> np.ndarray:
         return np.any([np.zeros(len(self.nodes), dtype=bool), *self.groups.values()], axis=0)
@@ -67,7 +70,7 @@ class _Table:
     """The file's blocks sorted by cell type, its groups as masks over each block."""
 
     def __init__(self, raw: meshio.Mesh, where: object):
-        self.blocks: list[_Block] = []
+        self.blocks: list[_CellBlock] = []
         for name in (*raw.cell_sets, *raw.point_sets):
             if not name or not name.isprintable():
                 raise InputError(where, "group", name, "must have a name of printable characters")
@@ -97,10 +100,10 @@ class _Table:
                     None,
                     "made of nodes that the file does not hold",
                 )
-            self.blocks.append(_Block(cell, nodes, number, masks))
+            self.blocks.append(_CellBlock(cell, nodes, number, masks))
         self.cells = {block.cell for block in self.blocks if len(block.nodes)}
 
-    def merged(self, cell: CellType) -> _Block:
+    def merged(self, cell: CellType) -> _CellBlock:
         parts = [block for block in self.blocks if block.cell is cell]
         nodes = np.concatenate([part.nodes for part in parts])
         key = np.sort(nodes, axis=1)
@@ -113,7 +116,7 @@ class _Table:
             groups[name] = np.isin(np.arange(len(first)), rank[np.concatenate(mask)])
         number = np.concatenate([part.number for part in parts])
         first = np.sort(first)
-        return _Block(cell, nodes[first], number[first], groups)
+        return _CellBlock(cell, nodes[first], number[first], groups)
 
 
 def _numbered(cell: CellType, numbers: np.ndarray) -> str:
@@ -137,8 +140,9 @@ def _flattened(points: np.ndarray, dim: int, where: object) -> np.ndarray:
         found = f"{points.dtype} {points.shape}"
         raise InputError(where, "node coordinates", found, "must be two or three numbers a node")
     points = points.astype(float)
-    if not np.isfinite(points).all():
-        raise InputError(where, "node coordinates", None, "must be finite numbers")
+    if not (np.abs(points) <= LARGEST).all():
+        allowed = f"must be finite numbers, at most {LARGEST:g}"
+        raise InputError(where, "node coordinates", None, allowed)
     if dim == 2 and points.shape[1] == 3:
         if np.ptp(points[:, 2]) > _PLANE * np.ptp(points, axis=0).max():
             raise InputError(where, "node coordinates", None, "a mesh of 2D cells must have z = 0")
@@ -146,7 +150,7 @@ def _flattened(points: np.ndarray, dim: int, where: object) -> np.ndarray:
     return np.ascontiguousarray(points)
 
 
-def _attached(blocks: list[_Block], dim: int, n_points: int, where: object) -> list[_Block]:
+def _attached(blocks: list[_CellBlock], dim: int, n_points: int, where: object) -> list[_CellBlock]:
     inside = np.zeros(n_points, dtype=bool)
     for block in blocks:
         if block.cell.dim == dim:
@@ -167,7 +171,10 @@ def _attached(blocks: list[_Block], dim: int, n_points: int, where: object) -> l
 
 
 def _compact(
-    points: np.ndarray, blocks: list[_Block], node_groups: dict[str, np.ndarray]
+    points: np.ndarray,
+    blocks: list[_CellBlock],
+    names: list[str],
+    node_groups: dict[str, np.ndarray],
 ) -> meshio.Mesh:
     present = np.zeros(len(points), dtype=bool)
     for block in blocks:
@@ -175,7 +182,6 @@ def _compact(
     used = np.flatnonzero(present)
     new = np.full(len(points), -1)
     new[used] = np.arange(len(used))
-    names = sorted({name for block in blocks for name in block.groups})
     sets = {
         name: [np.flatnonzero(block.groups.get(name, ())) for block in blocks] for name in names
     }
@@ -183,6 +189,6 @@ def _compact(
     return meshio.Mesh(
         points[used],
         [(block.cell.meshio, new[block.nodes]) for block in blocks],
-        cell_sets={name: ids for name, ids in sets.items() if any(len(i) for i in ids)},
-        point_sets={n: ids[ids >= 0] for n, ids in node_sets.items() if (ids >= 0).any()},
+        cell_sets=sets,
+        point_sets={n: ids[ids >= 0] for n, ids in node_sets.items()},
     )

@@ -5,18 +5,19 @@ round-off does is no change. Times are shown and never judged.
 """
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from solver.case.schemas import SUMMARY_SCHEMA, validate
 from solver.report import formats, stages
-from solver.report.rows import WORDS, Row, natural
+from solver.report.rows import Row, natural
 from solver.report.tables import outcome
 from solver.system.errors import InputError
 from solver.verification.checks import ROUND_OFF
+from solver.verification.verdict import WORDS, CheckResult, Verdict, typed
 
 SUMMARY = "summary.json"
 # A solve whose time changed is worth a line from this ratio on, and from these seconds.
@@ -45,7 +46,7 @@ class Batch:
     @property
     def origin(self) -> str:
         """Revision and machine, as far as the solves tell."""
-        found = [row.provenance or {} for row in self.rows.values()]
+        found = [row.verdict.provenance for row in self.rows.values()]
         values = [sorted({str(o[k]) for o in found if o.get(k)}) for k in ("revision", "cpu")]
         return "; ".join(", ".join(each) for each in values if each)
 
@@ -108,7 +109,7 @@ class Pair:
         """
         if self.this is None:
             return 0
-        before = self.base.word if self.base else "passed"
+        before = self.base.word if self.base else self.this.word if self.this.sound else "passed"
         return WORDS.index(before) - WORDS.index(self.this.word)
 
     @property
@@ -134,7 +135,7 @@ class Comparison:
     @property
     def worse(self) -> list[Pair]:
         """Verdicts that got worse, worst first; new solves that did not pass are among them."""
-        return sorted((p for p in self.pairs if p.step > 0), key=lambda pair: -pair.step)
+        return sorted((p for p in self.pairs if p.step > 0), key=lambda p: WORDS.index(p.row.word))
 
     @property
     def better(self) -> list[Pair]:
@@ -144,7 +145,7 @@ class Comparison:
     @property
     def still(self) -> list[Pair]:
         """Solves that did not pass before, and do no better and no worse."""
-        return [p for p in self.pairs if p.this and p.step == 0 and p.row.word != "passed"]
+        return [p for p in self.pairs if p.this and p.step == 0 and not p.row.sound]
 
     @property
     def new(self) -> list[Pair]:
@@ -203,36 +204,31 @@ def read_batch(path: Path) -> Batch:
         allowed = f"must be a folder of results with a report, or its {SUMMARY}"
         raise InputError(path, "batch", None, allowed)
     try:
-        verdicts = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(file, "file", None, f"must be JSON ({error})") from None
-    validate(verdicts, SUMMARY_SCHEMA, file)
-    rows = [Row(verdict, file.parent.parent / verdict["family"]) for verdict in verdicts]
+    verdicts = typed(list[Verdict], content, file)
+    rows = [Row(verdict, file.parent.parent / verdict.family) for verdict in verdicts]
     return Batch(file, {(row.group, row.name): row for row in rows})
 
 
 def _times(row: Row) -> dict[str, float | None]:
-    return {**row.stages, **dict(zip(_SUMS, (row.total, row.cpu_seconds), strict=True))}
+    return {**row.stages, **dict(zip(_SUMS, (row.total, row.verdict.cpu_seconds), strict=True))}
 
 
 def _changes(base: Row, this: Row) -> Iterator[Change]:
     solve = this.anchor
     for key, name in _COUNTS.items():
-        before, now = base.verdict.get(key), this.verdict.get(key)
+        before, now = getattr(base.verdict, key), getattr(this.verdict, key)
         if before != now:
             yield Change(solve, name, _text(before), _text(now), None)
-    yield from _checks(solve, _by_title(base), _by_title(this))
+    yield from _checks(solve, *({c.title: c for c in row.verdict.checks} for row in (base, this)))
     for name in {**base.norms, **this.norms}:
         yield from _number(solve, f"error {name}", base.norms.get(name), this.norms.get(name))
 
 
-def _by_title(row: Row) -> dict[str, Mapping[str, Any]]:
-    checks = row.verdict.get("checks", ())
-    return {f"{c['name']} {c.get('zone') or ''}".strip(): c for c in checks}
-
-
 def _checks(
-    solve: str, base: Mapping[str, Mapping[str, Any]], this: Mapping[str, Mapping[str, Any]]
+    solve: str, base: Mapping[str, CheckResult], this: Mapping[str, CheckResult]
 ) -> Iterator[Change]:
     for title in {**base, **this}:
         if title not in base or title not in this:
@@ -240,19 +236,18 @@ def _checks(
             yield Change(solve, title, before, now, None)
             continue
         old, new = base[title], this[title]
-        scale = old.get("scale") or 1.0
-        for key in ("minimum", "maximum"):
-            yield from _number(solve, f"{title}: {key}", old.get(key), new.get(key), scale)
-        for key in ("error", "tolerance"):
-            yield from _number(solve, f"{title}: {key}", old.get(key), new.get(key))
+        scale = 1.0 if math.isnan(old.scale) else old.scale or 1.0
+        for key, by in (("minimum", scale), ("maximum", scale), ("error", 1.0), ("tolerance", 1.0)):
+            yield from _number(solve, f"{title}: {key}", getattr(old, key), getattr(new, key), by)
 
 
 def _number(
     solve: str, quantity: str, base: float | None, this: float | None, scale: float = 1.0
 ) -> Iterator[Change]:
     """The change of a number, if it is one."""
-    if base is None or this is None:
-        if base is not this:
+    known = [value is not None and not math.isnan(value) for value in (base, this)]
+    if base is None or this is None or not all(known):
+        if any(known):
             yield Change(solve, quantity, _text(base), _text(this), None)
     elif abs(this - base) > ROUND_OFF * abs(scale):
         size = abs((this - base) / scale)

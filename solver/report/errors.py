@@ -1,7 +1,6 @@
 """Error against run time of all solves of a family, log–log, with what to compare them with."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 from urllib.parse import quote
 
 import numpy as np
@@ -9,6 +8,7 @@ from markupsafe import Markup
 
 from solver.report import formats, stages
 from solver.report.axes import EPSILON, Scale, draw_axes, draw_floor, draw_level, round_off
+from solver.report.families import CodeError
 from solver.report.rows import Row
 from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
 
@@ -29,10 +29,10 @@ def floor(rows: Sequence[Row]) -> tuple[float, float]:
 
 
 def _unknowns(rows: Sequence[Row]) -> int:
-    return max((row.dofs or 1 for row in rows), default=1)
+    return max((row.verdict.dofs or 1 for row in rows), default=1)
 
 
-def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]) -> Markup:
+def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Markup:
     """Points of all solves with lines for the tolerance, the reference code and round-off."""
     shown = drawn(rows)
     drawing = Drawing(WIDTH, HEIGHT, "Worst error against run time of every solve")
@@ -46,9 +46,8 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[Mapping[str, Any]]
     for tolerance in sorted({row.allowed for row in shown if row.allowed}):
         draw_level(drawing, x, y, tolerance, f"tolerance {100 * tolerance:.3g} %", RED)
     for entry in reference_code:
-        name = f"{entry.get('name', 'reference code')} {entry.get('version', '')}"
-        label = f"{name.strip()}: {formats.error(float(entry['error']))}"
-        draw_level(drawing, x, y, float(entry["error"]), label, MUTED, (6, 4))
+        label = f"{entry.name} {entry.version}: {formats.error(entry.error)}"
+        draw_level(drawing, x, y, entry.error, label, MUTED, (6, 4))
     at = np.column_stack([x(times), y(errors)])
     for row, point in zip(shown, at, strict=True):
         _mark(drawing, row, point)
@@ -69,9 +68,9 @@ def _mark(drawing: Drawing, row: Row, point: np.ndarray) -> None:
         f"{row.name}: {formats.error(error)} ({check}), {formats.seconds(row.total)}, {row.word}; "
         f"{stages.told(row.stages)}"
     )
-    color = COLORS.get(row.reference_kind, INK)
+    color = COLORS.get(row.verdict.reference_kind or "", INK)
     drawing.open_link(f"#{quote(row.anchor)}", tip)
-    if row.word == "passed":
+    if row.sound:
         drawing.circles(point[None], 4, fill=color, fill_opacity=0.55, stroke=color)
     else:
         drawing.crosses(point[None], 5, stroke=RED, stroke_width=2.2)
@@ -87,7 +86,7 @@ def _labels(drawing: Drawing, rows: Sequence[Row], at: np.ndarray) -> None:
         for left, base in ((x + 6, y + 4), (x - 6 - width, y + 4), (x - width / 2, y - 7)):
             box = (left, base - 8, left + width, base)
             if not any(_overlap(box, other) for other in boxes):
-                drawing.text(left, base, name, size=10, color=RED if row.why else INK)
+                drawing.text(left, base, name, size=10, color=INK if row.sound else RED)
                 boxes.append(box)
                 break
 

@@ -18,13 +18,13 @@ reference_code:                # another code's own errors, drawn beside those o
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from msgspec import Meta, structs
 
 from solver.case.expressions import Expression
-from solver.case.schemas import FAMILY_SCHEMA
+from solver.case.typed import Positive, Section, Text, Version, read_as
 from solver.case.yaml import read_mapping
 from solver.system.errors import InputError
 
@@ -42,53 +42,70 @@ _TAKEN = (
     "benchmark",
 )
 
+_Place = Annotated[str, Meta(min_length=1, description="an expression in x, y, z, r")]
 
-@dataclass(frozen=True)
-class Figure:
-    """A solve whose pressure is drawn along the interface, over `along` where that is given."""
 
-    job: str
-    along: Expression | None = None
+class Figure(Section, frozen=True):
+    """A solve whose pressure is drawn along the interface, over `along` where it is given."""
+
+    job: Annotated[str, Meta(description="the name of a solve, as in the report")]
+    along: Annotated[str, Meta(min_length=1, description="an expression in x, y, z, r")] | None = (
+        None
+    )
     caption: str = ""
 
+    @property
+    def expression(self) -> Expression | None:
+        """`along` as a function of position."""
+        return Expression(self.along) if self.along else None
 
-@dataclass(frozen=True)
-class Family:
-    """A family as its page shows it; `complaint` says what its file is refused for.
 
-    `reference_code` holds another code's own errors: name, version, error, remark.
-    """
+class CodeError(Section, frozen=True):
+    """Another code's own error."""
 
     name: str
-    title: str
+    version: Version
+    error: Positive
+    remark: str = ""
+
+
+class FamilyFile(Section, frozen=True):
+    """The keys of `family.yaml`."""
+
+    title: Text
     description: str = ""
-    order: float = math.inf
+    order: Annotated[int, Meta(description="a whole number: the place in the report")] | None = None
     problem: str = ""
     reference: str = ""
     figures: tuple[Figure, ...] = ()
-    reference_code: Sequence[Mapping[str, Any]] = ()
+    reference_code: tuple[CodeError, ...] = ()
+
+
+class Family(FamilyFile, frozen=True, kw_only=True):
+    """A family as its page shows it; `complaint` says why its file is refused."""
+
+    name: str
     complaint: str = ""
+
+    @property
+    def place(self) -> float:
+        """Its place in the report: after all others where none is given."""
+        return math.inf if self.order is None else self.order
 
 
 def read_family(file: Path) -> Family:
-    """The family of a file; under its folder's name alone where the file is missing or refused."""
+    """The family of a file; its folder's name alone where the file is missing or refused."""
     name = file.resolve().parent.name
     if not file.is_file():
-        return Family(name, name)
+        return Family(name, name=name)
     try:
-        content = read_mapping(file, FAMILY_SCHEMA)
-        content["figures"] = tuple(
-            _figure(file, i, item) for i, item in enumerate(content.get("figures", []))
-        )
+        content = read_as(FamilyFile, read_mapping(file), file)
+        for i, figure in enumerate(content.figures):
+            if figure.along:
+                Expression(figure.along, where=str(file), key=f"figures[{i}].along")
     except InputError as error:
-        return Family(name, name, complaint=str(error))
-    return Family(name, **content)
-
-
-def _figure(file: Path, index: int, item: Mapping[str, str]) -> Figure:
-    text, key = item.get("along"), f"figures[{index}].along"
-    along = Expression(text, where=str(file), key=key) if text else None
-    return Figure(item["job"], along, item.get("caption", ""))
+        return Family(name, name=name, complaint=str(error))
+    return Family(**structs.asdict(content), name=name)
 
 
 def page_name(family: str) -> str:

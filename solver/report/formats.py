@@ -1,60 +1,65 @@
 """Numbers and lists as the tables of the report show them."""
 
+import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from markupsafe import Markup, escape
 
+from solver.verification.verdict import Body
+
 NOTHING = "–"
-# Errors in the order in which they are shown, with what they are errors of.
-ERROR_LABELS = {
-    "displacement_l2": "displacement, L2",
-    "displacement_h1": "displacement, H1",
-    "stress_l2": "stress, L2",
-    "pressure_l2": "pressure, L2",
-    "pressure_max": "pressure, maximum",
-    "pressure_means": "pressure, macro-element means",
-    "pressure_oscillation": "pressure, second difference",
-    "half_width": "contact half-width",
-    "peak": "peak pressure",
-}
 
 
 def number(value: float | None) -> str:
     """Six significant digits, and no negative zero."""
-    return NOTHING if value is None else f"{value + 0.0:.6g}"
+    return NOTHING if value is None or math.isnan(value) else f"{value + 0.0:.6g}"
 
 
 def error(value: float | None) -> str:
     """Two digits and the power of ten; a zero is a zero."""
-    return NOTHING if value is None else "0" if value == 0 else f"{value:.1e}"
+    return NOTHING if value is None or math.isnan(value) else "0" if value == 0 else f"{value:.1e}"
 
 
-def extremes(pair: Sequence[float] | None, scale: float | None = None) -> str:
+def extremes(pair: Sequence[float | None] | None, scale: float | None = None) -> str:
     """Minimum … maximum; one number where both show alike; round-off of `scale` shown as such."""
     return " … ".join(both(pair, scale))
 
 
-def both(pair: Sequence[float] | None, scale: float | None = None) -> list[str]:
+def both(pair: Sequence[float | None] | None, scale: float | None = None) -> list[str]:
     """Minimum and maximum, or the one number where both show alike."""
     if not pair:
         return [NOTHING]
     return list(dict.fromkeys(_near_zero(value, scale) for value in pair))
 
 
-def _near_zero(value: float, scale: float | None) -> str:
-    return f"{value:.1e}" if scale and 0 < abs(value) < 1e-6 * scale else number(value)
+def _near_zero(value: float | None, scale: float | None) -> str:
+    near = value is not None and scale and 0 < abs(value) < 1e-6 * scale
+    return f"{value:.1e}" if near else number(value)
 
 
 def seconds(value: float | None) -> str:
     """Hundredths; more than a hundred seconds are whole."""
-    return NOTHING if value is None else f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
+    if value is None or math.isnan(value):
+        return NOTHING
+    return f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
 
 
-def types(body: Mapping[str, Any]) -> str:
+def duration(value: float) -> str:
+    """Two digits: `12 ms`, `0.12 s`, `1.2 s`; from ten seconds on whole ones."""
+    if value < 0.0995:
+        return f"{value * 1000:.2g} ms"
+    return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"
+
+
+def count(value: float) -> str:
+    """A whole number: `102,357`."""
+    return f"{value:,.0f}"
+
+
+def types(body: Body) -> str:
     """The cell types of a body."""
-    return ", ".join(body["cells"])
+    return ", ".join(body.cells)
 
 
 def against(count: int, reference: int | None) -> str:
@@ -64,10 +69,10 @@ def against(count: int, reference: int | None) -> str:
 
 def digits(value: float | None) -> str:
     """All the digits there are."""
-    return NOTHING if value is None else f"{value + 0.0:.15g}"
+    return NOTHING if value is None or math.isnan(value) else f"{value + 0.0:.15g}"
 
 
 def formula(text: str) -> Markup:
     """Text with what follows `_` set lower and what follows `^` higher: `σ_xx`, `r^(1/3)`."""
-    lowered = re.sub(r"_(\w+)", r"<sub>\1</sub>", str(escape(text)))
+    lowered = re.sub(r"_([^\W⁰¹²³⁴-⁹]+)", r"<sub>\1</sub>", str(escape(text)))
     return Markup(re.sub(r"\^(?:\(([^)]*)\)|(\w+))", r"<sup>\1\2</sup>", lowered))

@@ -1,13 +1,13 @@
 """What all pages of the report share: templates, style, and the words for kinds and checks."""
 
 from pathlib import Path
+from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from solver.report import PAGE, formats
 from solver.report.families import page_name, paragraphs
-from solver.report.formats import ERROR_LABELS
 
 # What each check looks at, in the order of the table of checks.
 MEANING = {
@@ -15,24 +15,31 @@ MEANING = {
     "nodal_stress": "normal stress at every node of both bodies",
     "surface_stress_slave": "normal stress on the slave surface",
     "surface_stress_master": "normal stress on the master surface",
-    "element_pressure": "pressure of every contact element",
+    "element_pressure": "pressure of every contact element, by the forces at the slave nodes",
     "element_gap": "average gap of every contact element, over the block size",
     "element_status": "contact status of every contact element: 1 in contact, 0 open",
     "coverage": "intersected area over the area of the macro-element",
     "covered_pressure": "coverage × pressure",
     "displacement": "displacement at every node",
     "stress_components": "the other components of stress at every node",
+    "integration_stress": "stress at the integration points, by the displacement alone",
     "balance": "contact forces and reactions against the loads: forces and moments",
+    "counts": "cells and contact faces of the bodies as meshed",
     "observation": "pressure of one contact element at every load step",
     "observation_gap": "gap of one contact element at every load step",
 }
 # Errors against exact solutions, which are checks where a case gives them a tolerance.
 NORMS = {
-    **ERROR_LABELS,
-    "stress_max": "stress, largest at nodes",
+    "displacement_l2": "displacement, L2",
+    "displacement_h1": "displacement, H1",
+    "stress_l2": "stress, L2",
+    "pressure_l2": "pressure, L2",
+    "pressure_max": "pressure, maximum",
+    "pressure_means": "pressure, macro-element means",
     "pressure_oscillation": "pressure, second difference",
     "half_width": "half-width of contact",
     "peak": "peak pressure",
+    "stress_max": "stress, largest at nodes",
 }
 MEANING |= {name: f"error of {what}, relative" for name, what in NORMS.items()}
 KINDS = {
@@ -43,10 +50,18 @@ KINDS = {
 }
 
 
-def environment() -> Environment:
-    """Where the templates of all pages come from, with the formats of numbers."""
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def render(template: Path, **values: Any) -> str:
+    """A page from a template that lies with its study; it may extend those of the report."""
+    return environment(template.parent).get_template(template.name).render(values)
+
+
+def environment(*folders: Path) -> Environment:
+    """Where templates come from (`folders`, then the report's own), with the formats of numbers."""
     templates = Environment(
-        loader=PackageLoader("solver.report"),
+        loader=FileSystemLoader([*folders, TEMPLATES]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -56,6 +71,8 @@ def environment() -> Environment:
         "error": formats.error,
         "number": formats.number,
         "seconds": formats.seconds,
+        "duration": formats.duration,
+        "count": formats.count,
     }
     templates.globals |= {
         "formats": formats,
@@ -75,4 +92,4 @@ def style() -> Markup:
 
 
 def _template(name: str) -> Markup:
-    return Markup((Path(__file__).parent / "templates" / name).read_text(encoding="utf-8"))
+    return Markup((TEMPLATES / name).read_text(encoding="utf-8"))

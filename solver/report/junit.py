@@ -13,13 +13,13 @@ from datetime import UTC, datetime
 from solver.report import formats
 from solver.report.rows import Row, counted, families
 
-_FAILURES = ("failed", "unreliable")
+_FAILURES, _ERRORS = ("failed", "unreliable"), ("crashed", "refused")
 # Of the provenance of a suite's solves, what tells one run from another.
 _PROPERTIES = ("revision", "cpu", "cores", "platform", "python", "numpy", "scipy", "scikit-fem")
 
 
 def to_junit(rows: Sequence[Row]) -> str:
-    """A suite for each family; refused and crashed solves are errors, the others failures."""
+    """A suite for each family; refused and crashed solves are errors, others not sound failures."""
     suites = ET.Element("testsuites")
     for number, (family, members) in enumerate(families(rows).items()):
         suites.append(_suite(number, family, members))
@@ -37,7 +37,7 @@ def _suite(number: int, family: str, rows: Sequence[Row]) -> ET.Element:
         "hostname": "localhost",  # a result does not tell
         "tests": str(len(rows)),
         "failures": str(sum(counts.get(word, 0) for word in _FAILURES)),
-        "errors": str(sum(n for word, n in counts.items() if word not in (*_FAILURES, "passed"))),
+        "errors": str(sum(counts.get(word, 0) for word in _ERRORS)),
         "time": f"{sum(row.total or 0 for row in rows):.3f}",
     }
     suite = ET.Element("testsuite", attributes)
@@ -53,7 +53,7 @@ def _suite(number: int, family: str, rows: Sequence[Row]) -> ET.Element:
 def _case(row: Row) -> ET.Element:
     attributes = {"classname": _xml(row.group), "name": _xml(row.name)}
     case = ET.Element("testcase", attributes | {"time": f"{row.total or 0:.3f}"})
-    if row.word != "passed":
+    if not row.sound:
         tag = "failure" if row.word in _FAILURES else "error"
         ending = ET.SubElement(case, tag, {"type": row.word, "message": _xml(row.why)})
         ending.text = _xml(_failed_checks(row))
@@ -62,9 +62,7 @@ def _case(row: Row) -> ET.Element:
 
 def _started(rows: Sequence[Row]) -> str:
     """When the first of the solves ended, in UTC as the schema wants it; now where none tells."""
-    times = [
-        str(row.provenance["time_utc"]) for row in rows if (row.provenance or {}).get("time_utc")
-    ]
+    times = [str(time) for row in rows if (time := row.verdict.provenance.get("time_utc"))]
     return min(times, default=datetime.now(UTC).isoformat())[:19]
 
 
@@ -73,18 +71,18 @@ def _properties(rows: Sequence[Row]) -> dict[str, str]:
     verdicts = ", ".join(f"{n} {word}" for word, n in counted(rows).items())
     found = {"verdicts": verdicts}
     for key in _PROPERTIES:
-        values = sorted({str(v) for row in rows if (v := (row.provenance or {}).get(key))})
+        values = sorted({str(v) for row in rows if (v := row.verdict.provenance.get(key))})
         if values:
             found[key] = ", ".join(values)
     return found
 
 
 def _failed_checks(row: Row) -> str:
-    failed = [check for check in row.checks or () if not check["passed"]]
     return "\n".join(
-        f"{check['name']}{' ' + check['zone'] if check['zone'] else ''}: error "
-        f"{formats.error(check['error'])}, tolerance {formats.error(check['tolerance'])}"
-        for check in failed
+        f"{check.title}: error {formats.error(check.error)}, tolerance "
+        f"{formats.error(check.tolerance)}"
+        for check in row.verdict.checks
+        if not check.passed
     )
 
 

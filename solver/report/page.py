@@ -6,26 +6,26 @@ from pathlib import Path
 from solver.report import stages
 from solver.report.html import MEANING, NORMS, environment
 from solver.report.pictures import picture
-from solver.report.plan import left_out, read_savings, with_savings
+from solver.report.plan import left_out
 from solver.report.rows import Row, counted
-from solver.report.sections import Section
+from solver.report.sections import FamilySection
 from solver.report.tables import outcome
 
 # Pages beside the report that other commands write.
 _PAGES = ("orders", "study", "stability", "gallery")
 
 
-def main_page(sections: Sequence[Section], folder: Path) -> str:
+def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
     rows = [row for section in sections for row in section.rows]
-    checks = {check["name"]: check for row in rows for check in row.checks or ()}
+    checks = {check.name: check for row in rows for check in row.verdict.checks}
     return (
         environment()
         .get_template("summary.html.jinja")
         .render(
             rows=rows,
             pages={name for name in _PAGES if (folder / f"{name}.html").is_file()},
-            bad=[row for row in rows if row.word != "passed"],
+            bad=[row for row in rows if not row.sound],
             outcome=outcome(rows),
             counts=counted(rows),
             families=sections,
@@ -38,9 +38,8 @@ def main_page(sections: Sequence[Section], folder: Path) -> str:
     )
 
 
-def family_page(section: Section, folder: Path) -> str:
+def family_page(section: FamilySection, folder: Path) -> str:
     """The page of a family: problem, reference, figures, its solves case by case."""
-    savings = read_savings(folder.parent)
     return (
         environment()
         .get_template("family.html.jinja")
@@ -50,8 +49,7 @@ def family_page(section: Section, folder: Path) -> str:
             norms=NORMS,
             stages=_stages(section.rows),
             picture=lambda row: picture(row, section.pictures),
-            left_out=left_out(section.rows, savings),
-            plan=lambda row: with_savings(row, savings),
+            left_out=left_out(section.rows),
             folder=folder,
         )
     )
@@ -59,7 +57,7 @@ def family_page(section: Section, folder: Path) -> str:
 
 def _facts(rows: Sequence[Row]) -> list[tuple[str, str]]:
     """When, where and with what the solves ran."""
-    origins = [row.provenance for row in rows if row.provenance]
+    origins = [row.verdict.provenance for row in rows if row.verdict.provenance]
     if not origins:
         return []
 
@@ -85,7 +83,7 @@ def _times(rows: Sequence[Row]) -> str:
 
 
 def _costs(row: Row) -> tuple[float | None, float | None]:
-    return row.total, row.cpu_seconds
+    return row.total, row.verdict.cpu_seconds
 
 
 def _order(name: str) -> tuple[int, str]:

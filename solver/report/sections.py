@@ -30,7 +30,7 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Section:
+class FamilySection:
     """One family with its rows, failures first; `pictures` is where drawings are kept."""
 
     family: Family
@@ -56,19 +56,18 @@ class Section:
     @cached_property
     def bad(self) -> list[Row]:
         """The rows that did not pass."""
-        return [row for row in self.rows if row.word != "passed"]
+        return [row for row in self.rows if not row.sound]
 
     @property
     def counted(self) -> bool:
         """Whether the numbers of cells or faces of a reference's meshes are known."""
         bodies = [body for row in self.rows for body in row.sides]
-        keys = ("reference_cells", "reference_faces")
-        return any(body.get(key) is not None for body in bodies for key in keys)
+        return any((body.reference_cells, body.reference_faces) != (None, None) for body in bodies)
 
     @property
     def cpu(self) -> float:
         """Processor time of all solves, seconds, without the start of Python."""
-        return sum(row.cpu_seconds or 0.0 for row in self.rows)
+        return sum(row.verdict.cpu_seconds or 0.0 for row in self.rows)
 
     @property
     def cost(self) -> str:
@@ -89,10 +88,10 @@ class Section:
         found: dict[tuple[str, str, str, float | None], list[Row]] = {}
         for row in self.rows:
             key = (
-                row.reference_kind or "",
+                row.verdict.reference_kind or "",
                 row.origin(KINDS),
-                row.reference_solution or "",
-                row.reference_uncertainty,
+                row.verdict.reference_solution or "",
+                row.verdict.reference_uncertainty,
             )
             found.setdefault(key, []).append(row)
         return found
@@ -107,7 +106,7 @@ class Section:
         """The pressure along the interface of the solves that the family names, or of some."""
         found = []
         for row, figure in self._figures():
-            drawing = profile(row, self.pictures, figure.along)
+            drawing = profile(row, self.pictures, figure.expression)
             found.append(Profile(row, drawing, figure.caption))
         return found
 
@@ -145,10 +144,11 @@ class Section:
     @property
     def colors(self) -> dict[str, str]:
         """The colours of the figure's marks by kind of reference."""
-        return {row.reference_kind: COLORS.get(row.reference_kind, INK) for row in drawn(self.rows)}
+        kinds = {row.verdict.reference_kind or "" for row in drawn(self.rows)}
+        return {kind: COLORS.get(kind, INK) for kind in kinds}
 
 
-def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[Section]:
+def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[FamilySection]:
     """The sections of all rows, in the order that families ask for, else in that of the rows.
 
     `files` holds the `family.yaml` of a family by its name.
@@ -156,7 +156,7 @@ def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> 
     found = []
     for name, members in families(rows).items():
         file = files.get(name)
-        family = read_family(file) if file else Family(name, name)
+        family = read_family(file) if file else Family(name, name=name)
         ladders = bool(file and file.with_name("orders.yaml").is_file())
-        found.append(Section(family, members, pictures, ladders))
-    return sorted(found, key=lambda section: section.family.order)
+        found.append(FamilySection(family, members, pictures, ladders))
+    return sorted(found, key=lambda section: section.family.place)

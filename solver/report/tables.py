@@ -2,13 +2,13 @@
 
 import csv
 import io
-import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from solver.report import formats
 from solver.report.rows import Row, counted, families
+from solver.verification.verdict import to_json as strict_json
 
 _HEAD = (
     "case",
@@ -33,13 +33,13 @@ _HEAD = (
 
 def to_json(rows: Sequence[Row]) -> str:
     """The verdicts as they are."""
-    return json.dumps([row.verdict for row in rows], indent=1, ensure_ascii=False) + "\n"
+    return strict_json([row.verdict.plain() for row in rows]) + "\n"
 
 
 def to_csv(rows: Sequence[Row]) -> str:
     """One line a solve, every digit kept; times by stage and errors by check in columns."""
     stages = list(dict.fromkeys(stage for row in rows for stage in row.stages))
-    checks = list(dict.fromkeys(check["name"] for row in rows for check in row.checks or ()))
+    checks = list(dict.fromkeys(check.name for row in rows for check in row.verdict.checks))
     records = [_record(row, stages, checks) for row in rows]
     return as_csv(records) or "case\r\n"
 
@@ -55,24 +55,24 @@ def as_csv(records: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _record(row: Row, stages: Sequence[str], checks: Sequence[str]) -> dict[str, Any]:
-    record = {
+    record: dict[str, Any] = {
         "family": row.group,
         "job": row.name,
-        "case": row.case,
-        "direction": row.direction,
-        "variant": row.variant,
+        "case": row.verdict.case,
+        "direction": row.verdict.direction,
+        "variant": row.verdict.variant,
         "verdict": row.word,
         "reason": row.why,
-        "reference_kind": row.reference_kind,
+        "reference_kind": row.verdict.reference_kind,
         "slave": row.slave,
     }
     for key in ("cells", "reference_cells", "faces", "reference_faces"):
         for role in ("slave", "master"):
-            bodies = [body for body in row.sides if body["role"] == role]
-            record[f"{role}_{key}"] = "; ".join(_plain(body.get(key)) for body in bodies)
-    record |= {"dofs": row.dofs, "macro_elements": row.macro_elements}
+            bodies = [body for body in row.sides if body.role == role]
+            record[f"{role}_{key}"] = "; ".join(_plain(getattr(body, key)) for body in bodies)
+    record |= {"dofs": row.verdict.dofs, "macro_elements": row.verdict.macro_elements}
     for key in ("pressure", "stress", "gap", "status", "coverage"):
-        pair = row.verdict.get(key) or (None, None)
+        pair = getattr(row.verdict, key) or (None, None)
         record |= {f"{key}_minimum": pair[0], f"{key}_maximum": pair[1]}
     worst = row.accuracy or (None, None)
     record |= {"worst_error": worst[0], "worst_check": worst[1]}
@@ -80,8 +80,11 @@ def _record(row: Row, stages: Sequence[str], checks: Sequence[str]) -> dict[str,
         record[f"error_{check}"] = next((e for e, _ in row.errors([check])), None)
     for stage in stages:
         record[f"seconds_{stage}"] = row.stages.get(stage)
-    record |= {"seconds_total": row.total, "cpu_seconds": row.cpu_seconds}
-    return record | {"peak_memory_mb": row.peak_memory_mb, "linear_solver": row.linear_solver}
+    record |= {"seconds_total": row.total, "cpu_seconds": row.verdict.cpu_seconds}
+    return record | {
+        "peak_memory_mb": row.verdict.peak_memory_mb,
+        "linear_solver": row.verdict.linear_solver,
+    }
 
 
 def _plain(value: Any) -> str:
@@ -93,7 +96,7 @@ def _plain(value: Any) -> str:
 def to_markdown(rows: Sequence[Row]) -> str:
     """The outcome, the failures with their reasons, and a table for each family."""
     parts = [f"# Verification of contact solves\n\n{outcome(rows)}\n"]
-    bad = [row for row in rows if row.word != "passed"]
+    bad = [row for row in rows if not row.sound]
     if bad:
         parts.append("\n## Not passed\n")
         parts += [f"- **{md(row.name)}** {row.word}: {md(row.why)}" for row in bad]
@@ -111,21 +114,20 @@ def _cells(row: Row) -> list[str]:
     return [
         row.name,
         row.word,
-        row.reference_kind or formats.NOTHING,
+        row.verdict.reference_kind or formats.NOTHING,
         " on ".join(formats.types(body) for body in sides) or formats.NOTHING,
         row.slave or formats.NOTHING,
         ", ".join(
-            formats.against(sum(body["cells"].values()), body.get("reference_cells"))
-            for body in sides
+            formats.against(sum(body.cells.values()), body.reference_cells) for body in sides
         ),
-        ", ".join(formats.against(body["faces"], body.get("reference_faces")) for body in sides),
-        str(row.dofs or formats.NOTHING),
-        str(row.macro_elements or formats.NOTHING),
-        formats.extremes(row.pressure),
-        formats.extremes(row.stress),
-        formats.extremes(row.gap, row.length),
-        formats.extremes(row.status),
-        formats.extremes(row.coverage),
+        ", ".join(formats.against(body.faces, body.reference_faces) for body in sides),
+        str(row.verdict.dofs or formats.NOTHING),
+        str(row.verdict.macro_elements or formats.NOTHING),
+        formats.extremes(row.verdict.pressure),
+        formats.extremes(row.verdict.stress),
+        formats.extremes(row.verdict.gap, row.verdict.length),
+        formats.extremes(row.verdict.status),
+        formats.extremes(row.verdict.coverage),
         f"{formats.error(worst[0])} ({worst[1]})" if worst else formats.NOTHING,
         formats.seconds(row.total),
         row.why,
@@ -140,7 +142,7 @@ def md(text: str) -> str:
 
 def to_failures(rows: Sequence[Row]) -> str:
     """One line for each solve that did not pass: name, verdict, reason; empty if all did."""
-    return "".join(f"{row.name}: {row.word}: {row.why}\n" for row in rows if row.word != "passed")
+    return "".join(f"{row.name}: {row.word}: {row.why}\n" for row in rows if not row.sound)
 
 
 def outcome(rows: Sequence[Row]) -> str:

@@ -1,28 +1,48 @@
-"""What a solve can know of its own accuracy: how many digits rounding has left in the pressure.
+"""What a solve can know of its own accuracy: digits lost to rounding, strains that are not small.
 
-Each term is a size at which something is rounded, times the unit of rounding, turned into a
-pressure by what it acts on; it is relative to the largest pressure:
+Each term of `Accuracy` is a size at which something is rounded, times the unit of rounding, turned
+into a pressure by what it acts on; it is relative to the largest pressure:
 
     forces       terms of opposite sign cancel where internal forces are summed (stretched cells,
                  nearly incompressible material), and what the solve leaves unbalanced
     gap          a gap is known to the rounding of the displacements and coordinates it is the
                  difference of; the stiffness behind it makes a pressure of that
-    coordinates  stored to the rounding of their distance from the origin, they tilt the faces
+    coordinates  stored to the rounding of their distance from the origin, they change strains and
+                 tilt faces; bodies that slide along tilted faces, or move along supports on tilted
+                 faces, are pushed apart
     stress       as forces, for the stress in the bodies
     slender      the errors of forces seen on the small faces of slender cells, as a stress there
+    sums         a stress is a sum over the nodes of a cell, of gradients that are such sums
 
 The largest one counts.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
+from solver.case.model import Case
+from solver.mechanics.fem import shape_functions
+from solver.mechanics.fem.elasticity import Block, steepness
+from solver.mechanics.fem.faces import FaceBlock, area_vectors
+from solver.mechanics.mortar.facets import FLAT
+from solver.mechanics.mortar.status import Trial
+from solver.simulation.iterate import ContactIterate
+from solver.simulation.scene import Scene
+
 EPSILON = float(np.finfo(float).eps)
 EPSILON_EXTENDED = float(np.finfo(np.longdouble).eps)
 LEAST_DIGITS = 4
 """A result with fewer digits is unreliable."""
+NOTED_STRAIN, SMALL_STRAIN = 1e-2, 1e-1
+"""A strain or rotation above the first is reported, one above the second is unreliable."""
+
+# Pressures and gaps below this share of their scales are round-off and change no status; gaps below
+# the second share of the displacements they are the difference of, or below so many roundings of
+# the coordinates, are so too; and pressures below so many times their estimated error.
+_NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
 
 _REASONS = {
     "forces": "the terms that add up to its forces are far larger than they",
@@ -30,6 +50,7 @@ _REASONS = {
     "coordinates": "the coordinates are rounded too far from the origin for cells so small",
     "stress": "the strains are lost in the rounding of the displacements",
     "slender": "on the small faces of slender cells the rounding of forces is a large stress",
+    "sums": "its cells have too many nodes",
 }
 
 
@@ -61,6 +82,19 @@ class Accuracy:
         )
 
 
+def beyond_small_strain(case: Case, strain: float, rotation: float) -> str:
+    """Why a result with these largest strain and rotation is unreliable; empty where it is not.
+
+    A case that names an exact solution asks for one of small strain, whatever the strain.
+    """
+    if case.solution is not None or not max(strain, rotation) > SMALL_STRAIN:
+        return ""
+    return (
+        f"strain {strain:.2g} with rotation {rotation:.2g} is beyond small strain: above "
+        f"{SMALL_STRAIN:g} linear theory does not describe the bodies"
+    )
+
+
 def pressure_of_forces(gaps: sparse.csr_matrix, noise: np.ndarray) -> float:
     """The largest pressure that nodal forces of the sizes `noise` (n_dofs,) stand for.
 
@@ -74,6 +108,172 @@ def pressure_of_gaps(gaps: sparse.csr_matrix, noise: np.ndarray, stiffness: np.n
     """The largest pressure that errors `noise` (m,) of ∫ gap bring up, by `stiffness` (n_dofs,)."""
     row, column, size = _largest(gaps)
     return float((noise[row] * stiffness[column] / size**2).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """What rounded coordinates do to a scene's mesh.
+
+    `strain`: the largest error of a strain, over the strain. `tilt` (n,): by what angle the contact
+    faces around each node may be turned. `turned` (n,): the same for the directions of supports,
+    zero where they are those of the axes. `steep`: `steepness` of the scene's blocks.
+    """
+
+    strain: float
+    tilt: np.ndarray
+    turned: np.ndarray
+    steep: list[np.ndarray]
+
+    def stress(self, blocks: Sequence[Block], displacement: np.ndarray) -> float:
+        """The largest stress as a displacement (n, dim) runs along supports that are tilted."""
+        if not self.turned.any():
+            return 0.0
+        move = self.turned * np.linalg.norm(displacement, axis=1)
+        found = [
+            (block.lame + 2 * block.shear) * (steep * move[block.cells]).sum(axis=1)
+            for block, steep in zip(blocks, self.steep, strict=True)
+        ]
+        return float(np.concatenate(found).max())
+
+    def gap(self, gaps: sparse.csr_matrix, displacement: np.ndarray) -> np.ndarray:
+        """The largest gap (m,) as a displacement (n, dim) slides along faces that are tilted."""
+        node, start = gaps.indices // displacement.shape[1], gaps.indptr[:-1]
+        first = np.repeat(displacement[node[start]], np.diff(gaps.indptr), axis=0)
+        slide = np.maximum.reduceat(np.linalg.norm(displacement[node] - first, axis=1), start)
+        return np.asarray(slide * np.maximum.reduceat(self.tilt[node], start))
+
+
+def roughness(scene: Scene) -> Roughness:
+    """How rough rounded coordinates make the mesh of a scene."""
+    points, dim = scene.points, scene.points.shape[1]
+    steep = steepness(points, scene.blocks)
+    around, tilt, turned = np.zeros((3, len(points)))
+    for block, slope in zip(scene.blocks, steep, strict=True):
+        np.maximum.at(around, block.cells, slope.sum(axis=1)[:, None])
+    around *= scene.rounding
+    for zone in scene.zones:
+        for faces in (*zone.slave_faces, *zone.master_faces):
+            np.maximum.at(tilt, faces.nodes, _tilts(points, faces, scene.rounding)[:, None])
+    if scene.free.selection is None:
+        entries = scene.free.basis.tocoo()
+        node = entries.row[np.bincount(entries.col)[entries.col] > 1] // dim
+        turned[node] = around[node]
+    return Roughness(float(around.max()), tilt, turned, steep)
+
+
+def _tilts(points: np.ndarray, faces: FaceBlock, noise: float) -> np.ndarray:
+    """By what angle (n,) faces may be turned whose nodes are known to `noise`.
+
+    The nodes of faces that count as flat are known to the bend that is left out. Faces that lie
+    across an axis are rounded as one and stay so.
+    """
+    kind, corner = faces.type, points[faces.nodes]
+    slopes = shape_functions(kind.name).gradients(kind.nodes[: kind.n_vertices].mean(axis=0)[None])
+    tangents = np.einsum("fad,at->fdt", corner - corner[:, :1], slopes[0], optimize=True)
+    steep = np.linalg.norm(np.matmul(slopes[0], np.linalg.pinv(tangents)), axis=(1, 2))
+    normal = area_vectors(points, faces.nodes, slopes)[:, 0]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    offset = corner - corner[:, : kind.n_vertices].mean(axis=1, keepdims=True)
+    bend = np.abs(np.einsum("fad,fd->fa", offset, normal)).max(axis=1)
+    radius = np.linalg.norm(offset, axis=2).max(axis=1)
+    across = (np.ptp(corner, axis=1) == 0).any(axis=1)
+    return np.where(across, 0.0, steep * (noise + np.where(bend <= FLAT * radius, bend, 0.0)))
+
+
+def terms_of(blocks: Sequence[Block]) -> int:
+    """The most terms of a stress at a node: nodes of a cell, those of its gradients, points."""
+    dim = blocks[0].type.dim
+    return max(2 * dim * block.type.n_nodes + len(block.rule[1]) for block in blocks)
+
+
+def estimate(
+    iterate: ContactIterate,
+    pressure: np.ndarray,
+    diagonal: np.ndarray,
+    rough: Roughness,
+    residual: float,
+    force_scale: float,
+) -> Accuracy:
+    """How many digits rounding leaves in the pressure (k,) of an iterate.
+
+    `diagonal` (n_dofs,) of the stiffness, `rough` what rounded coordinates do to the mesh,
+    `residual` relative to the size of the forces at work.
+    """
+    scene, constraints, closed = iterate.scene, iterate.constraints, iterate.closed
+    forces, unit = _rounding_of_forces(iterate), _unit(iterate)
+    scale = float(np.abs(pressure).max(initial=0.0))
+    if scale == 0:
+        return Accuracy({"forces": float(forces.max()) / force_scale})
+    noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
+    moving, moved = _moving(iterate)[closed], iterate.displacement.total.reshape(scene.points.shape)
+    pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
+    tilted = scale * (rough.strain + float(rough.tilt.max()))
+    tilted += pressure_of_gaps(moving, pushed, diagonal)
+    mean_stress = scene.mean.cancellation(iterate.mean_stress)[1]
+    causes = {
+        "forces": pressure_of_forces(moving, noise),
+        "gap": pressure_of_gaps(moving, _rounding_of_gaps(iterate)[closed], diagonal),
+        "coordinates": tilted + rough.stress(scene.blocks, moved),
+        "stress": max(unit * iterate.sizes.highest, EPSILON * mean_stress),
+        "slender": unit * iterate.sizes.slender,
+        "sums": EPSILON * terms_of(scene.blocks) * scale,
+    }
+    return Accuracy({name: error / scale for name, error in causes.items()})
+
+
+def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) -> Trial:
+    """Pressure (k,) and gap of an iterate with what is round-off of each, zone by zone.
+
+    The scale of pressures is the largest stress or pressure at the zone's own surfaces, the scale
+    of a gap the size of the displacements that open it.
+    """
+    scene, constraints, dim = iterate.scene, iterate.constraints, iterate.scene.points.shape[1]
+    left = iterate.residual() + constraints.on_free.T @ pressure
+    unbalanced = np.abs(scene.free.basis @ left)
+    forces, known = np.repeat(_rounding_of_forces(iterate), dim), _rounding_of_gaps(iterate)
+    moving, limit = _moving(iterate), np.zeros(len(pressure))
+    for zone in scene.zones:
+        mine, rows = zone.numbers, moving[zone.numbers]
+        places = constraints.gaps[mine].indices
+        stress = iterate.sizes.stress[places // dim].max(initial=0.0)
+        scale = max(float(np.abs(pressure[mine]).max(initial=0.0)), float(stress))
+        noise = forces + unbalanced[places].max(initial=0.0)
+        error = pressure_of_forces(rows, noise) + pressure_of_gaps(rows, known[mine], diagonal)
+        limit[mine] = _NOISE * scale + _ERRORS * error
+    motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)
+    covered = np.where(constraints.eligible, constraints.covered, np.inf)
+    return Trial(
+        pressure=pressure,
+        gap=iterate.gap,
+        pressure_limit=limit,
+        gap_limit=(_NOISE * iterate.opening_size + _NOISE_OF_MOTION * motion) / covered
+        + _ROUNDINGS * scene.rounding * (constraints.initial != 0),
+    )
+
+
+def _unit(iterate: ContactIterate) -> float:
+    return EPSILON_EXTENDED if iterate.extended else EPSILON
+
+
+def _moving(iterate: ContactIterate) -> sparse.csr_matrix:
+    """The coefficients of gaps (k, n_dofs) on what supports leave free of the slave nodes."""
+    own = iterate.constraints.slave & (np.diff(iterate.scene.free.basis.indptr) > 0)
+    moving = (iterate.constraints.gaps @ sparse.diags(own.astype(float))).tocsr()
+    moving.eliminate_zeros()
+    return moving
+
+
+def _rounding_of_forces(iterate: ContactIterate) -> np.ndarray:
+    """Errors (n,) of the internal forces at nodes."""
+    mean_terms, _ = iterate.scene.mean.cancellation(iterate.mean_stress)
+    return _unit(iterate) * iterate.sizes.forces + EPSILON * mean_terms
+
+
+def _rounding_of_gaps(iterate: ContactIterate) -> np.ndarray:
+    """Errors (k,) of ∫ gap."""
+    scene, constraints = iterate.scene, iterate.constraints
+    known = scene.rounding * constraints.covered * (constraints.initial != 0)
+    return known + EPSILON * iterate.opening_size
 
 
 def _largest(gaps: sparse.csr_matrix) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

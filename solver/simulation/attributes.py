@@ -1,38 +1,53 @@
 """What a case gives to groups of the mesh, on the cut mesh: materials, supports, loads."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import meshio
 import numpy as np
 
 from solver.case.expressions import evaluate
-from solver.case.reader import Case, Exact, Load, Material, Scalar, Support
+from solver.case.material import Material
+from solver.case.model import Case, Exact, Load, Scalar
 from solver.case.solutions import ExactSolution
 from solver.mechanics.fem import has_straight_edges
 from solver.mechanics.fem.bodies import body_numbers
 from solver.mechanics.fem.elasticity import Block, lame_parameters
-from solver.mechanics.fem.faces import FaceBlock, boundary_faces, nodal_normals, volume_cells
+from solver.mechanics.fem.faces import (
+    FaceBlock,
+    FaceError,
+    boundary_faces,
+    nodal_normals,
+    volume_cells,
+)
 from solver.mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from solver.mechanics.fem.mixed import MeanStress, in_mixed_form, split
-from solver.mechanics.fem.supports import Fixed, FreeMotion, free_motion
+from solver.mechanics.fem.supports import SAME, Fixed, FreeMotion, SupportClashError, free_motion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME
 from solver.simulation.exact import node_parts
 from solver.simulation.groups import ALL
+from solver.system.errors import InputError
 
 
-class CutZone(Protocol):
-    """A contact zone: its slave faces as meshed, and their sub-faces after the cut."""
+@dataclass(frozen=True)
+class CutZone:
+    """A contact zone: its slave faces as meshed, and their sub-faces after the cut.
 
-    @property
-    def slave_faces(self) -> list[FaceBlock]:
-        """As meshed."""
+    Macro-elements of sub-faces are counted within the zone.
+    """
 
-    @property
-    def sub_faces(self) -> list[SubFaces]:
-        """After the cut, macro-elements counted within the zone."""
+    slave_faces: list[FaceBlock]
+    sub_faces: list[SubFaces]
+
+
+def faces_of(mesh: meshio.Mesh, group: str, case: Case, key: str) -> list[FaceBlock]:
+    """The faces of a group that the case names under `key`; refuses those not on a boundary."""
+    try:
+        return boundary_faces(mesh, group)
+    except FaceError as error:
+        raise InputError(case.path, key, group, str(error)) from None
 
 
 class Attributes:
@@ -69,7 +84,7 @@ class Attributes:
     def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
         """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
         found: list[tuple[str, np.ndarray]] = []
-        for block in boundary_faces(self.mesh, group, self.case.path, key):
+        for block in faces_of(self.mesh, group, self.case, key):
             plain = np.ones(len(block.nodes), dtype=bool)
             for zone in self.zones:
                 plain &= ~self._swap_sub_faces(block, zone, found)
@@ -182,33 +197,53 @@ class Attributes:
 
     def supports(self) -> FreeMotion:
         """What supports and rigid bodies leave free."""
-        fixed = [
-            self._fixed(i, support, direction)
-            for i, support in enumerate(self.case.supports)
-            for direction in support.fix
-        ]
+        fixed = dict(self._fixed())
+        self._refuse_moved(fixed)
         dim = self.points.shape[1]
         for group in sorted(self.case.rigid):
             nodes = self.nodes(group, f"bodies.{group}")
-            for axis in np.eye(dim):
+            for name, axis in zip("xyz", np.eye(dim), strict=False):
                 directions = np.tile(axis, (len(nodes), 1))
-                fixed.append(Fixed(f"bodies.{group}", nodes, directions, np.zeros(len(nodes))))
-        return free_motion(len(self.points), dim, fixed, self.case.path)
+                fixed[f"bodies.{group}.{name}"] = Fixed(nodes, directions, np.zeros(len(nodes)))
+        try:
+            return free_motion(len(self.points), dim, list(fixed.values()))
+        except SupportClashError as clash:
+            key = list(fixed)[clash.number]
+            raise InputError(self.case.path, key, clash.value, str(clash)) from None
 
-    def _fixed(self, i: int, support: Support, direction: str) -> Fixed:
-        key = f"supports[{i}].fix.{direction}"
-        nodes = self.nodes(support.group, f"supports[{i}].group")
-        if direction == "normal":
-            directions = self._normals(support.group, nodes, key)
-        else:
-            axis = np.eye(self.points.shape[1])["xyz".index(direction)]
-            directions = np.tile(axis, (len(nodes), 1))
-        value = support.fix[direction]
-        if isinstance(value, Exact):
-            place = self.points[nodes] + self.origin
-            whole = self._exact.displacement(place, self.exact_part[nodes])
-            return Fixed(key, nodes, directions, np.einsum("nd,nd->n", whole, directions))
-        return Fixed(key, nodes, directions, self.field(value)(self.points[nodes]))
+    def _fixed(self) -> Iterator[tuple[str, Fixed]]:
+        """What supports hold, by the key of the case file."""
+        for i, support in enumerate(self.case.supports):
+            nodes = self.nodes(support.group, f"supports[{i}].group")
+            for direction, value in support.fix.items():
+                key = f"supports[{i}].fix.{direction}"
+                if direction == "normal":
+                    directions = self._normals(support.group, nodes, key)
+                else:
+                    axis = np.eye(self.points.shape[1])["xyz".index(direction)]
+                    directions = np.tile(axis, (len(nodes), 1))
+                if isinstance(value, Exact):
+                    place = self.points[nodes] + self.origin
+                    whole = self._exact.displacement(place, self.exact_part[nodes])
+                    values = np.einsum("nd,nd->n", whole, directions)
+                else:
+                    values = self.field(value)(self.points[nodes])
+                yield key, Fixed(nodes, directions, values)
+
+    def _refuse_moved(self, fixed: Mapping[str, Fixed]) -> None:
+        """Refuse displacements given to rigid bodies."""
+        largest = max((float(np.abs(f.values).max(initial=0)) for f in fixed.values()), default=0.0)
+        for group in sorted(self.case.rigid):
+            nodes = self.nodes(group, f"bodies.{group}")
+            for key, support in fixed.items():
+                given = support.values[np.isin(support.nodes, nodes)]
+                if (np.abs(given) > SAME * largest).any():
+                    allowed = (
+                        f"given to {len(given)} nodes of the rigid body {group}, which is fixed; "
+                        "allowed there: 0 (move the other body instead)"
+                    )
+                    value = float(given[np.abs(given).argmax()])
+                    raise InputError(self.case.path, key, value, allowed)
 
     def _normals(self, group: str, nodes: np.ndarray, key: str) -> np.ndarray:
         """Unit normals (n, dim) of a group's faces at its nodes, the mean over the faces there."""

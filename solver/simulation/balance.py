@@ -1,9 +1,17 @@
 """Balance of forces and moments: across each zone, and of reactions against loads."""
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
+from solver.mechanics.fem.faces import face_integrals
 from solver.simulation.problem import Equilibrium
-from solver.simulation.scene import Scene
+from solver.simulation.scene import Scene, ZoneScene
+
+# A macro-element of which the segments miss less than this share is covered in full.
+_COVERED = 1e-6
+# Of a macro-element's largest coefficient: smaller ones are round-off, or too small to divide by.
+_ROUND_OFF, _OWN = 1e-10, 1e-2
 
 
 def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
@@ -21,9 +29,12 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2) or 1.0
     result: dict[str, float] = {}
+    if state.correction.any():
+        by_zone["correction of the pressure"] = state.correction
+        contact += state.correction
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length)
-    unbalanced = (state.internal - state.force - contact).astype(float).ravel()
+    unbalanced = (state.iterate.internal - state.force - contact).astype(float).ravel()
     basis = scene.free.basis
     # What is left on held unknowns are the reactions; on free ones nothing may be left.
     free_part = (basis @ (basis.T @ unbalanced)).reshape(points.shape)
@@ -42,3 +53,63 @@ def _both(
     else:
         moment = float(np.abs(np.cross(points, forces).sum(axis=0)).max())
     return {f"{name}: force": float(force / scale), f"{name}: moment": moment / (scale * length)}
+
+
+def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | None]:
+    """The pressure (m,) on the macro-elements of each zone, by the forces at its slave nodes.
+
+    Internal forces less loads are -∑ p ∫ N n dS at nodes of the slave surfaces alone. They are
+    solved for p by least squares, with integrals over whole faces (over segments where a
+    macro-element is covered in part): neither multipliers nor the gap operator of covered faces
+    enter. None where multipliers are at nodes, or where a covered macro-element has no free node of
+    its own, so that its pressure is not determined.
+    """
+    nothing: list[np.ndarray | None] = [None] * len(scene.zones)
+    if not scene.zones or any(zone.operator.nodes is not None for zone in scene.zones):
+        return nothing
+    rows = _free_slave_rows(scene)
+    integrals = sparse.hstack([_integrals(scene, zone) for zone in scene.zones], format="csr")
+    integrals = (rows @ integrals).tocsr()
+    size = abs(integrals).max(axis=0).toarray().ravel()
+    scale = 1 / np.where(size > 0, size, 1.0)
+    integrals = integrals @ sparse.diags_array(scale)
+    integrals.data[np.abs(integrals.data) < _ROUND_OFF] = 0.0
+    integrals.eliminate_zeros()
+    alone = integrals[np.diff(integrals.indptr) == 1]
+    covered = np.concatenate([zone.operator.surface.covered for zone in scene.zones])
+    determined = (size == 0) & (covered == 0)
+    determined[alone.indices[np.abs(alone.data) > _OWN]] = True
+    if not determined.all():
+        return nothing
+    known = state.force + state.correction
+    forces = rows @ (state.iterate.internal - known).astype(float).ravel()
+    matrix = integrals.T @ integrals + sparse.diags_array((size == 0).astype(float))
+    pressure = np.atleast_1d(spsolve(matrix.tocsc(), integrals.T @ forces)) * scale
+    return list(np.split(pressure, np.cumsum([zone.count for zone in scene.zones])[:-1]))
+
+
+def _integrals(scene: Scene, zone: ZoneScene) -> sparse.csr_matrix:
+    """-∫ N n dS (n_dofs, m) over each macro-element of a zone."""
+    dim, surface = scene.points.shape[1], zone.operator.surface
+    partly = surface.covered < (1 - _COVERED) * surface.area
+    matrix = zone.operator.matrix.T @ sparse.diags_array(partly.astype(float))
+    for face in zone.sub_faces:
+        whole = ~partly[face.macro]
+        nodes, macro = face.nodes[whole], face.macro[whole]
+        values, _ = face_integrals(scene.points, nodes, face.type.name)
+        rows = dim * nodes[:, :, None] + np.arange(dim)
+        columns = np.broadcast_to(macro[:, None, None], rows.shape)
+        entries = (-values.ravel(), (rows.ravel(), columns.ravel()))
+        matrix = matrix + sparse.csr_array(entries, shape=matrix.shape)
+    return sparse.csr_matrix(matrix)
+
+
+def _free_slave_rows(scene: Scene) -> sparse.csr_matrix:
+    """The free directions (k, n_dofs) of the nodes on slave surfaces that are on no master."""
+    mine = np.zeros(len(scene.points), dtype=bool)
+    for side in ("sub_faces", "master_faces"):
+        for face in (face for zone in scene.zones for face in getattr(zone, side)):
+            mine[face.nodes] = side == "sub_faces"
+    rows = sparse.csr_matrix(scene.free.basis.T)
+    elsewhere = abs(rows) @ np.repeat(~mine, scene.points.shape[1]).astype(float)
+    return rows[elsewhere == 0]

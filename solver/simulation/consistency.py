@@ -1,14 +1,21 @@
 """Whether the fields of a solution fit one another: shapes, numbers of nodes, finite values.
 
-Checks compare what a case gives a reference for; what they do not look at must be sound all the
-same, in a solve as in a file read back.
+Contact that bears tension or overlaps is no solution either, whatever the search for its status
+found. Checks compare what a case gives a reference for; everything else must be sound as well, in a
+solve and in a file that is read back.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from solver.simulation.solution import NodalContact, Solution, ZoneResult
+from solver.mechanics.mortar.recovery import FORMS
+from solver.simulation.solution import NodalContact, RecoveredPressure, Solution, ZoneResult
+
+# A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
+# roundings of coordinates and displacements, a pressure by its estimated error and by what so many
+# roundings of displacements are as stress.
+_TOLERANCE, _ROUNDINGS = 1e-8, 1e3
 
 Shape = tuple[int | None, ...]
 
@@ -38,6 +45,8 @@ def _all(solution: Solution) -> Iterator[str]:
     for zone in solution.zones:
         for fault in _zone(zone, n, dim):
             yield f"zone {zone.name}: {fault}"
+    for zone in solution.zones:
+        yield from _status(zone, solution)
 
 
 def _steps(solution: Solution) -> Iterator[str]:
@@ -72,8 +81,47 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
         yield from _numbers(f"macro-elements of {kind}", owner, (len(owner),), m)
     for kind, faces in zone.master_faces:
         yield from _numbers(f"master faces {kind}", faces, (len(faces), None), n)
+    if zone.pressure_error is not None:
+        yield from _values("pressure_error", zone.pressure_error, (m,))
+    if zone.recovered:
+        yield from _recovered(zone.recovered, n, m, dim)
+    if zone.pressure_of_forces is not None:
+        yield from _values("pressure of forces", zone.pressure_of_forces, (m,))
     if zone.nodal:
         yield from _nodal(zone.nodal, n)
+
+
+def _recovered(field: RecoveredPressure, n: int, m: int, dim: int) -> Iterator[str]:
+    k = len(field.nodes)
+    yield from _numbers("nodes of the recovered pressure", field.nodes, (k,), n)
+    yield from _numbers("degree of the recovered pressure", field.degree, (m,), 3)
+    count = FORMS[field.form].count(dim) if field.form in FORMS else -1
+    shapes = {"coefficients": (m, count), "centre": (m, dim), "axes": (m, dim - 1, dim)}
+    shapes |= {"spread": (m, dim - 1, dim - 1), "at_nodes": (k,)}
+    for name, shape in shapes.items():
+        yield from _values(f"{name} of the recovered pressure", getattr(field, name), shape)
+
+
+def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
+    """Whether p ≥ 0 and ḡ ≥ 0, on the scales of the zone's own stress and displacement."""
+    nodes = np.union1d(zone.slave_nodes, zone.master_nodes)
+    moved, contact = solution.displacement[nodes], zone.nodal or zone
+    own = float(np.abs(contact.multiplier).max(initial=0.0))
+    scale = max(own, float(np.abs(solution.stress[nodes]).max(initial=0.0)))
+    largest = max(float(np.abs(other.multiplier).max(initial=0.0)) for other in solution.zones)
+    round_off = _ROUNDINGS * float(np.finfo(float).eps)
+    young = max(material.young for material in solution.case.materials.values())
+    smallest = float(zone.area.min()) ** (1 / (moved.shape[1] - 1))
+    error = round_off * young * float(np.abs(moved).max()) / smallest
+    error += max(solution.accuracy.values(), default=0.0) * largest
+    worst = float(contact.multiplier.min(initial=0.0))
+    if worst < -_TOLERANCE * scale - error:
+        yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"
+    size = float(np.ptp(moved, axis=0).max(initial=0.0))
+    place = float(np.abs(solution.mesh.points[nodes]).max() + np.abs(moved).max())
+    worst = float(contact.gap.min(initial=0.0))
+    if worst < -_TOLERANCE * size - round_off * place:
+        yield f"zone {zone.name}: the surfaces overlap, a gap of {worst:.3g}"
 
 
 def _nodal(nodal: NodalContact, n: int) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""A displacement kept to more digits than one number for each unknown can hold."""
+"""A displacement with more digits than one number for each unknown can hold."""
 
 from dataclasses import dataclass
 
@@ -6,28 +6,28 @@ import numpy as np
 from scipy import sparse
 
 Extended = np.longdouble
-"""64 bits of mantissa on x86, 113 on most others; where it is double precision, nothing is won."""
+"""64 bits of mantissa on x86, 113 on most others; no gain where it is double precision."""
 
 
 @dataclass(frozen=True)
 class Displacement:
-    """A displacement as free rigid motions of the bodies plus a remainder, the part that strains.
+    """A displacement as free rigid motions of the bodies plus a remainder, the deformation.
 
-    A stiff body on a soft one moves far and strains little. Were its displacement stored as one
-    number a node, its strain would be lost in the rounding of the motion; the remainder keeps it.
-    The rigid motion is that of the contact surface, so that the remainder is smallest where the
-    other body feels it. `motions` (n_dofs, k) are the rigid motions that supports leave free, `fit`
-    (k, n_dofs) finds how much of each a displacement holds, `amount` (k,) is how far each goes. The
-    remainder is the sum, never evaluated, of two parts `straining` (2, n_dofs): what the first
-    loses to rounding is in the second, so that each refinement gains its digits in full.
+    A stiff body on a soft one moves far and strains little. With one number stored for each
+    component, its strain would be lost in the rounding of the motion; the remainder keeps it. The
+    rigid motion is the motion of the contact surface, so that the remainder is smallest there.
+    `motions` (n_dofs, k) are the rigid motions that supports leave free, `fit` (k, n_dofs) yields
+    the amounts of the motions in a displacement, `amount` (k,) are those of this one. The remainder
+    is the sum, never evaluated, of two parts `deformation` (2, n_dofs): the second holds what the
+    first loses to rounding, so that each refinement gains its digits in full.
 
-    Without the cure (`split` False) there are no motions and the second part stays zero.
+    Without this safeguard (`split` False) there are no motions and the second part stays zero.
     """
 
     motions: sparse.csr_matrix
     fit: sparse.csr_matrix
     amount: np.ndarray
-    straining: np.ndarray
+    deformation: np.ndarray
     split: bool = True
 
     @classmethod
@@ -44,25 +44,25 @@ class Displacement:
     @property
     def total(self) -> np.ndarray:
         """The displacement (n_dofs,) itself."""
-        return self.motions @ self.amount + self.straining.sum(axis=0)
+        return self.motions @ self.amount + self.deformation.sum(axis=0)
 
     def moved(self, change: np.ndarray) -> "Displacement":
         """This displacement with `change` (n_dofs,) added."""
         more = self.fit @ change
-        first, second = self.straining
+        first, second = self.deformation
         added = change - self.motions @ more
         total = first + added
         # What the sum lost (Knuth, The Art of Computer Programming, vol. 2, §4.2.2).
         back = total - first
         lost = (first - (total - back)) + (added - back) if self.split else 0.0
-        straining = np.stack([total, second + lost])
-        return Displacement(self.motions, self.fit, self.amount + more, straining, self.split)
+        deformation = np.stack([total, second + lost])
+        return Displacement(self.motions, self.fit, self.amount + more, deformation, self.split)
 
     def opening(self, gaps: sparse.csr_matrix, dim: int, differences: bool = True) -> np.ndarray:
         """∫ gap (m,) that it opens, by the gap operator `gaps` (m, n_dofs), dofs dim · node + axis.
 
-        A displacement that all nodes share opens nothing, and is by far the largest part where a
-        body sinks deep into a soft one: only differences to one node of each row are summed.
+        A displacement common to all nodes opens nothing, and is by far the largest part where a
+        body sinks deep into a soft one: only differences from one node of each row are summed.
         """
         if not differences:
             return gaps @ self.total
@@ -73,7 +73,7 @@ class Displacement:
         return opened.astype(float)
 
     def opening_size(self, gaps: sparse.csr_matrix, dim: int) -> np.ndarray:
-        """The sum of the sizes (m,) of what `opening` sums."""
+        """The sum (m,) of the sizes of the terms of `opening`."""
         rows = np.repeat(np.arange(gaps.shape[0]), np.diff(gaps.indptr))
         sizes = np.abs(gaps.data * _apart(self, gaps, rows, dim)).astype(float)
         return np.bincount(rows, sizes, minlength=gaps.shape[0])
@@ -82,8 +82,8 @@ class Displacement:
 def _apart(
     displacement: Displacement, gaps: sparse.csr_matrix, rows: np.ndarray, dim: int
 ) -> np.ndarray:
-    """For each entry of the gap operator its displacement less that of its row's first node."""
+    """For each entry of the gap operator, its displacement minus that of its row's first node."""
     whole = (displacement.motions @ displacement.amount).astype(Extended)
-    whole += displacement.straining.astype(Extended).sum(axis=0)
+    whole += displacement.deformation.astype(Extended).sum(axis=0)
     first = gaps.indices[np.minimum(gaps.indptr[:-1], len(gaps.indices) - 1)] // dim
     return whole[gaps.indices] - whole[dim * first[rows] + gaps.indices % dim]

@@ -35,16 +35,20 @@ def deformable(solution: Solution) -> np.ndarray:
     return nodes
 
 
-def computed_pressure(zone: ZoneResult) -> np.ndarray:
-    """The computed pressure (k,) at the `surface_points` of a zone.
+def computed_pressure(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
+    """The computed pressure (k,) at the `surface_points` of a zone on the mesh's `points`.
 
-    That of each macro-element, or, between multipliers at nodes, linear (or what the shape
-    functions make of it where all nodes of a face have one).
+    The recovered one, or that of each macro-element, or, between multipliers at nodes, linear (or
+    what the shape functions make of it where all nodes of a face have one).
     """
     parts = []
     for name, nodes, owner in zone.faces:
         kind = cell_type(name)
         reference, weights = gauss_rule(kind.name, FACE_POINTS)
+        if zone.recovered is not None:
+            places = shape_functions(kind.name).values(reference) @ points[nodes]
+            parts.append(zone.recovered.values(zone.multiplier, owner, places).ravel())
+            continue
         if zone.nodal is None:
             parts.append(np.repeat(zone.multiplier[owner], len(weights)))
             continue

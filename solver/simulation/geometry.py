@@ -39,7 +39,7 @@ def _refuse_mixed_groups(scene: Scene, i: int, zone: ZoneScene) -> None:
                 f"{other} too; a surface must be on one body, or on others than its partner"
             )
             group = getattr(zone.zone, side)
-            raise InputError(scene.case.path, f"contact[{i}].{side}", group, allowed)
+            raise InputError(scene.case.path, scene.case.zone_key(i, side), group, allowed)
 
 
 def _bodies(scene: Scene, faces: list) -> set[int]:
@@ -60,7 +60,7 @@ def _refuse_deep_overlap(scene: Scene, i: int, zone: ZoneScene) -> None:
             f"{zone.zone.name} ({int(deep.sum())} beyond the limit); allowed is {_DEEPEST:g} of "
             f"the smaller body, {_DEEPEST * size:.4g}"
         )
-        raise InputError(scene.case.path, f"contact[{i}].slave", zone.zone.slave, allowed)
+        raise InputError(scene.case.path, scene.case.zone_key(i, "slave"), zone.zone.slave, allowed)
 
 
 def _refuse_unmerged(scene: Scene) -> None:

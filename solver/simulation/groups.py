@@ -8,16 +8,16 @@ from collections.abc import Iterable
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, Zone
+from solver.case.model import Case, Exact, Load, Zone
 from solver.case.rules import check_dimension
-from solver.case.schemas import hint
 from solver.mesh.catalogue import BY_MESHIO
-from solver.system.errors import InputError
+from solver.system.errors import InputError, hint
 
 ALL = "all"
+_EMPTY = "is empty, or none of its members touches a volume cell"
 
 
-def check_groups(case: Case, mesh: meshio.Mesh, swapped: bool = False) -> None:
+def check_groups(case: Case, mesh: meshio.Mesh) -> None:
     """Raise `InputError` where the case does not fit the mesh."""
     dim = mesh.points.shape[1]
     if dim == 2 and case.plane is None:
@@ -29,10 +29,10 @@ def check_groups(case: Case, mesh: meshio.Mesh, swapped: bool = False) -> None:
     groups = _Groups(case, mesh)
     groups.check_materials()
     groups.check_supports()
-    groups.check_loads()
     groups.check_bodies()
     for i, zone in enumerate(case.zones):
-        groups.check_zone(f"contact[{i}]", zone, swapped)
+        groups.check_zone(i, zone)
+    groups.check_loads()
 
 
 def named_parts(case: Case, mesh: meshio.Mesh) -> tuple[meshio.Mesh, tuple[int, int]]:
@@ -99,7 +99,7 @@ class _Groups:
                 for part, block in zip(chosen, self.mesh.cells, strict=True)
                 if len(part)
             ]
-            shown = f"holds {', '.join(held)} but no {kind}" if held else "is empty"
+            shown = f"holds {', '.join(held)} but no {kind}" if held else _EMPTY
             raise self.error(key, group, f"{shown}; a group of {kind} is needed")
         return parts
 
@@ -160,14 +160,38 @@ class _Groups:
                 self.cells(key, support.group, self.dim - 1)
             cells = self.mesh.cell_sets.get(support.group, [])
             if not sum(map(len, [*cells, self.mesh.point_sets.get(support.group, [])])):
-                raise self.error(key, support.group, "is empty")
+                raise self.error(key, support.group, _EMPTY)
 
     def check_loads(self) -> None:
         for i, load in enumerate(self.case.loads):
-            on_volume = load.kind == "body_force"
-            if not (on_volume and load.group == ALL):
-                dim = self.dim if on_volume else self.dim - 1
-                self.cells(f"loads[{i}].group", load.group, dim)
+            key, on_volume = f"loads[{i}].group", load.kind == "body_force"
+            if on_volume and load.group == ALL:
+                chosen = zip(self.mesh.cells, self.block_dims, strict=True)
+                parts = [np.arange(len(block.data) * (dim == self.dim)) for block, dim in chosen]
+            else:
+                parts = self.cells(key, load.group, self.dim if on_volume else self.dim - 1)
+            self.check_loaded(key, load, parts)
+
+    def check_loaded(self, key: str, load: Load, parts: list[np.ndarray]) -> None:
+        """No load on a rigid body, where it would move nothing.
+
+        An exact solution has none there, and its loads may act on both bodies at once.
+        """
+        count = sum(map(len, parts))
+        for rigid in sorted(self.case.rigid):
+            fixed = np.zeros(len(self.mesh.points), dtype=bool)
+            fixed[self.nodes(self.cells(f"bodies.{rigid}", rigid, self.dim))] = True
+            lost = sum(
+                int(fixed[block.data[part]].all(axis=1).sum())
+                for block, part in zip(self.mesh.cells, parts, strict=True)
+            )
+            if lost == count or (lost and not isinstance(load.value, Exact)):
+                kind = "cells" if load.kind == "body_force" else "faces"
+                allowed = (
+                    f"{lost} of its {count} {kind} belong to the rigid body {rigid}, which is "
+                    "fixed: a load there does nothing; load a deformable body"
+                )
+                raise self.error(key, load.group, allowed)
 
     def check_bodies(self) -> None:
         for group in self.case.rigid:
@@ -175,21 +199,16 @@ class _Groups:
         for group in self.case.counts:
             self.cells(f"counts.{group}", group, self.dim)
 
-    def check_zone(self, key: str, zone: Zone, swapped: bool) -> None:
+    def check_zone(self, number: int, zone: Zone) -> None:
         """Two surfaces without a common face, the slave's not on a rigid body."""
-        slave, master = (
-            self.cells(f"{key}.{side}", getattr(zone, side), self.dim - 1)
-            for side in ("slave", "master")
-        )
-        common = self.shared(slave, master)
+        keys = {side: self.case.zone_key(number, side) for side in ("slave", "master")}
+        parts = {s: self.cells(key, getattr(zone, s), self.dim - 1) for s, key in keys.items()}
+        common = self.shared(parts["slave"], parts["master"])
         if common:
             allowed = f"{common} of its faces are slave faces too; a slave cannot be its own master"
-            raise self.error(f"{key}.master", zone.master, allowed)
-        sides = {"slave": slave} if not swapped else {"master": master}
-        if self.case.directions == "both":
-            sides = {"slave": slave, "master": master}
-        for side, parts in sides.items():
-            self.check_deformable(f"{key}.{side}", getattr(zone, side), parts)
+            raise self.error(keys["master"], zone.master, allowed)
+        for side in ("slave", "master") if self.case.directions == "both" else ("slave",):
+            self.check_deformable(keys[side], getattr(zone, side), parts[side])
 
     def check_deformable(self, key: str, group: str, parts: list[np.ndarray]) -> None:
         for rigid in self.case.rigid:

@@ -14,8 +14,8 @@ def body_names(scene: Scene) -> list[str]:
 def body_infos(scene: Scene) -> list[BodyInfo]:
     """Each body as it was meshed: name, cells by type, faces on contact surfaces, role."""
     infos = []
-    for number in range(int(scene.body.max()) + 1):
-        inside = {t: scene.body[c[:, 0]] == number for t, c in scene.meshed.items()}
+    for number in range(scene.n_bodies):
+        inside = {t: scene.body[c[:, 0]] == number for t, c in scene.given.cells.items()}
         cells = {t: int(mask.sum()) for t, mask in inside.items() if mask.any()}
         roles, faces = set(), 0
         for zone in scene.zones:
@@ -30,7 +30,7 @@ def body_infos(scene: Scene) -> list[BodyInfo]:
 
 def _name(scene: Scene, inside: dict[str, np.ndarray], number: int) -> str:
     holders = []
-    for group, mask in scene.volume_groups.items():
+    for group, mask in scene.given.groups.items():
         if all(mask[t][cells].all() for t, cells in inside.items()):
             holders.append((sum(int(m.sum()) for m in mask.values()), group))
     return min(holders)[1] if holders else f"body {number + 1}"

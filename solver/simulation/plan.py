@@ -9,21 +9,25 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from solver.mechanics.fem.mixed import AUTOMATIC_ABOVE
-from solver.mechanics.linear.condensation import ROUND_OFF
 from solver.mechanics.mortar.cut import needs_cut
+from solver.simulation.accuracy import NOTED_STRAIN
+from solver.simulation.constraints import MIN_COVERAGE
 from solver.simulation.naming import body_names
-from solver.simulation.problem import MIN_COVERAGE, ContactProblem, Equilibrium
+from solver.simulation.options import Options
+from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.scene import Scene, ZoneScene
-from solver.simulation.skips import EVERYTHING
-from solver.simulation.solution import Line
+from solver.simulation.solution import Line, Solution
+
+# An estimated error below this is rounding.
+_ROUNDING = 1e-10
 
 
 def decided(problem: ContactProblem) -> Iterator[Line]:
     """What the scene alone decides, before the solve, in the order of the work."""
     scene = problem.scene
-    if scene.skips == EVERYTHING:
+    if scene.options.shortcuts == Options.everything().shortcuts:
         yield Line("everything is done", "as asked for by --everything, needed or not")
-    groups, cells = scene.unnamed
+    groups, cells = scene.given.unnamed
     if groups or cells:
         many = "s" * (groups != 1)
         what = f"left behind: {groups} group{many}, {cells} faces and edges of the mesh"
@@ -33,20 +37,20 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
         yield Line(f"mixed form in {scene.mean.n_cells} cells", why)
     yield from _cells(scene)
     for zone in scene.zones:
-        yield from _zone(zone, scene, problem.idle)
-    asleep = np.flatnonzero(scene.asleep)
-    if len(asleep):
+        yield from _zone(zone, scene, problem.constraints.inactive_multipliers)
+    unloaded = np.flatnonzero(scene.rest.unloaded_bodies)
+    if len(unloaded):
         names = body_names(scene)
-        what = f"left out, at rest without pressure: {', '.join(names[b] for b in asleep)}"
+        what = f"left out, at rest without pressure: {', '.join(names[b] for b in unloaded)}"
         yield Line(what, "no load, displacement imposed or overlap reaches them", "unloaded")
-    held = np.flatnonzero(scene.held)
-    if len(held):
+    fixed = np.flatnonzero(scene.rest.fixed_bodies)
+    if len(fixed):
         names = body_names(scene)
-        what = f"no stiffness of {', '.join(names[b] for b in held)}"
+        what = f"no stiffness of {', '.join(names[b] for b in fixed)}"
         yield Line(what, "supports or rigidity hold all of it where it is", "unloaded")
     if len(problem.parts) > 1:
         why = "no contact joins them"
-        yield Line(f"{len(problem.parts)} groups of bodies solved apart", why, "apart")
+        yield Line(f"{len(problem.parts)} groups of bodies solved apart", why)
 
 
 def _cells(scene: Scene) -> Iterator[Line]:
@@ -55,21 +59,18 @@ def _cells(scene: Scene) -> Iterator[Line]:
         yield Line("plain Gauss rules in TETRA10 cells", "all edges are straight", "quadrature")
 
 
-def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
-    """The lines of one zone; `idle` (k,): the multipliers that act on no free unknown."""
+def _zone(zone: ZoneScene, scene: Scene, inactive: np.ndarray) -> Iterator[Line]:
+    """The lines of one zone; `inactive` (k,): the multipliers that act on no free unknown."""
     name, operator = zone.zone.name, zone.operator
     if zone.zone.treatment != "lac":
         yield Line(f"{name}: treatment {zone.zone.treatment}", zone.treatment.what)
     kinds = sorted({block.type.name for block in zone.slave_faces})
     whole = [kind for kind in kinds if not needs_cut(kind)]
-    if zone.treatment.cut and whole and scene.skips.cut:
-        yield Line(f"{name}: no cut", f"{', '.join(whole)} faces own an inner node", "cut")
-    if operator.unclipped:
-        what = f"{name}: {operator.unclipped} of {operator.segments} segments not clipped"
-        yield Line(what, "there a slave face lies within one master face", "clipping")
+    if zone.treatment.cut and whole:
+        yield Line(f"{name}: no cut", f"{', '.join(whole)} faces own an inner node")
     if operator.closed_faces:
         why = "some faces are no affine images of their reference face"
-        why = why if scene.skips.quadrature else "as asked for"
+        why = why if scene.options.shortcuts.quadrature else "as asked for"
         yield Line(f"{name}: closure of {operator.closed_faces} face integrals", why)
     elif operator.plain:
         yield Line(f"{name}: plain Gauss rules", "every face is an affine image", "quadrature")
@@ -78,7 +79,7 @@ def _zone(zone: ZoneScene, scene: Scene, idle: np.ndarray) -> Iterator[Line]:
     if bare:
         why = f"less than {MIN_COVERAGE:.0%} of their area lies under the master surface"
         yield Line(f"{name}: {bare} macro-elements out of contact", why)
-    held = int(idle[zone.numbers].sum())
+    held = int(inactive[zone.numbers].sum())
     if held:
         why = "supports hold the nodes of both surfaces there"
         yield Line(f"{name}: {held} multipliers left out", why)
@@ -90,13 +91,31 @@ def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Li
     if scene.zones and len(states) > 1:
         why = "displacements are small: all load factors share them"
         yield Line("pairs and intersections found once", why)
-    if scene.skips.status and all(state.status.iterations == 1 for state in states):
+    if scene.options.shortcuts.status and all(state.status.iterations == 1 for state in states):
         why = "the first status already fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0"
         yield Line("no second active-set solve", why, "status")
     different = {state.status.closed.tobytes() for state in states}
-    if scene.skips.status and len(different) < len(states):
+    if scene.options.shortcuts.status and len(different) < len(states):
         why = "the same multipliers are closed as at another load factor"
         yield Line("no new factor for each load factor", why, "status")
-    if scene.skips.refinement and all(state.residual <= ROUND_OFF for state in states):
-        yield Line("no further refinement", "the residual is round-off", "refinement")
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
+
+
+def estimated(solution: Solution) -> Iterator[Line]:
+    """How far constant pressures are from the exact one, as a reconstruction shows it."""
+    for zone in solution.zones:
+        error = zone.relative_pressure_error
+        if error is not None and error > _ROUNDING:
+            how = f"a {zone.recovered.form} one" if zone.recovered else "a linear one"
+            what = f"{zone.name}: estimated error of the constant pressure {error:.1e} in L2"
+            yield Line(what, f"it differs so much from {how}, reconstructed from neighbours")
+        if zone.recovered and (left := int((zone.closed & (zone.recovered.degree == 0)).sum())):
+            what = f"{zone.name}: pressure constant on {left} macro-elements"
+            yield Line(what, "too few closed neighbours to recover it from")
+
+
+def strained(solution: Solution) -> Iterator[Line]:
+    """A note where strains or rotations are not small."""
+    if max(solution.strain, solution.rotation) > NOTED_STRAIN:
+        what = f"largest strain {solution.strain:.1e}, rotation {solution.rotation:.1e}"
+        yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")

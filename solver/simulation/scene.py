@@ -1,37 +1,40 @@
 """From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
+from typing import TypeAlias
 
 import meshio
 import numpy as np
 
-from solver.case.expressions import evaluate
-from solver.case.reader import Case, Zone
+from solver.case.model import Case, Zone
 from solver.mechanics.fem.bodies import body_numbers
 from solver.mechanics.fem.elasticity import Block
-from solver.mechanics.fem.faces import FaceBlock, boundary_faces, surface_points, volume_cells
+from solver.mechanics.fem.faces import FaceBlock, surface_points, volume_cells
 from solver.mechanics.fem.mixed import MeanStress
 from solver.mechanics.fem.supports import FreeMotion
 from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
 from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
-from solver.mechanics.mortar.held import joined
+from solver.mechanics.mortar.held import merge_fixed_multipliers
+from solver.mechanics.mortar.multipliers import constants
 from solver.mechanics.mortar.operator import GapOperator, gap_operator
-from solver.mechanics.mortar.treatments import SEGMENTED, TREATMENTS, Treatment, scheme_of
+from solver.mechanics.mortar.recovery import FORMS, Asked, automatic, vertex_neighbours
+from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from solver.mesh.catalogue import BY_NAME
-from solver.simulation.attributes import Attributes
-from solver.simulation.cures import ALL, Cures
+from solver.simulation.attributes import Attributes, CutZone, faces_of
 from solver.simulation.groups import check_groups, named_parts
-from solver.simulation.skips import NEEDED, Skips
+from solver.simulation.options import LEAN, Options
 from solver.system.clock import Clock
 from solver.system.errors import InputError
 
+# Slave and master faces of each zone.
+Surfaces: TypeAlias = list[tuple[list[FaceBlock], list[FaceBlock]]]
 # An average initial gap below this many roundings of the coordinates is none.
 _GAP_ROUND_OFF = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ZoneScene:
     """One zone: the zone as solved (swapped or not), its multipliers' numbers and its faces.
 
@@ -68,116 +71,152 @@ class ZoneScene:
         return np.asarray(self.operator.mean @ values[self.numbers])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
+class GivenMesh:
+    """The mesh before the cut.
+
+    `cells`: the volume cells by type; `groups`: which of them (n,) each named group holds;
+    `unnamed`: how many groups of the mesh, and of its faces and edges, the case does not name.
+    """
+
+    cells: dict[str, np.ndarray]
+    groups: dict[str, dict[str, np.ndarray]]
+    unnamed: tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rest:
+    """What nothing moves (see `solver.simulation.unloaded`).
+
+    `unloaded_bodies` (b,) and `unloaded_multipliers` (k,) are left out of the solve, and the cells
+    of `fixed_bodies` (b,): `blocks` and `free` of the scene are without them.
+    """
+
+    unloaded_bodies: np.ndarray
+    fixed_bodies: np.ndarray
+    unloaded_multipliers: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
 class Scene:
-    """The discrete problem.
+    """The discrete problem of a case as solved (see `Case.as_solved`).
 
     `points` (n, dim) are counted from `origin` (dim,), the mean of the mesh's nodes: far from the
-    origin of the coordinates, differences would lose digits. `force` (n, dim) and `free.offset` are
-    for load factor 1. `blocks` of cells in mixed form have λ = 0; `mean` makes up for it. `meshed`:
-    the volume cells before the cut, by type, and `volume_groups` which of them each named group
-    holds. `rounding`: how well the coordinates are known (a length). `unnamed`: how many groups of
-    the mesh, and of its faces and edges, the case does not name. `asleep` (b,) bodies and `resting`
-    (k,) multipliers are left out since nothing moves them, and the cells of `held` (b,) bodies (see
-    `solver.simulation.unloaded`): `blocks` and `free` are without them.
+    origin of the coordinates, differences would lose digits. `length` is the largest extent of the
+    mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
+    cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
+    up for it. `force` (n, dim) and `free.offset` are for load factor 1.
     """
 
     case: Case
-    points: np.ndarray
+    options: Options
+    given: GivenMesh
     origin: np.ndarray
+    length: float
+    rounding: float
+    points: np.ndarray
     mesh: CutMesh
+    body: np.ndarray
     blocks: list[Block]
     mean: MeanStress
-    body: np.ndarray
     free: FreeMotion
     force: np.ndarray
     zones: list[ZoneScene]
-    length: float
-    meshed: dict[str, np.ndarray]
-    volume_groups: dict[str, dict[str, np.ndarray]]
-    rounding: float
-    cures: Cures
-    skips: Skips
-    unnamed: tuple[int, int]
-    asleep: np.ndarray
-    held: np.ndarray
-    resting: np.ndarray
+    rest: Rest
 
     @property
     def n_dofs(self) -> int:
         """Number of degrees of freedom, held ones included."""
         return self.points.size
 
+    @property
+    def n_bodies(self) -> int:
+        """Number of bodies."""
+        return len(self.rest.unloaded_bodies)
+
 
 def build_scene(
-    case: Case,
-    mesh: meshio.Mesh,
-    swapped: bool,
-    hexahedra: str | None,
-    clock: Clock,
-    cures: Cures = ALL,
-    skips: Skips = NEEDED,
+    case: Case, mesh: meshio.Mesh, options: Options = LEAN, clock: Clock | None = None
 ) -> Scene:
     """The discrete problem of a case; raises InputError where case and mesh do not fit."""
-    check_groups(case, mesh, swapped)
+    clock, safeguards = clock or Clock(), options.safeguards
+    check_groups(case, mesh)
     mesh, unnamed = named_parts(case, mesh)
-    origin = mesh.points.mean(axis=0) * cures.local_coordinates
+    origin = mesh.points.mean(axis=0) * safeguards.local_coordinates
     local = replace_points(mesh, mesh.points - origin)
-    length = float(np.ptp(local.points, axis=0).max())
-    zones = [_as_solved(zone, swapped, hexahedra) for zone in case.zones]
-    with clock.stage("cut"):
-        surfaces = _surfaces(case, local, zones, swapped)
-        cut_mesh, sub_faces = _cut(local, zones, surfaces, skips)
-    points = cut_mesh.points
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
-    scenes = []
+    with clock.stage("cut"):
+        surfaces = _surfaces(case, local)
+        cut_mesh, sub_faces = _cut(local, case.zones, surfaces)
+    cut_zones = [
+        CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
+    ]
+    groups = Attributes(case, local, cut_mesh, cut_zones, origin)
     with clock.stage("pairing"):
-        for zone, (slave, master), faces in zip(zones, surfaces, sub_faces, strict=True):
-            count = sum(len(block.nodes) for block in slave)
-            operator = _operator(points, zone, faces, master, count, cures, skips)
-            noise = _GAP_ROUND_OFF * rounding * cures.gap_threshold
-            initial = _initial_gaps(zone, operator, points, faces, origin, noise)
-            operator = replace(operator, initial=initial)
-            scenes.append(ZoneScene(zone, 0, count, slave, master, faces, operator))
-    groups = Attributes(case, local, cut_mesh, scenes, origin)
+        noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
+        operators = [
+            _operator(groups, zone, faces, master, noise, options)
+            for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
+        ]
     with clock.stage("assembly"):
-        blocks, mean = groups.elasticity(cures.mixed, plain=skips.quadrature)
+        blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
         force = groups.forces()
-        scenes = _without_held(scenes, free)
-    body = body_numbers(len(points), cut_mesh.cells)
+        zones = _zones(case, cut_zones, surfaces, operators, free)
+    body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
+    n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
     return Scene(
         case=case,
-        points=points,
+        options=options,
+        given=GivenMesh(
+            cells=volume_cells(mesh),
+            groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
+            unnamed=unnamed,
+        ),
         origin=origin,
+        length=float(np.ptp(local.points, axis=0).max()),
+        rounding=rounding,
+        points=cut_mesh.points,
         mesh=cut_mesh,
+        body=body,
         blocks=blocks,
         mean=mean,
-        body=body,
         free=free,
         force=force,
-        zones=scenes,
-        length=length,
-        meshed=volume_cells(mesh),
-        volume_groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
-        rounding=rounding,
-        cures=cures,
-        skips=skips,
-        unnamed=unnamed,
-        asleep=np.zeros(int(body.max()) + 1, dtype=bool),
-        held=np.zeros(int(body.max()) + 1, dtype=bool),
-        resting=np.zeros(sum(len(zone.operator.initial) for zone in scenes), dtype=bool),
+        zones=zones,
+        rest=Rest(
+            unloaded_bodies=np.zeros(n_bodies, dtype=bool),
+            fixed_bodies=np.zeros(n_bodies, dtype=bool),
+            unloaded_multipliers=np.zeros(n_multipliers, dtype=bool),
+        ),
     )
 
 
-def _without_held(zones: list[ZoneScene], free: FreeMotion) -> list[ZoneScene]:
-    """The zones, multipliers of held nodes joined to others where the treatment does so."""
-    found, first = [], 0
-    for zone in zones:
-        operator = zone.operator
-        if zone.treatment.joins:
-            operator = joined(operator, free.basis)
-        found.append(replace(zone, first=first, operator=operator))
+def _zones(
+    case: Case,
+    cut_zones: Sequence[CutZone],
+    surfaces: Surfaces,
+    operators: Sequence[GapOperator],
+    free: FreeMotion,
+) -> list[ZoneScene]:
+    """The zones, multipliers of fixed nodes merged with others where the treatment does so."""
+    found: list[ZoneScene] = []
+    first = 0
+    for i, zone in enumerate(case.zones):
+        operator, (slave, master) = operators[i], surfaces[i]
+        if TREATMENTS[zone.treatment].joins:
+            operator = merge_fixed_multipliers(operator, free.basis)
+        found.append(
+            ZoneScene(
+                zone=zone,
+                first=first,
+                count=sum(len(block.nodes) for block in slave),
+                slave_faces=slave,
+                master_faces=master,
+                sub_faces=cut_zones[i].sub_faces,
+                operator=operator,
+            )
+        )
         first += len(operator.initial)
     return found
 
@@ -185,8 +224,7 @@ def _without_held(zones: list[ZoneScene], free: FreeMotion) -> list[ZoneScene]:
 def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndarray:
     """Values (n, dim) at the nodes of the mesh, interpolated at those of the scene's cut mesh."""
     surfaces = [(zone.slave_faces, zone.master_faces) for zone in scene.zones]
-    zones = [zone.zone for zone in scene.zones]
-    return _cut(replace_points(mesh, values), zones, surfaces, scene.skips)[0].points
+    return _cut(replace_points(mesh, values), scene.case.zones, surfaces)[0].points
 
 
 def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
@@ -194,29 +232,22 @@ def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
     return meshio.Mesh(points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets)
 
 
-def _as_solved(zone: Zone, swapped: bool, hexahedra: str | None) -> Zone:
-    if swapped:
-        zone = replace(zone, slave=zone.master, master=zone.slave)
-    return replace(zone, hexahedra=hexahedra or zone.hexahedra)
-
-
-def _surfaces(
-    case: Case, mesh: meshio.Mesh, zones: list[Zone], swapped: bool
-) -> list[tuple[list[FaceBlock], list[FaceBlock]]]:
+def _surfaces(case: Case, mesh: meshio.Mesh) -> Surfaces:
     """Slave and master faces of each zone; refuses slave nodes shared by two zones."""
-    slave_key, master_key = ("master", "slave") if swapped else ("slave", "master")
     owner: dict[int, str] = {}
     surfaces = []
-    for i, zone in enumerate(zones):
-        slave = boundary_faces(mesh, zone.slave, case.path, f"contact[{i}].{slave_key}")
-        master = boundary_faces(mesh, zone.master, case.path, f"contact[{i}].{master_key}")
+    for i, zone in enumerate(case.zones):
+        slave, master = (
+            faces_of(mesh, getattr(zone, side), case, case.zone_key(i, side))
+            for side in ("slave", "master")
+        )
         _refuse_untreated(case, i, zone, slave)
         nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave])).tolist()
         shared = [n for n in nodes if n in owner]
         if shared:
             raise InputError(
                 case.path,
-                f"contact[{i}].{slave_key}",
+                case.zone_key(i, "slave"),
                 zone.slave,
                 f"{len(shared)} of its nodes are slave nodes of zone {owner[shared[0]]} too; "
                 "a node may be a slave in one zone only",
@@ -239,10 +270,7 @@ def _refuse_untreated(case: Case, i: int, zone: Zone, slave: list[FaceBlock]) ->
 
 
 def _cut(
-    mesh: meshio.Mesh,
-    zones: list[Zone],
-    surfaces: list[tuple[list[FaceBlock], list[FaceBlock]]],
-    skips: Skips,
+    mesh: meshio.Mesh, zones: Sequence[Zone], surfaces: Surfaces
 ) -> tuple[CutMesh, list[list[SubFaces]]]:
     """The cut mesh, and each zone's sub-faces with macro-elements counted within the zone."""
     faces, macro, into_hexahedra, uncut, first = [], [], [], [], [0]
@@ -254,7 +282,7 @@ def _cut(
             uncut.append(not TREATMENTS[zone.treatment].cut)
         first.append(first[-1] + sum(len(block.nodes) for block in slave))
     cells = volume_cells(mesh)
-    cut_mesh = cut(mesh.points, cells, faces, macro, into_hexahedra, uncut, not skips.cut)
+    cut_mesh = cut(mesh.points, cells, faces, macro, into_hexahedra, uncut)
     sub_faces = []
     for low, high in pairwise(first):
         mine = [(f, (f.macro >= low) & (f.macro < high)) for f in cut_mesh.sub_faces]
@@ -265,28 +293,37 @@ def _cut(
 
 
 def _operator(
-    points: np.ndarray,
+    groups: Attributes,
     zone: Zone,
-    sub_faces: list[SubFaces],
+    faces: CutZone,
     master_faces: list[FaceBlock],
-    count: int,
-    cures: Cures,
-    skips: Skips,
+    noise: float,
+    options: Options,
 ) -> GapOperator:
-    slaves = [facets(points, f.type, f.nodes, f.macro) for f in sub_faces]
+    """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
+    points, count = groups.points, sum(len(block.nodes) for block in faces.slave_faces)
+    slaves = [facets(points, f.type, f.nodes, f.macro) for f in faces.sub_faces]
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
     masters = _master_facets(points, master_faces)
     corners = np.concatenate([f.centre for f in [*slaves, *masters]])
     search = float(np.linalg.norm(np.ptp(corners, axis=0)))
     search += max(f.radius.max() for f in [*slaves, *masters])
-    if not skips.quadrature:
+    if not options.shortcuts.quadrature:
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
-    if not skips.clipping and zone.treatment in SEGMENTED:
-        scheme = replace(scheme, meet=partial(scheme.meet, clip_all=True))
-    scheme = replace(scheme, closure=scheme.closure and cures.closure)
-    return gap_operator(slaves, masters, count, len(points), search, scheme)
+    scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
+    asked = _recovery(zone, faces.slave_faces, count) if scheme.space is constants else None
+    operator = gap_operator(slaves, masters, count, len(points), search, scheme, asked)
+    return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
+
+
+def _recovery(zone: Zone, slave_faces: list[FaceBlock], count: int) -> Asked:
+    """How a zone's pressure is recovered, and which of its macro-elements share a vertex."""
+    quadratic = all(block.owner_type.order == 2 for block in slave_faces)
+    name = automatic(quadratic) if zone.recovery == "automatic" else zone.recovery
+    vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
+    return Asked(FORMS[name], vertex_neighbours(vertices, count))
 
 
 def _as_bent(block: Facets) -> Facets:
@@ -297,9 +334,8 @@ def _as_bent(block: Facets) -> Facets:
 def _initial_gaps(
     zone: Zone,
     operator: GapOperator,
-    points: np.ndarray,
+    groups: Attributes,
     sub_faces: list[SubFaces],
-    origin: np.ndarray,
     noise: float,
 ) -> np.ndarray:
     """∫ φ gap (k,) at the start: as meshed, without those below `noise`, or as the case says."""
@@ -307,8 +343,8 @@ def _initial_gaps(
         meshed = operator.initial
         initial = np.where(np.abs(meshed) <= noise * operator.covered, 0.0, meshed)
     else:
-        at = surface_points(points, [(f.type.name, f.nodes, f.macro) for f in sub_faces])
-        means = at.means(evaluate(zone.clearance, at.place + origin))
+        at = surface_points(groups.points, [(f.type.name, f.nodes, f.macro) for f in sub_faces])
+        means = at.means(groups.field(zone.clearance)(at.place))
         whole = operator.mean.T @ (operator.surface.area * means)
         initial = whole * operator.covered / operator.area
     return initial - zone.interference * operator.covered

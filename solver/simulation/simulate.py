@@ -3,26 +3,34 @@
 import logging
 import resource
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import meshio
 import numpy as np
 
-from solver.case.reader import Case
-from solver.mechanics.fem.elasticity import nodal_stress
+from solver.case.model import Case
+from solver.mechanics.fem.elasticity import largest_strain, nodal_stress
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.stress import normal_stress
 from solver.mesh.catalogue import BY_NAME
-from solver.simulation.balance import imbalances
+from solver.simulation.balance import imbalances, pressures_of_forces
 from solver.simulation.consistency import inconsistency
-from solver.simulation.cures import ALL, Cures
 from solver.simulation.geometry import check_geometry
 from solver.simulation.naming import body_infos
-from solver.simulation.plan import decided, noted
+from solver.simulation.options import LEAN, Options
+from solver.simulation.plan import decided, estimated, noted, strained
 from solver.simulation.problem import ContactProblem, Equilibrium
+from solver.simulation.recovery import Recovered, RecoveredZone, recovered
 from solver.simulation.scene import Scene, ZoneScene, build_scene
-from solver.simulation.skips import NEEDED, Skips
-from solver.simulation.solution import Line, NodalContact, Solution, StepResult, ZoneResult
+from solver.simulation.solution import (
+    Line,
+    NodalContact,
+    RecoveredPressure,
+    Solution,
+    StepResult,
+    ZoneResult,
+)
 from solver.simulation.unloaded import without_unloaded
 from solver.system.clock import Clock, processor_time
 from solver.system.errors import SolveError
@@ -38,90 +46,88 @@ _HALF = 0.5 - 1e-9
 def simulate(
     case: Case,
     mesh: meshio.Mesh,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    log: Log = lambda _: None,
-    cures: Cures = ALL,
+    options: Options = LEAN,
     clock: Clock | None = None,
-    skips: Skips = NEEDED,
+    log: Log = lambda _: None,
 ) -> Solution:
-    """Solve a case on its mesh.
+    """Solve a case on its mesh; the case may be swapped (see `Case.as_solved`).
 
-    `swapped` exchanges slave and master, `hexahedra` overrides how slave hexahedra are cut.
-    `cures` turns what keeps the digits off, to show what it does, and `skips` what is left out
-    where the scene does not need it. The time of every stage is added to `clock`, where one is
-    given. Raises InputError where the case and its mesh do not fit,
-    SolveError where no solution is found.
+    The time of every stage is added to `clock`, where one is given. Raises InputError where the
+    case and its mesh do not fit, SolveError where no solution is found.
     """
     started = processor_time()
-    clock = Clock() if clock is None else clock
-    scene = build_scene(case, mesh, swapped, hexahedra, clock, cures, skips)
+    clock = clock or Clock()
+    scene = build_scene(case, mesh, options, clock)
     check_geometry(scene)
-    if skips.unloaded:
+    if options.shortcuts.unloaded:
         with clock.stage("assembly"):
             scene = without_unloaded(scene)
     log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
     with clock.stage("assembly"):
         problem = ContactProblem(scene)
-    solution = solve_problem(problem, clock, swapped, hexahedra, log)
+    solution = solve_problem(problem, clock, log)
     solution.cpu_seconds = processor_time() - started
     solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
 
 
-def solve_problem(
-    problem: ContactProblem,
-    clock: Clock,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    log: Log = lambda _: None,
-) -> Solution:
+def solve_problem(problem: ContactProblem, clock: Clock, log: Log = lambda _: None) -> Solution:
     """Solve an assembled problem at all load factors; how it was assembled goes on record."""
     plan = list(decided(problem))
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
     with clock.stage("solve"):
-        states = _walk(problem, problem.scene.case.steps, log)
+        states, recovered = _walk(problem, problem.scene.case.steps, log)
     plan += noted(problem, states)
     with clock.stage("recovery"):
-        solution = _recover(problem, states, plan, swapped, hexahedra)
+        solution = _recover(problem, states, recovered, plan)
+    solution.plan += [*estimated(solution), *strained(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
     return solution
 
 
-def _walk(problem: ContactProblem, steps: tuple[float, ...], log: Log) -> list[Equilibrium]:
-    """Solve the load factors in turn, each from the status of the one before."""
+def _walk(
+    problem: ContactProblem, steps: tuple[float, ...], log: Log
+) -> tuple[list[Equilibrium], Recovered]:
+    """Solve the load factors in turn, each from the status of the one before.
+
+    With the states the pressure recovered in the last one.
+    """
     states: list[Equilibrium] = []
+    fields: Recovered = {}
     for factor in steps:
         start = states[-1].status.closed if states else None
         state = problem.solve(factor, start)
+        if (state.trial.offence(state.iterate.closed) > 1).any():
+            raise SolveError(f"load factor {factor:g}: contact bears tension or surfaces overlap")
+        state, fields = recovered(problem, state, factor)
         states.append(state)
         log(
             f"load factor {factor:g}: {state.status.iterations} iterations, "
             f"{int(state.status.closed.sum())} closed, residual {state.residual:.1e}"
         )
-    return states
+    return states, fields
 
 
 def _recover(
-    problem: ContactProblem,
-    states: list[Equilibrium],
-    plan: list[Line],
-    swapped: bool,
-    hexahedra: str | None,
+    problem: ContactProblem, states: list[Equilibrium], fields: Recovered, plan: list[Line]
 ) -> Solution:
     scene = problem.scene
     last = states[-1]
-    stress = nodal_stress(scene.points, scene.blocks, last.straining, last.extended)
-    stress += scene.mean.nodal_stress(last.mean_stress, scene.blocks)
+    stress = nodal_stress(
+        scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
+    )
+    stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
     scale = _stress_scale(scene, stress)
-    zones = [_zone_result(scene, zone, last, stress) for zone in scene.zones]
+    strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
+    zones = [
+        _zone_result(scene, zone, last, stress, forces, fields.get(zone.zone.name))
+        for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
+    ]
     return Solution(
         case=scene.case,
-        swapped=swapped,
-        hexahedra=hexahedra,
         mesh=_output_mesh(scene),
         displacement=last.displacement,
         stress=stress,
@@ -140,8 +146,10 @@ def _recover(
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
         plan=plan,
+        strain=strain,
+        rotation=rotation,
         accuracy=last.accuracy.causes,
-        mean_stress=scene.mean.by_cell(last.mean_stress, scene.mesh.cells),
+        mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
     )
 
 
@@ -149,7 +157,7 @@ def _output_mesh(scene: Scene) -> meshio.Mesh:
     cells = [(_meshio_name(name), data) for name, data in scene.mesh.cells.items()]
     sets = {
         group: [np.flatnonzero(scene.mesh.members(name, mask)) for name in scene.mesh.cells]
-        for group, mask in scene.volume_groups.items()
+        for group, mask in scene.given.groups.items()
         if any(m.any() for m in mask.values())
     }
     return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)
@@ -170,7 +178,12 @@ def _contact_direction(scene: Scene) -> np.ndarray:
 
 
 def _zone_result(
-    scene: Scene, zone: ZoneScene, state: Equilibrium, stress: np.ndarray
+    scene: Scene,
+    zone: ZoneScene,
+    state: Equilibrium,
+    stress: np.ndarray,
+    pressure_of_forces: np.ndarray | None,
+    field: RecoveredZone | None,
 ) -> ZoneResult:
     surface = zone.operator.surface
     slave_nodes, slave_normal = _nodal_normals(
@@ -194,7 +207,37 @@ def _zone_result(
         slave_nodes=slave_nodes,
         master_nodes=master_nodes,
         nodal=_nodal_contact(zone, state),
+        pressure_of_forces=pressure_of_forces,
+        pressure_error=None if field is None else field.error,
+        recovered=_recovered_pressure(scene, zone, state, field),
     )
+
+
+def _recovered_pressure(
+    scene: Scene, zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
+) -> RecoveredPressure | None:
+    """The recovered pressure of a zone, and its mean at each node over the faces around."""
+    if field is None or field.name == "none":
+        return None
+    local, pressure = field.recovery.moments.local, state.pressure[zone.numbers]
+    nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
+    found = RecoveredPressure(
+        form=field.name,
+        coefficients=field.coefficients.reshape(len(pressure), -1),
+        degree=field.degree,
+        centre=local.centre + scene.origin,
+        axes=local.axes,
+        spread=local.spread,
+        nodes=nodes,
+        at_nodes=np.zeros(len(nodes)),
+    )
+    total, count = np.zeros((2, len(nodes)))
+    for faces in zone.sub_faces:
+        places = scene.points[faces.nodes] + scene.origin
+        at = np.searchsorted(nodes, faces.nodes)
+        np.add.at(total, at, found.values(pressure, faces.macro, places))
+        np.add.at(count, at, 1.0)
+    return replace(found, at_nodes=total / count)
 
 
 def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:

@@ -17,11 +17,11 @@ from solver.case import job_name
 if TYPE_CHECKING:
     import meshio
 
-    from solver.case.reader import Case
+    from solver.case.model import Case
 
 
 class Line(NamedTuple):
-    """A line of the plan: what was left out or decided, and why; `skip` is its switch in `Skips`.
+    """A line of the plan: what was left out or decided, and why; `skip`: its switch in `Shortcuts`.
 
     Empty where it has none.
     """
@@ -60,6 +60,34 @@ class NodalContact:
 
 
 @dataclass
+class RecoveredPressure:
+    """A pressure p* = p + Σ c ψ by macro-element (m,), recovered from the constants p.
+
+    `form`: linear, quadratic or smooth (see `mechanics.mortar.recovery`); `coefficients` c (m, k),
+    `degree` (m,) of the polynomials; `centre`, `axes`, `spread` are those of the local coordinates
+    that ψ is written in. `nodes` (n,) of the slave surface and `at_nodes` (n,), the mean there of
+    p* on the faces around.
+    """
+
+    form: str
+    coefficients: np.ndarray
+    degree: np.ndarray
+    centre: np.ndarray
+    axes: np.ndarray
+    spread: np.ndarray
+    nodes: np.ndarray
+    at_nodes: np.ndarray
+
+    def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
+        from solver.mechanics.mortar.recovery import FORMS, Local
+
+        local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
+        psi = local.shapes(macro, places, FORMS[self.form])
+        return mean[macro][:, None] + np.einsum("sqk,sk->sq", psi, self.coefficients[macro])
+
+
+@dataclass
 class ZoneResult:
     """The contact state of one zone, by macro-element, and the stress on both surfaces.
 
@@ -69,6 +97,10 @@ class ZoneResult:
     (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
     `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
     belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
+    `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
+    these do not determine it (see `solver.simulation.balance`). `pressure_error` (m,) estimates the
+    L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
+    where multipliers belong to nodes. `recovered` is p* where the case asks for one.
     """
 
     name: str
@@ -86,6 +118,17 @@ class ZoneResult:
     slave_nodes: np.ndarray
     master_nodes: np.ndarray
     nodal: NodalContact | None = None
+    pressure_of_forces: np.ndarray | None = None
+    pressure_error: np.ndarray | None = None
+    recovered: RecoveredPressure | None = None
+
+    @property
+    def relative_pressure_error(self) -> float | None:
+        """The estimated L2 error of the constants over their norm; None where there is none."""
+        if self.pressure_error is None:
+            return None
+        whole = float(np.sqrt((self.area * self.coverage) @ self.multiplier**2))
+        return float(np.linalg.norm(self.pressure_error)) / whole if whole else 0.0
 
 
 @dataclass
@@ -116,7 +159,8 @@ class Solution:
     `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
     `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
     the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
-    largest stress. `accuracy` are the relative errors that rounding alone may cause, by cause (see
+    largest stress. `strain` and `rotation` (radians) are the largest of the last load factor.
+    `accuracy` are the relative errors that rounding alone may cause, by cause (see
     `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
@@ -127,8 +171,6 @@ class Solution:
     """
 
     case: Case
-    swapped: bool
-    hexahedra: str | None
     mesh: meshio.Mesh
     displacement: np.ndarray
     stress: np.ndarray
@@ -147,6 +189,8 @@ class Solution:
     plan: list[Line]
     matrix_entries: int = 0
     linear_iterations: int = 0
+    strain: float = float("nan")
+    rotation: float = float("nan")
     accuracy: dict[str, float] = field(default_factory=dict)
     mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
@@ -154,6 +198,16 @@ class Solution:
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")
+
+    @property
+    def swapped(self) -> bool:
+        """Whether slave and master were exchanged."""
+        return self.case.swapped
+
+    @property
+    def hexahedra(self) -> str | None:
+        """How slave hexahedra were cut, where the case was overruled."""
+        return self.case.hexahedra
 
     @property
     def job(self) -> str:

@@ -19,7 +19,7 @@ from solver.mechanics.fem.bodies import (
     unheld_motion,
 )
 from solver.mechanics.fem.supports import FreeMotion
-from solver.simulation.scene import Scene
+from solver.simulation.scene import Rest, Scene
 
 
 def without_unloaded(scene: Scene) -> Scene:
@@ -31,20 +31,22 @@ def without_unloaded(scene: Scene) -> Scene:
     gaps, free = _gaps(scene), scene.free
     acting = (gaps @ free.basis).tocsr()
     bodies = scene.body[nodes_of_unknowns(free.basis, scene.points.shape[1])]
-    asleep, held = _unloaded(scene, gaps, acting, bodies)
-    if asleep.any() and _moves_freely(scene, gaps):
-        asleep[:] = False
-    kept = ~asleep[bodies]
-    if not (asleep | held).any() or not kept.any():
+    unloaded, fixed = _unloaded(scene, gaps, acting, bodies)
+    if unloaded.any() and _moves_freely(scene, gaps):
+        unloaded[:] = False
+    kept = ~unloaded[bodies]
+    if not (unloaded | fixed).any() or not kept.any():
         return scene
     selection = None if free.selection is None else free.selection[kept]
-    out = (asleep | held)[scene.body]
+    out = (unloaded | fixed)[scene.body]
     blocks = (block.of(~out[block.cells[:, 0]]) for block in scene.blocks)
     return replace(
         scene,
-        asleep=asleep,
-        held=held,
-        resting=np.asarray(abs(acting) @ (~kept).astype(float)) > 0,
+        rest=Rest(
+            unloaded_bodies=unloaded,
+            fixed_bodies=fixed,
+            unloaded_multipliers=np.asarray(abs(acting) @ (~kept).astype(float)) > 0,
+        ),
         blocks=[block for block in blocks if len(block.cells)],
         free=FreeMotion(free.basis[:, np.flatnonzero(kept)], free.offset, selection),
     )
@@ -57,7 +59,7 @@ def _unloaded(
 
     `gaps` (k, n_dofs) on all unknowns, `acting` (k, n_free) on free ones, those of `bodies`.
     """
-    n_bodies = len(scene.asleep)
+    n_bodies = scene.n_bodies
     group = joined_bodies(acting, bodies, n_bodies)
     offset = scene.free.offset
     awake, imposed = np.zeros((2, n_bodies), dtype=bool)
@@ -78,7 +80,7 @@ def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:
     there = covered > 0
     per_area = sparse.diags(1 / covered[there]) @ gaps[there]
     motions = rigid_motions(scene.points, scene.body)
-    return unheld_motion(motions, scene.free.basis, per_area, len(scene.asleep)) is not None
+    return unheld_motion(motions, scene.free.basis, per_area, scene.n_bodies) is not None
 
 
 def _gaps(scene: Scene) -> sparse.csr_matrix:

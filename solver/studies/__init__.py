@@ -1,1 +1,6 @@
-"""Studies that measure the program, each with its description, measurement and page."""
+"""Studies that measure the program, each with its description, measurement and page.
+
+A study comes in two sizes: all of it, and a part that takes some minutes.
+"""
+
+SIZES = FULL, QUICK = "full", "quick"

@@ -1,86 +1,67 @@
-"""Orders of convergence: fitted slopes with their spread, and what theory says of them.
+"""Powers fitted to measurements: value ~ size^power, by least squares in log–log.
 
-The LAC method on cells of degree one or two has a multiplier that is constant on each macro-element
-(Drouet, Hild, Numer. Math. 136 (2017) 467–502): the error of the displacement in H1 falls with
-order 1 or 1.5 at least, in L2 with one more; where the solution is smooth, it may reach what
-interpolation allows, 2 in H1 and 3 in L2 for degree two. The pressure error in L2 falls with order
-0.5 or 1 at least; 1 is the most that a piecewise constant can show. Its values at the means of
-macro-elements have no such bound.
+Orders of convergence are powers of the mesh size, growth of cost is a power of the unknowns.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-LAST = 3
-# Relative errors below are rounding: no slope is fitted to them.
 ROUND_OFF = 1e-11
+"""Relative errors up to this are rounding: no order is fitted to them."""
+LAST = 3
+"""Orders are fitted to so many of the finest sizes."""
 
 
 @dataclass(frozen=True)
-class Order:
-    """What theory says: the order guaranteed, and the best there can be (None: not known)."""
+class Fit:
+    """A fitted power and its standard error, which is NaN for two points.
 
-    least: float | None
-    best: float | None
-
-
-DEGREES = {1: "linear", 2: "quadratic"}
-THEORY: Mapping[str, Mapping[str, Order]] = {
-    "linear": {
-        "displacement_l2": Order(2.0, 2.0),
-        "displacement_h1": Order(1.0, 1.0),
-        "stress_l2": Order(1.0, 1.0),
-        "pressure_l2": Order(0.5, 1.0),
-        "pressure_max": Order(None, 1.0),
-    },
-    "quadratic": {
-        "displacement_l2": Order(2.5, 3.0),
-        "displacement_h1": Order(1.5, 2.0),
-        "stress_l2": Order(1.5, 2.0),
-        "pressure_l2": Order(1.0, 1.0),
-        "pressure_max": Order(None, 1.0),
-    },
-}
-
-
-@dataclass(frozen=True)
-class Slope:
-    """A fitted slope in log–log, and its standard error."""
+    `low` and `high` are the sizes between which it was fitted.
+    """
 
     value: float
     spread: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        """With the standard error, where there is one."""
+        return f"{self.value:.2f}" + ("" if np.isnan(self.spread) else f" ± {self.spread:.2f}")
 
 
-def fit_slope(sizes: ArrayLike, errors: ArrayLike, last: int = LAST) -> Slope | None:
-    """The slope of log(error) over log(size) by least squares over the `last` finest sizes.
+def fit_power(sizes: ArrayLike, values: ArrayLike) -> Fit | None:
+    """The power of sizes (n,) with which values (n,) change.
 
-    The spread is the standard error of the slope. None for fewer than three points, for errors that
-    are rounding, and where the sizes are all the same.
+    None for fewer than two different sizes, and for values that are not positive and finite.
     """
-    h, e = _finest(sizes, errors, last)
-    if len(h) < LAST or not np.all(np.isfinite(e)) or e.min() <= ROUND_OFF or h.min() == h.max():
+    h, e = np.asarray(sizes, dtype=float), np.asarray(values, dtype=float)
+    if len(h) < 2 or h.min() == h.max() or not ((e > 0) & np.isfinite(e)).all():
         return None
     x, y = np.log(h) - np.log(h).mean(), np.log(e) - np.log(e).mean()
-    slope = (x @ y) / (x @ x)
-    residual = y - slope * x
-    return Slope(float(slope), float(np.sqrt(residual @ residual / (len(h) - 2) / (x @ x))))
+    power = float((x @ y) / (x @ x))
+    residual, free = y - power * x, len(h) - 2
+    spread = float(np.sqrt(residual @ residual / free / (x @ x))) if free else float("nan")
+    return Fit(power, spread, float(h.min()), float(h.max()))
 
 
-def is_rounding(sizes: ArrayLike, errors: ArrayLike, last: int = LAST) -> bool:
-    """Whether the errors at the `last` finest sizes are all rounding."""
-    _, e = _finest(sizes, errors, last)
+def fit_order(sizes: ArrayLike, errors: ArrayLike) -> Fit | None:
+    """The order of convergence over the `LAST` finest sizes.
+
+    None for fewer sizes, and for errors that are rounding.
+    """
+    h, e = _finest(sizes, errors)
+    return None if len(h) < LAST or e.min() <= ROUND_OFF else fit_power(h, e)
+
+
+def is_rounding(sizes: ArrayLike, errors: ArrayLike) -> bool:
+    """Whether the errors at the `LAST` finest sizes are all rounding."""
+    _, e = _finest(sizes, errors)
     return len(e) > 0 and bool(np.all(e <= ROUND_OFF))
 
 
-def _finest(sizes: ArrayLike, errors: ArrayLike, last: int) -> tuple[np.ndarray, np.ndarray]:
+def _finest(sizes: ArrayLike, errors: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     h, e = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
-    order = np.argsort(h)[:last]
+    order = np.argsort(h)[:LAST]
     return h[order], e[order]
-
-
-def element_size(macro_elements: int, dim: int) -> float:
-    """The mean size of a macro-element over the size of the interface, for a mesh of `dim`."""
-    return float(macro_elements) ** (-1 / (dim - 1))

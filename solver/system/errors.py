@@ -1,5 +1,8 @@
 """The ways in which a command ends early: its input is refused, or the solve fails."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class InputError(Exception):
     """The input is refused: one line that names the file, the key, the value and the problem.
@@ -45,6 +48,24 @@ def printable(name: object) -> str:
     """A name as one line of UTF-8: other characters are escaped."""
     text = str(name)
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """`did you mean …?` when one of the known names is near, else the list of them."""
+    known = sorted(known)
+    near = get_close_matches(str(name), known, n=1)
+    listed = f"allowed: {', '.join(known)}" if known else "there is none"
+    return f"did you mean {near[0]}? ({listed})" if near else listed
+
+
+def key_path(keys: Iterable[str | int]) -> str:
+    """`contact[0].slave` for the keys `("contact", 0, "slave")`."""
+    path = ""
+    for key in keys:
+        name = str(key) if str(key).isprintable() else repr(key)
+        step = f"[{key}]" if isinstance(key, int) else name
+        path += step if isinstance(key, int) or not path else f".{step}"
+    return path
 
 
 def _shorten(value: object, length: int = 80) -> str:

@@ -58,15 +58,16 @@ def last_line(path: Path | None, most: int = 4096) -> str:
     return next((line.strip() for line in reversed(lines) if line.strip()), "")
 
 
-def seal(path: Path) -> None:
-    """Append the hash of all that a file holds, for `is_sealed`."""
-    mark = _SEAL % _digest(path, path.stat().st_size)
+def seal(path: Path) -> str:
+    """Append the hash of all that a file holds, for `seal_of`; the hash."""
+    digest = _digest(path, path.stat().st_size)
     with path.open("ab") as file:
-        file.write(mark)
+        file.write(_SEAL % digest)
+    return digest.decode()
 
 
-def is_sealed(path: str | Path) -> bool:
-    """Whether a file is, to the last bit, what `seal` was called for; False where there is none.
+def seal_of(path: str | Path) -> str:
+    """The hash of a file that is, to the last bit, what `seal` was called for; empty for any other.
 
     HDF5 reads some damaged files as if they were whole, and others take the interpreter down.
     """
@@ -76,9 +77,10 @@ def is_sealed(path: str | Path) -> bool:
         with path.open("rb") as file:
             file.seek(max(content, 0))
             mark = file.read()
-        return content >= 0 and mark == _SEAL % _digest(path, content)
+        digest = _digest(path, content)
+        return digest.decode() if content >= 0 and mark == _SEAL % digest else ""
     except (OSError, ValueError):
-        return False
+        return ""
 
 
 def _digest(path: Path, size: int) -> bytes:
@@ -113,3 +115,11 @@ def _lives(process: int) -> bool:
     except OSError:  # of another user
         return True
     return True
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file of that name, which may be too long for any."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False

@@ -1,42 +1,11 @@
-"""Memory: what a solve takes at least, what the machine has, and the refusal where that is less.
-
-Measured as peak resident memory of solves of all cell types, 547 of them with a factor by PARDISO
-and 20,000 to 640,000 unknowns: 100 MB for the program, then by unknown (of nodes times dimensions)
-1.9 to 7.4 kB in the plane and 4.4 to 16 kB in space, the less the more elongated the bodies are.
-With multigrid it is 1.9 (TETRA4) to 4.1 kB (HEXA20), for HEXA8 cubes 2.3 to 2.4 kB from 500,000
-to 1,000,000 unknowns. A solve is refused by the least figure, so that none is
-refused that fits; the usual one is for a warning, and a cluster is asked for the most, since a
-factor may have to take over.
-"""
+"""Memory: what the machine has, and what a process has used."""
 
 import resource
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
-from solver.system.errors import MachineError
-
-# Bytes of the program, with what every hierarchy of multigrid takes, and by unknown.
-_LEAST = {2: (100e6, 1.8e3), 3: (100e6, 1.6e3)}
-_USUAL = {2: (100e6, 3.0e3), 3: (200e6, 2.2e3)}
-_MOST = {2: (100e6, 7.4e3), 3: (100e6, 16.0e3)}
 # A cgroup without a limit has a number near 2⁶³ for one.
 _NO_LIMIT = 1 << 60
-
-
-@dataclass(frozen=True)
-class Need:
-    """Memory (bytes) of a solve: at least, usually, and at most."""
-
-    least: float
-    usual: float
-    most: float
-
-
-def needed(points: float, dim: int) -> Need:
-    """The memory of a solve on a mesh of so many points."""
-    kinds = (kind[dim] for kind in (_LEAST, _USUAL, _MOST))
-    return Need(*(program + by_unknown * points * dim for program, by_unknown in kinds))
 
 
 def peak_mb(used: resource.struct_rusage) -> float:
@@ -50,31 +19,6 @@ def available() -> float:
     The least of what is free (swap included), what its cgroups and its own limit leave.
     """
     return min([float("inf"), *_free(), *_cgroups(), *_own_limit()])
-
-
-def check_memory(
-    points: int, dim: int, where: object, log: Callable[[str], object], free: float | None = None
-) -> None:
-    """Raise MachineError where a solve on a mesh of `points` cannot fit; warn where it may not.
-
-    `where` is the file to name, `free` the memory there is, as `available` tells.
-    """
-    need, free = needed(points, dim), available() if free is None else free
-    if need.least > free:
-        raise MachineError(
-            where,
-            "memory",
-            f"{points * dim} unknowns",
-            f"needs at least {_gigabytes(need.least)}, {_gigabytes(free)} are free; what helps: a "
-            "coarser mesh, fewer solves at a time (CORES=1), a larger machine; "
-            "to try all the same: --no-memory-check",
-        )
-    if need.usual > free:
-        log(f"memory may run out: about {_gigabytes(need.usual)} of {_gigabytes(free)} free")
-
-
-def _gigabytes(size: float) -> str:
-    return f"{size / 1e9:.2g} GB"
 
 
 def _free() -> Iterator[float]:

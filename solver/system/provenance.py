@@ -24,7 +24,8 @@ def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
     return {
         "python": platform.python_version(),
         **{package: _version(package) for package in PACKAGES},
-        "command": shlex.join(["python", *sys.orig_argv[1:]]),
+        # Also where the batch starts it with other options of Python (warm.py).
+        "command": shlex.join(["python", *(a for a in sys.orig_argv[1:] if a != "-Es")]),
         "revision": _revision(),
         "case_sha256": _sha256(case),
         "mesh_sha256": _sha256(mesh),

@@ -17,7 +17,8 @@ in cells in mixed form):
     half_width, peak      of the half ellipse fitted to p_h (Hertz), relative
 
 In the first two of the pressure p_h is the field that the treatment of the interface solves for:
-constant on each macro-element, or, with multipliers at nodes, interpolated between these; in the
+constant on each macro-element, or what is recovered from the constants, or, with multipliers at
+nodes, interpolated between these; in the
 others its mean over each macro-element.
 
 Volume integrals use Gauss points two more each way than the degree of the cell, so that the
@@ -151,7 +152,7 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
     for zone in solution.zones:
         at = surface_points(solution.mesh.points, zone.faces)
         pressure = exact.contact_pressure(at.place)
-        error = computed_pressure(zone) - pressure
+        error = computed_pressure(solution.mesh.points, zone) - pressure
         covered = (zone.coverage > 0)[at.macro] & exact.regular(at.place)
         weight = at.weight * zone.coverage[at.macro]
         squares += _integral(weight, error), _integral(weight, pressure)

@@ -16,7 +16,8 @@ from pathlib import Path
 from solver.simulation.solution import Solution
 from solver.system.errors import InputError
 from solver.system.files import write_text
-from solver.verification.checks import Accepted, CheckResult
+from solver.verification.checks import Accepted
+from solver.verification.verdict import CheckResult
 
 _KEYS = {"minimum", "maximum"}
 

@@ -9,7 +9,8 @@ the checks need again, so that a file can be judged without solving:
     /errors        norms of the error against the case's exact solution, if it names one
     /mean_stress   by cell type, that of cells in mixed form at their nodes
     /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces; in `nodal` those
-                   of nodes where the treatment has its multipliers there
+                   of nodes where the treatment has its multipliers there; in `recovered` the
+                   coefficients of a recovered pressure and its values at nodes
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
     /provenance    versions, revision, hashes, machine
 
@@ -30,23 +31,25 @@ import h5py
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, parse_case
+from solver.case.model import Case
+from solver.case.reader import parse_case
 from solver.mesh.catalogue import cell_type
-from solver.mesh.files.vtkhdf import read_grid, write_grid
+from solver.mesh.files.vtkhdf import check_name, read_grid, write_grid
 from solver.simulation.consistency import inconsistency
 from solver.simulation.solution import (
     BodyInfo,
     Line,
     NodalContact,
+    RecoveredPressure,
     Solution,
     StepResult,
     ZoneResult,
 )
 from solver.system.errors import InputError
-from solver.system.files import is_sealed, replacing, seal
-from solver.system.hdf5 import column, new_file, read_table, write_table
-from solver.verification.checks import CheckResult
+from solver.system.files import replacing, seal, seal_of
+from solver.system.hdf5 import column, new_file, read_file, read_table, write_table
 from solver.verification.units import label_fields
+from solver.verification.verdict import CheckResult
 
 GRID = "VTKHDF"
 _SCALARS = (
@@ -77,16 +80,18 @@ _AT_MULTIPLIER_NODES = {
     "gap": "gap",
     "status": "closed",
 }
+_RECOVERED = ("coefficients", "degree", "centre", "axes", "spread", "nodes", "at_nodes")
 _ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 
 @dataclass
 class Result:
-    """What a result file gives back: the solution, and where it came from."""
+    """What a result file gives back: the solution, where it came from, and the file's hash."""
 
     solution: Solution
     provenance: dict[str, Any]
+    sha256: str
 
 
 def write_result(
@@ -94,12 +99,13 @@ def write_result(
     solution: Solution,
     checks: Iterable[CheckResult],
     provenance: Mapping[str, Any],
-) -> None:
-    """Write a solution, its checks and its provenance to a `.vtkhdf` file."""
+) -> str:
+    """Write a solution, its checks and its provenance to a `.vtkhdf` file; the file's hash."""
+    check_name(Path(path))
     with replacing(path) as temporary:
         with new_file(temporary) as file:
             _write(file, solution, checks, provenance)
-        seal(temporary)
+        return seal(temporary)
 
 
 def _write(
@@ -111,6 +117,7 @@ def _write(
     _write_grid(file.create_group(GRID), solution)
     _write_case(file.create_group("case"), solution)
     file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
+    file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
@@ -131,12 +138,12 @@ def _write(
 
 def read_result(path: str | Path) -> Result:
     """Read a result file back; `InputError` for a file that is none, or not as it was written."""
-    if not is_sealed(path):
+    if not (sha256 := seal_of(path)):
         raise _no_result(path, "damaged, of another version, or none at all")
     try:
-        with h5py.File(path) as file:
+        with read_file(path) as file:
             file.visititems(_refuse_complex)
-            result = Result(_read_solution(file), _plain(file["provenance"].attrs))
+            result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)
     except InputError:
         raise
@@ -167,8 +174,6 @@ def _read_solution(file: h5py.File) -> Solution:
     case = file["case"]
     return Solution(
         case=_read_case(case),
-        swapped=bool(case.attrs["swapped"]),
-        hexahedra=case.attrs["hexahedra"] or None,
         mesh=meshio.Mesh(
             grid.points,
             [grid.cells[i] for i in volumes],
@@ -186,6 +191,8 @@ def _read_solution(file: h5py.File) -> Solution:
         balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=_read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
+        strain=float(file["solve"].attrs.get("strain", np.nan)),
+        rotation=float(file["solve"].attrs.get("rotation", np.nan)),
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
@@ -216,9 +223,20 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
         "normal_stress": solution.nodal_normal_stress,
         "body": solution.body,
     }
+    if any(zone.recovered for zone in solution.zones):
+        point_data["recovered_pressure"] = _recovered_at_nodes(solution)
     write_grid(
         group, meshio.Mesh(mesh.points, cells + faces, cell_sets=sets), point_data, cell_data
     )
+
+
+def _recovered_at_nodes(solution: Solution) -> np.ndarray:
+    """The recovered pressure (n,) at slave nodes, NaN at all others."""
+    values = np.full(len(solution.mesh.points), np.nan)
+    for zone in solution.zones:
+        if zone.recovered:
+            values[zone.recovered.nodes] = zone.recovered.at_nodes
+    return values
 
 
 def _face_blocks(
@@ -275,7 +293,8 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
 
 
 def _read_case(group: h5py.Group) -> Case:
-    return parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+    case = parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
+    return case.as_solved(bool(group.attrs["swapped"]), group.attrs["hexahedra"] or None)
 
 
 def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
@@ -288,6 +307,15 @@ def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     # Faces of one type may be in several blocks, one for each type of cell behind them.
     for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
         faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
+    if zone.pressure_error is not None:
+        group["pressure_error"] = zone.pressure_error
+    if zone.recovered:
+        recovered = group.create_group("recovered")
+        recovered.attrs["form"] = zone.recovered.form
+        for name in _RECOVERED:
+            recovered[name] = getattr(zone.recovered, name)
+    if zone.pressure_of_forces is not None:
+        group["pressure_of_forces"] = zone.pressure_of_forces
     if zone.nodal:
         nodal = group.create_group("nodal")
         for name, attribute in _AT_MULTIPLIER_NODES.items():
@@ -304,7 +332,19 @@ def _read_zone(
         **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
         **{key: group[key][()] for key in _BY_NODE},
         nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
+        pressure_of_forces=_optional(group, "pressure_of_forces"),
+        pressure_error=_optional(group, "pressure_error"),
+        recovered=_read_recovered(group["recovered"]) if "recovered" in group else None,
     )
+
+
+def _optional(group: h5py.Group, name: str) -> np.ndarray | None:
+    return group[name][()] if name in group else None
+
+
+def _read_recovered(group: h5py.Group) -> RecoveredPressure:
+    fields = {name: group[name][()] for name in _RECOVERED}
+    return RecoveredPressure(form=group.attrs["form"], **fields)
 
 
 def _read_nodal(group: h5py.Group) -> NodalContact:

@@ -9,17 +9,20 @@ from typing import Any
 
 import meshio
 
-from solver.case.reader import Case, check_mesh_file, load_case
+from solver.case.model import Case
+from solver.case.reader import check_mesh_file, load_case
 from solver.mesh import generate, read_mesh, transform
+from solver.mesh.files.vtkhdf import check_name
+from solver.mesh.size import check_memory
+from solver.simulation.options import LEAN, Options
 from solver.simulation.simulate import simulate
-from solver.simulation.skips import EVERYTHING, NEEDED, Skips
 from solver.simulation.solution import Solution
 from solver.system.clock import Clock, processor_time
 from solver.system.errors import InputError, MachineError, SolveError, of_machine
 from solver.system.files import last_line
-from solver.system.memory import check_memory
 from solver.system.provenance import gather
-from solver.verification.checks import CheckResult, run_checks
+from solver.verification.checks import run_checks
+from solver.verification.judge import judge, without_result
 from solver.verification.norms import errors
 from solver.verification.regression import accepted_values
 from solver.verification.results import read_result, write_result
@@ -27,8 +30,8 @@ from solver.verification.verdict import (
     CRASHED,
     FAILED,
     REFUSED,
-    of_solution,
-    without_result,
+    CheckResult,
+    Verdict,
     write_verdict,
 )
 
@@ -54,13 +57,14 @@ class Job:
 
 
 def refined(case: Case, factor: int) -> Case:
-    """The case with the divisions of its recipe multiplied by `factor`."""
+    """The case with the divisions of its recipe multiplied by `factor`, and no counts to meet."""
     if factor == 1:
         return case
     if "path" in case.mesh:
         allowed = "cannot be refined: only the mesh of a recipe can"
         raise InputError(case.path, "mesh.file", str(case.mesh["path"]), allowed)
-    return replace(case, mesh={**case.mesh, "refine": factor * case.mesh.get("refine", 1)})
+    mesh = {**case.mesh, "refine": factor * case.mesh.get("refine", 1)}
+    return replace(case, mesh=mesh, counts={})
 
 
 def mesh_of(case: Case) -> meshio.Mesh:
@@ -73,7 +77,7 @@ def mesh_of(case: Case) -> meshio.Mesh:
     return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
 
 
-def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> dict[str, Any]:
+def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> Verdict:
     """Solve, check, write the result; the verdict, also written to `verdict_file` if given.
 
     Where there is no result, the verdict that says why is written all the same, and the exception
@@ -81,7 +85,7 @@ def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> dict[s
     """
     case: Case | None = None
     try:
-        case = refined(load_case(job.case), job.refine)
+        case = refined(load_case(job.case), job.refine).as_solved(job.swapped, job.hexahedra)
         verdict = _solve(job, case, output, verdict_file or output, log)
     except Exception as error:
         if verdict_file:
@@ -93,49 +97,47 @@ def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> dict[s
         raise
     if verdict_file:
         write_verdict(verdict_file, verdict)
-    log(summary(verdict))
+    log(verdict.summary)
     return verdict
 
 
 def solve_checked(
     case: Case,
     mesh: meshio.Mesh,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    log: Log = lambda _: None,
+    options: Options = LEAN,
     accepted: bool = True,
     clock: Clock | None = None,
-    skips: Skips = NEEDED,
+    log: Log = lambda _: None,
 ) -> tuple[Solution, list[CheckResult]]:
     """Solve a case on its mesh and run its checks, those of `accepted` values too if asked.
 
     The time of every stage is added to `clock`, where one is given.
     """
-    clock = Clock() if clock is None else clock
-    solution = simulate(case, mesh, swapped, hexahedra, log, clock=clock, skips=skips)
+    clock = clock or Clock()
+    solution = simulate(case, mesh, options, clock, log)
     with clock.stage("checks"):
         solution.errors = errors(solution)
         checks = run_checks(solution, accepted_values(solution) if accepted else {})
     return solution, checks
 
 
-def check(result_file: Path) -> dict[str, Any]:
+def check(result_file: Path) -> Verdict:
     """The verdict of a stored result, its checks run again on the stored fields."""
     result = read_result(result_file)
     result.solution.errors = errors(result.solution)
     checks = run_checks(result.solution, accepted_values(result.solution))
-    return of_solution(result.solution, checks, result_file.name, result.provenance)
+    return judge(result.solution, checks, result_file.name, result.provenance, result.sha256)
 
 
 def record_crash(
     job: Job, verdict_file: Path, log_file: Path | None, status: int | None = None
-) -> dict[str, Any]:
+) -> Verdict:
     """Write the verdict of a solve whose process died, and return it.
 
     The reason is its exit status, as far as known, and the last line of the log.
     """
     try:
-        case: Case | Path = load_case(job.case)
+        case: Case | Path = load_case(job.case).as_solved(job.swapped, job.hexahedra)
     except InputError:
         case = job.case
     said = last_line(log_file)
@@ -148,7 +150,7 @@ def record_crash(
     return verdict
 
 
-def record_refusal(case: Path, verdict_file: Path, reason: str) -> dict[str, Any]:
+def record_refusal(case: Path, verdict_file: Path, reason: str) -> Verdict:
     """Write the verdict of a case that is refused before any solve, and return it.
 
     Its job is called as the folder of the verdict.
@@ -169,35 +171,26 @@ def _death(status: int) -> str:
     return f"{told}, ended by {names[status]}{hint}"
 
 
-def summary(verdict: dict[str, Any]) -> str:
-    """The verdict in one line: job, word, reason or worst error, time."""
-    line = f"{verdict['job']}: {verdict['verdict']}"
-    if verdict["reason"]:
-        return f"{line}: {verdict['reason']}"
-    worst = verdict["worst"]
-    error = f", worst error {worst['error']:.1e} ({worst['name']})" if worst else ""
-    return f"{line}{error}, {verdict['seconds']['total']:.2f} s"
-
-
-def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> dict[str, Any]:
+def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> Verdict:
     """The verdict of a solve that comes to its end; `beside` lies where the verdict will."""
     started, clock = processor_time(), Clock()
-    output.parent.mkdir(parents=True, exist_ok=True)  # better refused now than after the solve
+    # Better refused now than after the solve.
+    check_name(output)
+    output.parent.mkdir(parents=True, exist_ok=True)
     with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
     # What was accepted is a result on the case's own mesh.
     accepted = job.refine == 1
-    skips = EVERYTHING if job.everything else NEEDED
-    solution, checks = solve_checked(
-        case, mesh, job.swapped, job.hexahedra, log, accepted, clock, skips
-    )
+    options = Options.everything() if job.everything else Options()
+    solution, checks = solve_checked(case, mesh, options, accepted, clock, log)
     solution.cpu_seconds = processor_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
     with clock.stage("write"):
-        write_result(output, solution, checks, provenance)
-    return of_solution(solution, checks, os.path.relpath(output, beside.parent), provenance)
+        sha256 = write_result(output, solution, checks, provenance)
+    name = os.path.relpath(output, beside.parent)
+    return judge(solution, checks, name, provenance, sha256)
 
 
 def _ending(error: Exception) -> tuple[str, str, bool]:

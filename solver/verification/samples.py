@@ -7,18 +7,25 @@ whole solve) and the reference; it gives None where there is nothing to compare.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from solver.case.expressions import evaluate
+from solver.mechanics.fem import shape_functions, volume_rule
+from solver.mechanics.fem.elasticity import lame_parameters, physical_gradients
 from solver.mechanics.fem.stress import COMPONENTS
+from solver.mesh.catalogue import cell_type
 from solver.simulation.exact import ExactValues, deformable
+from solver.simulation.groups import ALL
 from solver.simulation.solution import Solution, ZoneResult
+from solver.system.errors import InputError, hint
 
 Reference = Any
+# Numbers of gradients handled at once: small enough to stay in the processor's cache.
+_CHUNK = 1 << 17
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,12 @@ def expected_pressure(zone: ZoneResult, reference: Reference) -> np.ndarray:
 def pressure(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The multiplier of every macro-element."""
     return _at_macro_elements(zone.multiplier, expected_pressure(zone, reference))
+
+
+def pressure_of_forces(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+    """The pressure by forces at slave nodes; the multiplier where they do not determine it."""
+    found = zone.multiplier if zone.pressure_of_forces is None else zone.pressure_of_forces
+    return _at_macro_elements(found, expected_pressure(zone, reference))
 
 
 def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
@@ -133,6 +146,68 @@ def stress_components(solution: Solution, _: None, reference: Reference) -> Samp
     return _by_component(nodes, solution.stress, COMPONENTS, expected)
 
 
+def integration_stress(solution: Solution, _: None, reference: Reference) -> Sample:
+    """The given components at the integration points of all cells, by Hooke's law.
+
+    They follow from the displacement without extrapolation to nodes and averages.
+    """
+    place, stress, node, cell = (np.concatenate(c) for c in zip(*_by_hooke(solution), strict=True))
+    if isinstance(reference, ExactValues):
+        exact = reference.exact.stress(place, reference.part[node])
+        expected = dict(zip(COMPONENTS, exact.T, strict=True))
+    else:
+        expected = {name: evaluate(value, place) for name, value in reference.items()}
+    listed, count = list(expected), len(place)
+    return Sample(
+        np.concatenate([stress[:, COMPONENTS.index(name)] for name in listed]),
+        np.concatenate([expected[name] for name in listed]),
+        lambda i: f"cell {cell[i % count]} ({listed[i // count]})",
+    )
+
+
+def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
+    """By chunk of deformable cells, at their k integration points in all: place, stress, owner.
+
+    Place (k, dim), stress (k, 6), and of the cell: its first node (k,) and its number (k,).
+    """
+    points, moving, first = solution.mesh.points, deformable(solution), 0
+    for block, elastic in zip(solution.mesh.cells, _materials(solution), strict=True):
+        kind = cell_type(block.type)
+        reference, _ = volume_rule(kind.name)
+        values = shape_functions(kind.name).values(reference)
+        mixed = solution.mean_stress.get(kind.name)
+        chosen = np.flatnonzero(moving[block.data].all(axis=1))
+        step = max(1, _CHUNK // (len(reference) * kind.n_nodes * kind.dim))
+        for part in np.split(chosen, range(step, len(chosen), step)):
+            cells = block.data[part]
+            gradient, _ = physical_gradients(points, cells, kind, reference)
+            nodal = solution.displacement[cells]
+            slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ gradient
+            lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
+            mean = lame * np.einsum("cqii->cq", slope)
+            if mixed is not None:
+                own = mixed[part] @ values.T
+                mean = np.where(np.isnan(own), mean, own)
+            tensor = np.zeros((*mean.shape, 3, 3))
+            tensor[..., : kind.dim, : kind.dim] = slope + np.swapaxes(slope, 2, 3)
+            tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
+            stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]].reshape(-1, 6)
+            owners = (np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
+            yield (values @ points[cells]).reshape(-1, kind.dim), stress, *owners
+        first += len(block.data)
+
+
+def _materials(solution: Solution) -> list[np.ndarray]:
+    """Young's modulus and Poisson's ratio (n, 2) of the cells of each block."""
+    given = solution.case.materials
+    start = [(given[ALL].young, given[ALL].poisson)] if ALL in given else [(1.0, 0.0)]
+    found = [np.repeat(start, len(block.data), axis=0) for block in solution.mesh.cells]
+    for group in given.keys() - {ALL}:
+        for values, members in zip(found, solution.mesh.cell_sets[group], strict=True):
+            values[np.asarray(members, dtype=int)] = given[group].young, given[group].poisson
+    return found
+
+
 def _evaluated(
     solution: Solution, nodes: np.ndarray, given: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
@@ -169,6 +244,25 @@ def balance(solution: Solution, _: None, __: Reference) -> Sample:
     names = list(solution.balance)
     values = np.array(list(solution.balance.values()), dtype=float)
     return Sample(values, np.zeros(len(values)), lambda i: f"the balance of {names[i]}")
+
+
+def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
+    """Cells and contact faces of the bodies as meshed, against those that the case gives.
+
+    Raises `InputError` for a group that is not a body.
+    """
+    case, bodies = solution.case, {body.name: body for body in solution.bodies}
+    rows = []
+    for group, given in case.counts.items():
+        if group not in bodies:
+            allowed = f"is not a body; {hint(group, bodies)}"
+            raise InputError(case.path, f"counts.{group}", group, allowed)
+        found = {"cells": sum(bodies[group].cells.values()), "faces": bodies[group].faces}
+        rows += [(found[what], number, f"{what} of {group}") for what, number in given.items()]
+    if not rows:
+        return None
+    values, expected, places = zip(*rows, strict=True)
+    return Sample(np.array(values, float), np.array(expected, float), lambda i: places[i])
 
 
 def observed(quantity: str) -> Sampler:

@@ -1,131 +1,278 @@
-"""The verdict of a solve: one JSON object with all that the report shows, whatever happened."""
+"""The verdict of a solve: one typed record with all that the report shows, whatever happened.
+
+`verdict.json` holds it as a JSON object with the same keys. It is bound to what it judges: `digest`
+is the hash of all other keys, `result_sha256` that of the result file, and family and job are those
+of its folder. A file that was damaged, edited or moved is found out by `flaw`.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+import msgspec
 import numpy as np
 
-from solver.case import job_name
-from solver.case.reader import Case
-from solver.simulation.accuracy import Accuracy
-from solver.simulation.solution import Solution
-from solver.system.files import write_text
-from solver.verification.checks import CheckResult
+from solver.system.errors import InputError
+from solver.system.files import seal_of, write_text
 
-PASSED, FAILED, UNRELIABLE = "passed", "failed", "unreliable"
+PASSED, SOLVED, FAILED, UNRELIABLE = "passed", "solved", "failed", "unreliable"
 REFUSED, CRASHED = "refused", "crashed"
-# What a verdict says of where the case's reference comes from.
-_ORIGIN = ("reference_kind", "reference_uncertainty", "reference_code", "reference_remark")
-# What a solve tells and a solve without an end cannot.
-_UNKNOWN: dict[str, Any] = {
-    "result": None,
-    "dofs": None,
-    "macro_elements": None,
-    "iterations": None,
-    "linear_solver": None,
-    "linear_iterations": None,
-    "matrix_entries": None,
-    "length": None,
-    "load_scale": None,
-    "seconds": {},
-    "stage_cpu_seconds": {},
-    "cpu_seconds": None,
-    "peak_memory_mb": None,
-    "pressure": None,
-    "stress": None,
-    "gap": None,
-    "status": None,
-    "coverage": None,
-    "worst": None,
-    "bodies": [],
-    "plan": [],
-    "checks": [],
-    "accuracy": {},
-    "attainable": None,
-    "errors": {},
-    "provenance": {},
-    "transient": False,
-}
+# The worst first, as in every table.
+WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, SOLVED, PASSED)
+T = TypeVar("T")
+_DIGEST = "digest"
 
 
-def of_solution(
-    solution: Solution,
-    checks: Sequence[CheckResult],
-    result: str | None = None,
-    provenance: Mapping[str, Any] | None = None,
-) -> dict[str, Any]:
-    """The verdict of a solve that came to its end: `passed` when every check holds.
+@dataclass(frozen=True, kw_only=True)
+class Regression:
+    """How far a check's extremes lie from the accepted ones, over the check's scale."""
 
-    `unreliable` whatever the checks say, where rounding may have left less than four digits; then
-    `attainable`, the relative error that rounding alone may cause, is the first reason.
-    `result` is the name of the result file beside the verdict. Extremes are pairs of minimum and
-    maximum over all zones; `worst` names the check nearest to its tolerance, or furthest past it.
+    minimum: float = math.nan
+    maximum: float = math.nan
+    change: float = math.nan
+    tolerance: float
+    passed: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckResult:
+    """One check of one zone (None: of the whole solve).
+
+    `value` and `reference` are those of the place `where` the deviation is largest; `regression` is
+    None while no value has been accepted. `verifies`: the solution is compared with a reference
+    rather than with itself. `passed` asks that the error be within the tolerance and that no
+    accepted value has changed. Numbers are NaN where the solve has none.
     """
-    accuracy = Accuracy(solution.accuracy)
-    reasons = [accuracy.reason] if accuracy.reason else []
-    reasons += [check.reason for check in checks if not check.passed]
-    failed = UNRELIABLE if accuracy.reason else FAILED
-    zones = solution.zones
-    return _identity(solution.case, solution.swapped, solution.hexahedra) | {
-        "verdict": failed if reasons else PASSED,
-        "passed": not reasons,
-        "reason": _first_of(reasons),
-        "result": result,
-        "dofs": solution.dofs,
-        "macro_elements": solution.macro_elements,
-        "iterations": solution.iterations,
-        "linear_solver": solution.linear_solver,
-        "linear_iterations": solution.linear_iterations,
-        "matrix_entries": solution.matrix_entries,
-        "length": solution.length,
-        "load_scale": solution.load_scale,
-        "seconds": _with_total(solution.seconds),
-        "stage_cpu_seconds": dict(solution.stage_cpu_seconds),
-        "cpu_seconds": solution.cpu_seconds,
-        "peak_memory_mb": solution.peak_memory_mb,
-        "pressure": _extremes(zone.multiplier for zone in zones),
-        "stress": _extremes([solution.nodal_normal_stress[solution.body >= 0]]),
-        "gap": _extremes(zone.gap for zone in zones),
-        "status": _extremes(zone.closed.astype(int) for zone in zones),
-        "coverage": _extremes(zone.coverage for zone in zones),
-        "worst": _worst(checks),
-        "bodies": _bodies(solution),
-        "plan": [list(entry) for entry in solution.plan],
-        "checks": [asdict(check) for check in checks],
-        "accuracy": dict(solution.accuracy),
-        "attainable": accuracy.estimate,
-        "errors": dict(solution.errors),
-        "provenance": dict(provenance or {}),
-        "transient": False,
-    }
+
+    name: str
+    alias: str | None = None
+    zone: str | None = None
+    norm: str = "max"
+    minimum: float = math.nan
+    maximum: float = math.nan
+    value: float = math.nan
+    reference: float = math.nan
+    where: str = ""
+    scale: float = math.nan
+    error: float = math.nan
+    tolerance: float = math.nan
+    regression: Regression | None = None
+    passed: bool = False
+    verifies: bool = True
+
+    @property
+    def title(self) -> str:
+        """The check's name with its zone, the key of its accepted values."""
+        return f"{self.name} {self.zone}" if self.zone else self.name
+
+    @property
+    def share(self) -> float:
+        """The error as a part of its tolerance; infinite where it is not a number."""
+        if self.error == 0:
+            return 0.0
+        return self.error / self.tolerance if self.error > 0 and self.tolerance else math.inf
+
+    @property
+    def reason(self) -> str:
+        """Why the check failed, in one line; empty where it holds."""
+        if not self.error <= self.tolerance:
+            return (
+                f"{self.title}: {self.value:.9g} at {self.where}, reference {self.reference:.9g}: "
+                f"error {self.error:.2e}, tolerance {self.tolerance:.1e}"
+            )
+        if self.regression and not self.regression.passed:
+            old = self.regression
+            return (
+                f"{self.title}: {self.minimum:.12g} … {self.maximum:.12g}, accepted "
+                f"{old.minimum:.12g} … {old.maximum:.12g}: change {old.change:.2e}, tolerance "
+                f"{old.tolerance:.1e}"
+            )
+        return ""
 
 
-def without_result(
-    verdict: str,
-    reason: str,
-    case: Case | Path,
-    swapped: bool = False,
-    hexahedra: str | None = None,
-    transient: bool = False,
-) -> dict[str, Any]:
-    """The verdict of a solve that was refused, failed or crashed, for the reason given.
+@dataclass(frozen=True, kw_only=True)
+class CheckError:
+    """A check by name and zone, and its error."""
 
-    `case` is the path of the case file where the file itself could not be read. `transient`: the
-    reason lies in the machine (memory, disk, a kill), so that the same solve may do another time.
+    name: str
+    zone: str | None = None
+    error: float = math.nan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sides:
+    """A contact zone as it was solved: its slave and master groups."""
+
+    name: str
+    slave: str
+    master: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A body as it was meshed: cells by type, contact faces, and what a reference has of both."""
+
+    name: str
+    role: str
+    cells: dict[str, int]
+    faces: int
+    reference_cells: int | None = None
+    reference_faces: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """The verdict of one solve; None and empty where it came to no end.
+
+    `worst` is the check with the largest relative error, `closest_to_tolerance` the one nearest to
+    its tolerance or furthest past it. Pairs are minimum and maximum over all zones; `seconds` has
+    wall times by stage and their `total`. `transient`: the reason lies in the machine (memory,
+    disk, a kill), so that the same solve may succeed another time.
     """
-    ended = {"verdict": verdict, "passed": False, "reason": reason}
-    return _identity(case, swapped, hexahedra) | _UNKNOWN | ended | {"transient": transient}
+
+    case: str = ""
+    family: str
+    title: str = ""
+    job: str
+    swapped: bool = False
+    direction: str = ""
+    variant: str = ""
+    zones: list[Sides] = field(default_factory=list)
+    reference_kind: str | None = None
+    reference_uncertainty: float | None = None
+    reference_code: dict[str, str] | None = None
+    reference_remark: str | None = None
+    reference_solution: str | None = None
+    verdict: str
+    passed: bool = False
+    reason: str = ""
+    result: str | None = None
+    result_sha256: str | None = None
+    dofs: int | None = None
+    macro_elements: int | None = None
+    iterations: int | None = None
+    linear_solver: str | None = None
+    linear_iterations: int | None = None
+    matrix_entries: int | None = None
+    length: float | None = None
+    load_scale: float | None = None
+    strain: float | None = None
+    rotation: float | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
+    cpu_seconds: float | None = None
+    peak_memory_mb: float | None = None
+    pressure: list[float | None] | None = None
+    stress: list[float | None] | None = None
+    gap: list[float | None] | None = None
+    status: list[int] | None = None
+    coverage: list[float | None] | None = None
+    worst: CheckError | None = None
+    closest_to_tolerance: CheckError | None = None
+    bodies: list[Body] = field(default_factory=list)
+    plan: list[list[str]] = field(default_factory=list)
+    checks: list[CheckResult] = field(default_factory=list)
+    accuracy: dict[str, float] = field(default_factory=dict)
+    attainable: float | None = None
+    errors: dict[str, float] = field(default_factory=dict)
+    provenance: dict[str, str | int] = field(default_factory=dict)
+    transient: bool = False
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing is wrong with the solve: exit status 0."""
+        return self.verdict in (PASSED, SOLVED)
+
+    @property
+    def summary(self) -> str:
+        """One line: job, word, reason or worst error, time."""
+        line = f"{self.job}: {self.verdict}"
+        if self.reason:
+            return f"{line}: {self.reason}"
+        error = f", worst error {self.worst.error:.1e} ({self.worst.name})" if self.worst else ""
+        return f"{line}{error}, {self.seconds['total']:.2f} s"
+
+    def plain(self) -> dict[str, Any]:
+        """The verdict as plain values for strict JSON, with its digest."""
+        content = _strict(asdict(self))
+        return content | {_DIGEST: _digest(content)}
 
 
-def write_verdict(path: str | Path, verdict: Mapping[str, Any]) -> None:
+def write_verdict(path: str | Path, verdict: Verdict) -> None:
     """Write a verdict as strict JSON: whole or not at all."""
-    write_text(path, to_json(verdict) + "\n")
+    write_text(path, to_json(verdict.plain()) + "\n")
+
+
+def read_verdict(path: str | Path) -> Verdict:
+    """The verdict in a file; `InputError` where it is not, to the last digit, what was written."""
+    path = Path(path)
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        raise _damaged(path, " ".join(str(error).split())) from None
+    verdict = typed(Verdict, content, path)
+    if content.pop(_DIGEST, None) != _digest(content):
+        raise _damaged(path, "it is not as it was written")
+    if verdict.verdict not in WORDS:
+        raise _damaged(path, f"no such verdict: {verdict.verdict}")
+    return verdict
+
+
+def flaw(path: str | Path, case: str | Path | None = None) -> str:
+    """Why a verdict file cannot be relied on, in one line; empty where it can.
+
+    It must be as it was written and lie in the folder of its own family and job (where that is in
+    `results`), its result beside it as it was then. `case` is the case file that it must be of, as
+    the file is now. Reads the whole result.
+    """
+    path = Path(path)
+    try:
+        verdict = read_verdict(path)
+    except InputError as error:
+        return error.told
+    return unbound(verdict, path, case)
+
+
+def unbound(verdict: Verdict, path: Path, case: str | Path | None = None) -> str:
+    """What of folder, result and case is not the verdict's own; empty where all is."""
+    *_, root, family, job = ("", "", *path.absolute().parts[:-1])
+    if root == "results" and (family, job) != (verdict.family, verdict.job):
+        return f"the verdict is that of {verdict.family}/{verdict.job}"
+    if verdict.result is not None:
+        seal = seal_of(path.parent / verdict.result)
+        if not seal:
+            return f"the result {verdict.result} is missing or damaged"
+        if seal != verdict.result_sha256:
+            return f"the result {verdict.result} is that of another solve"
+    known = verdict.provenance.get("case_sha256")
+    if case is not None and known and known != hashlib.sha256(Path(case).read_bytes()).hexdigest():
+        return "the case file has changed"
+    return ""
+
+
+def typed(kind: type[T], content: object, where: Path) -> T:
+    """Plain values, as `json.loads` returns them, as verdicts; `InputError` where they are none.
+
+    Unknown keys are ignored. A key that is missing or null has its default, NaN for a number.
+    """
+    try:
+        return msgspec.convert(_without_nulls(content), kind)
+    except msgspec.ValidationError as error:
+        said, _, place = str(error).partition(" - at ")
+        key = place.strip("`").removeprefix("$").removeprefix(".")
+        raise InputError(where, key or "file", None, f"not as in a verdict: {said}") from None
+
+
+def _without_nulls(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nulls(item) for key, item in value.items() if item is not None}
+    return [_without_nulls(item) for item in value] if isinstance(value, list) else value
 
 
 def to_json(content: Any) -> str:
@@ -133,83 +280,14 @@ def to_json(content: Any) -> str:
     return json.dumps(_strict(content), indent=1, ensure_ascii=False, allow_nan=False)
 
 
-def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[str, Any]:
-    if isinstance(case, Case):
-        name, family, title = case.name, case.family, case.title
-        zones, origin = _zones(case, swapped), {key: getattr(case, key) for key in _ORIGIN}
-        exact = case.solution.name if case.solution else None
-    else:
-        name, family, title = case.stem, case.resolve().parent.name, ""
-        zones, origin, exact = [], dict.fromkeys(_ORIGIN), None
-    return {
-        "case": name,
-        "family": family,
-        "title": title,
-        "job": job_name(name, swapped, hexahedra),
-        "swapped": swapped,
-        "direction": "swapped" if swapped else "first",
-        "variant": hexahedra or "",
-        "zones": zones,
-        **origin,
-        "reference_solution": exact,
-    }
+def _damaged(path: Path, why: str) -> InputError:
+    return InputError(path, "file", None, f"damaged verdict ({why})")
 
 
-def _zones(case: Case, swapped: bool) -> list[dict[str, str]]:
-    """The zones as they were solved: slave and master exchanged where the solve was swapped."""
-    pairs = [(z.name, z.slave, z.master) for z in case.zones]
-    return [
-        {"name": name, "slave": master, "master": slave}
-        if swapped
-        else {"name": name, "slave": slave, "master": master}
-        for name, slave, master in pairs
-    ]
-
-
-def _bodies(solution: Solution) -> list[dict[str, Any]]:
-    counts = solution.case.counts
-    return [
-        asdict(body)
-        | {
-            "reference_cells": counts.get(body.name, {}).get("cells"),
-            "reference_faces": counts.get(body.name, {}).get("faces"),
-        }
-        for body in solution.bodies
-    ]
-
-
-def _first_of(reasons: Sequence[str]) -> str:
-    if len(reasons) < 2:
-        return "".join(reasons)
-    return f"{reasons[0]} (and {len(reasons) - 1} more)"
-
-
-def _with_total(seconds: Mapping[str, float]) -> dict[str, float]:
-    return {**seconds, "total": seconds.get("total", sum(seconds.values()))}
-
-
-def _extremes(arrays: Iterable[np.ndarray]) -> list[float] | None:
-    values = [array for array in arrays if len(array)]
-    if not values:
-        return None
-    joined = np.concatenate(values)
-    return [joined.min().item(), joined.max().item()]
-
-
-def _worst(checks: Iterable[CheckResult]) -> dict[str, Any] | None:
-    """The check whose error is the largest part of its tolerance; one without a number first."""
-
-    def share(check: CheckResult) -> float:
-        if math.isnan(check.error):
-            return math.inf
-        if check.tolerance > 0:
-            return check.error / check.tolerance
-        return math.inf if check.error > 0 else 0.0
-
-    worst = max(checks, key=share, default=None)
-    if worst is None:
-        return None
-    return {"name": worst.name, "zone": worst.zone, "error": worst.error}
+def _digest(content: Mapping[str, Any]) -> str:
+    """The hash of plain values, whatever the order of their keys."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _strict(value: Any) -> Any:

@@ -16,7 +16,7 @@ CASES = Path(__file__).parents[2] / "cases"
 
 def solved(name, swapped=False):
     case = load_case(CASES / f"{name}.yaml")
-    solution = simulate(case, mesh_of(case), swapped=swapped)
+    solution = simulate(case.as_solved(swapped), mesh_of(case))
     solution.errors = errors(solution)
     return solution
 

@@ -180,7 +180,52 @@ def test_check_judges_a_stored_result_again(small, capsys):
     assert "must be a result written by `solve`" in capsys.readouterr().err
 
 
-def test_accept_shows_the_difference_and_check_holds_it(small, capsys):
+def test_a_result_is_named_as_what_it_is(small, capsys):
+    for command in ("mesh", "solve"):
+        output = small / "out.vtu"
+        assert main([command, str(small / "c.yaml"), "-o", str(output)]) == 2
+        assert capsys.readouterr().err == f"{output}: extension = '.vtu': must be .vtkhdf\n"
+        assert not output.exists()
+
+
+def test_accepted_values_are_written_below_the_current_folder_alone(small, capsys, monkeypatch):
+    solve(small)
+    result = str(small / "out/r.vtkhdf")
+    (small / "elsewhere").mkdir()
+    monkeypatch.chdir(small / "elsewhere")
+    assert main(["accept", result]) == 2
+    assert "case = '" in capsys.readouterr().err
+    monkeypatch.chdir(small)
+    (small / "regression").symlink_to(small.parent)
+    assert main(["accept", result]) == 2
+    (small / "regression").unlink()
+    (small / "c.yaml").unlink()
+    assert main(["accept", result]) == 2
+    assert not (small / "regression").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "status"),
+    [
+        ("plane: strain", "plane: strain\ntransform: {scale: 1.0e+300}", 2),
+        ("plane: strain", "plane: strain\ntransform: {stretch: [1.0e+100, 1.0e+150]}", 2),
+        ("plane: strain", "plane: strain\ntransform: {perturb: 1.0e+100}", 2),
+        ("size: 50.0", "size: 1.0e+300", 2),
+        ("divisions: 3", f"divisions: [{'9' * 200}, 2]", 2),
+        ("pressure: 25.0}]", f"pressure: x{'.a' * 499}}}]", 2),
+        ("pressure: 25.0}]", "pressure: 1.0e+300}]", 1),
+    ],
+)
+def test_numbers_beyond_all_measure_end_in_one_line(small, old, new, status):
+    """As a process of its own: NumPy's warnings are part of what it prints."""
+    change(small, old, new)
+    command = [sys.executable, "-m", "solver", "solve", small / "c.yaml", "-o", small / "r.vtkhdf"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, len(done.stderr.splitlines())) == (status, status == 2), done.stderr
+
+
+def test_accept_shows_the_difference_and_check_holds_it(small, capsys, monkeypatch):
+    monkeypatch.chdir(small)
     solve(small)
     result = str(small / "out/r.vtkhdf")
     capsys.readouterr()

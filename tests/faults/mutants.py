@@ -18,14 +18,16 @@ from unittest.mock import patch
 
 import numpy as np
 
+from solver.case.model import Material
 from solver.case.reader import load_case
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError, SolveError
 from solver.verification.checks import run_checks
+from solver.verification.judge import judge
 from solver.verification.norms import errors
 from solver.verification.regression import accepted_values
 from solver.verification.run import mesh_of
-from solver.verification.verdict import of_solution
+from solver.verification.verdict import CheckResult
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 PLANE, SOLID = "ssnp170/c", "opening/overlap-tetra10-hexa8"
@@ -66,13 +68,20 @@ class Mutant:
     patch: Callable[[Wrapped], Any]
 
 
+def checks(case: str) -> dict[str, CheckResult]:
+    """The checks of a case of the batch by name."""
+    loaded, mesh = _case(case)
+    return {check.name: check for check in run_checks(simulate(loaded, mesh))}
+
+
 def verdict(case: str) -> dict[str, Any]:
     """The verdict of a case of the batch, with its checks and accepted values."""
     loaded, mesh = _case(case)
     try:
         solution = simulate(loaded, mesh)
         solution.errors = errors(solution)
-        return of_solution(solution, run_checks(solution, accepted_values(solution)))
+        found = judge(solution, run_checks(solution, accepted_values(solution)))
+        return {"passed": found.passed, "reason": found.reason}
     except (InputError, SolveError) as error:
         return {"passed": False, "reason": str(error)}
     except Exception as error:  # noqa: BLE001 -- the batch's verdict is then `crashed`
@@ -119,15 +128,14 @@ def _first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
 
 def _one_dropped(parts: list) -> list:
     """Without the smallest segment that is more than round-off."""
-    sizes = [part.weight.sum(axis=1) for part in parts]
+    sizes = [part.area for part in parts]
     if not parts:
         return parts
     least = _SLIVER * max(size.max() for size in sizes)
     real = [np.where(size > least, size, np.inf) for size in sizes]
     block = int(np.argmin([size.min() for size in real]))
     keep = np.arange(len(real[block])) != real[block].argmin()
-    kept = type(parts[block])(**{k: v[keep] for k, v in vars(parts[block]).items()})
-    return [kept if i == block else part for i, part in enumerate(parts)]
+    return [part.of(keep) if i == block else part for i, part in enumerate(parts)]
 
 
 def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -136,11 +144,12 @@ def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray
 
 
 def _never_closing(true: Wrapped) -> Wrapped:
-    def eligible(problem: Any, scene: Any) -> None:
-        true(problem, scene)
-        problem.eligible[len(problem.eligible) // 2] = False
+    def constraints(scene: Any) -> Any:
+        found = true(scene)
+        found.eligible[len(found.eligible) // 2] = False
+        return found
 
-    return eligible
+    return constraints
 
 
 def _first_system_kept(true: Wrapped) -> Wrapped:
@@ -160,22 +169,39 @@ def _factor_of_half(true: Wrapped) -> Wrapped:
 
 
 def _never_closes(true: Wrapped) -> Wrapped:
-    return lambda solve, start, eligible, *scales, **more: true(
-        solve, start, eligible & False, *scales, **more
-    )
+    return lambda solve, start, eligible, *more: true(solve, start, eligible & False, *more)
 
 
 def _stays_closed(true: Wrapped) -> Wrapped:
     """Tension is borne."""
 
-    def status(solve: Any, start: Any, eligible: Any, *scales: float, **more: bool) -> Any:
-        def no_tension_seen(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            pressure, gap = solve(closed)
-            return np.abs(pressure), gap
+    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
+        def no_tension_seen(closed: np.ndarray) -> Any:
+            trial = solve(closed)
+            return replace(trial, pressure=np.abs(trial.pressure))
 
-        return true(no_tension_seen, eligible, eligible, *scales, **more)
+        return true(no_tension_seen, eligible, eligible, *more)
 
     return status
+
+
+def _every_third_off(stress: np.ndarray) -> np.ndarray:
+    stress[::3, 0] -= 9e-4 * 25  # between the extremes: accepted values notice nothing
+    return stress
+
+
+def _lower_half_softer(true: Wrapped) -> Wrapped:
+    def by_material(self: Any, value: Callable[[Any], float], otherwise: float) -> Any:
+        found, height = true(self, value, otherwise), self.points[:, -1]
+        if value(Material(1.0, 0.3)) != 0.3:
+            return found
+        middle = (height.min() + height.max()) / 2
+        lower = {
+            kind: height[cells].mean(axis=1) < middle for kind, cells in self.cut.cells.items()
+        }
+        return {kind: np.where(lower[kind], 0.2991, values) for kind, values in found.items()}
+
+    return by_material
 
 
 def _rolled_sub_faces(result: Any) -> Any:
@@ -206,7 +232,7 @@ class _Alike:
 
 MUTANTS = (
     Mutant("gap-sign", "the initial gap counts with the wrong sign", CLOSING,
-           "solver.mechanics.mortar.operator:_integrals",
+           "solver.mechanics.mortar.operator:integrals",
            changed(lambda p: replace(p, gap=-p.gap))),
     Mutant("operator-sign", "the gap operator has the wrong sign: surfaces attract", PLANE,
            "solver.simulation.scene:gap_operator", changed(lambda o: replace(o, matrix=-o.matrix))),
@@ -214,19 +240,19 @@ MUTANTS = (
            "solver.simulation.scene:facets",
            given(lambda x, kind, nodes, n: (x, kind, nodes[:, ::-1], n))),
     Mutant("master-order", "master shape functions are given to the next node", TILTED,
-           "solver.mechanics.mortar.operator:_integrals",
-           changed(lambda p: replace(p, master=np.roll(p.master, 1, axis=2)))),
+           "solver.mechanics.mortar.operator:integrals",
+           changed(lambda p: replace(p, vectors=(p.vectors[0], np.roll(p.vectors[1], 1, axis=2))))),
     Mutant("slave-side-lost", "slave nodes are missing in the gap's derivative", PLANE,
-           "solver.mechanics.mortar.operator:_integrals",
-           changed(lambda p: replace(p, slave=0 * p.slave))),
+           "solver.mechanics.mortar.operator:integrals",
+           changed(lambda p: replace(p, vectors=(0 * p.vectors[0], p.vectors[1])))),
     Mutant("sliver-lost", "the smallest segment is dropped", PLANE,
            "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
     Mutant("sliver-lost-3d", "the smallest segment is dropped, in space", TILTED_SOLID,
            "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
     Mutant("pair-lost", "one master face is overlooked when faces are paired", PLANE,
-           "solver.mechanics.mortar.segments:candidate_pairs", changed(_master_overlooked)),
+           "solver.mechanics.mortar.pairing:candidate_pairs", changed(_master_overlooked)),
     Mutant("macro-element-dropped", "one macro-element may never close", PLANE,
-           "solver.simulation.problem:ContactProblem.__init__", _never_closing),
+           "solver.simulation.problem:contact_constraints", _never_closing),
     Mutant("macro-element-numbers", "sub-faces go to the next macro-element", VARYING,
            "solver.simulation.scene:cut", changed(_rolled_sub_faces)),
     Mutant("template-off-by-one", "the cut's first sub-face takes its nodes one further on", PLANE,
@@ -261,6 +287,9 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared among a face's nodes alike", BENT,
            "solver.mechanics.fem.loads:shape_functions",
            lambda true: lambda name: _Alike(true(name))),
+    Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
+           "solver.simulation.scene:gap_operator",
+           changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
     Mutant("coverage-lost", "the part that is covered is taken for the whole face", PARTLY,
            "solver.simulation.scene:gap_operator",
            changed(lambda o: replace(o, covered=o.area,
@@ -268,12 +297,20 @@ MUTANTS = (
     Mutant("stress-mean", "stress at nodes is the plain mean over the cell's quadrature", LAYERS,
            "solver.mechanics.fem.elasticity:_extrapolation",
            changed(lambda fit: np.full(fit.shape, 1 / fit.shape[1]))),
+    Mutant("stress-rows", "every node of a cell gets the stress of its neighbour", VARYING,
+           "solver.mechanics.fem.elasticity:_extrapolation",
+           changed(lambda fit: np.roll(fit, 1, axis=0))),
+    Mutant("stress-bits", "σ_xx is off by 9e-4 of the load at every third node", PLANE,
+           "solver.simulation.simulate:nodal_stress", changed(_every_third_off)),
+    Mutant("poisson-digits", "ν of the lower block is 0.2991 in place of 0.3", PLANE,
+           "solver.simulation.attributes:Attributes._by_material", _lower_half_softer),
     Mutant("stale-system", "the factored system is that of the first status", CLOSING,
            "solver.simulation.problem:ContactProblem._constrained", _first_system_kept),
     Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,
            "solver.mechanics.linear.condensation:prepare", _factor_of_half),
     Mutant("multiplier-sign", "the multiplier balances the wrong way", PLANE,
-           "solver.mechanics.linear.condensation:Condensed.multiplier", changed(lambda p: -p)),
+           "solver.mechanics.linear.condensation:CondensedSystem.multiplier",
+           changed(lambda p: -p)),
     Mutant("never-closes", "the contact status finds nothing to close", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,

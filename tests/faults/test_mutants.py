@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.mutants import MUTANTS, reason, verdict
+from tests.faults.mutants import MUTANTS, checks, planted, reason, verdict
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
 
@@ -20,6 +20,15 @@ def test_a_planted_fault_is_caught(mutant):
     assert why
     # A patch that does not fit its function would crash as well, and show nothing.
     assert not why.startswith("crashed") or mutant.name == "stale-system"
+
+
+def test_pressure_by_forces_does_not_depend_on_the_gap_operator():
+    """Of 97 % of the area the multiplier is 1/0.97 times the pressure; the forces stay."""
+    [lost] = [mutant for mutant in MUTANTS if mutant.name == "area-lost"]
+    with planted(lost):
+        found = checks(lost.case)
+    assert found["multiplier"].error == pytest.approx(1 / 0.97 - 1, rel=1e-9)
+    assert found["element_pressure"].error < 1e-13
 
 
 def test_the_page_lists_them_all():

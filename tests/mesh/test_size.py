@@ -7,20 +7,25 @@ import pytest
 import yaml
 
 from solver.case.reader import load_case
-from solver.mesh.size import of_body, of_mesh
-from solver.system.memory import needed
+from solver.mesh.size import Size, of_body, of_mesh
 from solver.verification.run import mesh_of
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 
 
 def test_grids_are_counted_and_refined():
-    assert of_body("HEXA8", [2, 3, 4]).unknowns == 3 * 24
-    assert of_body("HEXA8", [2, 3, 4], refine=2).unknowns == 3 * 24 * 8
-    assert of_body("QUAD8", [10]).unknowns == 2 * 3 * 100
+    """By hand: those vertices, edges, faces and cells of a grid that have nodes."""
+    assert of_body("HEXA8", [2, 3, 4]).points == 3 * 4 * 5
+    assert of_body("HEXA8", [2, 3, 4], refine=2).unknowns == 3 * 5 * 7 * 9
+    assert of_body("QUAD8", [10]).points == 11 * 11 + 2 * 10 * 11
+    assert of_body("QUAD9", [2, 3]).points == 5 * 7
+    assert of_body("HEXA20", [1, 1, 1]).points == 20
+    assert of_body("HEXA27", [2, 2, 1]).points == 5 * 5 * 3
+    assert of_body("PYRA13", [1, 1, 1]).points == 8 + 12 + 1 + 8
+    assert of_body("HEXA20", [4]).degree == 2
     section = {"cells": "QUAD4", "divisions": [3, 5]}
     mesh = {"recipe": "wavy", "bottom": section, "top": section, "refine": 2}
-    assert of_mesh(mesh, Path(), refine=3).unknowns == 2 * (2 * 15 * 36)
+    assert of_mesh(mesh, Path(), refine=3).unknowns == 2 * 2 * (6 * 3 + 1) * (6 * 5 + 1)
 
 
 @pytest.mark.parametrize("name", ["ssnp170/c", "ssnp170/k", "hertz/cylinder-tria6", "lame/spheres"])
@@ -50,6 +55,9 @@ BROKEN = [
     {"bottom": {"cells": "QUAD4", "divisions": []}},
     {"bottom": {"cells": "QUAD4", "divisions": "many"}},
     {"bottom": {"cells": "HEXA8", "divisions": -2}},
+    {"bottom": {"cells": ["HEXA8"], "divisions": [2, 2, 2]}},
+    {"bottom": {"cells": "HEXA8", "divisions": [2, 2]}},
+    {"bottom": {"cells": "HEXA8", "divisions": [10**200]}},
 ]
 
 
@@ -59,6 +67,6 @@ def test_what_is_broken_has_no_size(mesh, tmp_path):
 
 
 def test_a_cluster_is_asked_for_more_than_is_usual():
-    need = needed(34_848, 3)
+    need = Size(34_848, 3).memory
     assert need.least < need.usual < need.most
     assert need.usual == pytest.approx(0.44e9, rel=0.05)  # HEXA8 as measured

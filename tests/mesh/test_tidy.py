@@ -1,10 +1,14 @@
 """From the mesh of a file to the solver's: one block per type, no loose ends."""
 
+from pathlib import Path
+
 import meshio
 import numpy as np
 import pytest
 
+from solver.case.reader import parse_case
 from solver.mesh.tidy import tidy
+from solver.simulation.groups import check_groups
 from solver.system.errors import InputError
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
@@ -57,7 +61,10 @@ def test_nodes_of_no_cell_go_from_mesh_and_groups():
     )
     mesh = tidy(raw, "mesh")
     assert mesh.points.tolist() == SQUARE[:3]
-    assert {name: ids.tolist() for name, ids in mesh.point_sets.items()} == {"some": [1]}
+    assert {name: ids.tolist() for name, ids in mesh.point_sets.items()} == {
+        "none": [],
+        "some": [1],
+    }
 
 
 def test_lower_cells_stay_when_they_are_faces_or_named():
@@ -105,3 +112,21 @@ def test_a_plane_mesh_has_two_columns():
 def test_refusals(points, cells, sets, message):
     with pytest.raises(InputError, match=f"^mesh: .*{message}"):
         tidy(meshio.Mesh(np.array(points, dtype=float), cells, cell_sets=sets), "mesh")
+
+
+def test_a_group_whose_faces_touch_no_cell_is_kept_empty():
+    """So that a case that names it is told this, not that there is no such group."""
+    points = [*SQUARE, [5, 5], [6, 5]]
+    cells = [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [4, 5]])]
+    sets = {"low": [[], np.array([0])], "loose": [[], np.array([1])]}
+    mesh = tidy(meshio.Mesh(points, cells, cell_sets=sets), "mesh")
+    assert {name: [len(i) for i in ids] for name, ids in mesh.cell_sets.items()} == {
+        "loose": [0, 0],
+        "low": [0, 1],
+    }
+    text = (
+        "name: a\nmesh: {file: a.msh}\nplane: strain\nmaterials: {all: {young: 1, poisson: 0}}\n"
+        "supports: [{group: low, fix: [y]}]\nloads: [{group: loose, pressure: 1.0}]\n"
+    )
+    with pytest.raises(InputError, match="'loose': is empty, or none of its members touches a vol"):
+        check_groups(parse_case(text, Path("a.yaml")), mesh)

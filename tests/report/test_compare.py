@@ -170,10 +170,19 @@ def test_a_file_and_a_page_elsewhere(tmp_path, capsys):
     [
         (None, "must be a folder of results with a report, or its summary.json"),
         ('[{"job": ', "must be JSON ("),
-        ("{}", "must be a list of verdicts, as a report writes it into summary.json"),
-        ('[{"job": "a", "family": "b"}]', "[0].verdict: this key is needed"),
-        ('[{"job": "a", "family": "b", "verdict": "passed", "seconds": 3}]', "a mapping of numb"),
-        ('[{"job": "a", "family": "b", "verdict": "passed", "checks": [1]}]', "must be a check"),
+        ("{}", "Expected `array`, got `object`"),
+        (
+            '[{"job": "a", "family": "b"}]',
+            "[0]: not as in a verdict: Object missing",
+        ),
+        (
+            '[{"job": "a", "family": "b", "verdict": "passed", "seconds": 3}]',
+            "[0].seconds: not as in a verdict: Expected `object`, got `int`",
+        ),
+        (
+            '[{"job": "a", "family": "b", "verdict": "passed", "checks": [1]}]',
+            "[0].checks[0]: not as in a verdict: Expected `object`, got `int`",
+        ),
     ],
 )
 def test_what_is_no_batch_is_refused_in_one_line(tmp_path, capsys, content, message):

@@ -19,6 +19,7 @@ from solver.verification.results import write_result
 from tests import handmade
 from tests.report.test_pictures import SVG, polygons
 from tests.report.test_report import CHECK, verdict
+from tests.report.verdicts import put
 
 FAMILY = """\
 title: Blocks & <b>more</b>
@@ -52,7 +53,7 @@ def test_a_family_as_its_file_tells_it(file):
     assert (family.name, family.title) == ("blocks", "Blocks & <b>more</b>")
     assert family.reference == "It is uniform."
     assert [figure.job for figure in family.figures] == ["two-blocks", "not-solved"]
-    assert family.figures[0].along(np.array([[3.0, 0.0]])) == 6.0
+    assert family.figures[0].expression(np.array([[3.0, 0.0]])) == 6.0
     assert family.complaint == ""
 
 
@@ -64,6 +65,7 @@ def test_paragraphs_that_are_indented_are_formulas(file):
     ]
     assert formats.formula("q^d < p_rr") == "q<sup>d</sup> &lt; p<sub>rr</sub>"
     assert formats.formula("r^(1/3)") == "r<sup>1/3</sup>"
+    assert formats.formula("ν_1²/E_1") == "ν<sub>1</sub>²/E<sub>1</sub>"
 
 
 def test_a_family_without_a_file_has_its_folder_s_name(tmp_path):
@@ -78,7 +80,7 @@ def test_a_family_without_a_file_has_its_folder_s_name(tmp_path):
         ("2*x", "2*open(x)", "figures[0].along = '2*open(x)': `open(x)` is not allowed"),
         ('"7"', "7", "reference_code[0].version = 7: must be text (in quotes if it is a number)"),
         ("1.0e-9", "-1", "reference_code[0].error = -1: must be a positive number"),
-        ("job: not-solved", "jobs: [a]", "figures[1].job: this key is needed"),
+        ("job: not-solved", "jobs: [a]", "figures[1].jobs = ['a']: unknown key; did you mean job?"),
         ("title:", "title", "file"),
     ],
 )
@@ -130,9 +132,7 @@ def report(folder, verdicts, *families):
     paths, logged = [], []
     for content in verdicts:
         path = folder / "results" / content["family"] / content["job"] / "verdict.json"
-        path.parent.mkdir(parents=True)
-        path.write_text(json.dumps(content))
-        paths.append(path)
+        paths.append(put(path, content))
     write_report(paths, folder, logged.append, families)
     return "\n".join(logged)
 
@@ -206,9 +206,10 @@ def test_kinds_of_reference_are_kept_apart_with_uncertainty_code_and_version(tmp
 
 def test_the_page_goes_from_problem_to_figure_to_verdict(file, tmp_path):
     solution = handmade.plane(tmp_path)
-    content = verdict("two-blocks", "passed", family="blocks", result="result.vtkhdf")
-    write_result(tmp_path / "results/blocks/two-blocks/result.vtkhdf", solution, [], {})
-    (tmp_path / "results/blocks/two-blocks/verdict.json").write_text(json.dumps(content))
+    sha256 = write_result(tmp_path / "results/blocks/two-blocks/result.vtkhdf", solution, [], {})
+    bound = {"result": "result.vtkhdf", "result_sha256": sha256}
+    content = verdict("two-blocks", "passed", family="blocks", **bound)
+    put(tmp_path / "results/blocks/two-blocks/verdict.json", content)
     (tmp_path / "results/blocks/two-blocks/log").write_text("")
     verdicts = [tmp_path / "results/blocks/two-blocks/verdict.json"]
     command = ["report", *map(str, verdicts), "-o", str(tmp_path), "--families", str(file)]
@@ -231,7 +232,8 @@ def test_a_solve_that_is_held_against_norms_alone_shows_the_largest(tmp_path):
         for name, error in (("peak", 0.25), ("pressure_means", 0.125), ("balance", 0.4))
     ]
     errors = {"pressure_means": 0.125, "peak": 0.25, "pressure_l2": 0.3}
-    report(tmp_path, [verdict("a", "passed", checks=checks, errors=errors)])
+    worst = {"name": "peak", "error": 0.25}
+    report(tmp_path, [verdict("a", "passed", checks=checks, errors=errors, worst=worst)])
     rows = parsed(tmp_path / "fam.html").rows
     assert any("2.5e-01peak, of 5.0e-01" in cell for row in rows for cell in row)
     assert ["a", "3.0e-01", "1.2e-01"] in [row[:3] for row in rows]  # in L2, and at means

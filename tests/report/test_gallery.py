@@ -14,9 +14,10 @@ from solver.report.geometry import macro_edges
 from solver.report.layout import magnification
 from solver.report.plane import draw_plane
 from solver.report.space import draw_space
+from solver.system.files import seal_of
 from solver.verification.results import write_result
-from solver.verification.verdict import to_json
 from tests import handmade
+from tests.report.verdicts import put
 
 pyvista = pytest.importorskip("pyvista", reason="PyVista is not installed")
 
@@ -132,9 +133,9 @@ def batch(folder):
         place.mkdir(parents=True)
         verdict = {"job": name, "family": "fam", "verdict": "passed", "passed": True}
         if make:
-            verdict["result"] = written(make, place).name
-        (place / "verdict.json").write_text(to_json(verdict))
-        verdicts.append(place / "verdict.json")
+            file = written(make, place)
+            verdict |= {"result": file.name, "result_sha256": seal_of(file)}
+        verdicts.append(put(place / "verdict.json", verdict))
     return verdicts
 
 
@@ -146,23 +147,23 @@ def test_without_opengl_the_report_draws_and_says_why(tmp_path, monkeypatch):
     assert said[-1].startswith("2 pictures, 1 without.")
     page = (tmp_path / "out" / "gallery.html").read_text()
     assert "without OpenGL (VTK finds no OpenGL here (SIGSEGV))" in page
-    assert "no result, no picture" in page
+    assert "no picture: no result" in page
     names = sorted(path.name for path in (tmp_path / "out" / "gallery").iterdir())
-    assert names == ["fam-one-plain.png", "fam-two-plain.png"]
+    assert names == ["fam-one-plain.svg", "fam-two-plain.svg"]
     assert all(f'src="gallery/{name}"' in page for name in names)
 
 
 def test_pictures_are_drawn_again_for_newer_results_alone(tmp_path):
     verdicts, out = batch(tmp_path), tmp_path / "out"
     write_gallery(verdicts, out, plain=True, log=lambda _: None)
-    one, two = (out / "gallery" / f"fam-{name}-plain.png" for name in ("one", "two"))
+    one, two = (out / "gallery" / f"fam-{name}-plain.svg" for name in ("one", "two"))
     for path in (one, two):
         path.write_bytes(b"kept")
     later = two.stat().st_mtime + 10
     os.utime(verdicts[0].parent / "result.vtkhdf", (later, later))
     write_gallery(verdicts, out, plain=True, log=lambda _: None)
     assert one.read_bytes() == b"kept"
-    assert two.read_bytes()[:4] == b"\x89PNG"
+    assert two.read_bytes()[:4] == b"<svg"
 
 
 def test_a_damaged_result_is_said_in_place_of_its_picture(tmp_path):
@@ -171,7 +172,7 @@ def test_a_damaged_result_is_said_in_place_of_its_picture(tmp_path):
     result.write_bytes(result.read_bytes()[:5000])
     write_gallery(verdicts, tmp_path / "out", plain=True, log=lambda _: None)
     page = (tmp_path / "out" / "gallery.html").read_text()
-    assert re.search(r"no picture \(InputError: .*damaged", page)
+    assert "no picture: the result result.vtkhdf is missing or damaged" in page
 
 
 def test_the_command(tmp_path, capsys):

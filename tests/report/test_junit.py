@@ -9,6 +9,7 @@ from junitparser import Error, Failure, JUnitXml
 from solver.report.junit import to_junit
 from solver.report.rows import Row
 from tests.report.test_report import BATCH, NASTY, unfinished, verdict
+from tests.report.verdicts import record
 
 SCHEMAS = Path(__file__).parent / "schemas"
 OTHER = verdict("other-a", "passed", family="other family")
@@ -16,7 +17,7 @@ UNTOLD = unfinished("untold", "refused", "the case cannot be read") | {"family":
 
 
 def rows(*verdicts):
-    return [Row(each, Path()) for each in verdicts]
+    return [Row(record(each), Path()) for each in verdicts]
 
 
 @pytest.mark.parametrize("name", ["ant-junit.xsd", "jenkins-junit.xsd"])

@@ -17,6 +17,7 @@ from solver.report.space import draw_space, pressure_color
 from solver.report.svg import BLUE, ORANGE, Drawing, mixed
 from solver.verification.results import write_result
 from tests import handmade
+from tests.report.verdicts import record
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -114,7 +115,7 @@ def test_pressure_colours_darken():
 def test_picture_is_drawn_again_only_for_a_newer_result(tmp_path):
     result = tmp_path / "job" / "result.vtkhdf"
     write_result(result, handmade.plane(tmp_path), [], {})
-    row = Row({"job": "job", "family": "fam", "result": result.name}, result.parent)
+    row = Row(record({"result": result.name}), result.parent)
     first = picture(row, tmp_path / "pictures")
     assert "<svg" in first
     kept = tmp_path / "pictures" / "fam-job.svg"
@@ -127,5 +128,5 @@ def test_picture_is_drawn_again_only_for_a_newer_result(tmp_path):
 
 def test_a_result_that_cannot_be_read_is_said_in_place_of_its_picture(tmp_path):
     (tmp_path / "result.vtkhdf").write_text("no HDF5 <b>")
-    row = Row({"job": "job", "family": "fam", "result": "result.vtkhdf"}, tmp_path)
+    row = Row(record({"result": "result.vtkhdf"}), tmp_path)
     assert "No picture: InputError" in picture(row, tmp_path / "pictures")

@@ -10,6 +10,7 @@ from urllib.parse import unquote
 import pytest
 
 from solver.report import write_report
+from tests.report.verdicts import put
 
 NASTY = """<script>alert('1 & 2')</script> "quoted" | a_b * `c`"""
 CHECK = {
@@ -120,11 +121,9 @@ def report(tmp_path_factory):
     folder, logged = tmp_path_factory.mktemp("report"), []
     paths = []
     for number, content in enumerate(BATCH):
-        path = folder / "results" / "fam" / str(number) / "verdict.json"
-        path.parent.mkdir(parents=True)
-        path.write_text(json.dumps(content))
-        paths.append(path)
-    broken = folder / "results" / "fam" / "fam-broken" / "verdict.json"
+        path = folder / "batch" / "fam" / str(number) / "verdict.json"
+        paths.append(put(path, content))
+    broken = folder / "batch" / "fam" / "fam-broken" / "verdict.json"
     broken.parent.mkdir()
     broken.write_text('{"case": ')
     assert write_report([*paths, broken], folder / "report", logged.append) == 0
@@ -251,9 +250,7 @@ def test_numbers_keep_their_digits_in_csv(report):
 
 
 def test_a_batch_that_passed_leaves_no_failures(tmp_path):
-    path = tmp_path / "fam-a" / "verdict.json"
-    path.parent.mkdir()
-    path.write_text(json.dumps(verdict("fam-a", "passed")))
+    path = put(tmp_path / "fam-a" / "verdict.json", verdict("fam-a", "passed"))
     logged = []
     write_report([path], tmp_path / "report", logged.append)
     assert (tmp_path / "report" / "failures.txt").read_text() == ""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
+from solver.simulation.options import LEAN
 from solver.simulation.simulate import simulate
 from tests.scenes import block_case, block_mesh, with_points
 
@@ -13,7 +14,14 @@ MESHES = {2: ("TRIA6", "QUAD4", (6, 4)), 3: ("TETRA10", "HEXA8", (3, 2))}
 
 
 def patch_solution(
-    dim, lower=2000.0, upper=2000.0, poisson=0.3, pressure=25.0, move=None, **options
+    dim,
+    lower=2000.0,
+    upper=2000.0,
+    poisson=0.3,
+    pressure=25.0,
+    move=None,
+    swapped=False,
+    options=LEAN,
 ):
     """The patch test, supports by plane."""
     text = block_case(dim).source
@@ -29,7 +37,8 @@ def patch_solution(
     mesh = block_mesh(bottom, top, counts)
     if move:
         mesh = with_points(mesh, move(mesh.points))
-    return simulate(parse_case(text, Path("patch.yaml")), mesh, **options)
+    case = parse_case(text, Path("patch.yaml")).as_solved(swapped)
+    return simulate(case, mesh, options)
 
 
 def patch_errors(dim, pressure=25.0, **scene):

@@ -29,6 +29,11 @@ contact:
   - {name: a, slave: bottom_contact, master: top_contact}
 counts: {lower: {cells: 1}}
 """
+# The upper body is fixed: all that is loaded is the lower one.
+RIGID = (
+    PLANE.replace("  - {group: press, pressure: 1.0}\n", "").replace("group: all", "group: lower")
+    + "bodies: {upper: {rigid: true}}\n"
+)
 
 
 def two_squares():
@@ -59,7 +64,7 @@ def two_squares():
 
 def test_a_case_that_fits_is_accepted():
     check_groups(parse_case(PLANE, PATH), two_squares())
-    check_groups(parse_case(PLANE, PATH), two_squares(), swapped=True)
+    check_groups(parse_case(PLANE, PATH).as_solved(True), two_squares())
 
 
 def test_materials_for_all_and_for_rigid_bodies():
@@ -67,7 +72,7 @@ def test_materials_for_all_and_for_rigid_bodies():
     check_groups(parse_case(everywhere, PATH), two_squares())
     override = PLANE.replace("  upper:", "  all:")
     check_groups(parse_case(override, PATH), two_squares())
-    rigid = re.sub(r"  upper: .*\n", "", PLANE) + "bodies: {upper: {rigid: true}}\n"
+    rigid = re.sub(r"  upper: .*\n", "", RIGID)
     check_groups(parse_case(rigid, PATH), two_squares())
 
 
@@ -92,7 +97,11 @@ MISFITS = [
         "materials = ['lower']: 1 of 2 volume cells have no material; name their group, or `all`",
     ),
     # contact surfaces
-    ("slave: bottom_contact", "slave: empty", "contact[0].slave = 'empty': is empty; a group of "),
+    (
+        "slave: bottom_contact",
+        "slave: empty",
+        "contact[0].slave = 'empty': is empty, or none of its members touches a volume cell; a gr",
+    ),
     ("slave: bottom_contact", "slave: lower", "contact[0].slave = 'lower': holds 1 QUAD4 but no f"),
     ("master: top_contact", "master: top", "contact[0].master = 'top': no such group in the mesh;"),
     ("master: top_contact", "master: same", "contact[0].master = 'same': 1 of its faces are slave"),
@@ -112,13 +121,31 @@ def test_misfits(old, new, message):
 
 
 def test_a_rigid_side_is_master_in_every_direction_solved():
-    rigid = PLANE + "bodies: {upper: {rigid: true}}\n"
-    check_groups(parse_case(rigid, PATH), two_squares())
+    check_groups(parse_case(RIGID, PATH), two_squares())
     message = re.escape("contact[0].master = 'top_contact': lies on the rigid body upper; a rigid")
     with pytest.raises(InputError, match=message):
-        check_groups(parse_case(rigid, PATH), two_squares(), swapped=True)
+        check_groups(parse_case(RIGID, PATH).as_solved(True), two_squares())
     with pytest.raises(InputError, match=message):
-        check_groups(parse_case(rigid + "directions: both\n", PATH), two_squares())
+        check_groups(parse_case(RIGID + "directions: both\n", PATH), two_squares())
+
+
+@pytest.mark.parametrize(
+    ("load", "lost"),
+    [
+        ("group: press, pressure: 1.0", "1 of its 1 faces"),
+        ("group: press, traction: [1.0, 0.0]", "1 of its 1 faces"),
+        ("group: sides, pressure: 1.0", "1 of its 2 faces"),
+        ("group: all, body_force: [0.0, -1.0]", "1 of its 2 cells"),
+        ("group: both, body_force: [0.0, -1.0]", "1 of its 2 cells"),
+    ],
+)
+def test_a_load_on_a_rigid_body_would_vanish(load, lost):
+    mesh = two_squares()
+    mesh.cell_sets["sides"] = [np.array([], dtype=int), np.array([0, 3])]
+    case = parse_case(RIGID.replace("group: lower, body_force: [0.0, -1.0]", load), PATH)
+    message = f"loads[0].group = '{load.split()[1][:-1]}': {lost} belong to the rigid body upper, "
+    with pytest.raises(InputError, match=re.escape(message) + "which is fixed"):
+        check_groups(case, mesh)
 
 
 SOLID = """\

@@ -12,7 +12,6 @@ from solver.mesh.catalogue import BY_MESHIO, BY_NAME, cell_type
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
-from solver.system.clock import Clock
 from solver.system.errors import InputError, SolveError
 from tests.scenes import block_case, block_mesh, errors, with_points
 
@@ -48,7 +47,7 @@ def test_both_starts_give_the_same_answer_where_the_bodies_are_held():
             ("loads:\n  - {group: press, pressure: 25.0}\n", ""),
         ]
     )
-    scene = build_scene(case, block_mesh("TRIA3", "QUAD4", (4, 3)), False, None, Clock())
+    scene = build_scene(case, block_mesh("TRIA3", "QUAD4", (4, 3)))
     problem = ContactProblem(scene)
     closed = problem.solve(1.0)
     opened = problem.solve(1.0, np.zeros(4, dtype=bool))
@@ -100,7 +99,7 @@ def test_a_clearance_stands_for_the_gap_as_meshed():
     mesh = block_mesh("QUAD4", "TRIA3", (4, 3))
     mesh.points[:, 0] += 7.0
     case = replaced([], zone=", clearance: '0.01 * x', interference: 0.02")
-    zone = build_scene(case, mesh, False, None, Clock()).zones[0]
+    zone = build_scene(case, mesh).zones[0]
     centre = 7.0 + (np.arange(4) + 0.5) / 4
     mean = zone.operator.initial / zone.operator.covered
     assert np.sort(mean) == pytest.approx(0.01 * centre - 0.02, rel=1e-12)

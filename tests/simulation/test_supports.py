@@ -3,25 +3,24 @@
 import numpy as np
 import pytest
 
-from solver.mechanics.fem.supports import Fixed, free_motion
-from solver.system.errors import InputError
+from solver.mechanics.fem.supports import Fixed, SupportClashError, free_motion
 
 
-def fixed(nodes, direction, value=0.0, key="supports[0].fix.x"):
+def fixed(nodes, direction, value=0.0):
     direction = np.array(direction, dtype=float)
     n = len(nodes)
-    return Fixed(key, np.array(nodes), np.tile(direction, (n, 1)), np.full(n, value))
+    return Fixed(np.array(nodes), np.tile(direction, (n, 1)), np.full(n, value))
 
 
 def test_axes_pick_degrees_of_freedom():
-    free = free_motion(3, 2, [fixed([0, 2], [1, 0], 0.5), fixed([0], [0, 1])], "case")
+    free = free_motion(3, 2, [fixed([0, 2], [1, 0], 0.5), fixed([0], [0, 1])])
     assert free.selection.tolist() == [2, 3, 5]
     assert free.offset.tolist() == [0.5, 0, 0, 0, 0.5, 0]
 
 
 def test_a_tilted_plane_leaves_what_lies_in_it():
     normal = np.array([0.6, 0.8, 0.0])
-    free = free_motion(2, 3, [fixed([1], normal, 2.0)], "case")
+    free = free_motion(2, 3, [fixed([1], normal, 2.0)])
     assert free.basis.shape == (6, 5)
     basis = free.basis.toarray()
     assert np.allclose(basis.T @ basis, np.eye(5), atol=1e-15)
@@ -32,7 +31,7 @@ def test_a_tilted_plane_leaves_what_lies_in_it():
 def test_two_tilted_planes_and_an_axis_hold_a_node_fully():
     parts = [fixed([0], d, v) for d, v in (([0.6, 0.8, 0], 1.0), ([0, 0.6, 0.8], 2.0))]
     parts.append(fixed([0], [0, 0, 1], 3.0))
-    free = free_motion(1, 3, parts, "case")
+    free = free_motion(1, 3, parts)
     assert free.basis.shape == (3, 0)
     for part in parts:
         assert part.directions[0] @ free.offset == pytest.approx(part.values[0], rel=1e-13)
@@ -40,7 +39,8 @@ def test_two_tilted_planes_and_an_axis_hold_a_node_fully():
 
 def test_the_same_support_twice_is_one_and_another_value_is_refused():
     same = [fixed([0], [1, 0], 0.5), fixed([0, 1], [1, 0], 0.5)]
-    assert free_motion(2, 2, same, "case").selection.tolist() == [1, 3]
-    clash = [fixed([0], [1, 0], 0.5), fixed([0], [1, 0], 0.25, "supports[1].fix.x")]
-    with pytest.raises(InputError, match=r"case: supports\[1\].fix.x = 0.25: 1 nodes are given"):
-        free_motion(2, 2, clash, "case")
+    assert free_motion(2, 2, same).selection.tolist() == [1, 3]
+    clash = [fixed([0], [1, 0], 0.5), fixed([0], [1, 0], 0.25)]
+    with pytest.raises(SupportClashError, match="1 nodes are given another displacement") as error:
+        free_motion(2, 2, clash)
+    assert (error.value.number, error.value.value) == (1, 0.25)

@@ -96,9 +96,9 @@ NAN = float("nan")
         (zone_array("stress_master", 0, -25.03), {"surface_stress_master"}),
         (field("nodal_normal_stress", 20, -24.9), {"nodal_stress"}),
         (field("nodal_normal_stress", 0, NAN), {"nodal_stress"}),
-        (field("displacement", (5, 0), 0.1), {"displacement"}),
-        (field("displacement", (21, 1), 1.1375), {"displacement"}),
-        (field("displacement", (3, 1), NAN), {"displacement"}),
+        (field("displacement", (5, 0), 0.1), {"displacement", "integration_stress"}),
+        (field("displacement", (21, 1), 1.1375), {"displacement", "integration_stress"}),
+        (field("displacement", (3, 1), NAN), {"displacement", "integration_stress"}),
         (field("stress", (4, 0), 0.03), {"stress_components"}),
         (field("stress", (4, 2), 7.5), {"stress_components"}),
         (field("stress", (4, 3), NAN), {"stress_components"}),
@@ -112,6 +112,27 @@ NAN = float("nan")
 def test_one_wrong_quantity_fails_its_checks_and_no_other(solution, spoil, expected):
     spoil(solution)
     assert failing(solution) == expected
+
+
+def test_the_pressure_by_forces_is_a_value_of_its_own(solution):
+    zone = solution.zones[0]
+    zone.pressure_of_forces = np.array([25.0, 25.1])
+    assert failing(solution) == {"element_pressure"}
+    zone.multiplier, zone.pressure_of_forces = zone.pressure_of_forces, zone.multiplier
+    assert failing(solution) == PRESSURES - {"element_pressure"}
+
+
+def test_stress_at_integration_points_is_independent_of_that_at_nodes(solution):
+    solution.stress[:] += 1.0
+    assert "integration_stress" not in failing(solution)
+    solution.stress[:] -= 1.0
+    solution.displacement[0, 0] += 0.001
+    check = by_name(solution)["integration_stress"]
+    # On a QUAD4 of 25/3 × 50 the strain at the Gauss point nearest to the corner changes by
+    # -g · 0.001 / (25/3) along x, with g = (1 + 1/√3)/2; λ + 2μ = 35000/13.
+    g = (1 + 1 / np.sqrt(3)) / 2
+    assert check.value == pytest.approx(-g * 0.001 / (25 / 3) * 35000 / 13, rel=1e-9)
+    assert (check.passed, check.where) == (False, "cell 0 (xx)")
 
 
 def test_the_deviations_within_the_tolerances_pass(solution):
@@ -147,7 +168,8 @@ def test_a_check_without_a_reference_is_not_listed(tmp_path):
         if not line.strip().startswith(("normal_stress", "gap", "stress", "displacement"))
     )
     names = {check.name for check in run_checks(plane(tmp_path, text))}
-    assert names == PRESSURES | {"element_status", "coverage", "balance", "observation"}
+    others = {"element_status", "coverage", "balance", "counts", "observation"}
+    assert names == PRESSURES | others
 
 
 def test_balance_runs_without_any_reference(tmp_path):

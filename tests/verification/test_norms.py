@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d

@@ -106,6 +106,8 @@ def test_a_solve_without_contact_comes_back(tmp_path):
     solution = plane(tmp_path)
     solution.zones = []
     retold(solution, "observe: [{zone: interface, nearest: [0, 0]}]\n", "")
+    retold(solution, "  contact_pressure: 25.0\n", "")
+    retold(solution, "  gap: 0.0\n", "")
     retold(solution, "contact: [{name: interface, slave: lower, master: upper}]\n", "")
     for step in solution.steps:
         step.observations = []
@@ -137,7 +139,7 @@ def test_checks_of_the_file_are_those_of_the_solve(solution, written):
 
 def test_checks_are_made_from_the_stored_fields(written):
     with h5py.File(written, "r+") as file:
-        file["contact/interface/multiplier"][0] = -25.0
+        file["contact/interface/multiplier"][0] = 26.0
         file["VTKHDF/PointData/displacement"][3] = 1.0
     seal(written)
     failed = {c.name for c in run_checks(read_result(written).solution) if not c.passed}

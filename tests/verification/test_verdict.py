@@ -1,12 +1,15 @@
 """The verdict: strict JSON with the same keys whatever happened."""
 
+import hashlib
 import json
 
 import numpy as np
 import pytest
 
 from solver.verification.checks import run_checks
-from solver.verification.verdict import of_solution, to_json, without_result, write_verdict
+from solver.verification.judge import judge, without_result
+from solver.verification.results import write_result
+from solver.verification.verdict import Verdict, flaw, read_verdict, to_json, write_verdict
 from tests.handmade import PLANE, plane, solid
 
 CONTRACT = {
@@ -28,7 +31,7 @@ def strict(text):
 
 
 def verdict_of(solution, **more):
-    return of_solution(solution, run_checks(solution), **more)
+    return judge(solution, run_checks(solution), **more).plain()
 
 
 def test_a_solve_whose_checks_hold_has_passed(tmp_path):
@@ -60,7 +63,8 @@ def test_one_failing_check_fails_the_solve_and_is_the_reason(tmp_path):
     assert (verdict["verdict"], verdict["passed"]) == ("failed", False)
     assert verdict["reason"].startswith("element_gap interface: 1 at macro-element 1")
     assert verdict["reason"].endswith("(and 1 more)")
-    assert verdict["worst"] == {"name": "element_status", "zone": "interface", "error": 1.0}
+    closest = {"name": "element_status", "zone": "interface", "error": 1.0}
+    assert verdict["closest_to_tolerance"] == closest
 
 
 def test_a_result_without_digits_is_unreliable_though_its_checks_hold(tmp_path):
@@ -97,7 +101,7 @@ def test_the_other_direction_exchanges_slave_and_master(tmp_path):
 @pytest.mark.parametrize("word", ["refused", "failed", "crashed"])
 def test_a_solve_without_an_end_has_the_same_keys(tmp_path, word):
     solution = plane(tmp_path)
-    verdict = without_result(word, "said why", solution.case, swapped=True)
+    verdict = without_result(word, "said why", solution.case, swapped=True).plain()
     assert verdict.keys() == verdict_of(solution).keys()
     assert (verdict["verdict"], verdict["passed"], verdict["reason"]) == (word, False, "said why")
     assert verdict["job"] == "two-blocks-swapped"
@@ -106,22 +110,140 @@ def test_a_solve_without_an_end_has_the_same_keys(tmp_path, word):
 
 def test_a_case_file_that_cannot_be_read_is_known_by_its_path(tmp_path):
     verdict = without_result("refused", "no YAML", tmp_path / "mine.yaml")
-    assert (verdict["case"], verdict["family"]) == ("mine", tmp_path.name)
+    assert (verdict.case, verdict.family) == ("mine", tmp_path.name)
 
 
-def test_the_file_is_strict_json(tmp_path):
-    path = tmp_path / "results" / "verdict.json"
-    write_verdict(path, {"number": np.float64(2), "count": np.int64(3), "no": [np.nan, -np.inf]})
-    assert strict(path.read_text()) == {"number": 2.0, "count": 3, "no": [None, None]}
+def test_the_file_is_strict_json_and_gives_the_verdict_back(tmp_path):
+    solution, path = plane(tmp_path), tmp_path / "results" / "verdict.json"
+    solution.cpu_seconds, solution.zones[0].gap[0] = np.float64(2), np.nan
+    verdict = judge(solution, run_checks(solution))
+    write_verdict(path, verdict)
+    told = strict(path.read_text())
+    assert (told["cpu_seconds"], told["gap"]) == (2.0, [None, None])
+    assert read_verdict(path).plain() == verdict.plain()
 
 
 def test_a_verdict_that_cannot_be_written_leaves_the_old_one(tmp_path):
     path = tmp_path / "verdict.json"
-    write_verdict(path, {"verdict": "passed"})
+    write_verdict(path, Verdict(family="f", job="j", verdict="passed"))
+    before = path.read_bytes()
     with pytest.raises(TypeError):
-        write_verdict(path, {"verdict": object()})
-    assert strict(path.read_text()) == {"verdict": "passed"}
+        write_verdict(path, Verdict(family="f", job="j", verdict="passed", reason=object()))
+    assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_without_a_reference_a_solve_is_solved_and_not_verified(tmp_path):
+    solution = plane(tmp_path, PLANE[: PLANE.index("reference")])
+    verdict = judge(solution, run_checks(solution))
+    assert (verdict.verdict, verdict.passed, verdict.sound) == ("solved", False, True)
+    assert verdict.summary == "two-blocks: solved: not verified: the case gives no reference"
+    # the counts of a mesh verify no solution
+    counts = "counts: {bottom: {cells: 2}}\n"
+    solution = plane(tmp_path, PLANE[: PLANE.index("reference")] + counts)
+    assert judge(solution, run_checks(solution)).verdict == "solved"
+    solution.balance["reactions: moment"] = 1.0
+    assert judge(solution, run_checks(solution)).verdict == "failed"
+
+
+def test_the_worst_error_and_the_check_closest_to_its_tolerance(tmp_path):
+    tolerance = "tolerance: {multiplier: 0.1, element_gap: 1.0e-6}\n"
+    solution = plane(tmp_path, PLANE + tolerance)
+    solution.zones[0].multiplier[0] = 25.5  # 2 % of 25, a fifth of what is allowed
+    solution.zones[0].gap[0] = 4.5e-5  # 0.9e-6 of 50, nine tenths
+    verdict = judge(solution, run_checks(solution))
+    assert (verdict.worst.name, verdict.worst.error) == ("multiplier", pytest.approx(0.02))
+    assert verdict.closest_to_tolerance.name == "element_pressure"  # its tolerance is 0.001
+    solution.zones[0].multiplier[0] = 25.0
+    verdict = judge(solution, run_checks(solution))
+    assert verdict.closest_to_tolerance.name == "element_gap"
+    assert "worst error" in verdict.summary
+
+
+@pytest.fixture
+def solved(tmp_path):
+    """The verdict file of a solve in its folder, its result beside it."""
+    solution = plane(tmp_path)
+    folder = tmp_path / "results" / solution.case.family / solution.job
+    checks = run_checks(solution)
+    sha256 = write_result(folder / "result.vtkhdf", solution, checks, {})
+    verdict = judge(solution, checks, "result.vtkhdf", {}, sha256)
+    write_verdict(folder / "verdict.json", verdict)
+    assert flaw(folder / "verdict.json") == ""
+    return folder / "verdict.json"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b'"passed": true', b'"passed": 1'),
+        (b'"verdict": "passed"', b'"verdict": "failed"'),
+        (b'"dofs": 44', b'"dofs": 45'),
+        (b'"dofs": 44', b'"dofs": "44"'),
+        (b'"checks": [', b'"checks": [7, '),
+        (b'"family"', b'"famili"'),
+        (b"}", b""),
+        (b"two-blocks", b"two-bl\xffcks"),
+    ],
+)
+def test_a_verdict_that_was_edited_or_damaged_is_found_out(solved, old, new):
+    content = solved.read_bytes()
+    assert old in content
+    solved.write_bytes(content.replace(old, new, 1))
+    assert flaw(solved)
+
+
+def test_any_damage_to_a_byte_is_found_out_without_a_traceback(solved):
+    content = solved.read_bytes()
+    rng = np.random.default_rng(0)
+    for place in rng.integers(0, len(content), 200):
+        byte = bytes([rng.integers(0, 256)])
+        damaged = content[:place] + byte + content[place + 1 :]
+        if json_of(damaged) != json_of(content):
+            solved.write_bytes(damaged)
+            assert flaw(solved), place
+    for size in (0, 1, 100, len(content) // 2):
+        solved.write_bytes(content[:size])
+        assert flaw(solved)
+    solved.write_bytes(b"[" * 100_000)
+    assert flaw(solved)
+
+
+def json_of(content):
+    """What a JSON file says; None where it is none."""
+    try:
+        return json.loads(content)
+    except ValueError:
+        return None
+
+
+def test_a_verdict_is_bound_to_its_result_and_folder(solved, tmp_path):
+    result = solved.with_name("result.vtkhdf")
+    whole = result.read_bytes()
+    result.unlink()
+    assert flaw(solved) == "the result result.vtkhdf is missing or damaged"
+    result.write_bytes(whole[:1000] + b"x" + whole[1001:])
+    assert flaw(solved) == "the result result.vtkhdf is missing or damaged"
+    other = plane(tmp_path)
+    other.zones[0].multiplier[0] = 26.0
+    write_result(result, other, [], {})
+    assert flaw(solved) == "the result result.vtkhdf is that of another solve"
+    result.write_bytes(whole)
+    assert flaw(solved) == ""
+    swapped = solved.parent.with_name("two-blocks-swapped")
+    solved.parent.rename(swapped)
+    assert "the verdict is that of" in flaw(swapped / "verdict.json")
+
+
+def test_a_verdict_is_bound_to_its_case(tmp_path):
+    file = tmp_path / "case.yaml"
+    file.write_text("name: a")
+    known = {"case_sha256": hashlib.sha256(b"name: a").hexdigest()}
+    verdict = Verdict(family="f", job="j", verdict="refused", provenance=known)
+    write_verdict(tmp_path / "verdict.json", verdict)
+    assert flaw(tmp_path / "verdict.json", file) == ""
+    file.write_text("name: b")
+    assert flaw(tmp_path / "verdict.json", file) == "the case file has changed"
 
 
 def test_the_verdict_says_where_the_reference_comes_from(tmp_path):

@@ -81,17 +81,6 @@ def test_a_changed_solver_runs_all_and_a_changed_report_only_itself(project):
     assert jobs(project) == solves | REPORT
 
 
-def test_savings_that_were_measured_come_into_the_report(project):
-    page = project / "results" / "report" / "tiny.html"
-    assert "not measured: make benchmark" in page.read_text()
-    line = {"skip": "status", "median": 0.02, "low": 0.01, "high": 0.03}
-    measured = project / "results" / "benchmark" / "savings.json"
-    measured.parent.mkdir()
-    measured.write_text(json.dumps({"jobs": {"tiny-a": {"seconds": 0.1, "lines": [line]}}}))
-    assert snakemake(project, "report").returncode == 0
-    assert "tiny-a: 20.0 ms, 20% of the solve" in page.read_text()
-
-
 def test_all_runs_again_where_snakemake_remembers_nothing(project):
     shutil.rmtree(project / ".snakemake")
     solves = {"solve tiny-a", "solve tiny-a-swapped", "solve tiny-b"}

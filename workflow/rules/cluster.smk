@@ -20,9 +20,7 @@ def size_of(job, refine):
 
 def memory(job, attempt, refine=1):
     """Megabytes that a job of this case asks for, more each time it has to be run again."""
-    from solver.system.memory import needed
-
-    most = needed(size_of(job, refine).points, job.dim).most
+    most = size_of(job, refine).memory.most
     return attempt * round(AROUND_MB + min(most, MOST_MEMORY) / 1e6)
 
 

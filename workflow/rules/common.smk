@@ -76,7 +76,8 @@ def sources(*patterns):
     return sorted(map(str, files))
 
 
-OF_PAGES = ("report/**/*.*", "studies/*/page.py", "studies/*/figure.py")
+STUDY_PAGES = [f"studies/**/{page}.py" for page in ("page", "figure", "records")]
+OF_PAGES = ("report/**/*.*", "studies/**/*.jinja", *STUDY_PAGES)
 REPORT_SOURCES = [f for f in sources(*OF_PAGES) if not f.endswith(".pyc")]
 SOLVER_SOURCES = sorted({*sources("**/*.py", "case/schemas/*")} - {*REPORT_SOURCES})
 MESH_SOURCES = sources("case/**/*.py", "case/schemas/*", "mesh/**/*.py", "system/*.py")
@@ -178,15 +179,17 @@ def verdicts_there(jobs):
 
 
 def is_kept(folder):
-    """Whether a solve's verdict can be kept: it is whole, its result is there, and it was not the
-    machine (memory, disk, a kill) that ended the solve."""
+    """Whether a solve's verdict can be kept: it is as it was written, its result is there, and it was
+    not the machine (memory, disk, a kill) that ended the solve."""
+    from solver.system.errors import InputError
+    from solver.verification.verdict import read_verdict
+
     try:
-        verdict = json.loads(Path(folder, "verdict.json").read_text("utf-8"))
-        result = verdict["result"]
-        there = result is None or Path(folder, result).is_file()
-        return there and verdict["verdict"] and not verdict["transient"]
-    except (OSError, ValueError, KeyError, TypeError):
+        verdict = read_verdict(Path(folder, "verdict.json"))
+    except InputError:
         return False
+    there = verdict.result is None or Path(folder, verdict.result).is_file()
+    return there and not verdict.transient
 
 
 # Without Snakemake's records nobody knows what the results were made from.

@@ -17,9 +17,6 @@ FAMILY_FILES = sorted(
     }
 )
 
-# What each line of a plan saves, where `make benchmark` has measured it.
-SAVINGS = [f for f in ("results/benchmark/savings.json",) if Path(f).is_file()]
-
 
 # The pages of families are no outputs here: one that is missing, of a family not asked for before,
 # would hide from Snakemake that the batch is another one.
@@ -27,7 +24,6 @@ rule report:
     input:
         solves=lambda w: [results_of(job) for job in RUN.values()],
         families=watched(*FAMILY_FILES),
-        savings=watched(*SAVINGS),
         pages=watched(*PAGES),
     output:
         report(
@@ -45,7 +41,7 @@ rule report:
         verdicts=lambda w: [verdict_of(job) for job in RUN.values()],
         others=lambda w: verdicts_there(OTHERS),
         families=FAMILY_FILES,
-        content=contents(*FAMILY_FILES, *PAGES, *SAVINGS) + REPORT_CONTENT,
+        content=contents(*FAMILY_FILES, *PAGES) + REPORT_CONTENT,
     message:
         "report of all cases"
     shell:

@@ -9,11 +9,8 @@ SCALING_PAGE = "scaling" if SCALE == "full" else f"scaling-{SCALE}"
 @cache
 def scaling():
     from solver.studies.scaling.description import read_scaling
-    from solver.studies.scaling.expected import model
 
-    return measured_points(
-        "scaling_point", read_scaling, model, SCALING_FILE, SCALE, SCALED
-    )
+    return measured_points("scaling_point", read_scaling, SCALING_FILE, SCALE, SCALED)
 
 
 # A point always ends with a record, whatever became of it.

@@ -97,22 +97,20 @@ def tell_progress():
 ANNOUNCED = {}
 
 
-def measured_points(rule, read, model, file, size, folder):
-    """The points by name that a file describes at a `size`; `model` has the seconds of each.
+def measured_points(rule, read, file, size, folder):
+    """The points by name that a file describes at a `size`.
 
     Those that a run will measure are announced before it begins, by their `rule`; their records
     lie in `folder`.
     """
-    from solver.studies.work_precision.expected import announcement
+    from solver.studies.points import announcement
     from solver.system.errors import InputError
 
     try:
         content = read(Path(file), size)
     except InputError as error:
         refuse(error)
-    ANNOUNCED[rule] = lambda due: announcement(
-        content, model(content), Path(folder), due
-    )
+    ANNOUNCED[rule] = lambda due: announcement(content, Path(folder), due)
     return {point.name: point for point in content.points}
 
 

@@ -9,9 +9,8 @@ PAGE = "study" if SIZE == "full" else f"study-{SIZE}"
 @cache
 def study():
     from solver.studies.work_precision.description import read_study
-    from solver.studies.work_precision.expected import model
 
-    return measured_points("study_point", read_study, model, STUDY_FILE, SIZE, POINTS)
+    return measured_points("study_point", read_study, STUDY_FILE, SIZE, POINTS)
 
 
 def reference_of(w):

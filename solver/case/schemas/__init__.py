@@ -4,23 +4,13 @@ A schema's own `description` is what a message says is allowed, so that schema a
 """
 
 import json
-from collections.abc import Iterable
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from solver.system.errors import InputError
+from solver.system.errors import InputError, hint, key_path
 
-BENCHMARK_SCHEMA = Path(__file__).with_name("benchmark.schema.json")
 CASE_SCHEMA = Path(__file__).with_name("case.schema.json")
-INFSUP_SCHEMA = Path(__file__).with_name("infsup.schema.json")
-LADDERS_SCHEMA = Path(__file__).with_name("ladders.schema.json")
-FAMILY_SCHEMA = Path(__file__).with_name("family.schema.json")
-SCALING_SCHEMA = Path(__file__).with_name("scaling.schema.json")
-STUDY_SCHEMA = Path(__file__).with_name("study.schema.json")
-SUMMARY_SCHEMA = Path(__file__).with_name("summary.schema.json")
-SWEEP_SCHEMA = Path(__file__).with_name("sweep.schema.json")
 
 
 def validate(content: object, schema: Path, where: object) -> None:
@@ -30,24 +20,6 @@ def validate(content: object, schema: Path, where: object) -> None:
     errors = list(_validator(schema).iter_errors(content))
     if errors:
         raise _refusal(max(errors, key=relevance), where)
-
-
-def hint(name: str, known: Iterable[str]) -> str:
-    """`did you mean …?` when one of the known names is near, else the list of them."""
-    known = sorted(known)
-    near = get_close_matches(str(name), known, n=1)
-    listed = f"allowed: {', '.join(known)}" if known else "there is none"
-    return f"did you mean {near[0]}? ({listed})" if near else listed
-
-
-def key_path(keys: Iterable[str | int]) -> str:
-    """`contact[0].slave` for the keys `("contact", 0, "slave")`."""
-    path = ""
-    for key in keys:
-        name = str(key) if str(key).isprintable() else repr(key)
-        step = f"[{key}]" if isinstance(key, int) else name
-        path += step if isinstance(key, int) or not path else f".{step}"
-    return path
 
 
 @cache

@@ -14,8 +14,7 @@ from dataclasses import MISSING, dataclass, fields
 from math import inf
 from typing import Any
 
-from solver.case.reader import Material
-from solver.case.schemas import hint
+from solver.case.material import Material
 from solver.case.solutions.base import (
     ERRORS,
     ElasticSolution,
@@ -26,8 +25,11 @@ from solver.case.solutions.base import (
 from solver.case.solutions.hertz import HertzApproach, HertzCylinder, HertzSphere
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.nested import NestedCylinders, NestedSpheres
+from solver.case.solutions.oval import OvalCylinders
+from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
-from solver.system.errors import InputError
+from solver.case.solutions.waves import Waves2d, Waves3d
+from solver.system.errors import InputError, hint
 
 __all__ = [
     "ERRORS",
@@ -45,11 +47,16 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     Hydrostatic,
     NestedCylinders,
     NestedSpheres,
+    OvalCylinders,
     Parabola2d,
     Paraboloid3d,
     HertzCylinder,
     HertzSphere,
     HertzApproach,
+    Waves2d,
+    Waves3d,
+    PolynomialPressure2d,
+    PolynomialPressure3d,
 )
 SOLUTIONS: dict[str, type[ExactSolution]] = {c.name: c for c in _CLASSES}
 _ALL, _RIGID = "all", "rigid"
@@ -88,7 +95,7 @@ def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
         if unknown not in settable:
             allowed = f"{name} has no such parameter; {hint(unknown, settable)}"
             raise InputError(known.where, f"{key}.{unknown}", values[unknown], allowed)
-    reader = _Reader(known, key)
+    reader = _ParameterReader(known, key)
     taken = {n: reader.value(f, values.get(n)) for n, f in parameters.items()}
     try:
         solution = cls(**{n: value for n, value in taken.items() if value is not None})
@@ -101,7 +108,7 @@ def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
     return solution
 
 
-class _Reader:
+class _ParameterReader:
     """Turns what a case file gives for a parameter, or what the case knows, into a value."""
 
     def __init__(self, known: Known, key: str):

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions.base import ExactSolution, parameter
 
 # The pressure has a vertical tangent at the end of the contact.

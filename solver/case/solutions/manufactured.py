@@ -19,7 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, Part, parameter
 
 _MIDDLE = 0.5

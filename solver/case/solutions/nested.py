@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, Part, lame_of, parameter
 
 

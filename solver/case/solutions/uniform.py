@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, Part, parameter
 
 _DIMENSION = "must be 2 (plane strain) or 3"

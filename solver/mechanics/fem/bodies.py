@@ -1,15 +1,15 @@
-"""Bodies: connected parts of a mesh, their rigid motions, and what holds them."""
+"""Bodies: connected parts of a mesh, their rigid motions and their supports."""
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-# Eigenvalues below this share of the largest belong to motions that nothing resists.
+# Eigenvalues below this share of the largest belong to unresisted motions.
 _FREE = 1e-12
 
 
 def body_numbers(n_nodes: int, cells: dict[str, np.ndarray]) -> np.ndarray:
-    """Body number (n_nodes,) of each node: parts that share no node are different bodies."""
+    """Body number (n_nodes,) of each node: parts without a common node are different bodies."""
     first = np.concatenate([np.repeat(c[:, 0], c.shape[1] - 1) for c in cells.values()])
     others = np.concatenate([c[:, 1:].ravel() for c in cells.values()])
     graph = sparse.coo_matrix((np.ones(len(first)), (first, others)), shape=(n_nodes, n_nodes))
@@ -87,8 +87,8 @@ def unheld_motion(
 ) -> tuple[int, str] | None:
     """A rigid motion that neither supports nor `constraints` resist: (body, description), or None.
 
-    `basis` spans the displacements that the supports leave free; `constraints` (m, n_dofs) are
-    those of closed contact, per unit of area.
+    `basis` spans the displacements that the supports leave free; `constraints` (m, n_dofs) are the
+    rows of closed contact per unit of area.
     """
     held = motions - basis @ (basis.T @ motions)
     contact = constraints @ motions

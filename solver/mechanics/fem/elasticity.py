@@ -146,17 +146,27 @@ def _in_precision(
     return np.asarray(points, dtype=kind), np.asarray(displacement, dtype=kind)
 
 
-def cancellation(
-    points: np.ndarray, blocks: list[Block], displacement: np.ndarray
-) -> tuple[np.ndarray, float, float]:
-    """The sizes of what is summed up to forces (n_nodes,), and to stresses, at most.
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """How large stresses are, and the terms that forces and stresses are summed from.
 
-    A sum keeps no more digits than its largest term leaves: times the unit of rounding, these are
-    the errors of `internal_force` and of stresses. The third is the largest stress that the forces
-    stand for, which is large on the small faces of a slender cell. Taken at the middle of each
-    cell, from a displacement (n_nodes, dim) or several parts of it.
+    `forces` (n_nodes,), `highest`: the sizes of what is summed up to forces, and to stresses at
+    most. A sum keeps no more digits than its largest term leaves: times the unit of rounding, these
+    are the errors of `internal_force` and of stresses. `slender`: the largest stress that these
+    forces correspond to, which is large on the small faces of a slender cell. `stress` (n_nodes,):
+    the largest norm of the stress itself in the cells around each node.
     """
+
+    forces: np.ndarray
+    highest: float
+    slender: float
+    stress: np.ndarray
+
+
+def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> Sizes:
+    """Taken at the middle of each cell, from a displacement (n_nodes, dim) or several parts."""
     force, highest, slender = np.zeros(len(points)), 0.0, 0.0
+    largest = np.zeros(len(points))
     displacement = displacement.reshape(-1, *points.shape).sum(axis=0)
     for block in blocks:
         reference, weights = block.rule
@@ -168,14 +178,58 @@ def cancellation(
             nodal = displacement[cells]
             apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
             stiff = block.lame[part] + 2 * block.shear[part]
-            stress = stiff * np.einsum("ca,ca->c", slope, apart)
+            terms = stiff * np.einsum("ca,ca->c", slope, apart)
             extent = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
-            nodal_force = (determinant[:, 0] * weights.sum() * stress)[:, None] * slope
+            nodal_force = (determinant[:, 0] * weights.sum() * terms)[:, None] * slope
             np.add.at(force, cells.ravel(), nodal_force.ravel())
-            highest = max(highest, float(stress.max(initial=0.0)))
-            on_small_faces = stress * extent * slope.max(axis=1)
+            highest = max(highest, float(terms.max(initial=0.0)))
+            on_small_faces = terms * extent * slope.max(axis=1)
             slender = max(slender, float(on_small_faces.max(initial=0.0)))
-    return force, highest, slender
+            stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
+            norm = np.repeat(np.linalg.norm(stress, axis=(2, 3)), cells.shape[1])
+            np.maximum.at(largest, cells.ravel(), norm)
+    return Sizes(forces=force, highest=highest, slender=slender, stress=largest)
+
+
+def largest_strain(
+    points: np.ndarray, blocks: list[Block], displacement: np.ndarray
+) -> tuple[float, float]:
+    """The largest principal strain, by size, and rotation (radians) in the middle of the cells.
+
+    Of a displacement (n_nodes, dim). Both are small where linear elasticity holds.
+    """
+    strain = rotation = 0.0
+    for block in blocks:
+        reference, weights = block.rule
+        middle = (weights @ reference / weights.sum())[None]
+        for part in _chunks(block, points.shape[1]):
+            cells = block.cells[part]
+            gradient, _ = physical_gradients(points, cells, block.type, middle)
+            nodal = displacement[cells] - displacement[cells[:, :1]]
+            slope = np.einsum("cai,caj->cij", nodal, gradient[:, 0])
+            turned = np.swapaxes(slope, 1, 2)
+            size = np.linalg.norm(slope + turned, axis=(1, 2))
+            # The largest principal value is at least this share of the norm.
+            near = size >= size.max() / np.sqrt(points.shape[1])
+            principal = np.linalg.eigvalsh((slope + turned)[near]) / 2
+            strain = max(strain, float(np.abs(principal).max()))
+            angle = np.linalg.norm(slope - turned, axis=(1, 2)) / np.sqrt(8)
+            rotation = max(rotation, float(angle.max()))
+    return strain, rotation
+
+
+def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
+    """The sizes of the gradients of the shape functions (n, n_nodes) in the middle of each cell."""
+    found = []
+    for block in blocks:
+        reference, weights = block.rule
+        middle = (weights @ reference / weights.sum())[None]
+        slope = np.empty(block.cells.shape)
+        for part in _chunks(block, points.shape[1]):
+            gradient, _ = physical_gradients(points, block.cells[part], block.type, middle)
+            slope[part] = np.linalg.norm(gradient[:, 0], axis=2)
+        found.append(slope)
+    return found
 
 
 def _stress(

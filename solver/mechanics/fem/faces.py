@@ -9,10 +9,13 @@ import numpy as np
 from solver.mechanics.fem import face_rule, shape_functions
 from solver.mechanics.fem.gauss import gauss_rule
 from solver.mesh.catalogue import BY_MESHIO, CellType, cell_type
-from solver.system.errors import InputError
 
 # Points each way on a face: enough for pressures that end with a vertical tangent.
 FACE_POINTS = 8
+
+
+class FaceError(Exception):
+    """A group has faces that are not on the outside of a body."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +41,10 @@ def volume_cells(mesh: meshio.Mesh) -> dict[str, np.ndarray]:
     return {kind.name: data for kind, data in kinds if kind.dim == dim}
 
 
-def boundary_faces(mesh: meshio.Mesh, group: str, where: object, key: str) -> list[FaceBlock]:
+def boundary_faces(mesh: meshio.Mesh, group: str) -> list[FaceBlock]:
     """The faces of a group, each with the one volume cell behind it.
 
-    Raises InputError (naming file `where` and `key`) for a face with no cell behind it, with a cell
-    on both sides, or listed twice.
+    Raises FaceError for a face with no cell behind it, with a cell on both sides, or listed twice.
     """
     wanted = _corner_sets(_group_faces(mesh, group))
     marked = np.zeros(len(mesh.points), dtype=bool)
@@ -55,9 +57,9 @@ def boundary_faces(mesh: meshio.Mesh, group: str, where: object, key: str) -> li
     place[label[: len(wanted)]] = np.arange(len(wanted))
     repeated = len(wanted) - int((place >= 0).sum())
     if repeated:
-        raise InputError(where, key, group, f"the group lists {repeated} of its faces twice")
+        raise FaceError(f"the group lists {repeated} of its faces twice")
     owners = np.bincount(label[len(wanted) :], minlength=len(place))[label[: len(wanted)]]
-    _refuse_odd_owners(mesh, wanted, owners, group, where, key)
+    _refuse_odd_owners(mesh, wanted, owners)
     return _match(mesh, sides, place[label[len(wanted) :]])
 
 
@@ -104,25 +106,15 @@ def _candidate_sides(mesh: meshio.Mesh, marked: np.ndarray) -> list[_Side]:
     return sides
 
 
-def _refuse_odd_owners(
-    mesh: meshio.Mesh,
-    corners: np.ndarray,
-    owners: np.ndarray,
-    group: str,
-    where: object,
-    key: str,
-) -> None:
+def _refuse_odd_owners(mesh: meshio.Mesh, corners: np.ndarray, owners: np.ndarray) -> None:
     for count, what in ((owners == 0, "no cell behind it"), (owners > 1, "a cell on both sides")):
         if count.any():
             first = corners[np.flatnonzero(count)[0]]
             place = mesh.points[first[first >= 0]].mean(axis=0)
             at = ", ".join(f"{x:.6g}" for x in place)
-            raise InputError(
-                where,
-                key,
-                group,
+            raise FaceError(
                 f"{int(count.sum())} of its faces have {what} (the first near ({at})); "
-                "faces on the outside of a body are allowed",
+                "faces on the outside of a body are allowed"
             )
 
 

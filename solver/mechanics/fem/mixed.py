@@ -84,19 +84,19 @@ class MeanStress:
         return (self.divergence.T @ stress).reshape(self._shape)
 
     def cancellation(self, stress: np.ndarray) -> tuple[np.ndarray, float]:
-        """As `elasticity.cancellation`: the sizes of what `force` sums (n_nodes,), and of s."""
+        """As `elasticity.sizes`: the sizes of what `force` sums (n_nodes,), and of s."""
         size = np.abs(stress)
         sizes = (abs(self.divergence).T @ size).reshape(self._shape)
         return np.linalg.norm(sizes, axis=1), float(size.max(initial=0.0))
 
-    def defect(self, straining: np.ndarray, stress: np.ndarray) -> np.ndarray:
+    def defect(self, deformation: np.ndarray, stress: np.ndarray) -> np.ndarray:
         """C s − B u (size,), summed cell by cell from differences of displacement.
 
-        `straining` (parts, n_nodes, dim) are parts whose sum is the displacement.
+        `deformation` (parts, n_nodes, dim) are parts whose sum is the displacement.
         """
         defect = self.compliance * stress
         for part in self._parts:
-            nodal = straining[:, part.cells]
+            nodal = deformation[:, part.cells]
             difference = (nodal - nodal[:, :, :1]).sum(axis=0)
             opened = np.einsum("ckai,cai->ck", part.flux, difference, optimize=True)
             defect -= np.bincount(part.unknowns.ravel(), opened.ravel(), minlength=self.size)

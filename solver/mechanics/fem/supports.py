@@ -6,17 +6,24 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from solver.system.errors import InputError
-
 # Directions (unit vectors) whose part outside the others is smaller depend on them.
 _DEPENDENT = 1e-8
+SAME = 1e-9
+"""Displacements that differ by less than this share of the largest are the same."""
+
+
+class SupportClashError(Exception):
+    """A support, by its `number`, asks nodes for another displacement than one before it."""
+
+    def __init__(self, number: int, value: float, count: int):
+        super().__init__(f"{count} nodes are given another displacement by a support before it")
+        self.number, self.value = number, value
 
 
 @dataclass(frozen=True)
 class Fixed:
     """Imposed displacement of nodes (n,) along unit directions (n, dim), of values (n,)."""
 
-    key: str
     nodes: np.ndarray
     directions: np.ndarray
     values: np.ndarray
@@ -40,10 +47,10 @@ class FreeMotion:
         return (self.basis.T @ matrix @ self.basis).tocsr()
 
 
-def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed], where: object) -> FreeMotion:
+def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed]) -> FreeMotion:
     """What the supports leave free.
 
-    Raises InputError where two supports ask a node for different displacements.
+    Raises SupportClashError where two supports ask a node for different displacements.
     """
     nodes = np.concatenate([np.empty(0, dtype=int), *(f.nodes for f in fixed)])
     directions = np.concatenate([np.empty((0, dim)), *(f.directions for f in fixed)])
@@ -65,16 +72,10 @@ def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed], where: object) -
         length = np.linalg.norm(rest, axis=1)
         missing = values[now] - np.einsum("nd,nd->n", direction, offset[node])
         new = length > _DEPENDENT
-        clash = ~new & (np.abs(missing) > 1e-9 * largest)
+        clash = ~new & (np.abs(missing) > SAME * largest)
         if clash.any():
-            first = np.flatnonzero(clash)[0]
-            key = fixed[source[now][first]].key
-            raise InputError(
-                where,
-                key,
-                float(values[now][first]),
-                f"{int(clash.sum())} nodes are given another displacement by a support before it",
-            )
+            first = np.flatnonzero(now)[clash.argmax()]
+            raise SupportClashError(int(source[first]), float(values[first]), int(clash.sum()))
         node, unit = node[new], rest[new] / length[new][:, None]
         held[node, count[node]] = unit
         offset[node] += unit * (missing[new] / length[new])[:, None]

@@ -1,9 +1,9 @@
-"""The sparse direct solvers behind one shape: a function that factors and returns the solve.
+"""The sparse direct solvers behind one interface: a function that factors and returns a solve.
 
 Each takes the upper triangle of a symmetric matrix (csr, int32 indices, sorted, every diagonal
-entry stored) and whether it has to be positive definite, imports its library only then, and
-raises `BreakdownError` where it meets a pivot that it cannot use. The solve takes and returns
-columns (n, k); the factor's memory goes with the last reference to the solve.
+entry stored) and whether it must be positive definite, imports its library only when called, and
+raises `BreakdownError` at a pivot that it cannot use. The solve takes and returns columns (n, k);
+the factor's memory is released with the last reference to the solve.
 """
 
 import os
@@ -20,7 +20,7 @@ Solve = Callable[[np.ndarray], np.ndarray]
 
 
 class BreakdownError(Exception):
-    """The factorisation met a pivot that is zero, or not positive where it has to be."""
+    """A pivot is zero, or not positive where it must be."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Backend:
 
 
 def threads() -> int:
-    """Cores that this process may use; OMP_NUM_THREADS, where set, says fewer."""
+    """Cores that this process may use, limited by OMP_NUM_THREADS where it is set."""
     allowed = len(os.sched_getaffinity(0))
     wish = os.environ.get("OMP_NUM_THREADS", "")
     return min(allowed, int(wish)) if wish.isdigit() and int(wish) else allowed

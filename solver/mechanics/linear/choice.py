@@ -1,9 +1,9 @@
-"""The linear solver that a positive definite system gets, by its size and dimension."""
+"""The linear solver for a positive definite system, chosen by size and dimension."""
 
 import logging
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 
 from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.condensed_matrix import Symmetric
@@ -15,44 +15,56 @@ from solver.system.errors import SolveError
 _LOG = logging.getLogger(__name__)
 
 MULTIGRID = "multigrid"
+# Shares of the diagonal added to a matrix that is singular to working precision: its round-off.
+_SHIFTS = 0.0, 1e-15, 1e-14
+_SOFT = "displacements along the softest motions are not determined"
 _ASKED = "as asked for"
-# Unknowns in space from which multigrid takes less time than a factor, and half the memory or less:
-# whether PARDISO makes the factor, whether cells are quadratic, which takes twice the iterations.
+# Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory.
+# Keys: whether PARDISO makes the factor; whether cells are quadratic (twice the iterations).
 _MULTIGRID_FROM = {
     (True, False): 80_000,
     (True, True): 200_000,
     (False, False): 20_000,
     (False, True): 100_000,
 }
-# From as many entries more than the matrix has, condensing is slower than a saddle point; a few
-# (the second figure) take no time.
+# Condensing is slower than a saddle point if it adds more entries than this share of the matrix;
+# up to the second number of entries it costs nothing.
 _FILL, _LEAST_FILL = 1.0, 1_000_000
 
 
 def multigrid_from(quadratic: bool) -> int:
-    """Unknowns in space from which multigrid is the quicker way, with what is installed here."""
+    """Unknowns in 3D from which multigrid is quicker, with the libraries installed here."""
     return _MULTIGRID_FROM[BACKENDS["pardiso"].available(), quadratic]
 
 
-class Chosen:
-    """What solves one system, as often as wanted: `name`, and `why` it was chosen.
+class LinearSolver:
+    """A solver of one system for any number of right-hand sides: `name`, and `why` it was chosen.
 
-    Multigrid gives way to a factor once it does not converge: thin cells, nearly incompressible
-    material. `gave_up` then says why; else it is empty.
+    Multigrid is replaced by a factor when it does not converge (thin cells, nearly incompressible
+    material); `gave_up` then says why and is empty otherwise. Where the matrix is singular to
+    working precision, which `doubt` then says, the factor is that of a matrix that differs by
+    round-off: what it solves is a solution only if refinement converges.
     """
 
-    def __init__(self, matrix: Symmetric, dim: int, solver: Factor | Multigrid, why: str):
-        self._matrix, self._dim, self._solver, self.why = matrix, dim, solver, why
-        self.gave_up = ""
+    def __init__(self, matrix: Symmetric, dim: int, solver: Factor | Multigrid | None, why: str):
+        """Without a `solver` the matrix is factored."""
+        self._matrix, self._dim, self._why = matrix, dim, why
+        self.gave_up = self.doubt = ""
+        self._solver = self._factor() if solver is None else solver
+
+    @property
+    def why(self) -> str:
+        """Why it was chosen, and what to mind."""
+        return f"{self._why}; nearly singular: {_SOFT}" if self.doubt else self._why
 
     @property
     def name(self) -> str:
-        """By what."""
+        """Of the library or method."""
         return self._solver.name
 
     @property
     def iterations(self) -> int:
-        """The most that one solution took so far; 0 by a factor alone."""
+        """Largest number of iterations of one solution so far; 0 for a factor alone."""
         return self._solver.iterations
 
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
@@ -65,19 +77,33 @@ class Chosen:
         except SolveError as error:
             if not isinstance(self._solver, Multigrid):
                 raise
-            self.why = self.gave_up = _instead(error)
+            self._why = self.gave_up = _instead(error)
             _LOG.info("%s", self.why)
         self._solver.close()
-        self._solver = factorise(self._matrix.tocsr(), dim=self._dim)
+        self._solver = self._factor()
         return self._solver.solve(right, accuracy)
 
+    def _factor(self) -> Factor:
+        matrix = self._matrix.tocsr()
+        try:
+            return factorise(matrix, dim=self._dim)
+        except SolveError as error:
+            self.doubt = str(error)
+        for shift in _SHIFTS:
+            try:
+                shifted = matrix + shift * diags(matrix.diagonal())
+                return factorise(shifted, dim=self._dim, least=0.0)
+            except SolveError:
+                continue
+        raise SolveError(self.doubt)
 
-def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> Chosen:
-    """Make ready to solve with a symmetric positive definite `matrix` (n, n).
 
-    `gave_up`: why multigrid did on a matrix like it; then it is not tried again. Raises SolveError
-    where the matrix is not positive definite or singular to working precision; a singular matrix
-    that multigrid solves for a consistent right-hand side goes unnoticed.
+def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> LinearSolver:
+    """Prepare to solve with a symmetric positive definite `matrix` (n, n).
+
+    `gave_up`: why multigrid failed on a similar matrix; it is then not tried again. Raises
+    SolveError where the matrix is not positive definite beyond round-off; see `LinearSolver.doubt`.
+    A singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
     """
     dim, size = unknowns.dim, matrix.shape[0]
     against = gave_up or _against_multigrid(size, unknowns)
@@ -87,12 +113,12 @@ def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> Chosen:
         why = f"{least} unknowns or more in space: quicker and smaller than a factor"
         try:
             solver = Multigrid(matrix, unknowns)
-            return Chosen(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
+            return LinearSolver(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
             against = gave_up = _instead(error)
             _LOG.info("%s", against)
-    chosen = Chosen(matrix, dim, factorise(matrix.tocsr(), dim=dim), against)
+    chosen = LinearSolver(matrix, dim, None, against)
     chosen.gave_up = gave_up
     return chosen
 
@@ -108,10 +134,10 @@ def _against_multigrid(size: int, unknowns: Unknowns) -> str:
 
 
 def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
-    """Why `matrix` (n, n) had better not be condensed by `constraints` (m, n), but factored.
+    """Why `matrix` (n, n) should not be condensed by `constraints` (m, n); empty if it should.
 
-    Empty where it had. A constraint over w unknowns leaves a block of w² entries in the condensed
-    system. Only PARDISO factors saddle points in space well.
+    A constraint over w unknowns leaves a block of w² entries in the condensed
+    system. Only PARDISO factors 3D saddle points well.
     """
     widths = np.diff(constraints.indptr).astype(float)
     filled = float((widths**2).sum())

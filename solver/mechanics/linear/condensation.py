@@ -1,8 +1,8 @@
 """Elasticity under closed contact constraints, condensed to a positive definite system.
 
-Each closed macro-element owns a degree of freedom that no other constraint sees. It is expressed by
-the others through the constraint, x = Z v + c, and the multiplier follows from the equilibrium of
-that degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
+Each closed macro-element owns a degree of freedom that no other constraint contains. The constraint
+expresses it by the others, x = Z v + c, and the multiplier follows from the equilibrium of that
+degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
 """
 
 import logging
@@ -12,7 +12,7 @@ from typing import Protocol, Self, TypeVar
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.linear.choice import Chosen, prepare
+from solver.mechanics.linear.choice import LinearSolver, prepare
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix, Symmetric
 from solver.mechanics.linear.direct import Factor, factorise_indefinite
 from solver.mechanics.linear.krylov import EPSILON, ROUGH
@@ -26,6 +26,8 @@ _MIN_GAIN = 0.5
 _MAX_REFINEMENTS = 6
 # A residual below this multiple of the machine precision, relative to the forces, is round-off.
 ROUND_OFF = 8 * np.finfo(float).eps
+# The residual by which the solution with the factor of a nearly singular system is one.
+_CONVERGED = 1e-8
 # A refinement aims at this share of round-off, and at no smaller a gain.
 _WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
 # A macro-element's own coefficient must not be smaller than this share of its row's largest.
@@ -35,23 +37,28 @@ _SMALLEST_PIVOT = 1e-6
 AnyIterate = TypeVar("AnyIterate", bound="Iterate")
 
 
-class Constrained(Protocol):
+class ConstrainedSystem(Protocol):
     """A factored system K x = f + Gᵀ p under constraints G x = b."""
 
     @property
-    def factor(self) -> Chosen | Factor:
-        """What solves the system."""
+    def factor(self) -> LinearSolver | Factor:
+        """The solver of the system."""
 
     @property
     def why(self) -> str:
-        """Why that was chosen."""
+        """Why it was chosen."""
+
+    @property
+    def doubt(self) -> str:
+        """Why a residual that stays large means no solution; empty for a sound factor."""
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
         """The change of x (n,) that removes f − K x = `force` and b − G x = `violation`.
 
-        What is left of the forces may be `accuracy` of them, where another correction follows.
+        Several at once by columns (n, c) and (m, c), as for the multipliers.
+        The forces left may be `accuracy` of those given, where another correction follows.
         """
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
@@ -62,7 +69,7 @@ class Constrained(Protocol):
 
 
 @dataclass(frozen=True)
-class Condensed:
+class CondensedSystem:
     """x = Z v + shift · b for constraints G x = b, and the factor of ZᵀKZ.
 
     `pivot` (m,) the eliminated unknowns, `kept` (n − m,) the others, `coefficient` (m,) of the
@@ -72,26 +79,31 @@ class Condensed:
     expansion: sparse.csr_matrix
     pivot: np.ndarray
     coefficient: np.ndarray
-    factor: Chosen
+    factor: LinearSolver
     coupling: sparse.csr_matrix
 
     @property
     def why(self) -> str:
-        """Why that was chosen."""
+        """Why it was chosen."""
         return self.factor.why
+
+    @property
+    def doubt(self) -> str:
+        """A factor of a nearly singular matrix is that of another one."""
+        return self.factor.doubt
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
         """The pivots alone meet the constraints; the others then restore equilibrium."""
-        change = np.zeros(self.expansion.shape[0])
-        change[self.pivot] = violation / self.coefficient
+        change = np.zeros_like(force)
+        change[self.pivot] = (violation.T / self.coefficient).T
         moved = force - self.coupling.T @ change[self.pivot]
         return change + self.expansion @ self.factor.solve(self.expansion.T @ moved, accuracy)
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
-        """From the equilibrium of the pivots, which one multiplier each acts on."""
-        return -force[self.pivot] / self.coefficient
+        """From the equilibrium of the pivots: one multiplier acts on each."""
+        return (-force[self.pivot].T / self.coefficient).T
 
     def imbalance(self, force: np.ndarray) -> float:
         """The largest force left on the unknowns v."""
@@ -99,7 +111,7 @@ class Condensed:
 
 
 @dataclass(frozen=True)
-class Saddle:
+class SaddlePoint:
     """The system with the multipliers as unknowns.
 
     `scaled` are the constraints with rows of unit size; the matrix is K + `weight` Ĝᵀ Ĝ, which
@@ -113,19 +125,21 @@ class Saddle:
     weight: float
     factor: Factor
     why: str
+    doubt: str = ""
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
         """Solved for x and p together."""
-        wanted = violation / self.size
+        wanted = (violation.T / self.size).T
         pulled = force + self.weight * (self.scaled.T @ wanted)
         return self.factor.solve(np.concatenate([pulled, -wanted]), accuracy)[: len(force)]
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """The multipliers of the same system with nothing violated."""
-        right = np.concatenate([force, np.zeros(self.constraints.shape[0])])
-        return self.factor.solve(right)[len(force) :] / self.size
+        nothing = np.zeros((len(self.size), *force.shape[1:]))
+        found = self.factor.solve(np.concatenate([force, nothing]))[len(force) :]
+        return (found.T / self.size).T
 
     def imbalance(self, force: np.ndarray) -> float:
         """The largest force left with the multipliers acting."""
@@ -135,7 +149,7 @@ class Saddle:
 
 def saddle_point(
     matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, why: str, weighted: bool = True
-) -> Saddle:
+) -> SaddlePoint:
     """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular.
 
     `weighted`: K made definite by the constraints, which any order of elimination takes.
@@ -145,7 +159,7 @@ def saddle_point(
     weight = float(matrix.diagonal().max(initial=0.0)) if weighted else 0.0
     upper = matrix + weight * (scaled.T @ scaled) if weighted else matrix
     factor = factorise_indefinite(sparse.bmat([[upper, -scaled.T], [-scaled, None]], format="csr"))
-    return Saddle(constraints, scaled, size, weight, factor, why)
+    return SaddlePoint(constraints, scaled, size, weight, factor, why)
 
 
 def choose_pivots(
@@ -153,8 +167,8 @@ def choose_pivots(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """For each row the largest entry in a column that is its own: pivot, coefficient, found (m,).
 
-    `own` (n,) marks the columns that may serve (unknowns of slave nodes). Rows without one, or with
-    a negligible one, have found = False.
+    `own` (n,) marks the columns that may be pivots (unknowns of slave nodes). Rows without a column
+    of their own, or with a negligible coefficient there, have found = False.
     """
     m, n = constraints.shape
     seen = np.bincount(constraints.indices, minlength=n)
@@ -180,11 +194,11 @@ def condense(
     own: np.ndarray,
     unknowns: Unknowns,
     gave_up: str = "",
-) -> Condensed:
+) -> CondensedSystem:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
-    `own` (n,) marks what may be eliminated, `unknowns` tells what each is, `gave_up` why multigrid
-    is not tried again (see `prepare`).
+    `own` (n,) marks the unknowns that may be eliminated, `unknowns` describes all, `gave_up` says
+    why multigrid is not tried again (see `prepare`).
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
@@ -206,7 +220,7 @@ def condense(
         added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
         condensed = CondensedMatrix(matrix, kept_columns, added.tocsr())
     factor = prepare(condensed, unknowns.of(kept_columns), gave_up)
-    return Condensed(expansion, pivot, coefficient, factor, coupling)
+    return CondensedSystem(expansion, pivot, coefficient, factor, coupling)
 
 
 def _expansion(
@@ -241,7 +255,7 @@ class Iterate(Protocol):
 
 
 def solve(
-    system: Constrained,
+    system: ConstrainedSystem,
     iterate: AnyIterate,
     scale: float,
     refine: bool = True,
@@ -252,7 +266,7 @@ def solve(
     `scale` is the size of the forces. Newton's method with a fixed factor: one step solves, further
     ones refine until the residual no longer falls (Higham, Accuracy and Stability of Numerical
     Algorithms, §12), or is less than `round_off` of the forces. Raises SolveError where the
-    solution is not finite.
+    solution is not finite, or the system nearly singular and the residual stays large.
     """
     force, last, accuracy = iterate.residual(), np.inf, ROUGH if refine else EPSILON
     for step in range(_MAX_REFINEMENTS if refine else 1):
@@ -271,4 +285,6 @@ def solve(
             break
         # No more than it takes from here to well below round-off.
         accuracy = min(max(_WELL_BELOW * round_off / last, ROUGH), _LEAST_GAIN)
+    if system.doubt and last > _CONVERGED:
+        raise SolveError(system.doubt)
     return iterate, system.multiplier(force), last

@@ -1,8 +1,8 @@
 """Sparse direct solution of symmetric systems, by the best library that is installed.
 
-The matrix is first scaled symmetrically to a diagonal near one, by powers of two, so that nothing
-is rounded: what follows does not depend on units, and a pivot or an eigenvalue of the scaled
-matrix can be compared with the machine precision.
+The matrix is first scaled symmetrically to a diagonal near one, by powers of two, which rounds
+nothing. The rest does not depend on units, and a pivot or an eigenvalue of the scaled matrix can be
+compared with the machine precision.
 
 A large positive definite matrix is factored in single precision, which halves memory and time;
 conjugate gradients in double precision, preconditioned by that factor, take the solution to
@@ -24,11 +24,11 @@ from solver.mechanics.linear.krylov import EPSILON, conjugate_gradients, in_sing
 from solver.system.errors import SolveError
 
 LIGHT = 150_000
-"""Stored entries up to which CHOLMOD is quickest in 3D (in 2D it always is, in processor time)."""
+"""Stored entries up to which CHOLMOD takes least processor time in 3D (in 2D it always does)."""
 SINGLE_FROM = 20_000
 """Unknowns in 3D from which a factor in single precision pays for its iterations."""
 SINGULAR = 4 * EPSILON
-"""Smallest eigenvalue of the scaled matrix (largest entry 1) at which it counts as singular."""
+"""A scaled matrix (largest entry 1) whose smallest eigenvalue is not larger counts as singular."""
 SINGULAR_INDEFINITE = 1e-12
 """The same for an indefinite matrix: PARDISO replaces pivots below 1e-13."""
 TRUSTED_SINGLE = 1e-6
@@ -39,8 +39,8 @@ _auto: ContextVar[str] = ContextVar("auto", default="auto")
 
 
 @contextmanager
-def standing_for_auto(kind: str) -> Iterator[None]:
-    """Within the block `auto` stands for `kind`, the name of a solver, or `multigrid`.
+def force_solver(kind: str) -> Iterator[None]:
+    """Within the block `auto` means `kind`: the name of a solver, or `multigrid`.
 
     Raises SolveError there for a solver that is not installed, or not for that kind of matrix.
     """
@@ -52,18 +52,18 @@ def standing_for_auto(kind: str) -> Iterator[None]:
 
 
 def wanted() -> str:
-    """What `auto` stands for at present: `auto`, or the name of a solver."""
+    """The present meaning of `auto`: `auto` itself, or the name of a solver."""
     return _auto.get()
 
 
 class Factor:
-    """A factored matrix; `name` says by what. The memory goes when it is closed or dropped.
+    """A matrix factored by the library `name`; closing or dropping it releases the memory.
 
-    `iterations`: the most that a solution took so far, 0 where the factor alone is exact enough.
+    `iterations`: the most of one solution so far, 0 where the factor alone is accurate enough.
     """
 
     def __init__(self, name: str, solve: Iterative, scale: np.ndarray):
-        """`solve` takes columns (n, k) and an accuracy, and tells its iterations too."""
+        """`solve` takes columns (n, k) and an accuracy, and returns the iterations too."""
         self.name = name
         self.iterations = 0
         self._scale = scale
@@ -87,7 +87,7 @@ class Factor:
         return solution.reshape(right.shape)
 
     def close(self) -> None:
-        """Release the memory; the factor solves no more."""
+        """Release the memory; the factor cannot solve afterwards."""
         self._solve = None
 
     def __enter__(self) -> Self:
@@ -98,16 +98,20 @@ class Factor:
 
 
 def factorise(
-    matrix: spmatrix | sparray, kind: str = "auto", precision: str = "auto", dim: int = 3
+    matrix: spmatrix | sparray,
+    kind: str = "auto",
+    precision: str = "auto",
+    dim: int = 3,
+    least: float = SINGULAR,
 ) -> Factor:
     """Factor a symmetric positive definite `matrix` (n, n), of which the upper triangle is read.
 
     `kind`: auto, pardiso, rslab, cholmod or superlu. `precision` of the factor: auto, double or
     single (pardiso and rslab); solutions have double precision either way. `dim`, the dimension
-    of the mesh behind the matrix, guides what auto stands for.
+    of the mesh behind the matrix, guides the choice for auto.
 
     Raises SolveError where the matrix is not positive definite, or singular to working precision:
-    the smallest eigenvalue of the matrix scaled to a diagonal near one is at most `SINGULAR`.
+    the smallest eigenvalue of the matrix scaled to a diagonal near one is at most `least`.
     """
     upper = _upper_triangle(matrix)
     if upper.shape[0] == 0:
@@ -130,7 +134,7 @@ def factorise(
         factor = _factorise_single(backend, upper, scale)
         if factor is not None:
             return factor
-    return _factorise_double(backend, upper, scale, definite=True)
+    return _factorise_double(backend, upper, scale, definite=True, limit=least)
 
 
 def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Factor:
@@ -144,14 +148,15 @@ def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Fact
     for _ in range(3):
         scale *= _power_of_two(1 / np.sqrt(_largest_in_row(_scaled(upper, scale))))
     upper = _scaled(upper, scale)
-    # Not rslab: its pivots stay within a supernode, where that of a multiplier may be alone, zero.
-    return _factorise_double(_choose(kind, ("pardiso",)), upper, scale, definite=False)
+    # Not rslab: it pivots within a supernode, where a multiplier's zero may be alone.
+    backend = _choose(kind, ("pardiso",))
+    return _factorise_double(backend, upper, scale, definite=False, limit=SINGULAR_INDEFINITE)
 
 
 def _choose(kind: str, order: tuple[str, ...]) -> Backend:
     if kind != "auto":
         return BACKENDS[kind]
-    # Multigrid makes no factor: where one is needed all the same, the best will do.
+    # Multigrid makes no factor: where one is needed all the same, take the best.
     if (asked := wanted()) in BACKENDS:
         if asked not in (*order, "superlu"):
             raise SolveError(f"{BACKENDS[asked].name} factors positive definite matrices only")
@@ -162,7 +167,7 @@ def _choose(kind: str, order: tuple[str, ...]) -> Backend:
 
 
 def _factorise_double(
-    backend: Backend, upper: csr_matrix, scale: np.ndarray, definite: bool
+    backend: Backend, upper: csr_matrix, scale: np.ndarray, definite: bool, limit: float
 ) -> Factor:
     try:
         solve = backend.factor(upper, definite)
@@ -170,7 +175,6 @@ def _factorise_double(
         wanted = "positive definite" if definite else "regular"
         raise SolveError(f"the matrix is not {wanted}: a pivot fails in {backend.name}") from None
     smallest = _smallest_eigenvalue(solve, upper.shape[0])
-    limit = SINGULAR if definite else SINGULAR_INDEFINITE
     if not smallest > limit:
         raise SolveError(
             f"the matrix is singular to working precision: scaled to a largest entry of 1, its "

@@ -14,7 +14,7 @@ Operator = Callable[[np.ndarray], np.ndarray]
 
 EPSILON = float(np.finfo(float).eps)
 ROUGH = 1e-9
-"""Residual, over the right-hand side, of a solution that is going to be refined."""
+"""Residual over right-hand side of a solution that will be refined."""
 
 
 def conjugate_gradients(
@@ -23,9 +23,9 @@ def conjugate_gradients(
     """Solve for the columns of `right` (n, k) at once; return the solution and the iterations.
 
     `accuracy` is residual over right-hand side, in 2-norms. Raises SolveError where `most`
-    iterations do not reach it, or a third or two thirds of them not that part of the digits. The
-    flexible form (Golub and Ye, SIAM J. Sci. Comput. 21 (1999) 1305): the preconditioner is
-    rounded, so it is linear only to single precision.
+    iterations do not reach it, or where one third (two thirds) of them reach less than one third
+    (two thirds) of the digits. The flexible form (Golub and Ye, SIAM J. Sci. Comput. 21 (1999)
+    1305): the preconditioner is rounded, so it is linear only to single precision.
     """
     solution, residual = np.zeros_like(right), right.copy()
     start = np.linalg.norm(right, axis=0)
@@ -56,9 +56,9 @@ def conjugate_gradients(
 
 
 def in_single(solve: Operator) -> Operator:
-    """The linear `solve` of float32 columns, for float64 columns: each lifted to order one.
+    """A linear `solve` of float32 columns as one of float64 columns, each scaled to order one.
 
-    Single precision has few exponents.
+    Single precision has a small range of exponents.
     """
 
     def lifted(right: np.ndarray) -> np.ndarray:
@@ -70,5 +70,5 @@ def in_single(solve: Operator) -> Operator:
 
 
 def _ratio(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
-    # A column that is solved exactly has nothing left to divide by.
+    # A column that is solved exactly has a denominator of zero.
     return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > 0)

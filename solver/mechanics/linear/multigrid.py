@@ -1,10 +1,10 @@
 """Algebraic multigrid for large 3D elasticity: smoothed aggregation within conjugate gradients.
 
-Nodes are gathered into aggregates, the rigid motions of which are what is unknown on the next level
-(Vanek, Mandel, Brezina, Computing 56 (1996) 179). Every level is scaled to a diagonal of at most
-one and kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes,
-Numer. Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in
-double precision take the solution to round-off.
+Nodes are gathered into aggregates, whose rigid motions are the unknowns of the next level (Vanek,
+Mandel, Brezina, Computing 56 (1996) 179). Every level is scaled to a diagonal of at most one and
+kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer.
+Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in double
+precision take the solution to round-off.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from solver.mechanics.linear.krylov import EPSILON, conjugate_gradients, in_sing
 from solver.system.errors import SolveError
 
 COARSEST = 600
-"""Unknowns at which the hierarchy ends: that level is inverted as a dense matrix."""
+"""The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
 LARGEST_DENSE = 4_000
-"""More unknowns than this where the aggregates no longer grow: multigrid is of no use."""
+"""Largest level that is inverted where nothing coarsens further; beyond it multigrid is refused."""
 MOST_NEIGHBOURS = 50
-"""More aggregates than this, on the mean, that some node feels together with one; 20 to 35 do as a
-rule. Contact couples all that lies on one face: of hundreds of faces, coarse levels fill in."""
+"""Largest mean number of neighbouring aggregates (20–35 is typical). Contact couples everything on
+one face: with hundreds of faces on it, coarse levels fill in."""
 MAX_ITERATIONS = 150
 _ROWS_AT_ONCE = 30_000  # whole nodes
 _BLOCKS_AT_ONCE = 100_000
@@ -37,11 +37,11 @@ _SMOOTHED = 4 / 3
 
 @dataclass(frozen=True)
 class Unknowns:
-    """What the unknowns of a system stand for, in a space of `dim` dimensions.
+    """The meaning of the unknowns of a system, in `dim` dimensions.
 
-    `node` (n,): the node that each belongs to, at most `dim` to a node; `motions` (n, 3 or 6): the
-    rigid motions, in these unknowns; `body` (n,): the number of the body. Bodies that slide on each
-    other share no aggregate. `quadratic`: some of their cells are.
+    `node` (n,): the node of each unknown, at most `dim` per node; `motions` (n, 3 or 6): the rigid
+    motions in these unknowns; `body` (n,): the number of the body. Bodies that slide on each other
+    share no aggregate. `quadratic`: some cells are quadratic.
     """
 
     dim: int
@@ -51,7 +51,7 @@ class Unknowns:
     quadratic: bool = False
 
     def of(self, chosen: np.ndarray) -> "Unknowns":
-        """What some of them stand for."""
+        """The same for some of them."""
         arrays = self.node[chosen], self.motions[chosen], self.body[chosen]
         return Unknowns(self.dim, *arrays, self.quadratic)
 
@@ -66,7 +66,7 @@ class Level:
     restriction: bsr_matrix
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
-        """The correction that the polynomial in the matrix makes of a residual (n, k)."""
+        """The correction for a residual (n, k): the Chebyshev polynomial applied to it."""
         step = residual * (np.float32(4 / 3) / self.bound)
         residual = residual - self.matrix @ step
         change = _FIRST * step
@@ -104,7 +104,7 @@ class Multigrid:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
 
         In 2-norms of the system scaled to a diagonal of at most one. Raises SolveError where
-        `MAX_ITERATIONS` do not lead there, or will not, and where the solution is not finite.
+        `MAX_ITERATIONS` do not or will not suffice, and where the solution is not finite.
         """
         columns = np.asarray(right, dtype=float)
         columns = columns if columns.ndim == 2 else columns[:, None]
@@ -155,8 +155,8 @@ def _places(unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
 def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
     """The scaled matrix in single precision and blocks of three; rows without unknown are zero.
 
-    Row and column i go to `place` (n,) i of `size`. Some rows at a time: no copy in double
-    precision is made of the whole.
+    Row and column i go to `place[i]` (n,) of `size`. Rows are copied in parts, so that there is no
+    second matrix in double precision.
     """
     order, place = np.argsort(place), place.astype(np.int32)
     rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
@@ -172,7 +172,7 @@ def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: in
         arrays = values.astype(np.float32), place[some.indices], starts
         part = csr_matrix(arrays, shape=(last - first, size)).tobsr((3, 3))
         before, after = len(columns), len(columns) + len(part.indices)
-        # The system moves pages where an array grows: at no time are there two of it.
+        # An array grows by moved pages: there are never two copies of it.
         blocks.resize((after, 3, 3), refcheck=False)
         columns.resize(after, refcheck=False)
         blocks[before:], columns[before:] = part.data, part.indices
@@ -221,7 +221,7 @@ def _refuse_fill(prolongation: bsr_matrix) -> None:
 
 
 def _coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
-    """Pᵀ A P, some rows of A at a time: A P is large."""
+    """Pᵀ A P, formed from some rows of A at a time because A P is large."""
     height, width = prolongation.blocksize
     count, size = matrix.shape[0] // height, prolongation.shape[1]
     total = bsr_matrix((size, size), dtype=np.float32, blocksize=(width, width))
@@ -271,8 +271,8 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     """Matrix and motions scaled to a diagonal of at most one, and the scale (n,).
 
     Rows whose entries add up to more than the typical sum are scaled down further: otherwise the
-    few at a contact surface would set the bound of the eigenvalues for all. Zero rows, unknowns
-    that are not there, stay zero.
+    few at a contact surface would set the eigenvalue bound for all. Zero rows, which have no
+    unknown, stay zero.
     """
     size = matrix.blocksize[0]
     diagonal = matrix.diagonal().astype(float)

@@ -6,46 +6,6 @@ for being small: a lost sliver would be a lost piece of force.
 
 import numpy as np
 
-# A vertex this far outside a polygon, in parts of the size of its own, lies on its edge.
-_ON_EDGE = 1e-12
-
-
-def placed(
-    window: np.ndarray, subject: np.ndarray, convex: bool = True
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which windows (n, w, 2) lie within their subjects (n, v, 2), and which lie apart from them.
-
-    Three masks (n,): within, to round-off; apart, having no common area at all; and apart to
-    round-off. Windows are convex; subjects that are not `convex` are seldom known to be either.
-    """
-    size = np.linalg.norm(window - window.mean(axis=1, keepdims=True), axis=2).max(axis=1)
-    seen, limit = _sides(subject, window, size)
-    back, back_limit = _sides(window, subject, size)
-    within = np.all(seen >= -limit, axis=(1, 2))
-    apart = _beyond_an_edge(back, 0.0)
-    nearly = _beyond_an_edge(back, back_limit)
-    if convex:
-        apart |= _beyond_an_edge(seen, 0.0)
-        nearly |= _beyond_an_edge(seen, limit)
-    return within, apart, nearly
-
-
-def _beyond_an_edge(sides: np.ndarray, limit: np.ndarray | float) -> np.ndarray:
-    return np.any(np.all(sides <= limit, axis=2), axis=1)
-
-
-def _sides(
-    polygon: np.ndarray, points: np.ndarray, size: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """How far to the left of each edge (n, v, p) points (n, p, 2) lie, times its length.
-
-    Also the values below which they lie on it, given the size (n,) of what is looked at.
-    """
-    edge = np.roll(polygon, -1, axis=1) - polygon
-    offset = points[:, None] - polygon[:, :, None]
-    left = edge[:, :, None, 0] * offset[..., 1] - edge[:, :, None, 1] * offset[..., 0]
-    return left, _ON_EDGE * (np.linalg.norm(edge, axis=2) * size[:, None])[..., None]
-
 
 def clip(
     subject: np.ndarray, count: np.ndarray, window: np.ndarray
@@ -54,6 +14,11 @@ def clip(
 
     Windows are convex with all w vertices in use. Source: Sutherland, Hodgman, Reentrant polygon
     clipping, CACM 17 (1974) 32–42.
+
+    >>> square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
+    >>> part, count = clip(square + 0.5, np.array([4]), square)
+    >>> part[0, : count[0]].tolist()
+    [[0.5, 0.5], [1.0, 0.5], [1.0, 1.0], [0.5, 1.0]]
     """
     for k in range(window.shape[1]):
         start, end = window[:, k], window[:, (k + 1) % window.shape[1]]
@@ -92,6 +57,11 @@ def triangles(polygon: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.nd
     """Fans of triangles: polygon number (t,), corners (t, 3, 2), signed areas (t,).
 
     Signs are kept: the fan of a polygon that is not convex then still sums to the polygon.
+
+    >>> square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
+    >>> which, corner, area = triangles(square, np.array([4]))
+    >>> which.tolist(), area.tolist()
+    ([0, 0], [0.5, 0.5])
     """
     v = polygon.shape[1]
     fan = np.arange(1, max(v - 1, 1))
@@ -107,7 +77,12 @@ def triangles(polygon: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def overlap(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Common part (n, 2) of intervals (n, 2) with ascending ends, and its length (n,)."""
+    """Common part (n, 2) of intervals (n, 2) with ascending ends, and its length (n,).
+
+    >>> ends, length = overlap(np.array([[0.0, 2.0]]), np.array([[1.5, 3.0]]))
+    >>> ends.tolist(), length.tolist()
+    ([[1.5, 2.0]], [0.5])
+    """
     low = np.maximum(first[:, 0], second[:, 0])
     high = np.minimum(first[:, 1], second[:, 1])
     return np.stack([low, high], axis=1), high - low

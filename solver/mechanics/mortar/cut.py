@@ -53,7 +53,11 @@ class CutMesh:
 
 
 def needs_cut(face_type: str) -> bool:
-    """Whether a slave face of that type has no node strictly inside (2D: SEG3 has one)."""
+    """Whether a slave face of that type has no node strictly inside (2D: SEG3 has one).
+
+    >>> needs_cut("SEG2"), needs_cut("SEG3")
+    (True, False)
+    """
     return face_type in CUT_FACES
 
 
@@ -64,18 +68,24 @@ def cut(
     macro: list[np.ndarray],
     into_hexahedra: list[bool],
     uncut: list[bool] | None = None,
-    without_need: bool = False,
 ) -> CutMesh:
     """Cut the cells behind slave faces.
 
     `faces` are the slave faces of all zones, `macro` their macro-element numbers, `into_hexahedra`
     the choice for hexahedra, all by block; blocks marked `uncut` are left as they are.
-    `without_need`: those that own an inner node are cut as well.
+
+    A triangle on its slave edge from (0, 0) to (2, 0) is cut in two, at a new node 3:
+
+    >>> corner = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 1.0]])
+    >>> zero = np.array([0])
+    >>> face = FaceBlock(BY_NAME["SEG2"], np.array([[0, 1]]), zero, BY_NAME["TRIA3"], zero, zero)
+    >>> mesh = cut(corner, {"TRIA3": np.array([[0, 1, 2]])}, [face], [zero], [False])
+    >>> mesh.points[3:].tolist(), len(mesh.cells["TRIA3"]), mesh.sub_faces[0].nodes.tolist()
+    ([[1.0, 0.0]], 2, [[0, 3], [3, 1]])
     """
     left = uncut or [False] * len(faces)
     chosen = [
-        (without_need or needs_cut(block.type.name)) and not leave
-        for block, leave in zip(faces, left, strict=True)
+        needs_cut(block.type.name) and not leave for block, leave in zip(faces, left, strict=True)
     ]
     slaves = _slave_faces_by_cell(
         list(compress(faces, chosen)),

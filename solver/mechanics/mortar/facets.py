@@ -11,14 +11,16 @@ from solver.mesh.catalogue import CellType
 from solver.system.errors import SolveError
 
 # Below these shares of a face's size, its bending and the skew of its map are round-off.
-_FLAT = 1e-9
+FLAT = 1e-9
 _AFFINE = 1e-12
 # Newton's method stops at steps below the first (in parts of a face) and accepts the second.
 _CONVERGED, _ACCEPTED = 1e-13, 1e-8
 _NEWTON_STEPS = 30
+# Points that it loses are approached from the middle of the face in as many stages.
+_STAGES = 32
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Facets:
     """Faces of one type with what the pairing and the intersections need, per face.
 
@@ -50,10 +52,15 @@ def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]
     On a plane these are the face's own, and the faces stay as they are. Source: Yang, Laursen,
     Meng, Two dimensional mortar contact methods for large deformation frictional sliding, Int. J.
     Numer. Meth. Engng 62 (2005) 1183–1225, §3.
+
+    On a plane nothing changes:
+
+    >>> with_nodal_normals([master], points)[0].directions is None
+    True
     """
     normals = nodal_normals(points, [(block.type.name, block.nodes) for block in blocks])
     differ = max(np.abs(normals[b.nodes] - b.normal[:, None]).max(initial=0.0) for b in blocks)
-    if differ <= _FLAT:
+    if differ <= FLAT:
         return blocks
     return [replace(block, directions=normals[block.nodes]) for block in blocks]
 
@@ -62,6 +69,11 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
     """Faces of one type from points (n_points, dim) and node numbers (n, n_nodes).
 
     Raises SolveError for faces of no size, as beside a node that lies beyond all measure.
+
+    >>> ends = np.array([[4.0, 0.0], [1.0, 0.0]])
+    >>> edge = facets(ends, BY_NAME["SEG2"], np.array([[0, 1]]), np.array([0]))
+    >>> edge.centre.tolist(), edge.radius.tolist(), edge.normal.tolist()
+    ([[2.5, 0.0]], [1.5], [[0.0, 1.0]])
     """
     corner = points[nodes]
     centre = corner[:, : kind.n_vertices].mean(axis=1)
@@ -74,21 +86,24 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
         lost = int((~(size > 0)).sum())
         raise SolveError(f"{lost} {kind.name} faces have no size left in the precision of the mesh")
     normal /= size[:, None]
-    shape = _shape(kind, corner - centre[:, None], radius, normal)
+    flat, straight, affine = _shape(kind, corner - centre[:, None], radius, normal)
     return Facets(
-        kind,
-        nodes,
-        number,
-        corner,
-        centre,
-        radius,
-        normal,
-        _tangents(normal),
-        *shape,
+        type=kind,
+        nodes=nodes,
+        number=number,
+        corner=corner,
+        centre=centre,
+        radius=radius,
+        normal=normal,
+        tangents=tangents_of(normal),
+        flat=flat,
+        straight=straight,
+        affine=affine,
     )
 
 
-def _tangents(normal: np.ndarray) -> np.ndarray:
+def tangents_of(normal: np.ndarray) -> np.ndarray:
+    """Unit tangents (n, dim − 1, dim) that complete unit normals (n, dim) to frames."""
     if normal.shape[1] == 2:
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
     axis = np.zeros_like(normal)
@@ -103,7 +118,7 @@ def _shape(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which faces are flat, which straight-edged as well, and which affine images."""
     bend = np.abs(np.einsum("fad,fd->fa", corner, normal)).max(axis=1)
-    flat = bend <= _FLAT * radius
+    flat = bend <= FLAT * radius
     n, edges = kind.n_vertices, np.array(kind.edges)
     if kind.order == 2 and kind.dim == 2:
         ends = corner[:, edges]
@@ -116,23 +131,24 @@ def _shape(
     sides = corner[:, [1, n - 1]] - first if kind.dim == 2 else corner[:, [1]] - first
     image = first + np.einsum("ar,frd->fad", kind.nodes - kind.nodes[0], sides)
     skew = np.linalg.norm(image - corner, axis=2).max(axis=1)
-    straight = bend <= _FLAT * radius
+    straight = bend <= FLAT * radius
     return flat, straight, straight & (skew <= _AFFINE * radius)
 
 
-def shift(face: Facets, chosen: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """Node coordinates (c, n_nodes, dim) of the chosen faces, seen from origins (c, dim)."""
-    return face.corner[chosen] - origin[:, None]
-
-
 def surface_vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
-    """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`."""
+    """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`.
+
+    The edge from (2, 0) to (0, 0):
+
+    >>> surface_vectors(slave, np.array([[[-1.0], [1.0]]])).tolist()
+    [[[0.0, 2.0]]]
+    """
     n, n_nodes, dim = block.corner.shape
     nodes = np.arange(n * n_nodes).reshape(n, n_nodes)
     return area_vectors(block.corner.reshape(-1, dim), nodes, slopes)
 
 
-def locate(
+def project_along(
     kind: CellType,
     corner: np.ndarray,
     target: np.ndarray,
@@ -146,21 +162,70 @@ def locate(
     through the vertices, which is exact at once for affine faces. Raises SolveError where it does
     not converge; points of an `outline` around the face then keep their place on the affine face
     (they lie outside the face, and all that matters is that neighbours agree on them).
+
+    Up from (3/4, 0) to the edge from (0, 1/2) to (1, 1/2):
+
+    >>> up = np.array([[[0.0, 1.0]]])
+    >>> place, distance = project_along(
+    ...     master.type, master.corner[:1], np.array([[[0.75, 0.0]]]), up
+    ... )
+    >>> place.tolist(), distance.tolist()
+    ([[[0.75]]], [[0.5]])
     """
     start, distance = _on_affine_face(kind, corner, target, direction)
-    place = start
-    for _ in range(_NEWTON_STEPS):
-        step = _newton_step(kind, corner, target, direction, place, distance)
-        place, distance = place - step[..., :-1], distance - step[..., -1]
-        size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
-        if not (size > _CONVERGED).any():
-            break
+    place, distance, size = _newton(kind, corner, target, direction, start, distance)
     lost = ~(size <= _ACCEPTED)
     if outline:
         return np.where(lost[..., None], start, place), distance
     if lost.any():
+        face, q = np.nonzero(lost)
+        rest = corner[face], target[face, q][:, None], direction[face, q][:, None]
+        again, height, size = _from_the_middle(kind, *rest)
+        place[lost], distance[lost] = again[:, 0], height[:, 0]
+        lost[lost] = ~(size[:, 0] <= _ACCEPTED)
+    if lost.any():
         raise SolveError(f"{int(lost.sum())} points could not be projected onto {kind.name} faces")
     return place, distance
+
+
+def _newton(
+    kind: CellType,
+    corner: np.ndarray,
+    target: np.ndarray,
+    direction: np.ndarray,
+    place: np.ndarray,
+    distance: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places, distances, and the sizes (f, q) of the last steps; done faces are left alone."""
+    place, distance = place.copy(), distance.copy()
+    size = np.zeros(distance.shape)
+    rows = np.arange(len(corner))
+    for _ in range(_NEWTON_STEPS):
+        step = _newton_step(
+            kind, corner[rows], target[rows], direction[rows], place[rows], distance[rows]
+        )
+        place[rows] -= step[..., :-1]
+        distance[rows] -= step[..., -1]
+        size[rows] = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+        rows = rows[~(size[rows] <= _CONVERGED).all(axis=1)]
+        if not len(rows):
+            break
+    return place, distance, size
+
+
+def _from_the_middle(
+    kind: CellType, corner: np.ndarray, target: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same, going from the middle of the face to the point: for faces bent up to folding."""
+    middle = kind.nodes[: kind.n_vertices].mean(axis=0)
+    values = shape_functions(kind.name).values(middle)
+    centre = np.einsum("a,fad->fd", values, corner)[:, None]
+    place = np.broadcast_to(middle, (*target.shape[:2], kind.dim))
+    distance = np.zeros(target.shape[:2])
+    for share in np.arange(1, _STAGES + 1) / _STAGES:
+        between = centre + share * (target - centre)
+        place, distance, size = _newton(kind, corner, between, direction, place, distance)
+    return place, distance, size
 
 
 def _on_affine_face(

@@ -20,10 +20,19 @@ from solver.mechanics.mortar.operator import GapOperator
 _HELD = 1e-12
 
 
-def joined(operator: GapOperator, basis: sparse.csr_matrix) -> GapOperator:
+def merge_fixed_multipliers(operator: GapOperator, basis: sparse.csr_matrix) -> GapOperator:
     """The operator without multipliers of held nodes; `basis` (n_dofs, n_free) is what is free.
 
     It stays as it is where all nodes are held, or none.
+
+    A support holds node 0, so that the multiplier of node 1 stands for the whole edge:
+
+    >>> operator = gap_operator([slave], [master], 1, 5, 1.0, scheme_of("nodal", None))
+    >>> operator.area.round(15).tolist()
+    [1.0, 1.0]
+    >>> free = sparse.identity(10, format="csr")[:, 2:]
+    >>> merge_fixed_multipliers(operator, free).area.round(15).tolist()
+    [2.0]
     """
     if operator.nodes is None:
         raise ValueError("the multipliers do not belong to nodes")

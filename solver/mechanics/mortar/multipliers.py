@@ -14,10 +14,11 @@ from solver.mechanics.mortar.facets import Facets
 from solver.mechanics.mortar.segments import Segments
 from solver.mechanics.mortar.surface_points import Samples
 
-Found = Sequence[tuple[int, int, Segments]]
+Intersections = Sequence[Segments]
+"""Between all pairs of blocks of a slave and a master surface."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Multipliers:
     """`count` multipliers on blocks of slave faces, k of them on each face.
 
@@ -53,12 +54,12 @@ class Multipliers:
         shares = sparse.coo_matrix(entries, shape=(n_macro, self.count)).tocsr()
         area = np.asarray(shares.sum(axis=0)).ravel()
         if self.nodes is None:
-            return Averages(area, sparse.identity(n_macro, format="csr"))
+            return Averages(area=area, mean=sparse.identity(n_macro, format="csr"))
         whole = np.asarray(shares.sum(axis=1)).ravel()
-        return Averages(area, (sparse.diags(1 / whole) @ shares).tocsr())
+        return Averages(area=area, mean=(sparse.diags(1 / whole) @ shares).tocsr())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Averages:
     """`area` (count,): ∫ φ of each multiplier; `mean` (m, count): averages over macro-elements."""
 
@@ -66,21 +67,29 @@ class Averages:
     mean: sparse.csr_matrix
 
 
-@dataclass(frozen=True)
-class Meeting:
-    """What multipliers may depend on: slave faces by block, points on them, what they meet."""
+@dataclass(frozen=True, kw_only=True)
+class InterfaceData:
+    """What multipliers may depend on: slave faces by block, points on them, the intersections."""
 
     slaves: list[Facets]
     samples: list[Samples]
-    found: Found
+    found: Intersections
     n_macro: int
 
 
-Space = Callable[[Meeting], Multipliers]
+Space = Callable[[InterfaceData], Multipliers]
 
 
-def constants(at: Meeting) -> Multipliers:
-    """One multiplier for each macro-element, constant on it."""
-    ones = [np.ones((block.type.n_nodes, 1)) for block in at.slaves]
-    number = [block.number[:, None] for block in at.slaves]
-    return Multipliers(at.n_macro, number, [one[None] for one in ones], ones)
+def constants(data: InterfaceData) -> Multipliers:
+    """One multiplier for each macro-element, constant on it.
+
+    >>> data = InterfaceData(slaves=[slave], samples=[], found=[], n_macro=1)
+    >>> space = constants(data)
+    >>> space.count, space.at(0, np.array([0]), np.array([[[0.25, 0.75]]])).tolist()
+    (1, [[[1.0]]])
+    """
+    ones = [np.ones((block.type.n_nodes, 1)) for block in data.slaves]
+    number = [block.number[:, None] for block in data.slaves]
+    return Multipliers(
+        count=data.n_macro, number=number, coefficients=[one[None] for one in ones], shapes=ones
+    )

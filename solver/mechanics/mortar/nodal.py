@@ -13,23 +13,34 @@ from dataclasses import replace
 import numpy as np
 
 from solver.mechanics.fem import shape_functions
-from solver.mechanics.mortar.multipliers import Meeting, Multipliers
+from solver.mechanics.mortar.multipliers import InterfaceData, Multipliers
 
 # Of a face covered by less than this share, dual functions are those of the whole face: those of
 # so small a part would be lost in round-off.
 _FEW = 0.01
 
 
-def linear(at: Meeting) -> Multipliers:
-    """A multiplier at each slave vertex, its function the linear hat."""
-    vertices = [block.nodes[:, : block.type.n_vertices] for block in at.slaves]
+def linear(data: InterfaceData) -> Multipliers:
+    """A multiplier at each slave vertex, its function the linear hat.
+
+    >>> space = linear(InterfaceData(slaves=[slave], samples=[], found=[], n_macro=1))
+    >>> space.nodes.tolist(), space.number[0].tolist(), space.shapes[0].tolist()
+    ([0, 1], [[1, 0]], [[1.0, 0.0], [0.0, 1.0]])
+    """
+    vertices = [block.nodes[:, : block.type.n_vertices] for block in data.slaves]
     nodes = np.unique(np.concatenate([v.ravel() for v in vertices]))
     number = [np.searchsorted(nodes, v) for v in vertices]
-    hats = [shape_functions(b.type.skeleton).values(b.type.nodes) for b in at.slaves]
-    return Multipliers(len(nodes), number, [hat[None] for hat in hats], hats, nodes)
+    hats = [shape_functions(b.type.skeleton).values(b.type.nodes) for b in data.slaves]
+    return Multipliers(
+        count=len(nodes),
+        number=number,
+        coefficients=[hat[None] for hat in hats],
+        shapes=hats,
+        nodes=nodes,
+    )
 
 
-def dual(at: Meeting) -> Multipliers:
+def dual(data: InterfaceData) -> Multipliers:
     """A multiplier at each node of linear faces, its function orthogonal to all other hats.
 
     φᵢ = Σⱼ Aᵢⱼ Nⱼ on each face with A = D M⁻¹, M = ∫ N Nᵀ, D = diag ∫ N, integrals over the part of
@@ -37,17 +48,23 @@ def dual(at: Meeting) -> Multipliers:
     spaces for the Lagrange multiplier, SIAM J. Numer. Anal. 38 (2000) 989–1012; on the covered
     part: Cichosz, Bischoff, Consistent treatment of boundaries with mortar contact formulations
     using dual Lagrange multipliers, CMAME 200 (2011) 1317–1332.
+
+    The functions of an edge are 2 N₁ − N₂ and 2 N₂ − N₁:
+
+    >>> data = InterfaceData(slaves=[slave], samples=face_samples([slave]), found=[], n_macro=1)
+    >>> dual(data).coefficients[0].round(12).tolist()
+    [[[2.0, -1.0], [-1.0, 2.0]]]
     """
-    plain = linear(at)
+    plain = linear(data)
     coefficients = []
-    for a, (block, sample) in enumerate(zip(at.slaves, at.samples, strict=True)):
+    for a, (block, sample) in enumerate(zip(data.slaves, data.samples, strict=True)):
         whole = np.einsum("fq,qi,qj->fij", sample.weight, sample.values, sample.values)
         mass = np.zeros_like(whole)
-        for b, _, segments in at.found:
-            if b == a:
-                values = segments.slave_values
-                part = np.einsum("sq,sqi,sqj->sij", segments.weight, values, values)
-                np.add.at(mass, segments.slave, part)
+        for segments in data.found:
+            side = segments.slave
+            if side.index == a:
+                part = np.einsum("sq,sqi,sqj->sij", segments.weight, side.values, side.values)
+                np.add.at(mass, side.face, part)
         few = mass.sum(axis=(1, 2)) < _FEW * whole.sum(axis=(1, 2))
         mass[few] = whole[few]
         # Rows of M sum to ∫ N, since the functions sum to one.

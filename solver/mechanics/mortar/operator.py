@@ -4,39 +4,41 @@ With ḡ = (initial + matrix · u) / covered area, the contact forces of pressur
 Source: Abbas, Drouet, Hild, CMAME 339 (2018) 488–513, §2–4.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import sparse
 
 from solver.mechanics.fem import mortar_degree
-from solver.mechanics.mortar.closure import Integrals, close_faces, close_plane
+from solver.mechanics.mortar.closure import MASTER, SLAVE, Integrals, close_faces, integrals
 from solver.mechanics.mortar.facets import Facets
-from solver.mechanics.mortar.multipliers import Found, Meeting, Multipliers, Space, constants
+from solver.mechanics.mortar.multipliers import (
+    InterfaceData,
+    Multipliers,
+    Space,
+    constants,
+)
+from solver.mechanics.mortar.recovery import Asked, Recovery, recovery
 from solver.mechanics.mortar.segments import Segments, intersect
-from solver.mechanics.mortar.surface_points import Samples, face_samples
+from solver.mechanics.mortar.surface_points import Samples, Surface, face_samples
 
 # Slave-side entries of dual multipliers below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
+# A slave face that misses more than this share of its area is looked at again, farther away.
+_MISSED = 1e-6
+# Surfaces come into contact where they are no farther apart, beyond their smallest distance, than
+# this share of the extent of the slave surface: displacements are small.
+_REACH = 0.5
+# The distance of one continuous surface changes, over a macro-element, by no more than its slope
+# times the size of the macro-element and this share of that size, for what bends.
+_BEND = 0.1
 
-Meet = Callable[..., list[tuple[int, int, Segments]]]
-
-
-@dataclass(frozen=True)
-class Surface:
-    """The m macro-elements of a slave surface.
-
-    `area`, `covered` (m,): whole and intersected area; `centre`, `normal` (m, dim).
-    """
-
-    area: np.ndarray
-    covered: np.ndarray
-    centre: np.ndarray
-    normal: np.ndarray
+Meet = Callable[..., list[Segments]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GapOperator:
     """Gap integrals seen by k multipliers φ; LAC has one on each macro-element, φ = 1.
 
@@ -44,9 +46,10 @@ class GapOperator:
     `area`, `covered` (k,): ∫ φ over the whole and the intersected surface; `mean` (m, k): values
     by multiplier averaged over the macro-elements of `surface`; `nodes` (k,): the nodes that
     multipliers belong to, None for macro-elements; `segments`: how many there are; `closed_faces`:
-    on how many faces the closure of integrals was used; `unclipped`: how many segments are whole
-    slave faces; `plain`: whether plain Gauss rules are exact on all of them. `at_nodes` (n, k): the
-    values at `nodes`, then (n,), by multiplier, where some nodes have no multiplier of their own.
+    on how many faces the closure of integrals was used; `plain`: whether plain Gauss rules are
+    exact on all of them. `at_nodes` (n, k): the values at `nodes`, then (n,), by multiplier, where
+    some nodes have no multiplier of their own. `recovery`: what recovers the pressure, if asked
+    for.
     """
 
     matrix: sparse.csr_matrix
@@ -58,35 +61,37 @@ class GapOperator:
     surface: Surface
     segments: int
     closed_faces: int
-    unclipped: int = 0
     plain: bool = False
     at_nodes: sparse.csr_matrix | None = None
+    recovery: Recovery | None = None
 
 
 def meet_in_segments(
-    slaves: list[Facets],
-    _: list[Samples],
-    masters: list[Facets],
+    slaves: Sequence[Facets],
+    _: Sequence[Samples],
+    masters: Sequence[Facets],
     reach: float,
+    among: Sequence[np.ndarray] | None = None,
     weighted: bool = False,
-    clip_all: bool = False,
-) -> list[tuple[int, int, Segments]]:
-    """Segments between all pairs of blocks: (slave block, master block, segments).
+    degree: int = 0,
+) -> list[Segments]:
+    """Segments between all pairs of blocks.
 
-    `weighted`: with quadrature for integrands weighted by linear shape functions of the slave;
-    `clip_all`: slave faces that lie within one master face are clipped as the others.
+    `among`: by block, the slave faces that are looked at, all of them by default; `weighted`: with
+    quadrature for integrands weighted by linear shape functions of the slave, or by polynomials of
+    a `degree`.
+
+    >>> [s.area.tolist() for s in meet_in_segments([slave], [], [master], 1.0)]
+    [[1.0, 1.0]]
     """
-    return [
-        (a, b, segments)
-        for a, slave in enumerate(slaves)
-        for b, master in enumerate(masters)
-        for segments in intersect(
-            slave, master, reach, mortar_degree(slave.type.skeleton) if weighted else 0, clip_all
-        )
-    ]
+    found = []
+    for a, slave in enumerate(slaves):
+        more = mortar_degree(slave.type.skeleton) if weighted else degree
+        found += intersect(slaves, a, masters, reach, more, None if among is None else among[a])
+    return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Scheme:
     """How the gap is integrated: which points, which multipliers, and whether closure is due.
 
@@ -110,50 +115,53 @@ def gap_operator(
     n_nodes: int,
     search: float,
     scheme: Scheme = LAC,
+    asked: Asked | None = None,
 ) -> GapOperator:
     """Gap operator of slave sub-faces (numbered by macro-element) over master faces.
 
     `search` is the largest distance (a length) at which surfaces are looked for. They are first
-    looked for nearby, and farther away only for sub-faces that found no partner there. Faces that
-    meet along directions other than their own normals have no closure.
+    looked for nearby, and farther away only for sub-faces that found no partner there. What is out
+    of reach of contact does not count as covered. Faces that meet along directions other than
+    their own normals have no closure. `asked`: how the pressure is recovered, for the multipliers
+    of macro-elements alone.
+
+    A slave edge of length 2 under two master edges, open by 1/2:
+
+    >>> operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    >>> operator.matrix.toarray().reshape(5, 2)[:, 1].round(15).tolist()
+    [-1.0, -1.0, 0.5, 1.0, 0.5]
+    >>> operator.initial.round(15).tolist(), operator.covered.round(15).tolist()
+    ([1.0], [2.0])
     """
+    if asked is not None:
+        scheme = replace(scheme, meet=partial(scheme.meet, degree=asked.form.degree))
     if any(block.directions is not None for block in slaves):
         scheme = replace(scheme, closure=False)
     samples = scheme.sample(slaves)
-    found = _search(slaves, samples, masters, search, scheme.meet)
-    space = scheme.space(Meeting(slaves, samples, found, n_macro))
-    parts = [_integrals(space, a, segments) for a, _, segments in found]
-    closed = close_faces(slaves, masters, found, parts) if scheme.closure else 0
-    slave = _assembled(space, slaves, found, [p.slave for p in parts], n_nodes, "slave")
-    master = _assembled(space, masters, found, [p.master for p in parts], n_nodes, "master")
-    matrix = (master - (_diagonal(slave) if space.dual else slave)).tocsr()
+    found = _in_reach(_search(slaves, samples, masters, search, scheme.meet), slaves, n_macro)
+    data = InterfaceData(slaves=slaves, samples=samples, found=found, n_macro=n_macro)
+    space = scheme.space(data)
+    parts = [integrals(space, segments) for segments in found]
+    parts, closed = close_faces(parts) if scheme.closure else (parts, 0)
+    slave, master = (_assembled(space, parts, side, n_nodes, slaves) for side in (SLAVE, MASTER))
     initial, covered = np.zeros(space.count), np.zeros(space.count)
-    for (a, _, segments), part in zip(found, parts, strict=True):
-        number = space.number[a][segments.slave]
-        np.add.at(initial, number, part.gap)
-        np.add.at(covered, number, part.weight)
+    for part in parts:
+        np.add.at(initial, part.number, part.gap)
+        np.add.at(covered, part.number, part.weight)
+    surface = _surface(data)
     averages = space.averages(samples, [block.number for block in slaves], n_macro)
-    surface = _surface(slaves, samples, found, n_macro)
-    if scheme.closure and found:
-        plane = _plane_closure(slaves, masters, space, found, parts, n_nodes)
-        if plane is not None:
-            matrix = sparse.kron(plane, slaves[0].normal[:1]).tocsr()
-            initial, covered = initial * (averages.area / covered), averages.area
-            surface = replace(surface, covered=surface.area)
-            closed = sum(len(block.number) for block in [*slaves, *masters])
-    count = sum(len(s.slave) for _, _, s in found)
     return GapOperator(
-        matrix,
-        initial,
-        averages.area,
-        covered,
-        averages.mean,
-        space.nodes,
-        surface,
-        count,
-        closed,
-        sum(int(s.whole.sum()) for _, _, s in found),
-        scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
+        matrix=(master - (_diagonal(slave) if space.dual else slave)).tocsr(),
+        initial=initial,
+        area=averages.area,
+        covered=covered,
+        mean=averages.mean,
+        nodes=space.nodes,
+        surface=surface,
+        segments=sum(len(segments.gap) for segments in found),
+        closed_faces=closed,
+        plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
+        recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
     )
 
 
@@ -163,73 +171,66 @@ def _search(
     masters: list[Facets],
     search: float,
     meet: Meet,
-) -> list[tuple[int, int, Segments]]:
+) -> list[Segments]:
     """Segments of all pairs of blocks, nearby first, then within the whole search distance."""
     nearby = max(f.radius.max() for f in [*slaves, *masters])
     reach = min(nearby, search)
     found = meet(slaves, samples, masters, reach)
     if reach == search:
         return found
-    for a, (block, sample) in enumerate(zip(slaves, samples, strict=True)):
-        covered = np.zeros(len(block.number))
-        for segments in [f[2] for f in found if f[0] == a]:
-            covered += np.bincount(
-                segments.slave, segments.weight.sum(axis=1), minlength=len(covered)
-            )
-        lonely = np.flatnonzero(covered < (1 - 1e-6) * sample.weight.sum(axis=1))
-        if len(lonely):
-            found = [(i, b, _without(s, lonely) if i == a else s) for i, b, s in found]
-            subset = _subset(block, lonely)
-            for _, b, segments in meet([subset], [sample.of(lonely)], masters, search):
-                found.append((a, b, _renumbered(segments, lonely)))
-    return found
+    missed = [sample.weight.sum(axis=1) for sample in samples]
+    lonely = []
+    for a, whole in enumerate(missed):
+        covered = np.zeros(len(whole))
+        for segments in found:
+            if segments.slave.index == a:
+                np.add.at(covered, segments.slave.face, segments.area)
+        lonely.append(np.flatnonzero(covered < (1 - _MISSED) * whole))
+    if not any(len(faces) for faces in lonely):
+        return found
+    kept = [s.of(~np.isin(s.slave.face, lonely[s.slave.index])) for s in found]
+    return kept + meet(slaves, samples, masters, search, lonely)
 
 
-def _subset(face: Facets, chosen: np.ndarray) -> Facets:
-    arrays = {k: v[chosen] for k, v in vars(face).items() if isinstance(v, np.ndarray)}
-    return Facets(type=face.type, **arrays)
+def _in_reach(found: list[Segments], slaves: list[Facets], n_macro: int) -> list[Segments]:
+    """The segments that contact may reach: of the master surface that is nearest to each slave.
 
-
-def _without(segments: Segments, slaves: np.ndarray) -> Segments:
-    kept = ~np.isin(segments.slave, slaves)
-    return Segments(**{k: v[kept] for k, v in vars(segments).items()})
-
-
-def _renumbered(segments: Segments, slaves: np.ndarray) -> Segments:
-    return Segments(**{**vars(segments), "slave": slaves[segments.slave]})
-
-
-def _integrals(space: Multipliers, block: int, segments: Segments) -> Integrals:
-    functions = space.at(block, segments.slave, segments.slave_values)
-    weights = segments.weight[..., None] * functions
-    measure = weights[..., None] * segments.normal[:, :, None]
-    return Integrals(
-        np.einsum("sqa,sqkd->skad", segments.slave_values, measure),
-        np.einsum("sqa,sqkd->skad", segments.master_values, measure),
-        np.einsum("sqk,sq->sk", weights, segments.gap),
-        weights.sum(axis=1),
-        segments.weight.sum(axis=1),
-        segments.normal[:, 0],
-    )
+    Left out are those farther away, on a macro-element, than a continuous surface could be that is
+    as near as its nearest segment; and those beyond the reach of contact in the zone.
+    """
+    if not found:
+        return found
+    distance = [np.abs(segments.gap).min(axis=1) for segments in found]
+    nearest, slope, size = np.full(n_macro, np.inf), np.zeros(n_macro), np.zeros(n_macro)
+    for segments, far in zip(found, distance, strict=True):
+        cosine = np.abs(np.einsum("sd,sd->s", *(s.faces.normal[s.face] for s in segments.sides)))
+        np.minimum.at(nearest, segments.macro, far)
+        np.maximum.at(slope, segments.macro, np.sqrt(np.maximum(cosine**-2 - 1, 0.0)))
+    corners = np.concatenate([block.corner.reshape(-1, block.corner.shape[2]) for block in slaves])
+    macro = np.concatenate([np.repeat(b.number, b.corner.shape[1]) for b in slaves])
+    low, high = (np.full((n_macro, corners.shape[1]), x) for x in (np.inf, -np.inf))
+    np.minimum.at(low, macro, corners)
+    np.maximum.at(high, macro, corners)
+    size = np.linalg.norm(high - low, axis=1)
+    limit = nearest + (slope + _BEND) * size
+    extent = np.linalg.norm(np.ptp(corners, axis=0))
+    limit = np.minimum(limit, nearest.min() + _REACH * extent)
+    kept = [s.of(far <= limit[s.macro]) for s, far in zip(found, distance, strict=True)]
+    return [segments for segments in kept if len(segments.gap)]
 
 
 def _assembled(
-    space: Multipliers,
-    blocks: list[Facets],
-    found: Found,
-    vectors: list[np.ndarray],
-    n_nodes: int,
-    side: str,
+    space: Multipliers, parts: list[Integrals], side: int, n_nodes: int, slaves: list[Facets]
 ) -> sparse.csr_matrix:
-    """∫ φ N n of one side (k, n_dofs) from those of the segments (s, k, n_nodes, dim)."""
-    dim = blocks[0].centre.shape[1]
+    """∫ φ N n of one side (k, n_dofs)."""
+    dim = slaves[0].centre.shape[1]
     rows, columns, values = [], [], []
-    for (a, b, segments), part in zip(found, vectors, strict=True):
-        nodes = blocks[a if side == "slave" else b].nodes[getattr(segments, side)]
-        dofs = dim * nodes[:, None, :, None] + np.arange(dim)
-        rows.append(_spread(space.number[a][segments.slave][:, :, None, None], part))
-        columns.append(_spread(dofs, part))
-        values.append(part.ravel())
+    for part in parts:
+        vectors = part.vectors[side]
+        dofs = dim * part.segments.sides[side].nodes[:, None, :, None] + np.arange(dim)
+        rows.append(_spread(part.number[:, :, None, None], vectors))
+        columns.append(_spread(dofs, vectors))
+        values.append(vectors.ravel())
     entries = (_joined(values), (_joined(rows).astype(int), _joined(columns).astype(int)))
     return sparse.coo_matrix(entries, shape=(space.count, dim * n_nodes)).tocsr()
 
@@ -251,41 +252,18 @@ def _diagonal(slave: sparse.csr_matrix) -> sparse.csr_matrix:
     return slave
 
 
-def _plane_closure(
-    slaves: list[Facets],
-    masters: list[Facets],
-    space: Multipliers,
-    found: Found,
-    parts: list[Integrals],
-    n_nodes: int,
-) -> sparse.csr_matrix | None:
-    """∫ φ (N_b − N_a) dS (k, n_nodes), closed over whole plane surfaces, where that is needed."""
-    rows, columns, values = [], [], []
-    for (a, b, segments), part in zip(found, parts, strict=True):
-        normal = np.einsum("skad,sd->ska", part.master, part.normal)
-        nodes = masters[b].nodes[segments.master][:, None]
-        rows.append(_spread(space.number[a][segments.slave][:, :, None], normal))
-        columns.append(_spread(nodes, normal))
-        values.append(normal.ravel())
-    entries = (_joined(values), (_joined(rows), _joined(columns)))
-    covering = sparse.coo_matrix(entries, shape=(space.count, n_nodes)).tocsr()
-    closed = close_plane(slaves, masters, space, covering)
-    return None if closed is None else closed[1] - closed[0]
-
-
-def _surface(slaves: list[Facets], samples: list[Samples], found: Found, n_macro: int) -> Surface:
-    dim = slaves[0].centre.shape[1]
+def _surface(data: InterfaceData) -> Surface:
+    n_macro, dim = data.n_macro, data.slaves[0].centre.shape[1]
     area, covered = np.zeros(n_macro), np.zeros(n_macro)
     centre, normal = np.zeros((n_macro, dim)), np.zeros((n_macro, dim))
-    for block, sample in zip(slaves, samples, strict=True):
+    for block, sample in zip(data.slaves, data.samples, strict=True):
         area += np.bincount(block.number, sample.weight.sum(axis=1), minlength=n_macro)
         place = np.einsum(
             "fq,qa,fad->fd", sample.weight, sample.values, block.corner, optimize=True
         )
         np.add.at(centre, block.number, place)
         np.add.at(normal, block.number, np.einsum("fq,fqd->fd", sample.weight, sample.normal))
-    for a, _, segments in found:
-        macro = slaves[a].number[segments.slave]
-        covered += np.bincount(macro, segments.weight.sum(axis=1), minlength=n_macro)
+    for segments in data.found:
+        covered += np.bincount(segments.macro, segments.area, minlength=n_macro)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    return Surface(area, covered, centre / area[:, None], normal)
+    return Surface(area=area, covered=covered, centre=centre / area[:, None], normal=normal)

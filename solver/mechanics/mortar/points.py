@@ -10,6 +10,7 @@ element method for a class of contact-impact problems, CMAME 8 (1976) 249–276;
 Computational Contact Mechanics, 2006, §9.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -18,12 +19,14 @@ import numpy as np
 from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.gauss import gauss_rule
-from solver.mechanics.mortar.facets import Facets, locate, shift
-from solver.mechanics.mortar.multipliers import Meeting, Multipliers
-from solver.mechanics.mortar.segments import Segments, facing_pairs
+from solver.mechanics.mortar.facets import Facets, project_along
+from solver.mechanics.mortar.multipliers import InterfaceData, Multipliers
+from solver.mechanics.mortar.pairing import facing_pairs
+from solver.mechanics.mortar.segments import Segments, Side
 from solver.mechanics.mortar.surface_points import Samples, face_samples, sampled
 from solver.mesh.catalogue import CellType
 
+Among = Sequence[np.ndarray] | None
 # A point this far outside a face, in parts of its reference face, is on its edge.
 _EDGE = 1e-9
 # A line is looked at where it passes a face's centre within this many radii.
@@ -33,12 +36,20 @@ _CHUNK = 1 << 20
 
 
 def gauss(slaves: list[Facets], n: int) -> list[Samples]:
-    """Gauss points, n each way on each face, collapsed ones on triangles: degree 2 n − 1."""
+    """Gauss points, n each way on each face, collapsed ones on triangles: degree 2 n − 1.
+
+    >>> gauss([slave], 1)[0].weight.tolist()
+    [[2.0]]
+    """
     return [sampled(block, gauss_rule(block.type.name, n)) for block in slaves]
 
 
 def at_nodes(slaves: list[Facets]) -> list[Samples]:
-    """The nodes, weighted with ∫ N over each face, their normals the mean around them."""
+    """The nodes, weighted with ∫ N over each face, their normals the mean around them.
+
+    >>> at_nodes([master])[0].weight.round(15).tolist()
+    [[0.5, 0.5], [0.5, 0.5]]
+    """
     nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slaves]))
     places = np.empty((len(nodes), slaves[0].centre.shape[1]))
     numbers = [np.searchsorted(nodes, block.nodes) for block in slaves]
@@ -47,17 +58,31 @@ def at_nodes(slaves: list[Facets]) -> list[Samples]:
     faces = [(block.type.name, number) for block, number in zip(slaves, numbers, strict=True)]
     normal = nodal_normals(places, faces)
     return [
-        Samples(np.eye(block.type.n_nodes), whole.weight @ whole.values, normal[number])
+        Samples(
+            values=np.eye(block.type.n_nodes),
+            weight=whole.weight @ whole.values,
+            normal=normal[number],
+        )
         for block, number, whole in zip(slaves, numbers, face_samples(slaves), strict=True)
     ]
 
 
-def one_each(at: Meeting) -> Multipliers:
-    """A multiplier at each slave node: its pressure is the node's force over tributary area."""
-    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in at.slaves]))
-    number = [np.searchsorted(nodes, block.nodes) for block in at.slaves]
-    shapes = [np.eye(block.type.n_nodes) for block in at.slaves]
-    return Multipliers(len(nodes), number, [shape[None] for shape in shapes], shapes, nodes)
+def one_each(data: InterfaceData) -> Multipliers:
+    """A multiplier at each slave node: its pressure is the node's force over tributary area.
+
+    >>> one_each(InterfaceData(slaves=[master], samples=[], found=[], n_macro=2)).number[0].tolist()
+    [[0, 1], [1, 2]]
+    """
+    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in data.slaves]))
+    number = [np.searchsorted(nodes, block.nodes) for block in data.slaves]
+    shapes = [np.eye(block.type.n_nodes) for block in data.slaves]
+    return Multipliers(
+        count=len(nodes),
+        number=number,
+        coefficients=[shape[None] for shape in shapes],
+        shapes=shapes,
+        nodes=nodes,
+    )
 
 
 def meet_at_points(
@@ -65,22 +90,30 @@ def meet_at_points(
     samples: list[Samples],
     masters: list[Facets],
     reach: float,
+    among: Among = None,
     beyond: float = _EDGE,
-) -> list[tuple[int, int, Segments]]:
-    """Each point with its master face, as segments of one point: (slave, master block, segments).
+) -> list[Segments]:
+    """Each point with its master face, as segments of one point.
 
     A point that no face holds goes to one that it misses by at most `beyond`, in parts of the
     face's reference face: slave nodes at the end of a bent surface look past the master's end.
+
+    One Gauss point at x = 1, where it meets the first of two edges that end there:
+
+    >>> (segments,) = meet_at_points([slave], gauss([slave], 1), [master], 1.0)
+    >>> segments.weight.tolist(), segments.gap.tolist(), segments.master.values.tolist()
+    ([[2.0]], [[0.5]], [[[0.0, 1.0]]])
     """
     found = []
     for a, (slave, sample) in enumerate(zip(slaves, samples, strict=True)):
-        hits = [_hits(slave, sample, master, reach, beyond) for master in masters]
+        some = None if among is None else among[a]
+        hits = [_hits(slave, sample, master, reach, beyond, some) for master in masters]
         block = np.repeat(np.arange(len(masters)), [len(hit.point) for hit in hits])
         chosen = _nearest(hits)
         for b, (master, hit) in enumerate(zip(masters, hits, strict=True)):
             mine = hit.of(chosen[block == b])
             if len(mine.point):
-                found.append((a, b, _segments(sample, master, mine)))
+                found.append(_segments((slave, a), (master, b), sample, mine))
     return found
 
 
@@ -102,12 +135,19 @@ class _Hits:
         return type(self)(*(values[chosen] for values in vars(self).values()))
 
 
-def _hits(slave: Facets, sample: Samples, master: Facets, reach: float, beyond: float) -> _Hits:
+def _hits(
+    slave: Facets,
+    sample: Samples,
+    master: Facets,
+    reach: float,
+    beyond: float,
+    among: np.ndarray | None,
+) -> _Hits:
     """Every meeting of a point's normal with a face, within `reach` and `beyond` its edges."""
     places = np.einsum("qa,fad->fqd", sample.values, slave.corner)
     count = places.shape[1]
     step = max(1, _CHUNK // count)
-    i, j = facing_pairs(slave, master, reach)
+    i, j = facing_pairs(slave, master, reach, among)
     parts = []
     for start in range(0, len(i), step):
         pair = slice(start, start + step)
@@ -115,8 +155,8 @@ def _hits(slave: Facets, sample: Samples, master: Facets, reach: float, beyond: 
         face, partner = i[pair][which], j[pair][which]
         target, normal = places[face, q][:, None], sample.normal[face, q][:, None]
         # Seen from the point itself, where no digits are lost.
-        corner = shift(master, partner, target[:, 0])
-        place, gap = locate(master.type, corner, 0 * target, normal, outline=True)
+        corner = master.corner[partner] - target
+        place, gap = project_along(master.type, corner, 0 * target, normal, outline=True)
         outside = _outside(master.type, place[:, 0])
         near = (outside <= beyond) & (np.abs(gap[:, 0]) <= reach)
         hit = _Hits(face * count + q, partner, place[:, 0], gap[:, 0], outside)
@@ -162,15 +202,15 @@ def _nearest(hits: list[_Hits]) -> np.ndarray:
     return chosen
 
 
-def _segments(sample: Samples, master: Facets, hit: _Hits) -> Segments:
+def _segments(
+    slave: tuple[Facets, int], master: tuple[Facets, int], sample: Samples, hit: _Hits
+) -> Segments:
     face, q = np.divmod(hit.point, len(sample.values))
+    on_master = shape_functions(master[0].type.name).values(hit.place)[:, None]
     return Segments(
-        face,
-        hit.face,
-        sample.values[q][:, None],
-        shape_functions(master.type.name).values(hit.place)[:, None],
-        sample.weight[face, q][:, None],
-        sample.normal[face, q][:, None],
-        hit.gap[:, None],
-        np.zeros(len(face), dtype=bool),
+        slave=Side(faces=slave[0], index=slave[1], face=face, values=sample.values[q][:, None]),
+        master=Side(faces=master[0], index=master[1], face=hit.face, values=on_master),
+        weight=sample.weight[face, q][:, None],
+        normal=sample.normal[face, q][:, None],
+        gap=hit.gap[:, None],
     )

@@ -1,285 +1,324 @@
 """Mortar segments: the pieces of the slave surface that lie over one master face each.
 
-Straight slave faces are cut in their own plane, seen along their normal; bent ones in their
-reference face, into which the master's outline is projected. Every quadrature point of a segment
-knows its place on both faces, found along the slave's normal at that point (that of the face, or
-one interpolated between the mean normals at its nodes), so that both sides of an integral share one
-normal and one surface measure. Source: Puso, Laursen, A mortar
-segment-to-segment contact method, CMAME 193 (2004) 601–629, for segments; Abbas et al. (2018), §4.
+Both faces are seen along the normal at the slave's centre. Where their edges look straight,
+polygons are clipped; where they look bent they are parabolas, and so are the edges of the segments:
+areas in that plane are exact to round-off either way. In 2D, bent slave faces are cut in their
+reference face. Of two master faces behind each other the nearer one counts. Every quadrature point
+knows its place on both faces, found along the slave's normal at that point (the face's own, or one
+interpolated between the mean normals at its nodes), so that both sides of an integral share one
+normal and one surface measure.
+Sources: Puso, Laursen, A mortar segment-to-segment contact method, CMAME 193 (2004) 601–629, for
+segments; Abbas et al. (2018), §4.
 """
 
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from solver.mechanics.fem import mortar_degree, shape_functions, simplex_rule
-from solver.mechanics.fem.small_matrices import invert
-from solver.mechanics.mortar.clipping import clip, overlap, placed, triangles
-from solver.mechanics.mortar.facets import Facets, locate, shift
-from solver.mechanics.mortar.pairing import candidate_pairs
-from solver.mesh.catalogue import CellType
+from solver.mechanics.mortar.clipping import clip, overlap, triangles
+from solver.mechanics.mortar.facets import Facets, project_along
+from solver.mechanics.mortar.pairing import (
+    Outlines,
+    Pairs,
+    face_pairs,
+    hidden_pairs,
+    outlines,
+    seen_along,
+)
+from solver.mechanics.mortar.regions import (
+    Pieces,
+    Regions,
+    clip_to_face,
+    joined,
+    quadrature,
+    without_face,
+)
 
-# A master face may meet a slave face only where their normals oppose at least this much.
-_FACING = 0.2
 # Extra degrees where a face is not the affine image of its reference face: its functions are then
 # no polynomials in the plane.
 _BENT_DEGREES = 6
-# More than what rounding makes of a distance, as a share of it.
-_ROUNDING = 1e-9
 # Pairs cut at once: few enough for their polygons to stay in the processor's cache.
 _PAIRS_AT_ONCE = 4096
-# The straight edges around a bent face are moved outward by twice what its mid-nodes ask for, since
-# an edge may reach beyond its mid-node, and by this share of their distance from the centre.
+# Edges whose middle is off the chord by less than this share of it look straight.
+_STRAIGHT = 1e-12
+# The ends of a line are looked for this far beyond a bent face, in parts of its length.
 _MARGIN = 0.05
 
 
-@dataclass(frozen=True)
-class Segments:
-    """Segments between slave faces of one type and master faces of one type.
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """Where s segments lie on the faces of one block.
 
-    `slave`, `master` (s,) index the two Facets; at each of q points: `slave_values`,
-    `master_values` (s, q, n_nodes) shape functions, `weight` (s, q) surface measure × quadrature
-    weight, `normal` (s, q, dim) the slave's and `gap` (s, q) the distance along it, positive when
-    open. `whole` (s,): parts of slave faces that lie within the master face and were not clipped.
+    `faces`: the block; `index`: its number among the surface's; `face` (s,): which of its faces;
+    `values` (s, q, n_nodes): shape functions at the q points of each segment.
     """
 
-    slave: np.ndarray
-    master: np.ndarray
-    slave_values: np.ndarray
-    master_values: np.ndarray
+    faces: Facets
+    index: int
+    face: np.ndarray
+    values: np.ndarray
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Nodes (s, n_nodes) of the faces."""
+        return self.faces.nodes[self.face]
+
+    def of(self, chosen: np.ndarray) -> Self:
+        """Some of the segments."""
+        return replace(self, face=self.face[chosen], values=self.values[chosen])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Segments:
+    """Segments between the slave faces of one block and the master faces of one block.
+
+    At each of q points: `weight` (s, q) surface measure × quadrature weight, `normal` (s, q, dim)
+    the slave's unit normal and `gap` (s, q) the distance along it, positive when open.
+    """
+
+    slave: Side
+    master: Side
     weight: np.ndarray
     normal: np.ndarray
     gap: np.ndarray
-    whole: np.ndarray
+
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        """Slave and master."""
+        return self.slave, self.master
+
+    @property
+    def area(self) -> np.ndarray:
+        """Area (s,) of the segments on the slave surface."""
+        return self.weight.sum(axis=1)
+
+    @property
+    def points(self) -> np.ndarray:
+        """The quadrature points (s, q, dim) on the slave surface."""
+        corner = self.slave.faces.corner[self.slave.face]
+        return np.einsum("sqa,sad->sqd", self.slave.values, corner)
+
+    @property
+    def macro(self) -> np.ndarray:
+        """The macro-elements (s,) that they belong to."""
+        return self.slave.faces.number[self.slave.face]
+
+    def of(self, chosen: np.ndarray) -> Self:
+        """Some of the segments."""
+        return type(self)(
+            slave=self.slave.of(chosen),
+            master=self.master.of(chosen),
+            weight=self.weight[chosen],
+            normal=self.normal[chosen],
+            gap=self.gap[chosen],
+        )
 
 
 def intersect(
-    slave: Facets, master: Facets, reach: float, more: int = 0, clip_all: bool = False
+    slaves: Sequence[Facets],
+    index: int,
+    masters: Sequence[Facets],
+    reach: float,
+    more: int = 0,
+    among: np.ndarray | None = None,
 ) -> list[Segments]:
-    """All segments between two blocks of faces, looked for within `reach` (a length).
+    """All segments of the slave block `index` over master blocks, looked for within `reach`.
 
     Their quadrature is exact for shape functions of affine faces times polynomials of degree
-    `more`. `clip_all`: faces that lie within others are clipped as well.
+    `more`. `reach` is a length. `among`: the slave faces that are looked at, all by default.
+    Raises SolveError for points that have no place on a face.
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> segments.master.face.tolist(), segments.area.tolist(), segments.gap[:, 0].tolist()
+    ([0, 1], [1.0, 1.0], [0.5, 0.5])
     """
-    i, j = facing_pairs(slave, master, reach)
-    straight = slave.straight[i]
-    in_plane = partial(_in_plane, clip_all=clip_all)
-    charts = (
-        (np.flatnonzero(straight & _above_each_other(slave, master, i, j)), in_plane),
-        (np.flatnonzero(~straight), _in_reference),
-    )
-    parts = []
-    for pairs, chart in charts:
-        for start in range(0, len(pairs), _PAIRS_AT_ONCE):
-            some = pairs[start : start + _PAIRS_AT_ONCE]
-            parts.append(chart(slave, master, (i[some], j[some]), reach, more))
-    return [part for part in parts if len(part.slave)]
+    pairs = face_pairs(slaves, index, masters, reach, among)
+    hidden, nearer = hidden_pairs(pairs)
+    found: list[Segments] = []
+    for start in range(0, len(pairs.i), _PAIRS_AT_ONCE):
+        end = start + _PAIRS_AT_ONCE
+        low, high = np.searchsorted(hidden, [start, end])
+        behind = hidden[low:high] - start, pairs.j[nearer[low:high]]
+        found += _segments(pairs.of(slice(start, end)), behind, reach, more)
+    return found
 
 
-def facing_pairs(slave: Facets, master: Facets, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (slave number, master number) of faces within `reach` that look at each other."""
-    i, j = candidate_pairs(slave.centre, slave.radius, master.centre, master.radius, reach)
-    facing = np.einsum("pd,pd->p", slave.normal[i], master.normal[j]) < -_FACING
-    return i[facing], j[facing]
+# Pieces of slave faces: pair numbers (s,), places (s, q, dim − 1), weights (s, q)
+
+Behind = tuple[np.ndarray, np.ndarray]
 
 
-def _above_each_other(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Which pairs (p,) may overlap, seen along the slave's normal: their balls do."""
-    between = master.centre[j] - slave.centre[i]
-    beside = np.einsum("pd,ptd->pt", between, slave.tangents[i])
-    return np.linalg.norm(beside, axis=1) <= (1 + _ROUNDING) * (slave.radius[i] + master.radius[j])
+def _segments(pairs: Pairs, behind: Behind, reach: float, more: int) -> Iterator[Segments]:
+    degree = _degree(pairs) + more
+    if pairs.slave.centre.shape[1] == 2:
+        straight = pairs.slave.straight[pairs.i]
+        for chosen in (np.flatnonzero(straight), np.flatnonzero(~straight)):
+            if len(chosen):
+                some = pairs.of(chosen)
+                pieces = _intervals(some, _among(behind, chosen, len(straight)), degree)
+                yield from _with_master(some, pieces, reach)
+        return
+    window, bend = pairs.seen(outlines([pairs.slave]), pairs.i)
+    subject, bulge = pairs.seen(pairs.outline, pairs.j)
+    special = ~(_looks_straight(window, bend) & _looks_straight(subject, bulge))
+    special[behind[0]] = True
+    chosen = np.flatnonzero(~special)
+    pieces = _polygons(window[chosen], subject[chosen], degree)
+    yield from _with_master(pairs.of(chosen), pieces, reach)
+    chosen = np.flatnonzero(special)
+    if len(chosen):
+        some = pairs.of(chosen)
+        for pieces in _bent(some, _among(behind, chosen, len(special)), degree):
+            yield from _with_master(some, pieces, reach)
 
 
-def _in_plane(
-    slave: Facets,
-    master: Facets,
-    pair: tuple[np.ndarray, np.ndarray],
-    reach: float,
-    more: int,
-    clip_all: bool,
-) -> Segments:
-    """Segments of straight slave faces, cut in the plane of the slave face."""
-    i, j = pair
-    tangents = slave.tangents[i]
-    outline = _outline(slave.type, bent=False)
-    window = _plane(shift(slave, i, slave.centre[i])[:, outline], tangents)
-    outline = _outline(master.type, bent=not master.straight[j].all())
-    subject = _plane(shift(master, j, slave.centre[i])[:, outline[::-1]], tangents)
-    degree = _degree(slave, master, i, j) + more
-    whole = np.zeros(len(i), dtype=bool)
-    if window.shape[2] == 2 and not clip_all:
-        meeting, whole = _meeting(window, subject, i, bool(master.straight[j].all()))
-        i, j, window, subject = (x[meeting] for x in (i, j, window, subject))
-    count = np.full(len(i), subject.shape[1])
-    which, places, weight = _cut_pieces(window, subject, count, degree, whole)
-    i, j, whole = i[which], j[which], whole[which]
-    points = np.einsum("sqt,std->sqd", places, slave.tangents[i])
-    normal = np.broadcast_to(slave.normal[i][:, None], points.shape)
-    place, height = locate(slave.type, shift(slave, i, slave.centre[i]), points, normal)
-    points = points + height[..., None] * normal
-    normal = _directions(slave, i, place, normal)
-    return _with_master(slave, master, (i, j), place, points, weight, normal, reach, whole)
+def _among(behind: Behind, chosen: np.ndarray, count: int) -> Behind:
+    """The same couples, with their pairs numbered among the chosen ones."""
+    number = np.full(count, -1)
+    number[chosen] = np.arange(len(chosen))
+    kept = number[behind[0]] >= 0
+    return number[behind[0][kept]], behind[1][kept]
 
 
-def _meeting(
-    window: np.ndarray, subject: np.ndarray, slave: np.ndarray, convex: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """The pairs (k,) with a common area, and which of them (k,) are slave faces within the master.
-
-    Polygons (n, v, 2) of pairs, of the slave faces numbered `slave` (n,).
-    """
-    within, apart, nearly = placed(window, subject, convex)
-    held = np.zeros(slave.max(initial=-1) + 1, dtype=bool)
-    held[slave[within]] = True
-    # A face that counts as a whole has no sliver on the next master face.
-    meeting = np.flatnonzero(within | ~np.where(held[slave], nearly, apart))
-    return meeting, within[meeting]
+def _looks_straight(corner: np.ndarray, bulge: np.ndarray) -> np.ndarray:
+    """Which outlines (p,) have straight edges only."""
+    chord = np.roll(corner, -1, axis=1) - corner
+    sideways = chord[..., 0] * bulge[..., 1] - chord[..., 1] * bulge[..., 0]
+    return (np.abs(sideways) <= _STRAIGHT * (chord**2).sum(axis=2)).all(axis=1)
 
 
-def _in_reference(
-    slave: Facets, master: Facets, pair: tuple[np.ndarray, np.ndarray], reach: float, more: int
-) -> Segments:
-    """Segments of bent slave faces, cut in the reference face of the slave."""
-    i, j = pair
-    kind = slave.type
-    corner = shift(slave, i, slave.centre[i])
-    outline = _outline(master.type, bent=True)
-    rim = _plane(shift(master, j, slave.centre[i])[:, outline[::-1]], slave.tangents[i])
-    rim, count = _near(_plane(corner, slave.tangents[i]), kind.n_vertices, rim)
-    used = np.arange(rim.shape[1]) < count[:, None]
-    rim = np.where(used[..., None], rim, rim[:, :1])
-    some = count > 0
-    i, j, corner, rim, count = i[some], j[some], corner[some], rim[some], count[some]
-    rim = np.einsum("sat,std->sad", rim, slave.tangents[i])
-    direction = np.broadcast_to(slave.normal[i][:, None], rim.shape)
-    subject, _ = locate(kind, corner, rim, direction, outline=True)
-    window = kind.nodes[_outline(kind, bent=False)]
-    window = np.broadcast_to(window, (len(i), *window.shape))
-    degree = _degree(slave, master, i, j) + more
-    none = np.zeros(len(i), dtype=bool)
-    which, place, weight = _cut_pieces(window, subject, count, degree, none)
-    i, j = i[which], j[which]
-    values, slopes = shape_functions(kind.name).both(place)
-    corner = shift(slave, i, slave.centre[i])
-    points = np.einsum("sqa,sad->sqd", values, corner)
-    vectors = _area_vectors_at(corner, slopes)
-    stretch = np.linalg.norm(vectors, axis=-1)
-    normal = _directions(slave, i, place, vectors / stretch[..., None])
-    weight, none = weight * stretch, none[which]
-    return _with_master(slave, master, (i, j), place, points, weight, normal, reach, none)
+def _degree(pairs: Pairs) -> int:
+    kinds = [pairs.slave.type, *(block.type for block in pairs.masters)]
+    degree = max(mortar_degree(kind.name) for kind in kinds)
+    affine = pairs.slave.affine[pairs.i].all() and pairs.outline.affine[pairs.j].all()
+    plain = affine and pairs.slave.directions is None
+    return degree if plain else degree + _BENT_DEGREES
 
 
-def _directions(slave: Facets, i: np.ndarray, place: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Unit vectors (s, q, dim) towards the master: the given normals, or those between nodes."""
-    if slave.directions is None:
-        return normal
-    values = shape_functions(slave.type.name).values(place)
-    between = np.einsum("sqa,sad->sqd", values, slave.directions[i])
-    return between / np.linalg.norm(between, axis=-1, keepdims=True)
-
-
-def _area_vectors_at(corner: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Normal × surface measure (s, q, dim) where every face has its own points."""
-    s, q, n_nodes, _ = slopes.shape
-    points = np.repeat(corner, q, axis=0).reshape(s * q * n_nodes, -1)
-    nodes = np.arange(len(points)).reshape(s * q, n_nodes)
-    tangent = np.einsum("fad,fat->ftd", points[nodes], slopes.reshape(s * q, n_nodes, -1))
-    if points.shape[1] == 2:
-        vectors = np.stack([tangent[:, 0, 1], -tangent[:, 0, 0]], axis=-1)
-    else:
-        vectors = np.cross(tangent[:, 0], tangent[:, 1])
-    return vectors.reshape(s, q, -1)
-
-
-def _with_master(
-    slave: Facets,
-    master: Facets,
-    pair: tuple[np.ndarray, np.ndarray],
-    place: np.ndarray,
-    points: np.ndarray,
-    weight: np.ndarray,
-    normal: np.ndarray,
-    reach: float,
-    whole: np.ndarray,
-) -> Segments:
-    """Find each point's partner on the master face; leave out segments beyond the reach."""
-    i, j = pair
-    partner, gap = locate(master.type, shift(master, j, slave.centre[i]), points, normal)
-    near = np.abs(gap).max(axis=1, initial=0.0) <= reach
-    return Segments(
-        i[near],
-        j[near],
-        shape_functions(slave.type.name).values(place[near]),
-        shape_functions(master.type.name).values(partner[near]),
-        weight[near],
-        normal[near],
-        gap[near],
-        whole[near],
-    )
-
-
-def _outline(kind: CellType, bent: bool) -> list[int]:
-    """The face's rim as a closed polygon: vertices, with mid-nodes where edges may be bent."""
-    if kind.dim == 1:
-        return [0, 1]
-    return list(kind.boundary) if bent else list(range(kind.n_vertices))
-
-
-def _plane(corner: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-    return np.einsum("fad,ftd->fat", corner, tangents)
-
-
-def _degree(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> int:
-    degree = max(mortar_degree(slave.type.name), mortar_degree(master.type.name))
-    affine = slave.affine[i].all() and master.affine[j].all() and slave.directions is None
-    return degree if affine else degree + _BENT_DEGREES
-
-
-def _near(face: np.ndarray, n_vertices: int, rim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The part of each rim (n, v, d) around its face (n, a, d), both seen in a plane, and counts.
-
-    Far from a bent face, points have no place in its reference face, or a wrong one.
-    """
-    if face.shape[2] == 1:
-        low, high = face.min(axis=1), face.max(axis=1)
-        margin = _MARGIN * (high - low)
-        ends, length = overlap(np.hstack([low - margin, high + margin]), np.sort(rim[..., 0], 1))
-        return ends[..., None], np.where(length > 0, 2, 0)
-    vertices = face[:, :n_vertices]
-    centre = vertices.mean(axis=1, keepdims=True)
-    side = np.roll(vertices, -1, axis=1) - vertices
-    outward = np.stack([side[..., 1], -side[..., 0]], axis=-1)
-    inner = np.einsum("fed,fed->fe", outward, vertices - centre)
-    reach = np.einsum("fed,fad->fea", outward, face - centre).max(axis=2)
-    offset = (1 + _MARGIN) * inner + 2 * (reach - inner)
-    # A corner of the window is where two neighbouring edges, moved outward, meet.
-    lines = np.stack([np.roll(outward, 1, axis=1), outward], axis=2)
-    values = np.stack([np.roll(offset, 1, axis=1), offset], axis=2)
-    window = centre + np.einsum("feij,fej->fei", invert(lines)[1], values)
-    return clip(rim, np.full(len(rim), rim.shape[1]), window)
-
-
-def _cut_pieces(
-    window: np.ndarray, subject: np.ndarray, count: np.ndarray, degree: int, whole: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pieces of the subjects within the windows: pair (s,), points (s, q, d), weights (s, q).
-
-    Polygons (n, v, 2) of `count` (n,) vertices in 3D; intervals (n, 2, 1) in 2D. `whole` (n,)
-    windows are known to lie within their subjects.
-    """
-    dim = window.shape[2]
-    reference, weights = simplex_rule(dim, degree)
-    if dim == 1:
-        ends, length = overlap(np.sort(window[..., 0], axis=1), np.sort(subject[..., 0], axis=1))
-        pair = np.flatnonzero(length > 0)
-        points = ends[pair, :1] + length[pair, None] * reference[:, 0]
-        return pair, points[..., None], length[pair, None] * weights
-    part, full = np.flatnonzero(~whole), np.flatnonzero(whole)
-    clipped = triangles(*clip(subject[part], count[part], window[part]))
-    kept = triangles(window[full], np.full(len(full), window.shape[1]))
-    pair = np.concatenate([part[clipped[0]], full[kept[0]]])
-    corner, area = (np.concatenate(both) for both in zip(clipped[1:], kept[1:], strict=True))
+def _polygons(window: np.ndarray, subject: np.ndarray, degree: int) -> Pieces:
+    """Triangles of what straight slave and master faces (p, v, 2) have in common."""
+    reference, weights = simplex_rule(2, degree)
+    which, corner, area = triangles(*clip(subject, np.full(len(subject), subject.shape[1]), window))
     barycentric = np.column_stack([1 - reference.sum(axis=1), reference])
-    points = np.einsum("qk,skt->sqt", barycentric, corner)
-    return pair, points, 2 * area[:, None] * weights
+    return which, np.einsum("qk,skt->sqt", barycentric, corner), 2 * area[:, None] * weights
+
+
+def _bent(pairs: Pairs, behind: Behind, degree: int) -> list[Pieces]:
+    """Fans of what faces have in common where edges are bent, or where others hide some of it."""
+    corner, bulge = pairs.seen(outlines([pairs.slave]), pairs.i)
+    slave = Regions(start=corner, bulge=bulge, count=np.full(len(corner), corner.shape[1]))
+    parts = clip_to_face(slave, *pairs.seen(pairs.outline, pairs.j))
+    for face, rows in _layers(behind, len(pairs.i)):
+        cut = []
+        for which, regions in parts:
+            deep = rows[which] >= 0
+            cut.append((which[~deep], regions.of(~deep)))
+            chosen = which[deep]
+            outline = pairs.of(chosen).seen(pairs.outline, face[rows[chosen]])
+            cut += [(chosen[k], part) for k, part in without_face(regions.of(deep), *outline)]
+        parts = cut
+    which = np.concatenate([which for which, _ in parts])
+    pieces = quadrature(joined([regions for _, regions in parts]), degree)
+    return [(which[number], points, weight) for number, points, weight in pieces]
+
+
+def _layers(behind: Behind, count: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Nearer faces, at most one for each pair at a time: their numbers, and which is whose."""
+    hidden, nearer = behind
+    layer = np.arange(len(hidden)) - np.searchsorted(hidden, hidden)
+    for k in range(int(layer.max(initial=-1)) + 1):
+        rows = np.full(count, -1)
+        rows[hidden[layer == k]] = np.flatnonzero(layer == k)
+        yield nearer, rows
+
+
+def _intervals(pairs: Pairs, behind: Behind, degree: int) -> Pieces:
+    """Intervals of what edges have in common: on straight slaves along them, else in reference."""
+    reference, weights = simplex_rule(1, degree)
+    window = _ends(pairs, outlines([pairs.slave]), pairs.i)
+    ends, _ = overlap(window, _ends(pairs, pairs.outline, pairs.j))
+    which = np.arange(len(pairs.i))
+    for face, rows in _layers(behind, len(pairs.i)):
+        deep = np.flatnonzero(rows[which] >= 0)
+        hiding = _ends(pairs.of(which[deep]), pairs.outline, face[rows[which[deep]]])
+        beyond = np.stack([np.maximum(ends[deep, 0], hiding[:, 1]), ends[deep, 1]], axis=1)
+        ends[deep, 1] = np.minimum(ends[deep, 1], hiding[:, 0])
+        ends, which = np.concatenate([ends, beyond]), np.concatenate([which, which[deep]])
+    length = ends[:, 1] - ends[:, 0]
+    real = length > 0
+    points = ends[real, :1] + length[real, None] * reference[:, 0]
+    return which[real], points[..., None], length[real, None] * weights
+
+
+def _ends(pairs: Pairs, outline: Outlines, j: np.ndarray) -> np.ndarray:
+    """The ends (p, 2) of edges `j`, ascending, in the coordinate that the slave is cut in."""
+    ends, _ = pairs.seen(outline, j)
+    if not pairs.slave.straight[pairs.i].all():
+        corner = pairs.corner
+        own = seen_along(corner, pairs.slave.tangents[pairs.i])
+        low, high = own.min(axis=1), own.max(axis=1)
+        margin = _MARGIN * (high - low)
+        # Far from a bent face, points have no place in its reference face, or a wrong one.
+        ends = np.clip(ends, (low - margin)[:, None], (high + margin)[:, None])
+        points = np.einsum("sat,std->sad", ends, pairs.slave.tangents[pairs.i])
+        direction = np.broadcast_to(pairs.slave.normal[pairs.i][:, None], points.shape)
+        ends, _ = project_along(pairs.slave.type, corner, points, direction, outline=True)
+    return np.sort(ends[..., 0], axis=1)
+
+
+# Points on both faces
+
+
+def _with_master(pairs: Pairs, pieces: Pieces, reach: float) -> Iterator[Segments]:
+    """The segments of pieces; those with points beyond the reach are left out."""
+    which, points, weight = pieces
+    pairs = pairs.of(which)
+    slave, i = pairs.slave, pairs.i
+    kind, corner = slave.type, pairs.corner
+    normal = np.broadcast_to(slave.normal[i][:, None], (*points.shape[:2], slave.normal.shape[1]))
+    if points.shape[2] == 1 and not slave.straight[i].all():
+        place = points
+        points = np.einsum("sqa,sad->sqd", shape_functions(kind.name).values(place), corner)
+        vectors = _area_vectors(corner, shape_functions(kind.name).gradients(place))
+        stretch = np.linalg.norm(vectors, axis=-1)
+        normal, weight = vectors / stretch[..., None], weight * stretch
+    else:
+        points = np.einsum("sqt,std->sqd", points, slave.tangents[i])
+        place, height = project_along(kind, corner, points, normal)
+        points = points + height[..., None] * normal
+        if not slave.flat[i].all():
+            vectors = _area_vectors(corner, shape_functions(kind.name).gradients(place))
+            stretch = np.linalg.norm(vectors, axis=-1)
+            weight = weight * stretch / np.einsum("sqd,sqd->sq", vectors, normal)
+            normal = vectors / stretch[..., None]
+    values = shape_functions(kind.name).values(place)
+    if slave.directions is not None:
+        between = np.einsum("sqa,sad->sqd", values, slave.directions[i])
+        normal = between / np.linalg.norm(between, axis=-1, keepdims=True)
+    for index, master in enumerate(pairs.masters):
+        mine = np.flatnonzero(pairs.outline.block[pairs.j] == index)
+        face = pairs.outline.face[pairs.j[mine]]
+        corner = master.corner[face] - slave.centre[i[mine]][:, None]
+        partner, gap = project_along(master.type, corner, points[mine], normal[mine])
+        near = np.abs(gap).max(axis=1, initial=0.0) <= reach
+        mine = mine[near]
+        if len(mine):
+            on_master = shape_functions(master.type.name).values(partner[near])
+            yield Segments(
+                slave=Side(faces=slave, index=pairs.index, face=i[mine], values=values[mine]),
+                master=Side(faces=master, index=index, face=face[near], values=on_master),
+                weight=weight[mine],
+                normal=normal[mine],
+                gap=gap[near],
+            )
+
+
+def _area_vectors(corner: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Normal × surface measure (s, q, dim) of faces (s, n_nodes, dim) at points of their own."""
+    tangent = np.einsum("sad,sqat->sqtd", corner, slopes)
+    if corner.shape[2] == 2:
+        return np.stack([tangent[:, :, 0, 1], -tangent[:, :, 0, 0]], axis=-1)
+    return np.cross(tangent[:, :, 0], tangent[:, :, 1])

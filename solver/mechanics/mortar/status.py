@@ -1,33 +1,60 @@
-"""Contact status by a primal–dual active set (semi-smooth Newton).
+"""Contact status by a primal–dual active set (semi-smooth Newton), with a search that must end.
 
-ḡ ≥ 0, p ≥ 0, p ḡ = 0 for each macro-element. One iteration solves with the present set of closed
-macro-elements as equality constraints; a macro-element is closed in the next one where
-p − c ḡ > 0, with c a stiffness over a length so that no unit matters. Source: Hüeber, Wohlmuth,
-A primal–dual active set strategy for non-linear multibody contact problems, CMAME 194 (2005).
+ḡ ≥ 0, p ≥ 0, p ḡ = 0 for each macro-element. One iteration solves with the present closed
+macro-elements as equality constraints; a closed one then opens where p < 0, an open one closes
+where ḡ < 0, by more than round-off of its own size. Source: Hüeber, Wohlmuth, A primal–dual active
+set strategy for non-linear multibody contact problems, CMAME 194 (2005).
+
+This search may cycle, make no progress or open so much that a body moves freely. Then the linear
+complementarity problem |T| p = W ḡ + q of all macro-elements is formed on the factor that has them
+all closed, and solved by a method that ends after finitely many steps (`complementarity`). A solve
+with the set found yields accurate p and ḡ, from which q is corrected until no status is wrong.
 """
 
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 
+from solver.mechanics.linear.complementarity import complementary
 from solver.system.errors import SolveError
 
 _LOG = logging.getLogger(__name__)
 
-# solve(closed) gives pressure (m,) (zero where open), average gap (m,), and the rest it found
-Solve = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+# The quick search ends after so many solves without fewer wrong statuses than ever before.
+_PATIENCE = 10
+_MAX_CORRECTIONS = 6
 
-# Pressures and gaps below these shares of their scales are round-off and change no status.
-PRESSURE_NOISE = 1e-10
-GAP_NOISE = 1e-12
-_MAX_ITERATIONS = 60
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """What a solve with given closed multipliers found, and what is round-off in it; all (k,).
+
+    `pressure` is zero where open. Pressures above −`pressure_limit` and gaps above −`gap_limit`
+    change no status.
+    """
+
+    pressure: np.ndarray
+    gap: np.ndarray
+    pressure_limit: np.ndarray
+    gap_limit: np.ndarray
+
+    def offence(self, closed: np.ndarray) -> np.ndarray:
+        """How many times its limit each multiplier (k,) violates p ≥ 0 if closed, else ḡ ≥ 0."""
+        value = np.where(closed, -self.pressure, -self.gap)
+        limit = np.where(closed, self.pressure_limit, self.gap_limit)
+        with np.errstate(over="ignore"):
+            return value / np.maximum(limit, np.finfo(float).tiny)
+
+
+Solve = Callable[[np.ndarray], Trial]
 
 
 @dataclass(frozen=True)
 class StatusResult:
-    """Final `closed` (m,), how many solves it took, and how many statuses changed in each."""
+    """Final `closed` (k,), how many solves it took, and how many statuses changed in each."""
 
     closed: np.ndarray
     iterations: int
@@ -38,45 +65,102 @@ def find_status(
     solve: Solve,
     start: np.ndarray,
     eligible: np.ndarray,
-    pressure_scale: float,
-    length: float,
+    area: np.ndarray,
+    stiffness: Callable[[], np.ndarray],
     confirm: bool = False,
 ) -> StatusResult:
-    """Iterate from `start` (m,) until no status changes; only `eligible` (m,) may close.
+    """Iterate from `start` (k,) until no status changes; only `eligible` (k,) may close.
 
-    `pressure_scale` and `length` are the sizes below whose noise nothing changes. A set seen before
-    (a cycle) is broken by changing only the worst offender from then on. `confirm`: the set that is
-    found is solved once more. Raises SolveError when there is no end within the allowed iterations.
+    `area` (k,) turns pressures into forces. `stiffness()` is asked for where the quick search
+    fails: the forces (e, e) that average gaps of the eligible multipliers bring up, each imposed
+    with all others closed. It may raise SolveError where no pressure makes equilibrium. `confirm`:
+    the set that is found is solved once more. Raises SolveError where no status fulfils the
+    conditions.
+
+    Two macro-elements, of which the second one would be pulled:
+
+    >>> tiny, both = np.full(2, 1e-9), np.array([True, True])
+    >>> def solve(closed):
+    ...     pressure, gap = np.where(closed, [1.0, -1.0], 0.0), np.where(closed, 0.0, 0.5)
+    ...     return Trial(pressure=pressure, gap=gap, pressure_limit=tiny, gap_limit=tiny)
+    >>> result = find_status(solve, both, both, np.ones(2), lambda: np.eye(2))
+    >>> result.closed.tolist(), result.iterations
+    ([True, False], 2)
     """
     closed, seen = start & eligible, set()
     changes: list[int] = []
     single = False
-    for iteration in range(1, _MAX_ITERATIONS + 1):
-        pressure, gap = solve(closed)
-        scale = max(pressure_scale, float(np.abs(pressure).max(initial=0.0)))
-        offence = np.where(closed, -pressure / scale, -gap / length)
-        noise = np.where(closed, PRESSURE_NOISE, GAP_NOISE)
-        wrong = eligible & (offence > noise)
-        told = iteration, int(closed.sum()), len(closed), int(wrong.sum())
-        _LOG.info("contact status: iteration %d, %d of %d closed, %d wrong", *told)
+    fewest, since = len(closed) + 1, 0
+    for iteration in count(1):
+        try:
+            offence = np.where(eligible, solve(closed).offence(closed), 0.0)
+        except SolveError as error:
+            if iteration == 1:
+                raise
+            return _certain(solve, closed, eligible, area, stiffness, changes, error)
+        wrong = offence > 1
+        _log(iteration, closed, wrong)
         if not wrong.any():
             if confirm:
                 confirm = False
                 continue
             return StatusResult(closed, iteration, changes)
+        since = 0 if wrong.sum() < fewest else since + 1
+        fewest = min(fewest, int(wrong.sum()))
+        if since == _PATIENCE:
+            break
         seen.add(closed.tobytes())
         following = closed ^ wrong
+        # A cycle is broken by changing the worst offender alone from then on.
         single = single or following.tobytes() in seen
         if single:
             following = closed.copy()
-            worst = int(np.where(wrong, offence, -np.inf).argmax())
-            following[worst] = ~following[worst]
+            following[offence.argmax()] ^= True
         changes.append(int((following ^ closed).sum()))
         closed = following
-    raise SolveError(
-        f"the contact status did not settle within {_MAX_ITERATIONS} iterations "
-        f"({changes[-1]} macro-elements still change)"
+    return _certain(solve, closed, eligible, area, stiffness, changes, None)
+
+
+def _certain(
+    solve: Solve,
+    latest: np.ndarray,
+    eligible: np.ndarray,
+    area: np.ndarray,
+    stiffness: Callable[[], np.ndarray],
+    changes: list[int],
+    failure: SolveError | None,
+) -> StatusResult:
+    """The status from the complementarity problem of all multipliers; see the module.
+
+    Raises `failure`, why the quick search ended, where this one ends without a status too.
+    """
+    _LOG.info("contact status: complementarity problem of %d multipliers", eligible.sum())
+    closed = eligible
+    try:
+        matrix = stiffness()
+    except SolveError as error:
+        raise failure or error from None
+    for _ in range(_MAX_CORRECTIONS):
+        try:
+            trial = solve(closed)
+        except SolveError as error:
+            raise failure or error from None
+        wrong = eligible & (trial.offence(closed) > 1)
+        changes.append(int((closed ^ latest).sum()))
+        _log(len(changes) + 1, closed, wrong)
+        if not wrong.any():
+            return StatusResult(closed, len(changes) + 1, changes)
+        force = (area * trial.pressure)[eligible] - matrix @ trial.gap[eligible]
+        latest, closed = closed, eligible.copy()
+        closed[eligible] = complementary(matrix, force) == 0
+    raise failure or SolveError(
+        f"the contact status did not settle ({int(wrong.sum())} macro-elements still change)"
     )
+
+
+def _log(iteration: int, closed: np.ndarray, wrong: np.ndarray) -> None:
+    known = iteration, int(closed.sum()), len(closed), int(wrong.sum())
+    _LOG.info("contact status: iteration %d, %d of %d closed, %d wrong", *known)
 
 
 def likely_closed(
@@ -88,6 +172,12 @@ def likely_closed(
     the plane by F/E*; `push` is F/E*, F per thickness in the plane. Macro-elements close in the
     order of their gaps up to that approach, from where bodies that are apart first touch. A first
     guess that is too small grows in one iteration; one that is too large shrinks step by step.
+
+    In the plane, an approach of 2 closes gaps of 0 and 1, but not of 3:
+
+    >>> gap, eligible = np.array([0.0, 1.0, 3.0]), np.ones(3, dtype=bool)
+    >>> likely_closed(gap, np.ones(3), eligible, 2.0, 2).tolist()
+    [True, True, False]
     """
     if not eligible.any():
         return eligible

@@ -1,7 +1,6 @@
-"""Quadrature points on whole slave faces, with their share of the surface and their normals."""
+"""Whole slave surfaces: quadrature points on their faces, and their macro-elements."""
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -10,7 +9,20 @@ from solver.mechanics.fem.quadrature import Rule
 from solver.mechanics.mortar.facets import Facets, surface_vectors
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """The m macro-elements of a slave surface.
+
+    `area`, `covered` (m,): whole and intersected area; `centre`, `normal` (m, dim).
+    """
+
+    area: np.ndarray
+    covered: np.ndarray
+    centre: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
 class Samples:
     """Points on the n faces of one block, the same q places on each.
 
@@ -22,18 +34,24 @@ class Samples:
     weight: np.ndarray
     normal: np.ndarray
 
-    def of(self, chosen: np.ndarray) -> Self:
-        """Those of some of the faces."""
-        return type(self)(self.values, self.weight[chosen], self.normal[chosen])
-
 
 def face_samples(slaves: list[Facets]) -> list[Samples]:
-    """Points that integrate shape functions over whole planar faces exactly, by block."""
+    """Points that integrate shape functions over whole planar faces exactly, by block.
+
+    >>> (sample,) = face_samples([slave])
+    >>> round(float(sample.weight.sum()), 15)
+    2.0
+    """
     return [sampled(block, face_rule(block.type.name)) for block in slaves]
 
 
 def sampled(block: Facets, rule: Rule) -> Samples:
-    """The points of a rule on the reference face."""
+    """The points of a rule on the reference face.
+
+    >>> sample = sampled(slave, (np.array([[0.5]]), np.array([1.0])))
+    >>> sample.weight.tolist(), sample.values.tolist(), sample.normal.tolist()
+    ([[2.0]], [[0.5, 0.5]], [[[0.0, 1.0]]])
+    """
     places, weights = rule
     values, slopes = shape_functions(block.type.name).both(places)
     vectors = surface_vectors(block, slopes)
@@ -41,4 +59,4 @@ def sampled(block: Facets, rule: Rule) -> Samples:
     if block.directions is not None:
         vectors = np.einsum("qa,fad->fqd", values, block.directions)
     normal = vectors / np.linalg.norm(vectors, axis=2, keepdims=True)
-    return Samples(values, measure * weights, normal)
+    return Samples(values=values, weight=measure * weights, normal=normal)

@@ -41,7 +41,9 @@ def _quadrature(points: int) -> Scheme:
     return Scheme(sample=partial(gauss, n=points), meet=meet_at_points, closure=False)
 
 
-_NODES = Scheme(at_nodes, partial(meet_at_points, beyond=_BEYOND), one_each, closure=False)
+_NODES = Scheme(
+    sample=at_nodes, meet=partial(meet_at_points, beyond=_BEYOND), space=one_each, closure=False
+)
 _NODAL = Scheme(meet=partial(meet_in_segments, weighted=True), space=linear)
 
 TREATMENTS: dict[str, Treatment] = {
@@ -74,10 +76,10 @@ TREATMENTS: dict[str, Treatment] = {
 }
 
 
-SEGMENTED = tuple(name for name, t in TREATMENTS.items() if t.scheme(DEFAULT_POINTS).closure)
-"""Those that integrate over the intersections of faces."""
-
-
 def scheme_of(name: str, points: int | None) -> Scheme:
-    """The integration of a treatment, by as many points each way where it has them."""
+    """The integration of a treatment, by as many points each way where it has them.
+
+    >>> scheme_of("quadrature", 2).closure, scheme_of("lac", None).closure
+    (False, True)
+    """
     return TREATMENTS[name].scheme(points or DEFAULT_POINTS)

@@ -22,7 +22,8 @@ import numpy as np
 
 from solver.mesh.changes import parts
 from solver.mesh.changes.perturb import perturbed
-from solver.mesh.keys import Keys
+from solver.mesh.keys import LARGEST, Keys
+from solver.system.errors import InputError
 
 
 def transform(mesh: meshio.Mesh, spec: Mapping[str, Any], where: str) -> meshio.Mesh:
@@ -33,6 +34,8 @@ def transform(mesh: meshio.Mesh, spec: Mapping[str, Any], where: str) -> meshio.
     keys = Keys(spec, where, "transform")
     for key in spec:
         mesh = _STEPS[keys.known(key, _STEPS)](mesh, key, keys)
+    if not (np.abs(mesh.points) <= LARGEST).all():
+        raise InputError(where, "transform", None, f"moves nodes farther than {LARGEST:g}")
     return mesh
 
 

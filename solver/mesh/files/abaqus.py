@@ -138,6 +138,8 @@ class _Deck:
 
     def _take_nodes(self, options: _Options, lines: _Lines) -> None:
         for number, *place in lines:
+            if int(number) in self.nodes:
+                raise self._refuse("*NODE", int(number), "two nodes have this number")
             self.nodes[int(number)] = ([float(x) for x in place[:3] if x] + [0.0] * 3)[:3]
         if "NSET" in options:
             self.node_sets[self._key(options["NSET"])] += [int(line[0]) for line in lines]
@@ -155,6 +157,8 @@ class _Deck:
             missing = next((n for n in nodes if n not in self.nodes), None)
             if missing is not None:
                 raise self._refuse("node", missing, f"cell {number} has it, *NODE has not")
+            if number in self.cells:
+                raise self._refuse("*ELEMENT", number, "two cells have this number")
             self.cells[number] = (cell, nodes)
         if "ELSET" in options:
             self.cell_sets[self._key(options["ELSET"])] += table[:, 0].tolist()

@@ -20,6 +20,14 @@ _SECONDS, _SECONDS_PER_MB = 8.0, 5.0
 Reader = Callable[[Path], meshio.Mesh]
 
 
+def read_here(reader: Reader, path: Path) -> meshio.Mesh:
+    """What `reader(path)` gives; raises InputError for whatever exception it ends with."""
+    mesh, refusal = _attempt(reader, path)
+    if mesh is None:
+        raise InputError(*refusal)
+    return mesh
+
+
 def read_apart(reader: Reader, path: Path) -> meshio.Mesh:
     """What `reader(path)` gives; raises InputError for whatever keeps it from an end."""
     inward, outward = os.pipe()
@@ -37,7 +45,7 @@ def read_apart(reader: Reader, path: Path) -> meshio.Mesh:
         long = "takes too long to read" if status == -signal.SIGPROF else "the reader died of it"
         raise InputError(path, "mesh", None, f"cannot be read ({long}: damaged?)")
     mesh, refusal = pickle.loads(answer)
-    if refusal:
+    if mesh is None:
         raise InputError(*refusal)
     return mesh
 
@@ -57,13 +65,11 @@ def _answer(reader: Reader, path: Path, outward: int) -> None:
         os._exit(status)
 
 
-def _attempt(
-    reader: Reader, path: Path
-) -> tuple[meshio.Mesh | None, tuple[str, str, object, str] | None]:
+def _attempt(reader: Reader, path: Path) -> tuple[meshio.Mesh | None, tuple[str, str, object, str]]:
     try:
-        return reader(path), None
+        return reader(path), ("", "", None, "")
     except InputError as error:
         return None, (error.where, error.key, error.value, error.problem)
-    except BaseException as error:  # noqa: BLE001 -- whatever the reader trips over is in the file
+    except Exception as error:  # noqa: BLE001 -- whatever the reader trips over is in the file
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         return None, (str(path), "mesh", None, f"cannot be read ({reason})")

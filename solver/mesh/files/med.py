@@ -11,6 +11,7 @@ import numpy as np
 
 from solver.mesh.catalogue import BY_NAME
 from solver.system.errors import InputError
+from solver.system.hdf5 import read_file
 
 _TYPES = {
     "SE2": "SEG2", "SE3": "SEG3", "TR3": "TRIA3", "TR6": "TRIA6",
@@ -31,7 +32,7 @@ def read(path: Path) -> meshio.Mesh:
     """
     if not h5py.is_hdf5(path):
         raise InputError(path, "mesh", None, "no MED file (MED files are HDF5 files)")
-    with h5py.File(path, "r") as file:
+    with read_file(path) as file:
         name, step = _mesh_of(file, path)
         nodes = step["NOE"]
         points = nodes["COO"][()].reshape(-1, int(nodes["COO"].attrs["NBR"])).T

@@ -14,8 +14,8 @@ import numpy as np
 
 from solver.mesh.catalogue import BY_NAME, cell_type
 from solver.system.errors import InputError
-from solver.system.files import is_sealed, seal
-from solver.system.hdf5 import new_file
+from solver.system.files import seal, seal_of
+from solver.system.hdf5 import new_file, read_file
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
 _GROUPS = "mesh_groups"
@@ -86,6 +86,12 @@ def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
     return mesh, *data
 
 
+def check_name(path: Path) -> None:
+    """Raise InputError for a name that readers would not take for VTKHDF."""
+    if path.suffix != ".vtkhdf":
+        raise InputError(path, "extension", path.suffix, "must be .vtkhdf")
+
+
 def write(mesh: meshio.Mesh, path: Path) -> None:
     """Write the mesh alone into a new file."""
     with new_file(path) as file:
@@ -101,9 +107,9 @@ def read(path: Path) -> meshio.Mesh:
     if not h5py.is_hdf5(path):
         lines = path.read_text(errors="replace")[:2000].splitlines()
         raise InputError(path, "mesh", None, lines[0] if lines else "the file is empty")
-    if not is_sealed(path):
+    if not seal_of(path):
         raise InputError(path, "mesh", None, "damaged, or no mesh that this program wrote")
-    with h5py.File(path, "r") as file:
+    with read_file(path) as file:
         if "VTKHDF" not in file or _GROUPS not in file:
             raise InputError(path, "mesh", None, "no mesh that this program wrote")
         return read_grid(file["VTKHDF"])[0]

@@ -8,14 +8,16 @@
 `cells` is the cell type, in both blocks of the same dimension. `divisions` says how many pieces
 the edges have along each axis; blocks of QUAD and HEXA cells are regular grids. Blocks of TRIA and
 TETRA cells are unstructured inside; there `far` (divisions of the lateral edges on the side away
-from the interface, by default as on it), `inner` (size of the inner cells, as a share of what the
-edges suggest) and `algorithm` (for the surfaces) shape the mesh.
+from the interface, by default as on it), `inner` (edge length that gmsh aims at inside, in the
+units of `size`; by default the edges of the block decide) and `algorithm` (for the surfaces) shape
+the mesh.
 Blocks of PENTA and PYRA cells are boxes cut in pieces (see `hybrid`).
 
 The interface lies in y = 0 (2D) or z = 0 (3D), the corner of both blocks at x = 0 (and y = 0).
 Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (the lower side of the
 bottom block), `press` (the upper side of the top block), `symx` (x = 0) and `symy` (y = 0, 3D) of
-both blocks, `farx` and `fary` opposite to them. `refine` multiplies all divisions (1).
+both blocks, `farx` and `fary` opposite to them. `refine` multiplies all divisions and divides
+`inner` (1).
 """
 
 from itertools import pairwise

@@ -63,9 +63,9 @@ def write_gallery(
 def _drawing(plain: bool) -> tuple[Draw, str]:
     """What draws a result into a file, and the ending of these files."""
     if plain:
-        from solver.report.gallery.plain import ENDING, draw
+        from solver.report.gallery.plain import draw
 
-        return draw, f"-plain{ENDING}"
+        return draw, "-plain.svg"
     from solver.report.gallery.drawing import draw as by_pyvista
 
     return by_pyvista, ".png"
@@ -75,7 +75,7 @@ def _picture(row: Row, folder: Path, draw: Draw, ending: str) -> Picture:
     from solver.report.pictures import is_current
 
     if row.result_file is None:
-        return Picture(row, "", "no result, no picture")
+        return Picture(row, "", f"no picture: {row.why or 'no result'}")
     target = folder / FOLDER / f"{row.group}-{row.folder.name}{ending}"
     if not is_current(target, row.result_file, Path(__file__).parent):
         try:

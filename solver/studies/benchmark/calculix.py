@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, Zone
+from solver.case.model import Case, Zone
 from solver.mechanics.fem.faces import boundary_faces, volume_cells
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME, CellType
 from solver.mesh.files.abaqus import FACES
@@ -46,8 +46,8 @@ def version() -> str:
         return ""
     # It leaves files wherever it runs.
     with TemporaryDirectory() as folder:
-        told = run_apart([PROGRAM, "-v"], cores_for(1), 10.0, folder=Path(folder)).output
-    found = re.search(r"Version (\S+)", told)
+        output = run_apart([PROGRAM, "-v"], cores_for(1), 10.0, folder=Path(folder)).output
+    found = re.search(r"Version (\S+)", output)
     return found[1] if found else "unknown"
 
 
@@ -68,7 +68,7 @@ def solve(
 
 
 def deck_lines(case: Case, mesh: meshio.Mesh) -> Iterator[str]:
-    """The lines of the deck of a case in space, with pressures, supports along axes, one contact.
+    """The lines of the deck of a 3D case with pressures, supports along axes, one contact.
 
     Raises KeyError for cells that CalculiX has not, or orders otherwise.
     """
@@ -115,7 +115,7 @@ def _elements(start: int, cells: np.ndarray) -> Iterator[str]:
 
 def _faces(mesh: meshio.Mesh, group: str, starts: dict[str, int]) -> Iterator[tuple[int, int]]:
     """Element and face number of every face of a group."""
-    for block in boundary_faces(mesh, group, "deck", group):
+    for block in boundary_faces(mesh, group):
         numbers = np.array(
             [_label(block.owner_type, i) for i in range(len(block.owner_type.faces))]
         )

@@ -14,111 +14,112 @@
           - {title: rslab, solver: rslab}            # the linear solver
           - {title: without MKL, free: true}         # free software alone
           - {title: not cut, treatment: uncut}       # of the interface
-          - {title: no cures, cures: false}          # see `solver.simulation.cures`
-          - {title: nothing left out, everything: true}   # see `solver.simulation.skips`
+          - {title: no cures, cures: false}          # see `solver.simulation.options`
+          - {title: nothing left out, everything: true}   # see `solver.simulation.options`
           - {title: CalculiX, program: calculix}     # another code
-    growth: [{series: hexa8, sizes: [1.0e+5, 3.0e+5]}]
     batch: {title: …, most: 2, cases: [case.yaml]}   # in one warm process, and one by one
-    quick: {size: 1000}           # of every mesh, for a first look; growth from half of it
+    quick: {size: 1000}           # of every mesh, for a first look
 
 `most` is the number of seconds that all cases of the batch together should not exceed.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
-from solver.case.descriptions import file_beside, refuse_unknown
-from solver.case.schemas import BENCHMARK_SCHEMA
+from msgspec import Meta
+
+from solver.case.typed import Section, Text, read_as
 from solver.case.yaml import read_mapping
-from solver.studies.scaling import QUICK
-from solver.studies.scaling.description import Point, Scaling, Series, read_scaling
+from solver.studies import QUICK
+from solver.studies.keys import Count, Seconds, Unknowns
+from solver.studies.scaling.description import ScalingPoint, read_scaling
+from solver.system.errors import InputError, hint
 
 
-@dataclass(frozen=True)
-class Way:
+class Way(Section, frozen=True):
     """One way to solve; see the module's text."""
 
-    title: str
-    solver: str = "auto"
+    title: Text
+    solver: Literal["auto", "multigrid", "pardiso", "rslab", "cholmod", "superlu"] = "auto"
     free: bool = False
-    treatment: str = "lac"
+    treatment: Text = "lac"
     cures: bool = True
     everything: bool = False
-    program: str = ""
+    program: Literal["", "calculix"] = ""
+
+
+class _Comparison(Section, frozen=True):
+    title: Text
+    series: Text
+    size: Unknowns
+    repetitions: Annotated[int, Meta(ge=0, le=100, description="a whole number, 0 to 100")]
+    ways: Annotated[tuple[Way, ...], Meta(min_length=1)]
+
+
+class WarmBatch(Section, frozen=True):
+    """Cases solved in one process and in one each; `most` seconds are the goal."""
+
+    title: Text
+    most: Seconds
+    cases: Annotated[tuple[Path, ...], Meta(min_length=1)]
+
+
+class _QuickBenchmark(Section, frozen=True):
+    size: Unknowns
+
+
+class BenchmarkFile(Section, frozen=True):
+    """The keys of `benchmark.yaml`."""
+
+    title: Text
+    threads: Count
+    limit: Seconds
+    scaling: Path
+    comparisons: tuple[_Comparison, ...]
+    batch: WarmBatch
+    quick: _QuickBenchmark
 
 
 @dataclass(frozen=True)
-class Comparison:
+class WayComparison:
     """One mesh, solved in several ways."""
 
     title: str
-    point: Point
+    point: ScalingPoint
     repetitions: int
     ways: tuple[Way, ...]
 
 
 @dataclass(frozen=True)
-class Batch:
-    """Cases solved in one process and in one each; `most` seconds are the goal."""
-
-    title: str
-    most: float
-    cases: tuple[Path, ...]
-
-
-@dataclass(frozen=True)
 class Benchmark:
-    """All of it. `growth`: series, their sizes those to be measured."""
+    """All of it."""
 
     path: Path
     title: str
     threads: int
     limit: float
-    scaling: Scaling
-    comparisons: tuple[Comparison, ...]
-    growth: tuple[Series, ...]
-    batch: Batch
+    comparisons: tuple[WayComparison, ...]
+    batch: WarmBatch
 
 
 def read_benchmark(path: Path, size: str) -> Benchmark:
     """The benchmark in a file, or its quick version; InputError says what is refused."""
-    content = read_mapping(path, BENCHMARK_SCHEMA)
-    scaling = read_scaling(path.parent / content["scaling"])
-    small = int(content["quick"]["size"]) if size == QUICK else None
-    known = {series.name: series for series in scaling.series}
-
-    def find(item: Mapping[str, Any], key: str, sizes: Sequence[int]) -> Series:
-        refuse_unknown(path, f"{key}.series", item["series"], "series", known)
-        return replace(known[item["series"]], sizes=tuple(sizes))
-
+    content = read_as(BenchmarkFile, read_mapping(path), path)
+    small = int(content.quick.size) if size == QUICK else None
+    known = {series.name: series for series in read_scaling(content.scaling).series}
     comparisons = []
-    for i, item in enumerate(content["comparisons"]):
-        unknowns = small or int(item["size"])
-        point = Point(find(item, f"comparisons[{i}]", [unknowns]), unknowns)
-        ways = tuple(Way(**way) for way in item["ways"])
-        comparisons.append(Comparison(item["title"], point, item["repetitions"], ways))
-    growth = [
-        find(
-            item, f"growth[{i}]", [small // 2, small] if small else sorted(map(int, item["sizes"]))
-        )
-        for i, item in enumerate(content["growth"])
-    ]
+    for i, item in enumerate(content.comparisons):
+        if item.series not in known:
+            problem = f"no such series; {hint(item.series, known)}"
+            raise InputError(path, f"comparisons[{i}].series", item.series, problem)
+        point = ScalingPoint(known[item.series], small or int(item.size))
+        comparisons.append(WayComparison(item.title, point, item.repetitions, item.ways))
     return Benchmark(
         path=path,
-        title=content["title"],
-        threads=content["threads"],
-        limit=float(content["limit"]),
-        scaling=replace(scaling, threads=content["threads"], limit=float(content["limit"])),
+        title=content.title,
+        threads=content.threads,
+        limit=content.limit,
         comparisons=tuple(comparisons),
-        growth=tuple(growth),
-        batch=_batch(path, content["batch"]),
+        batch=content.batch,
     )
-
-
-def _batch(path: Path, item: Mapping[str, Any]) -> Batch:
-    cases = tuple(
-        file_beside(path, f"batch.cases[{i}]", case) for i, case in enumerate(item["cases"])
-    )
-    return Batch(item["title"], float(item["most"]), cases)

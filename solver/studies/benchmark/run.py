@@ -1,7 +1,5 @@
 """Runs the benchmark: each way in a process of its own, one after the other, nothing beside it."""
 
-import json
-import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,10 +8,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from solver.studies.benchmark import calculix
-from solver.studies.benchmark.description import Batch, Benchmark, Comparison, Way
-from solver.studies.scaling.description import Point
-from solver.studies.scaling.point import SOLVED, measure_point
+from solver.studies.benchmark import calculix, ways
+from solver.studies.benchmark.description import Benchmark, WarmBatch, Way, WayComparison
+from solver.studies.points import FAILED, MISSING, SOLVED, ended, measure_apart, surroundings
+from solver.studies.scaling.description import ScalingPoint
 from solver.system.clock import now
 from solver.system.errors import SolveError
 from solver.system.process import cores_for, run_apart
@@ -32,16 +30,9 @@ class Bench:
     cores: Sequence[int]
     limit: float
 
-    def work(self, kind: str, **job: Any) -> Record:
-        """What a worker found; outcome and reason where it died."""
-        output = self.folder / "found.json"
-        output.unlink(missing_ok=True)
-        job |= {"kind": kind, "output": str(output), "started": now()}
-        command = [sys.executable, "-m", "solver.studies.benchmark.worker", json.dumps(job)]
-        done = run_apart(command, self.cores, self.limit)
-        if done.status == 0:
-            return json.loads(output.read_text(encoding="utf-8"))
-        return {"outcome": "crashed", "reason": done.reason}
+    def work(self, work: Callable[[Any], Record], **job: Any) -> Record:
+        """What a function found in a process of its own; outcome and reason where it died."""
+        return measure_apart(work, job, self.folder / "found.json", self.cores, self.limit)
 
     def often(self, *arguments: object) -> Record:
         """What a short command took: of a few times the one in the middle, by processor time."""
@@ -70,19 +61,18 @@ def bench(benchmark: Benchmark) -> Iterator[Bench]:
 
 
 def run_benchmark(benchmark: Benchmark, log: Log) -> Record:
-    """Run all of it, logging what is about to be measured; the record (see `words`).
+    """Run all of it, logging what is about to be measured; the record (see `page`).
 
     Raises SolveError where a mesh cannot be made.
     """
     from solver.system.provenance import gather
 
-    started, load = now(), os.getloadavg()[0]
+    started = now()
     with bench(benchmark) as place:
+        about = surroundings(place.cores)
         record: Record = {
             "title": benchmark.title,
-            "threads": len(place.cores),
-            "cores": list(place.cores),
-            "load": round(load, 2),
+            **about,
             "machine": gather(benchmark.path, None),
             "calculix": calculix.version(),
             "comparisons": [],
@@ -94,17 +84,15 @@ def run_benchmark(benchmark: Benchmark, log: Log) -> Record:
         record["batch"] = _batch(place, benchmark.batch)
         log("measuring: start of the program")
         record["start"] = _start(place, benchmark.batch.cases[0])
-        log("measuring: growth")
-        record["growth"] = _growth(place, benchmark)
     return record | {"whole": now() - started}
 
 
-def _compare(place: Bench, comparison: Comparison) -> Record:
+def _compare(place: Bench, comparison: WayComparison) -> Record:
     """All ways to solve one mesh."""
     case = place.folder / "case.yaml"
     case.write_text(comparison.point.source(), encoding="utf-8")
     mesh = place.mesh(case, "mesh")
-    ways = [
+    found = [
         {"way": way.title} | _solve(place, comparison, way, case, mesh) for way in comparison.ways
     ]
     return {
@@ -113,15 +101,15 @@ def _compare(place: Bench, comparison: Comparison) -> Record:
         "size": comparison.point.size,
         "divisions": list(comparison.point.divisions),
         "repetitions": comparison.repetitions,
-        "ways": ways,
+        "ways": found,
     }
 
 
-def _solve(place: Bench, comparison: Comparison, way: Way, case: Path, mesh: Path) -> Record:
+def _solve(place: Bench, comparison: WayComparison, way: Way, case: Path, mesh: Path) -> Record:
     if way.program:
         return _other(place, comparison.point, mesh)
     return place.work(
-        "solve",
+        ways.solve,
         case=str(case),
         mesh=str(mesh),
         repetitions=comparison.repetitions,
@@ -133,21 +121,19 @@ def _solve(place: Bench, comparison: Comparison, way: Way, case: Path, mesh: Pat
     )
 
 
-def _other(place: Bench, point: Point, mesh: Path) -> Record:
+def _other(place: Bench, point: ScalingPoint, mesh: Path) -> Record:
     """The same problem on the same mesh by CalculiX, where it is installed."""
     from solver.mesh import read_mesh
 
     if not calculix.version():
-        return {"outcome": "missing", "reason": f"{calculix.PROGRAM} is not installed"}
+        return ended(MISSING, f"{calculix.PROGRAM} is not installed")
     case = point.parsed(place.folder / "case.yaml")
     [pressure] = [load.value for load in case.loads if isinstance(load.value, float)]
     try:
         found = calculix.solve(case, read_mesh(mesh), place.folder, place.cores, place.limit)
     except SolveError as error:
-        return {"outcome": "failed", "reason": str(error)}
-    return {
-        "outcome": SOLVED,
-        "reason": "",
+        return ended(FAILED, str(error))
+    return ended(SOLVED, "") | {
         "process": found.process.used,
         "times": {},
         "linear_solver": "its own",
@@ -156,7 +142,7 @@ def _other(place: Bench, point: Point, mesh: Path) -> Record:
     }
 
 
-def _batch(place: Bench, batch: Batch) -> Record:
+def _batch(place: Bench, batch: WarmBatch) -> Record:
     """Cases in a process each, then in one process twice."""
     jobs = []
     for number, case in enumerate(batch.cases):
@@ -165,7 +151,7 @@ def _batch(place: Bench, batch: Batch) -> Record:
         {"case": case} | place.command("solve", case, "--mesh", mesh, "-o", f"{mesh}.r.vtkhdf")
         for case, mesh in jobs
     ]
-    together = place.work("batch", cases=jobs, folder=str(place.folder))
+    together = place.work(ways.batch, cases=jobs, folder=str(place.folder))
     return {"title": batch.title, "most": batch.most, "each": each, "together": together}
 
 
@@ -174,14 +160,3 @@ def _start(place: Bench, case: Path) -> Record:
     mesh = place.mesh(case, "start")
     plane = place.often("solve", case, "--mesh", mesh, "-o", f"{mesh}.r.vtkhdf")
     return {"help": place.often("--help"), "plane": {"case": str(case)} | plane}
-
-
-def _growth(place: Bench, benchmark: Benchmark) -> list[Record]:
-    """The points of each series, as the scaling family measures them."""
-    found = []
-    for series in benchmark.growth:
-        for size in series.sizes:
-            record = place.folder / "point.json"
-            measure_point(benchmark.scaling, Point(series, size), record)
-            found.append(json.loads(record.read_text(encoding="utf-8")))
-    return found

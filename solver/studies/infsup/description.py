@@ -16,35 +16,31 @@ opposite to the interface are held all over; `floating`, the upper block is free
 down. Each ladder is run with the cut and, where there is one, without.
 """
 
-import json
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
-import meshio
-import numpy as np
+from msgspec import Meta
 
-from solver.case.reader import parse_case
-from solver.case.schemas import INFSUP_SCHEMA
+from solver.case.typed import Section, read_as
 from solver.case.yaml import read_mapping
-from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME
-from solver.simulation.scene import build_scene
-from solver.studies.infsup.constant import inf_sup_constant
-from solver.system.clock import Clock
-from solver.system.errors import InputError, SolveError
+from solver.studies.fits import fit_power
+from solver.studies.keys import Cell
 
 LEVEL = 0.4
-"""β_h falls with the size of the faces to this power at most, where it is said to level off."""
+"""β_h falls with the size of the faces to this power at most."""
 ZERO = 1e-6
 """β_h below is zero but for round-off."""
-Log = Callable[[str], Any]
+
+Level = Annotated[int, Meta(ge=1, description="a whole number, 1 or more")]
+Levels = Annotated[tuple[Level, ...], Meta(min_length=1)]
 
 
 @dataclass
-class Ladder:
+class InfSupLadder:
     """One family of meshes; the lists hold a value a level, coarsest first.
 
     `coarser`: slave divisions over master divisions. `cut`: with the cut, or as meshed where the
@@ -105,10 +101,9 @@ class Ladder:
 
         Not a number where it is zero: some multiplier acts on no displacement at all.
         """
-        if len(self.constants) < 2 or min(self.constants[-2:]) < ZERO:
-            return np.nan
-        before, last = self.constants[-2:]
-        return float(np.log(before / last) / np.log(self.levels[-1] / self.levels[-2]))
+        levels, constants = self.levels[: len(self.constants)][-2:], self.constants[-2:]
+        fit = fit_power(levels, constants) if min(constants, default=0.0) >= ZERO else None
+        return -fit.value if fit else math.nan
 
     @property
     def levels_off(self) -> bool:
@@ -116,82 +111,55 @@ class Ladder:
         return not self.reason and bool(self.order <= LEVEL)
 
 
-def read_ladders(path: Path, quick: bool = False) -> list[Ladder]:
+class _Levels(Section, frozen=True):
+    plane: Levels
+    space: Levels
+
+
+class _Ladder(Section, frozen=True):
+    cells: Cell
+    contact: Literal["", "TRIA3", "TRIA6", "QUAD4", "QUAD8"] = ""
+    hexahedra: Literal["", "pyramids", "hexahedra"] = ""
+    cut: bool = True
+    levels: Levels = ()
+
+
+class InfSupFile(Section, frozen=True):
+    """The keys of `infsup.yaml`."""
+
+    levels: _Levels
+    quick: _Levels
+    coarser: _Levels
+    cells: Annotated[tuple[_Ladder, ...], Meta(min_length=1)]
+
+
+def read_ladders(path: Path, quick: bool = False) -> list[InfSupLadder]:
     """The ladders that a file asks for, none of them run; InputError says what is refused."""
-    content = read_mapping(path, INFSUP_SCHEMA)
-    return list(_ladders(content, quick))
+    return list(_ladders(read_as(InfSupFile, read_mapping(path), path), quick))
 
 
-def _ladders(content: dict[str, Any], quick: bool) -> Iterator[Ladder]:
+def _ladders(content: InfSupFile, quick: bool) -> Iterator[InfSupLadder]:
     uncut: set[tuple[str, str]] = set()
-    for item in content["cells"]:
-        space = "plane" if BY_NAME[item["cells"]].dim == 2 else "space"
-        levels = content["quick" if quick else "levels"][space]
-        levels = levels if quick else item.get("levels", levels)
-        chosen = {key: item[key] for key in ("cells", "contact", "hexahedra") if key in item}
+    for item in content.cells:
+        space = "plane" if BY_NAME[item.cells].dim == 2 else "space"
+        levels = getattr(content.quick if quick else content.levels, space)
+        levels = levels if quick else item.levels or levels
         ways = [True]
-        kind = (item["cells"], item.get("contact", ""))
-        if item.get("cut", True) and kind not in uncut:
+        kind = (item.cells, item.contact)
+        if item.cut and kind not in uncut:
             uncut.add(kind)
             ways.append(False)
-        masters = content["coarser"][space]
+        masters = getattr(content.coarser, space)
         for coarser in masters[-1:] if quick else masters:
             for clamped in (True,) if quick else (True, False):
                 for cut in ways:
-                    ladder = Ladder(**chosen, cut=cut, clamped=clamped, coarser=coarser)
-                    ladder.needs_cut = item.get("cut", True)
-                    ladder.levels = list(levels)
-                    yield ladder
-
-
-def run(ladder: Ladder, log: Log) -> Ladder:
-    """Fill in every level; where one fails, its reason is kept and the rest left out."""
-    for n in ladder.levels:
-        try:
-            _add_level(ladder, n)
-        except (InputError, SolveError) as error:
-            ladder.reason = str(error)
-            break
-    shown = " ".join(f"{constant:.3f}" for constant in ladder.constants)
-    log(f"{ladder.name}: {shown or ladder.reason}")
-    return ladder
-
-
-def _add_level(ladder: Ladder, n: int) -> None:
-    mesh = _mesh(ladder.cells, ladder.contact, n, max(1, n // ladder.coarser))
-    case = parse_case(json.dumps(_case(ladder)), Path("infsup.yaml"))
-    scene = build_scene(case, mesh, False, None, Clock())
-    ladder.constants.append(inf_sup_constant(scene))
-    ladder.macro_elements.append(sum(zone.count for zone in scene.zones))
-    ladder.unknowns.append(scene.n_dofs)
-
-
-@lru_cache(maxsize=4)
-def _mesh(cells: str, contact: str, slave: int, master: int) -> meshio.Mesh:
-    dim = BY_NAME[cells].dim
-    recipe: dict[str, Any] = {"recipe": "blocks", "size": 1.0}
-    for name, n in (("bottom", slave), ("top", master)):
-        recipe[name] = {"cells": cells, "divisions": [n] * dim}
-        if contact:
-            recipe[name]["contact"] = contact
-    return generate(recipe, "inf-sup test")
-
-
-def _case(ladder: Ladder) -> dict[str, Any]:
-    axes = "xyz"[: ladder.dim]
-    sides: dict[str, list[str]] = {f"sym{axis}": [axis] for axis in axes[:-1]}
-    outer: dict[str, list[str]] = {"base": [axes[-1]]}
-    if ladder.clamped:
-        outer = {"base": list(axes), "press": list(axes)}
-    zone = {"name": "interface", "slave": "bottom_contact", "master": "top_contact"}
-    zone["treatment"] = "lac" if ladder.cut else "uncut"
-    if ladder.hexahedra:
-        zone["hexahedra"] = ladder.hexahedra
-    return {
-        "name": "infsup",
-        "mesh": {"recipe": "blocks"},
-        **({"plane": "strain"} if ladder.dim == 2 else {}),
-        "materials": {"all": {"young": 1.0, "poisson": 0.3}},
-        "supports": [{"group": g, "fix": fix} for g, fix in (sides | outer).items()],
-        "contact": [zone],
-    }
+                    yield InfSupLadder(
+                        cells=item.cells,
+                        cut=cut,
+                        clamped=clamped,
+                        coarser=coarser,
+                        contact=item.contact,
+                        hexahedra=item.hexahedra,
+                        needs_cut=item.cut,
+                        levels=list(levels),
+                    )

@@ -19,7 +19,6 @@ from solver.case.reader import parse_case
 from solver.mesh import generate
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
-from solver.system.clock import Clock
 
 PRESSURE, FACES, COARSER = 25.0, 64, 4
 CELLS = {"TRIA3": True, "QUAD4": True, "TRIA6": False, "QUAD8": False, "QUAD9": False}
@@ -28,7 +27,7 @@ _LEFT = "12.5 * (1 + (1 - x) / sqrt((1 - x)**2))"  # 25 where x < 1, else 0
 
 
 @dataclass(frozen=True)
-class Profile:
+class PressureProfile:
     """Contact pressure over 25 along the interface: `place` and `pressure`, a value a face.
 
     `cut`: with the cut, or as meshed where the cells need none.
@@ -46,7 +45,9 @@ class Profile:
         return float(np.abs(np.diff(self.pressure, 2)).max())
 
 
-def profiles(faces: int = FACES, log: Callable[[str], Any] = lambda _: None) -> list[Profile]:
+def profiles(
+    faces: int = FACES, log: Callable[[str], Any] = lambda _: None
+) -> list[PressureProfile]:
     """All cells, cut and uncut, bilateral and opening, on so many slave faces."""
     found = []
     for cells, has_cut in CELLS.items():
@@ -58,7 +59,7 @@ def profiles(faces: int = FACES, log: Callable[[str], Any] = lambda _: None) -> 
     return found
 
 
-def profile_pair(cells: str, cut: bool, faces: int = FACES) -> list[Profile]:
+def profile_pair(cells: str, cut: bool, faces: int = FACES) -> list[PressureProfile]:
     """The profiles of one kind of cells, bilateral and opening."""
     master = faces // COARSER
     recipe = {
@@ -69,7 +70,7 @@ def profile_pair(cells: str, cut: bool, faces: int = FACES) -> list[Profile]:
     }
     mesh = generate(recipe, "half-loaded block")
     case = parse_case(json.dumps(_case(cut)), Path("half-loaded.yaml"))
-    scene = build_scene(case, mesh, False, None, Clock())
+    scene = build_scene(case, mesh)
     problem = ContactProblem(scene)
     place = scene.zones[0].operator.surface.centre[:, 0] + scene.origin[0]
     order = np.argsort(place)
@@ -77,7 +78,7 @@ def profile_pair(cells: str, cut: bool, faces: int = FACES) -> list[Profile]:
     for bilateral in (True, False):
         pressure = problem.solve(1.0, bilateral=bilateral).pressure / PRESSURE
         along = place[order].tolist(), pressure[order].tolist()
-        found.append(Profile(cells, cut, bilateral, *along))
+        found.append(PressureProfile(cells, cut, bilateral, *along))
     return found
 
 

@@ -18,43 +18,45 @@
 A ladder is solved in every direction of its case.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from msgspec import Meta, field, structs
 
 from solver.case import job_name
-from solver.case.descriptions import file_beside
-from solver.case.schemas import LADDERS_SCHEMA
+from solver.case.typed import Number, Positive, Section, read_as
 from solver.case.yaml import read_mapping
+from solver.studies.keys import Counts, Cut, Degree, ErrorName
 
-FILE_NAME = "orders.yaml"
+Slopes = dict[ErrorName, Number]
+_Orders = Annotated[
+    tuple[float | None, float | None],
+    Meta(description="[guaranteed, best], null where not known"),
+]
 
 
-@dataclass(frozen=True)
-class Ladder:
+class Ladder(Section, frozen=True):
     """One case file, and what the divisions of its recipe are multiplied by, level by level.
 
-    Ladders of the same `problem` share their plots; `label` tells those of the same cells apart.
-    `observed` holds the reference code's own
-    slopes by error, `finest` the largest errors allowed at the finest level.
+    Ladders of the same `problem` share their plots; `label` distinguishes those of the same cells.
+    `observed` are the reference code's own slopes by error, `finest` the largest errors allowed at
+    the finest level.
     """
 
     case: Path
-    levels: tuple[int, ...]
+    levels: Counts = ()
     problem: str = ""
     label: str = ""
-    hexahedra: str | None = None
-    observed: Mapping[str, float] = field(default_factory=dict)
-    finest: Mapping[str, float] = field(default_factory=dict)
+    hexahedra: Cut | None = None
+    observed: Slopes = field(name="reference_code", default_factory=dict)
+    finest: dict[ErrorName, Positive] = field(default_factory=dict)
 
     def folder(self, swapped: bool) -> str:
         """The name of the folder in which the results of one direction lie."""
         return job_name(self.case.stem, swapped, self.hexahedra)
 
 
-@dataclass(frozen=True)
-class ReferenceCode:
+class ReferenceCode(Section, frozen=True):
     """The code whose slopes are shown beside ours."""
 
     name: str = "reference code"
@@ -62,23 +64,28 @@ class ReferenceCode:
     remark: str = ""
 
 
-@dataclass(frozen=True)
-class Family:
-    """The ladders of a family.
+class LaddersFile(Section, frozen=True):
+    """The keys of `orders.yaml`.
 
-    `least` and `theory` go by degree ("linear", "quadratic") and error; `theory` holds only what
-    differs from `orders.THEORY`. `shortfalls` says why slopes stay below theory. Where `title` or
-    `description` is empty, `family.yaml` has it.
+    `least` and `theory` go by degree and error; `theory` holds only what differs from
+    `theory.THEORY`. `shortfalls` says why slopes stay below theory. Where `title` or `description`
+    is empty, `family.yaml` has it.
     """
 
-    folder: Path
-    title: str
-    description: str
-    ladders: tuple[Ladder, ...]
-    least: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    theory: Mapping[str, Mapping[str, list[float | None]]] = field(default_factory=dict)
-    reference_code: ReferenceCode = field(default_factory=ReferenceCode)
+    levels: Counts
+    ladders: Annotated[tuple[Ladder, ...], Meta(min_length=1)]
+    title: str = ""
+    description: str = ""
     shortfalls: str = ""
+    least: dict[Degree, Slopes] = field(default_factory=dict)
+    theory: dict[Degree, dict[ErrorName, _Orders]] = field(default_factory=dict)
+    reference_code: ReferenceCode = ReferenceCode()
+
+
+class LadderFamily(LaddersFile, frozen=True, kw_only=True):
+    """The ladders of a family, each with its levels."""
+
+    folder: Path
 
     @property
     def name(self) -> str:
@@ -86,29 +93,9 @@ class Family:
         return self.folder.name
 
 
-def read_ladders(path: Path) -> Family:
+def read_ladders(path: Path) -> LadderFamily:
     """The ladders in a file; `InputError` says what is refused, and what is allowed."""
-    content = read_mapping(path, LADDERS_SCHEMA)
-    return Family(
-        folder=path.resolve().parent,
-        title=content.get("title", ""),
-        description=content.get("description", ""),
-        ladders=tuple(_ladder(path, content, i) for i in range(len(content["ladders"]))),
-        least=content.get("least", {}),
-        theory=content.get("theory", {}),
-        reference_code=ReferenceCode(**content.get("reference_code", {})),
-        shortfalls=content.get("shortfalls", ""),
-    )
-
-
-def _ladder(path: Path, content: Mapping[str, Any], index: int) -> Ladder:
-    item = content["ladders"][index]
-    return Ladder(
-        case=file_beside(path, f"ladders[{index}].case", item["case"]),
-        levels=tuple(item.get("levels", content["levels"])),
-        problem=item.get("problem", ""),
-        label=item.get("label", ""),
-        hexahedra=item.get("hexahedra"),
-        observed=item.get("reference_code", {}),
-        finest=item.get("finest", {}),
-    )
+    content = structs.asdict(read_as(LaddersFile, read_mapping(path), path))
+    levels, ladders = content["levels"], content.pop("ladders")
+    ladders = tuple(structs.replace(one, levels=one.levels or levels) for one in ladders)
+    return LadderFamily(**content, ladders=ladders, folder=path.resolve().parent)

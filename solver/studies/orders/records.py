@@ -1,6 +1,6 @@
 """Refinement ladders as the report shows them: the verdicts of every ladder, and fitted slopes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,20 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from solver.mesh.catalogue import BY_NAME, CellType
-from solver.report.formats import ERROR_LABELS
+from solver.report.html import NORMS
 from solver.report.rows import Row, read_rows
-from solver.studies.fits import (
-    DEGREES,
-    THEORY,
-    Order,
-    Slope,
-    element_size,
-    fit_slope,
-    is_rounding,
-)
-from solver.studies.orders.description import Family, Ladder
+from solver.studies.fits import Fit, fit_order, is_rounding
+from solver.studies.orders.description import Ladder, LadderFamily
+from solver.studies.orders.theory import DEGREES, THEORY, UNKNOWN, Order, element_size
 
 VERDICT = "verdict.json"
+# The errors of ladders in the order in which they are shown.
+ERRORS = {name: what for name, what in NORMS.items() if name != "stress_max"}
 # A slope this much below an order is still that order: levels are few, and not yet the limit.
 LEEWAY = 0.1
 
@@ -34,14 +29,14 @@ class Curve:
     """
 
     name: str
-    family: Family
+    family: LadderFamily
     ladder: Ladder
     rows: Sequence[Row]
 
     @cached_property
     def solved(self) -> list[Row]:
         """The rows that have errors, and therefore a point in the plots."""
-        return [row for row in self.rows if _errors(row) and row.macro_elements]
+        return [row for row in self.rows if row.norms and row.verdict.macro_elements]
 
     @cached_property
     def missing(self) -> list[str]:
@@ -56,8 +51,8 @@ class Curve:
     def slave_cells(self) -> list[CellType]:
         """The cell types of the slave's cells; none where nothing is solved."""
         bodies = self.solved[-1].sides if self.solved else []
-        slaves = [body for body in bodies if body["role"] in ("slave", "both")]
-        return [BY_NAME[name] for body in slaves for name in body["cells"]]
+        slaves = [body for body in bodies if body.role in ("slave", "both")]
+        return [BY_NAME[name] for body in slaves for name in body.cells]
 
     @cached_property
     def label(self) -> str:
@@ -81,30 +76,30 @@ class Curve:
     @cached_property
     def sizes(self) -> list[float]:
         """The mean size of a macro-element over that of the interface, level by level."""
-        return [element_size(row.macro_elements, self.dim) for row in self.solved]
+        return [element_size(row.verdict.macro_elements or 0, self.dim) for row in self.solved]
 
     def errors(self, error: str) -> tuple[np.ndarray, np.ndarray]:
         """Sizes (k,) and errors (k,) of the levels that have this error."""
         pairs = [
             (size, value)
             for size, row in zip(self.sizes, self.solved, strict=True)
-            if (value := _errors(row).get(error)) is not None
+            if (value := row.norms.get(error)) is not None
         ]
         sizes, values = np.array(pairs, dtype=float).reshape(-1, 2).T
         return sizes, values
 
-    def slope(self, error: str) -> Slope | None:
+    def slope(self, error: str) -> Fit | None:
         """The slope over the finest levels."""
-        return fit_slope(*self.errors(error))
+        return fit_order(*self.errors(error))
 
     def rounding(self, error: str) -> bool:
         """Whether the finest levels are exact up to rounding, so that there is no slope."""
         return is_rounding(*self.errors(error))
 
-    def theory(self, error: str) -> Order | None:
-        """What theory says of the slope; None where it says nothing."""
+    def theory(self, error: str) -> Order:
+        """What theory says of the slope."""
         own = self.family.theory.get(self.degree, {}).get(error)
-        return Order(*own) if own else THEORY.get(self.degree, {}).get(error)
+        return Order(*own) if own else THEORY.get(self.degree, {}).get(error, UNKNOWN)
 
     def least(self, error: str) -> float | None:
         """The slope that has to be reached, if any."""
@@ -129,31 +124,30 @@ class Curve:
 
     def below_theory(self, error: str) -> bool:
         """Whether the slope is less than theory guarantees, by more than its spread explains."""
-        slope, theory = self.slope(error), self.theory(error)
-        if slope is None or theory is None or theory.least is None:
+        slope, least = self.slope(error), self.theory(error).least
+        if slope is None or least is None:
             return False
-        return slope.value + max(2 * slope.spread, LEEWAY) < theory.least
+        return slope.value + max(2 * slope.spread, LEEWAY) < least
 
     @cached_property
     def complaints(self) -> list[str]:
         """Levels without a result, slopes and finest errors that are not reached, one line each."""
-        where = f"{self.family.name}/{self.name}"
-        lines = [f"{where}: {line}" for line in self.missing]
-        for error in ERROR_LABELS:
+        lines = [f"{self.family.name}/{self.name}: {line}" for line in self.missing]
+        for error, what in ERRORS.items():
             if self.reached(error) is False:
                 slope = self.slope(error)
                 shown = f"{slope.value:.3f} ± {slope.spread:.3f}" if slope else "not known"
                 asked = f"at least {self.least(error):g} is asked for"
-                lines.append(f"{where}: {ERROR_LABELS[error]}: {shown}; {asked}")
+                lines.append(f"{self.family.name}/{self.name}: {what}: {shown}; {asked}")
             if self.kept(error) is False:
                 found = self.at_finest(error)
                 shown = "not known" if found is None else f"{found:.1e}"
                 asked = f"at most {self.ladder.finest[error]:g} is asked for at the finest level"
-                lines.append(f"{where}: {ERROR_LABELS[error]}: {shown}; {asked}")
+                lines.append(f"{self.family.name}/{self.name}: {what}: {shown}; {asked}")
         return lines
 
 
-def read_curves(family: Family, results: Path) -> list[Curve]:
+def read_curves(family: LadderFamily, results: Path) -> list[Curve]:
     """The curves of a family, from `results/<family>/<ladder>/<level>/verdict.json`.
 
     A ladder's first direction always has one; the other where it has been solved.
@@ -168,11 +162,6 @@ def read_curves(family: Family, results: Path) -> list[Curve]:
             rows = sorted(found, key=lambda row: int(row.folder.name))
             curves.append(Curve(folder.name, family, ladder, rows))
     return curves
-
-
-def _errors(row: Row) -> Mapping[str, float | None]:
-    """Errors against the exact solution, by the names of `ERROR_LABELS`."""
-    return row.verdict.get("errors") or {}
 
 
 def _reason(row: Row) -> str:
@@ -195,4 +184,4 @@ def groups(curves: Sequence[Curve]) -> dict[str, list[Curve]]:
 
 def shown_errors(curves: Sequence[Curve]) -> list[str]:
     """The errors that any of the curves has, in their order."""
-    return [error for error in ERROR_LABELS if any(len(curve.errors(error)[0]) for curve in curves)]
+    return [error for error in ERRORS if any(len(curve.errors(error)[0]) for curve in curves)]

@@ -23,45 +23,62 @@ A goal's `what` is `cpu` or `wall` (seconds of the whole process, from mesh file
 solve`. A point is one series and size; its name is the path of its record: `hexa8/10000`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-import yaml
+from msgspec import Meta, field, structs
 
-from solver.case.descriptions import file_beside, point_of, refuse_twins, refuse_unknown
-from solver.case.reader import Case, parse_case
-from solver.case.schemas import SCALING_SCHEMA
+from solver.case.model import Case
+from solver.case.reader import parse_case
+from solver.case.typed import (
+    ONCE,
+    Positive,
+    Section,
+    Text,
+    read_as,
+    refuse_twins,
+    refuse_unknown,
+)
 from solver.case.yaml import read_mapping
 from solver.mesh.catalogue import BY_NAME
-from solver.studies.scaling import FULL, QUICK
+from solver.mesh.size import Size, of_bodies, of_body
+from solver.studies import FULL, QUICK
+from solver.studies.keys import Count, Name, Seconds, Unknowns
+from solver.studies.points import PointStudy
 
 GROWTH = "growth of "
-# Nodes of an unstructured block for each product of its divisions, and of those of a side: as
-# counted, within a tenth.
-_SIMPLICES = {
-    "TRIA3": (1.155, 2.4),
-    "TRIA6": (4.62, 5.0),
-    "TETRA4": (0.674, 4.8),
-    "TETRA10": (5.0, 26.0),
-}
+_START = 5.0  # seconds: three interpreters, libraries loaded, small mesh
+Division = Annotated[int, Meta(ge=1, le=1000)]
+SizeRange = Annotated[
+    tuple[Unknowns, Unknowns], Meta(description="a list of two sizes, from and to")
+]
+_What = Annotated[
+    str,
+    Meta(
+        pattern=r"^(cpu|wall|memory|pressure|growth of [a-z]+)$(?!\n)",
+        description="cpu, wall, memory, pressure, or `growth of` and a stage",
+    ),
+]
 
 
-@dataclass(frozen=True)
-class Series:
+class SizeSeries(Section, frozen=True, dict=True):
     """One mesh of two blocks at all sizes; `divisions` the proportion of slave and master."""
 
-    name: str
-    title: str
+    name: Name
+    title: Text
     case: Path
-    cells: str
-    divisions: tuple[int, int]
-    slab: bool
-    sizes: tuple[int, ...]
-    fit: tuple[float, float]
+    cells: Literal["TRIA3", "TRIA6", "QUAD4", "QUAD8", "TETRA4", "TETRA10", "HEXA8", "HEXA20"]
+    divisions: Annotated[
+        tuple[Division, Division], Meta(description="a list of two whole numbers, 1 to 1000")
+    ]
+    sizes: Annotated[tuple[Unknowns, ...], ONCE]
+    slab: bool = False
+    fit: SizeRange = (0, 0)
 
     @cached_property
     def template(self) -> dict[str, Any]:
@@ -75,10 +92,10 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Point:
+class ScalingPoint:
     """One series at one size (unknowns that the mesh has at least)."""
 
-    series: Series
+    series: SizeSeries
     size: int
 
     @property
@@ -91,9 +108,22 @@ class Point:
         """The divisions of slave and master: the coarsest mesh that has the unknowns."""
         for finer in range(1, self.size + 1):
             found = self._divisions(finer)
-            if unknowns(self.series.cells, found) >= self.size:
+            if self._mesh(found).unknowns >= self.size:
                 return found
         raise AssertionError("every mesh has more unknowns than divisions")
+
+    def _mesh(self, divisions: Sequence[Sequence[int]]) -> Size:
+        return of_bodies([of_body(self.series.cells, block) for block in divisions])
+
+    @property
+    def mesh(self) -> Size:
+        """The size of the point's mesh."""
+        return self._mesh(self.divisions)
+
+    @property
+    def seconds(self) -> float:
+        """About how long the point takes."""
+        return _START + self.mesh.seconds
 
     def _divisions(self, finer: int) -> tuple[list[int], list[int]]:
         proportion, dim = self.series.divisions, self.series.dim
@@ -114,117 +144,84 @@ class Point:
             mesh["size"] = [width] * (self.series.dim - 1) + [thickness]
             solution = {**template["reference"]["solution"], "base": -thickness}
             content["reference"] = {**template["reference"], "solution": solution}
-        return yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
+        return json.dumps(content, indent=1)
 
     def parsed(self, path: Path) -> Case:
         """The point's case, as of a case file at `path`."""
         return parse_case(self.source(), path)
 
 
-def unknowns(cells: str, divisions: Sequence[Sequence[int]]) -> float:
-    """Unknowns of blocks of so many divisions each: of grids as counted, else about."""
-    kind = BY_NAME[cells]
-    return kind.dim * sum(_nodes(cells, block) for block in divisions)
-
-
-def _nodes(cells: str, divisions: Sequence[int]) -> float:
-    vertices = prod(n + 1 for n in divisions)
-    if cells in ("QUAD4", "HEXA8"):
-        return vertices
-    if cells in ("QUAD8", "HEXA20"):
-        return vertices + sum(n * vertices / (n + 1) for n in divisions)
-    inside, outside = _SIMPLICES[cells]
-    return inside * prod(divisions) + outside * prod(divisions[:-1])
-
-
-@dataclass(frozen=True)
-class Goal:
+class Goal(Section, frozen=True):
     """A number to reach; `others` has what other codes needed for the same work."""
 
-    title: str
-    series: str
-    size: int | None
-    what: str
-    most: float
+    title: Text
+    series: Name
+    what: _What
+    most: Positive
     unit: str
-    others: Mapping[str, float]
+    size: Unknowns | None = None
+    others: dict[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Scaling:
+class _QuickScaling(Section, frozen=True):
+    largest: Unknowns
+    series: Annotated[tuple[Name, ...], ONCE]
+
+
+class ScalingFile(Section, frozen=True):
+    """The keys of `scaling.yaml`."""
+
+    title: Text
+    threads: Count
+    limit: Seconds
+    fit: SizeRange
+    series: Annotated[tuple[SizeSeries, ...], Meta(min_length=1)]
+    quick: _QuickScaling
+    goals: tuple[Goal, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        refuse_twins("series", self.series)
+        names = {series.name for series in self.series}
+        for i, goal in enumerate(self.goals):
+            refuse_unknown(("goals", i, "series"), goal.series, "series", names)
+        for i, name in enumerate(self.quick.series):
+            refuse_unknown(("quick", "series", i), name, "series", names)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scaling(PointStudy):
     """All of it."""
 
-    path: Path
-    title: str
-    size: str
-    threads: int
-    limit: float
-    series: tuple[Series, ...]
+    series: tuple[SizeSeries, ...]
     goals: tuple[Goal, ...]
 
     @cached_property
-    def points(self) -> tuple[Point, ...]:
-        """Every point, the small ones of all series first: a run that is broken off tells most."""
-        every = [Point(series, size) for series in self.series for size in series.sizes]
+    def points(self) -> tuple[ScalingPoint, ...]:
+        """Every point, small ones of all series first: a run that is interrupted shows most."""
+        every = [ScalingPoint(series, int(size)) for series in self.series for size in series.sizes]
         return tuple(sorted(every, key=lambda point: point.size))
-
-    def point(self, name: str) -> Point:
-        """The point of that name; InputError where there is none."""
-        return point_of(self.path, self.points, name)
 
 
 def read_scaling(path: Path, size: str = FULL) -> Scaling:
     """The family in a file, or its quick part; InputError says what is refused, what allowed."""
-    content = read_mapping(path, SCALING_SCHEMA)
-    series = tuple(
-        _series(path, i, item, content["fit"]) for i, item in enumerate(content["series"])
-    )
-    names = [one.name for one in series]
-    refuse_twins(path, "series", series)
+    content = read_as(ScalingFile, read_mapping(path), path)
+    largest = content.quick.largest if size == QUICK else math.inf
+    series = [
+        structs.replace(
+            one,
+            sizes=tuple(sorted(int(n) for n in one.sizes if n <= largest)),
+            fit=one.fit if any(one.fit) else content.fit,
+        )
+        for one in content.series
+        if size != QUICK or one.name in content.quick.series
+    ]
     return Scaling(
         path=path,
-        title=content["title"],
+        title=content.title,
         size=size,
-        threads=content["threads"],
-        limit=float(content["limit"]),
-        series=tuple(_quick(path, content["quick"], series)) if size == QUICK else series,
-        goals=tuple(_goals(path, content.get("goals", ()), names)),
+        threads=content.threads,
+        limit=content.limit,
+        series=tuple(series),
+        goals=content.goals,
     )
-
-
-def _series(path: Path, index: int, item: Mapping[str, Any], fit: Sequence[float]) -> Series:
-    slave, master = item["divisions"]
-    low, high = item.get("fit", fit)
-    return Series(
-        name=item["name"],
-        title=item["title"],
-        case=file_beside(path, f"series[{index}].case", item["case"]),
-        cells=item["cells"],
-        divisions=(slave, master),
-        slab=item.get("slab", False),
-        sizes=tuple(sorted(int(size) for size in item["sizes"])),
-        fit=(float(low), float(high)),
-    )
-
-
-def _quick(path: Path, quick: Mapping[str, Any], series: Sequence[Series]) -> Iterator[Series]:
-    """The small sizes of some series."""
-    known = {one.name: one for one in series}
-    for i, name in enumerate(quick["series"]):
-        refuse_unknown(path, f"quick.series[{i}]", name, "series", known)
-        small = tuple(size for size in known[name].sizes if size <= quick["largest"])
-        yield replace(known[name], sizes=small)
-
-
-def _goals(path: Path, items: Sequence[Mapping[str, Any]], names: Sequence[str]) -> Iterator[Goal]:
-    for i, item in enumerate(items):
-        refuse_unknown(path, f"goals[{i}].series", item["series"], "series", names)
-        yield Goal(
-            title=item["title"],
-            series=item["series"],
-            size=int(item["size"]) if "size" in item else None,
-            what=item["what"],
-            most=float(item["most"]),
-            unit=item["unit"],
-            others=item.get("others", {}),
-        )

@@ -6,66 +6,72 @@ from typing import Any
 
 import numpy as np
 
-from solver.report import measured, stages
-from solver.report.html import environment
+from solver.report import formats, stages
+from solver.report.html import render
+from solver.report.marks import MARKS
+from solver.report.svg import BLUE, GREEN, INK, ORANGE, PURPLE, RED
 from solver.report.tables import as_csv
-from solver.studies.scaling import FULL, words
+from solver.studies.plots import SMALL, PlotLine, draw_bar, draw_lines
+from solver.studies.points import disturbed, facts, outcome, page_name
 from solver.studies.scaling.description import Scaling
-from solver.studies.scaling.figure import SMALL, Drawn, draw_bar, draw_key, draw_plot, look
-from solver.studies.scaling.growth import BY_FACES
 from solver.studies.scaling.records import (
+    BY_FACES,
     OTHER,
     WHOLE,
-    Line,
-    Measured,
+    Reached,
+    ScaledSolve,
+    SeriesSolves,
     failures,
     reached,
-    read_lines,
+    read_series,
 )
 from solver.system.files import write_text
 
-_SIDES = {3: "Space", 2: "Plane"}
-
-
-def page_name(scaling: Scaling) -> str:
-    """The name of the page and of its tables."""
-    return "scaling" if scaling.size == FULL else f"scaling-{scaling.size}"
+# Colour and mark by the number of a line: either shows which it is.
+_COLORS = (BLUE, ORANGE, GREEN, PURPLE, INK, RED)
+# The slope of cost in proportion to size.
+_LINEAR = [1.0]
+_SIDES = {3: "3D", 2: "2D"}
+_PLOTS = {
+    "cpu": "processor time of the whole process, s",
+    "memory": "peak memory, GB",
+    "solve": "processor time of the linear solve, s",
+}
 
 
 def write_scaling(
     scaling: Scaling, results: Path, folder: Path, log: Callable[[str], Any] = print
 ) -> None:
     """Write page and tables into `folder`; `results` holds the records. Logs what was found."""
-    lines, name = read_lines(scaling, results), page_name(scaling)
-    write_text(folder / f"{name}.html", _to_html(scaling, lines))
+    lines, name = read_series(scaling, results), page_name("scaling", scaling.size)
+    write_text(folder / f"{name}.html", _to_html(scaling, lines, name))
     write_text(folder / f"{name}.csv", as_csv(point_rows(lines)))
     write_text(folder / f"{name}-exponents.csv", as_csv(exponent_rows(lines)))
-    for line in lines:
-        log(words.largest(line))
-    log(f"{words.goals(reached(scaling, lines))} {outcome(lines)} Page: {folder / name}.html")
+    goals, points = reached(scaling, lines), [m for line in lines for m in line.points]
+    log(f"{outcome(points)} {goals_reached(goals)} Page: {folder / name}.html")
 
 
-def outcome(lines: Sequence[Line]) -> str:
-    """How many points are solved."""
-    points = [m for line in lines for m in line.points]
-    lost = sum(not m.solved for m in points)
-    text = f"{len(points) - lost} of {len(points)} points are solved."
-    return text + (f" {lost} have no solve, each with its reason." if lost else "")
+def goals_reached(goals: Sequence[Reached]) -> str:
+    """How many goals are reached, of those that the measured sizes can answer."""
+    known = [one.good for one in goals if one.value is not None]
+    if not known:
+        return "These sizes answer no goal."
+    return f"{sum(known)} of {len(known)} goals measured here are reached."
 
 
-def stage_names(lines: Sequence[Line]) -> list[str]:
-    """The stages of all solves in the order of the work, what they do not tell at the end."""
+def stage_names(lines: Sequence[SeriesSolves]) -> list[str]:
+    """The stages of all solves in the order of the work, then the time outside all of them."""
     found = [stage for line in lines for m in line.solved for stage in m.stages]
     return [s for s in stages.colors(found) if s != OTHER] + [OTHER] * bool(found)
 
 
-def point_rows(lines: Sequence[Line]) -> list[dict[str, Any]]:
+def point_rows(lines: Sequence[SeriesSolves]) -> list[dict[str, Any]]:
     """One row for each point, those without a solve too."""
     names = stage_names(lines)
     return [_row(m, names) for line in lines for m in line.points]
 
 
-def _row(m: Measured, names: Sequence[str]) -> dict[str, Any]:
+def _row(m: ScaledSolve, names: Sequence[str]) -> dict[str, Any]:
     record = m.record
     row: dict[str, Any] = {
         "series": m.point.series.name,
@@ -87,122 +93,104 @@ def _row(m: Measured, names: Sequence[str]) -> dict[str, Any]:
     return row | {key: record.get(key) for key in ("threads", "load")}
 
 
-def exponent_rows(lines: Sequence[Line]) -> list[dict[str, Any]]:
+def exponent_rows(lines: Sequence[SeriesSolves]) -> list[dict[str, Any]]:
     """The exponents of every series: whole process, stages, memory, with what they grow with."""
-    rows = []
-    for line in lines:
-        fits = {name: line.growth(name) for name in (WHOLE, *stage_names(lines))}
-        for name, growth in (fits | {"memory": line.memory_growth}).items():
-            if growth:
-                over = "faces" if name in BY_FACES else "unknowns"
-                row: dict[str, Any] = {"series": line.series.name, "cost": name, "over": over}
-                row |= {"exponent": growth.value, "spread": growth.spread}
-                rows.append(row | {"from": growth.low, "to": growth.high})
-    return rows
+    return [
+        {
+            "series": line.series.name,
+            "cost": name,
+            "over": "faces" if name in BY_FACES else "unknowns",
+            "exponent": growth.value,
+            "spread": growth.spread,
+            "from": growth.low,
+            "to": growth.high,
+        }
+        for line in lines
+        for name in (WHOLE, *stage_names(lines), "memory")
+        if (growth := line.growth(name))
+    ]
 
 
-def _to_html(scaling: Scaling, lines: Sequence[Line]) -> str:
-    names = stage_names(lines)
-    solved = [m.record for line in lines for m in line.solved]
-    colors = stages.colors(names)
-    return (
-        environment()
-        .get_template("scaling.html.jinja")
-        .render(
-            scaling=scaling,
-            name=page_name(scaling),
-            outcome=outcome(lines),
-            good=not failures(lines),
-            goals=reached(scaling, lines),
-            sections=[_section(title, lines, dim) for dim, title in _SIDES.items()],
-            pairing=_pairing(lines),
-            lines=lines,
-            stages=colors,
-            bars=[(line, _stage_plot(line, colors), _bar(line, colors)) for line in lines],
-            failures=failures(lines),
-            facts=measured.facts(solved),
-            disturbed=measured.disturbed(solved),
-            words=words,
-            whole=WHOLE,
-            by_faces=BY_FACES,
-        )
+def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
+    points = [m for line in lines for m in line.points]
+    colors, goals, lost = (
+        stages.colors(stage_names(lines)),
+        reached(scaling, lines),
+        failures(lines),
+    )
+    return render(
+        Path(__file__).with_name("page.html.jinja"),
+        title=scaling.title + f" ({scaling.size})" * (name != "scaling"),
+        name=name,
+        outcome=f"{outcome(points)} {goals_reached(goals)}",
+        good=not lost,
+        goals=goals,
+        sections=[_section(title, lines, dim) for dim, title in _SIDES.items()],
+        pairing=_pairing(lines),
+        lines=lines,
+        stages=colors,
+        bars=[
+            (line, _stage_plot(line, colors), _bar(line, colors)) for line in lines if line.solved
+        ],
+        failures=lost,
+        facts=facts(points),
+        disturbed=disturbed(points),
+        whole=WHOLE,
+        by_faces=BY_FACES,
     )
 
 
-def _drawn(lines: Sequence[Line], what: str, over: str) -> list[Drawn]:
-    """A line for each series that has solves: `what` of `Measured.answer` or a stage."""
-    drawn = []
+def _plot_lines(lines: Sequence[SeriesSolves], what: str, over: str) -> list[PlotLine]:
+    """A line for each series: a cost, as `ScaledSolve.cost` names it."""
+    found = []
     for number, line in enumerate(lines):
-        if line.solved:
-            color, mark = look(number)
-            x = np.array([m.record[over] for m in line.solved], dtype=float)
-            cost = [
-                m.answer(what) if what in ("cpu", "memory") else m.cost(what) for m in line.solved
-            ]
-            y = np.maximum(np.array(cost, dtype=float), 1e-3)
-            tips = [_tip(line, m) for m in line.solved]
-            drawn.append(Drawn(line.series.title, x, y, color, mark, tips, line.series.slab))
-    return drawn
+        color, mark = _COLORS[number % len(_COLORS)], MARKS[number % len(MARKS)]
+        x = np.array([m.record[over] for m in line.solved], dtype=float)
+        y = np.maximum([m.cost(what) for m in line.solved], 1e-3)
+        tips = [_tip(line, m) for m in line.solved]
+        slab = line.series.slab
+        dashes = (5.0, 3.0) if slab else ()
+        found.append(PlotLine(line.series.title, x, y, color, mark, dashes, not slab, tips=tips))
+    return found
 
 
-def _tip(line: Line, m: Measured) -> str:
+def _tip(line: SeriesSolves, m: ScaledSolve) -> str:
     return (
-        f"{line.series.title}: {words.count(m.record['dofs'])} unknowns, {m.cpu:.3g} s of "
+        f"{line.series.title}: {formats.count(m.record['dofs'])} unknowns, {m.cpu:.3g} s of "
         f"processor time, {m.memory:.2g} GB, {m.record['linear_solver']}"
     )
 
 
-def _section(title: str, lines: Sequence[Line], dim: int) -> dict[str, Any]:
+def _section(title: str, lines: Sequence[SeriesSolves], dim: int) -> dict[str, Any]:
     """Time and memory of the series of one dimension."""
     mine = [line for line in lines if line.series.dim == dim and line.solved]
-    if not mine:
-        return {"title": title, "plots": [], "keys": [], "sentences": []}
     plots = [
-        draw_plot(
-            f"{title}: {label}",
-            "unknowns",
-            label,
-            _drawn(mine, what, "dofs"),
-        )
-        for what, label in (
-            ("cpu", "processor time of the whole process, s"),
-            ("memory", "peak memory, GB"),
-            ("solve", "processor time of the linear solve, s"),
-        )
+        draw_lines(f"{title}: {label}", "unknowns", label, _plot_lines(mine, what, "dofs"), _LINEAR)
+        for what, label in (_PLOTS if mine else {}).items()
     ]
-    keys = [(draw_key(one), one.name) for one in _drawn(mine, "cpu", "dofs")]
-    return {
-        "title": title,
-        "plots": plots,
-        "keys": keys,
-        "sentences": [words.largest(line) for line in mine],
-    }
+    keys = [(one.key(), one.name) for one in _plot_lines(mine, "cpu", "dofs")]
+    return {"title": title, "plots": plots, "keys": keys}
 
 
-def _pairing(lines: Sequence[Line]) -> Any:
-    """Pairing and intersection over the faces of both sides, in space."""
+def _pairing(lines: Sequence[SeriesSolves]) -> Any:
+    """Pairing and intersection over the faces of both sides, in 3D."""
     mine = [line for line in lines if line.series.dim == 3 and line.solved]
-    if not mine:
-        return ""
     label = "pairing and intersection, processor time, s"
-    return draw_plot(label, "faces of both sides", label, _drawn(mine, "pairing", "faces"))
+    drawn = _plot_lines(mine, "pairing", "faces")
+    return draw_lines(label, "faces of both sides", label, drawn, _LINEAR) if mine else ""
 
 
-def _stage_plot(line: Line, colors: dict[str, str]) -> Any:
+def _stage_plot(line: SeriesSolves, colors: dict[str, str]) -> Any:
     """All stages of a series over its unknowns."""
-    if not line.solved:
-        return ""
     x = np.array([m.record["dofs"] for m in line.solved], dtype=float)
     drawn = [
-        Drawn(stage, x, np.maximum([m.cost(stage) for m in line.solved], 1e-3), color, "circle")
+        PlotLine(stage, x, np.maximum([m.cost(stage) for m in line.solved], 1e-3), color)
         for stage, color in colors.items()
     ]
-    return draw_plot(line.series.title, "unknowns", "processor time, s", drawn, size=SMALL)
+    return draw_lines(line.series.title, "unknowns", "processor time, s", drawn, _LINEAR, SMALL)
 
 
-def _bar(line: Line, colors: dict[str, str]) -> Any:
+def _bar(line: SeriesSolves, colors: dict[str, str]) -> Any:
     """The share of each stage in the largest solve."""
-    if not line.solved:
-        return ""
     largest = line.solved[-1]
     return draw_bar({stage: largest.cost(stage) for stage in colors}, colors)

@@ -1,35 +1,24 @@
 """The points of the scaling family as the page shows them: costs of each, growth of each series."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-from solver.studies.scaling.description import GROWTH, Goal, Point, Scaling, Series
-from solver.studies.scaling.growth import BY_FACES, Growth, fit_growth, window
-from solver.studies.scaling.point import SOLVED
+from solver.studies.fits import Fit, fit_power
+from solver.studies.points import MeasuredPoint, read_record
+from solver.studies.scaling.description import GROWTH, Goal, Scaling, ScalingPoint, SizeSeries
 
 WHOLE, OTHER = "whole", "start-up"
+BY_FACES = ("cut", "pairing")
+"""Stages whose work is the interface: they grow with its faces, not with the unknowns."""
 
 
 @dataclass(frozen=True)
-class Measured:
+class ScaledSolve(MeasuredPoint):
     """One point with its record."""
 
-    point: Point
-    record: Mapping[str, Any]
-
-    @property
-    def solved(self) -> bool:
-        """Whether there is a solve to show."""
-        return self.record["outcome"] == SOLVED
-
-    @property
-    def why_not(self) -> str:
-        """Why there is none."""
-        return f"{self.record['outcome']}: {self.record['reason']}"
+    point: ScalingPoint
 
     @property
     def cpu(self) -> float:
@@ -43,13 +32,9 @@ class Measured:
 
     @cached_property
     def stages(self) -> dict[str, float]:
-        """Processor seconds by stage; the last one is what the stages do not tell."""
+        """Processor seconds by stage; the last one is the time outside all stages."""
         stages = dict(self.record["stage_cpu_seconds"])
         return stages | {OTHER: max(self.cpu - sum(stages.values()), 0.0)}
-
-    def cost(self, stage: str) -> float:
-        """Processor seconds of a stage, or of the whole process."""
-        return self.cpu if stage == WHOLE else self.stages.get(stage, 0.0)
 
     def work(self, stage: str) -> int:
         """What a stage grows with: faces of the interface, or unknowns."""
@@ -60,30 +45,35 @@ class Measured:
         """The largest error of the pressure, relative."""
         return self.record["errors"]["pressure_max"]
 
-    def answer(self, what: str) -> float:
-        """What a goal asks of one point."""
+    def cost(self, what: str) -> float:
+        """What a goal asks of one point, or the processor seconds of a stage."""
         if what == "wall":
             return self.record["process"]["wall"]
-        return {"cpu": self.cpu, "memory": self.memory, "pressure": self.pressure}[what]
+        whole = {"cpu": self.cpu, WHOLE: self.cpu, "memory": self.memory, "pressure": self.pressure}
+        return whole[what] if what in whole else self.stages.get(what, 0.0)
 
 
 @dataclass(frozen=True)
-class Line:
+class SeriesSolves:
     """The points of a series, smallest first."""
 
-    series: Series
-    points: Sequence[Measured]
+    series: SizeSeries
+    points: Sequence[ScaledSolve]
 
     @cached_property
-    def solved(self) -> list[Measured]:
+    def solved(self) -> list[ScaledSolve]:
         """The points that have a solve."""
         return [m for m in self.points if m.solved]
 
     @cached_property
-    def fitted(self) -> list[Measured]:
-        """The points that exponents are fitted to."""
-        chosen = window([m.point.size for m in self.solved], *self.series.fit)
-        return [self.solved[i] for i in chosen]
+    def fitted(self) -> list[ScaledSolve]:
+        """The points that exponents are fitted to: those between the sizes asked for.
+
+        At least the last two. Small sizes are mostly start-up, which does not grow.
+        """
+        low, high = self.series.fit
+        inside = [m for m in self.solved if low <= m.point.size <= high]
+        return inside if len(inside) > 1 else self.solved[-2:]
 
     @property
     def on_large(self) -> bool:
@@ -92,16 +82,16 @@ class Line:
         low, high = self.series.fit
         return bool(sizes) and min(sizes) >= low and max(sizes) >= high
 
-    def growth(self, stage: str) -> Growth | None:
-        """The exponent of a stage, or of the whole process; None where it cannot be told."""
+    def growth(self, what: str) -> Fit | None:
+        """The exponent of a stage, of the whole process or of memory; None where unknown."""
         found = self.fitted
-        return fit_growth([m.work(stage) for m in found], [m.cost(stage) for m in found])
+        return fit_power([m.work(what) for m in found], [m.cost(what) for m in found])
 
     @property
-    def memory_growth(self) -> Growth | None:
-        """The exponent of the peak memory over unknowns."""
-        found = self.fitted
-        return fit_growth([m.record["dofs"] for m in found], [m.memory for m in found])
+    def span(self) -> tuple[int, int] | None:
+        """The unknowns between which exponents are fitted."""
+        sizes = [m.record["dofs"] for m in self.fitted]
+        return (min(sizes), max(sizes)) if sizes else None
 
 
 @dataclass(frozen=True)
@@ -118,44 +108,36 @@ class Reached:
         return self.value is not None and self.value <= self.goal.most
 
 
-def read_lines(scaling: Scaling, folder: Path) -> list[Line]:
+def read_series(scaling: Scaling, folder: Path) -> list[SeriesSolves]:
     """All series with the records of their points in `folder`; one without a record says so."""
-    found = [Measured(point, _read(folder / f"{point.name}.json")) for point in scaling.points]
+    files = ((p, folder / f"{p.name}.json") for p in scaling.points)
+    found = [ScaledSolve(read_record(file, "process", "dofs"), p) for p, file in files]
     return [
-        Line(series, [m for m in found if m.point.series is series]) for series in scaling.series
+        SeriesSolves(series, [m for m in found if m.point.series is series])
+        for series in scaling.series
     ]
 
 
-def _read(path: Path) -> Mapping[str, Any]:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {"outcome": "missing", "reason": "there is no record of this point"}
-
-
-def reached(scaling: Scaling, lines: Sequence[Line]) -> list[Reached]:
+def reached(scaling: Scaling, lines: Sequence[SeriesSolves]) -> list[Reached]:
     """Every goal with its measured number."""
     known = {line.series.name: line for line in lines}
     return [_reached(goal, known.get(goal.series)) for goal in scaling.goals]
 
 
-def _reached(goal: Goal, line: Line | None) -> Reached:
-    if line is None:
-        return Reached(goal, None, "not in this part of the family")
-    if goal.what.startswith(GROWTH):
+def _reached(goal: Goal, line: SeriesSolves | None) -> Reached:
+    if line and goal.what.startswith(GROWTH):
         growth = line.growth(goal.what.removeprefix(GROWTH))
         if growth is None or not line.on_large:
             return Reached(goal, None, "too few of the large sizes are measured")
         return Reached(goal, growth.value, "")
-    m = next((m for m in line.points if m.point.size == goal.size), None)
+    points = line.points if line else ()
+    m = next((m for m in points if m.point.size == goal.size), None)
     if m is None:
         return Reached(goal, None, "not in this part of the family")
-    if not m.solved:
-        return Reached(goal, None, m.why_not)
-    return Reached(goal, m.answer(goal.what), "")
+    return Reached(goal, m.cost(goal.what), "") if m.solved else Reached(goal, None, m.why_not)
 
 
-def failures(lines: Sequence[Line]) -> list[tuple[str, str]]:
+def failures(lines: Sequence[SeriesSolves]) -> list[tuple[str, str]]:
     """Points without a solve, and points whose checks do not hold: (name, why)."""
     lost = []
     for m in (m for line in lines for m in line.points):

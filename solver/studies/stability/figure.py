@@ -1,15 +1,15 @@
 """The map of numerical stability: digits of the pressure, a square a point, three maps abreast."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from markupsafe import Markup
 
 from solver.report import formats
 from solver.report.svg import INK, MUTED, RULE, Drawing
+from solver.studies.points import Record
 
-# Dark is good, and the lightness alone tells it (viridis; van der Walt and Smith).
+# Dark is good, also in greyscale (viridis; van der Walt and Smith).
 _COLORS = (
     (12, "#440154"),
     (10, "#3b528b"),
@@ -24,8 +24,6 @@ MOST_DIGITS = 16
 _FEWEST = 5
 _WIDTH, _HEIGHT, _GAP, _LABEL = 37.0, 19.0, 34.0, 250.0
 _PANELS = {"floor": "floor of double precision", "cured": "solved", "uncured": "without cures"}
-
-Record = Mapping[str, Any]
 
 
 def digits(error: float | None) -> int | None:
@@ -93,11 +91,11 @@ def _draw_point(
     kinds = ("floor_pressure", "floor_stress") if name == "floor" else ("pressure", "stress")
     error, of_stress = (source.get(kind) for kind in kinds)
     found = digits(error)
-    told = source["reason"] or "no floor"
+    text = source["reason"] or "no floor"
     if error is not None:
-        told = f"error of pressure {formats.error(error)}, of stress {formats.error(of_stress)}"
+        text = f"error of pressure {formats.error(error)}, of stress {formats.error(of_stress)}"
     where = f"{record['title']}: {point['label']}, {point['series']}"
-    drawing.open_link(f"#{anchor(record, point)}", f"{where}: {_PANELS[name]}: {told}")
+    drawing.open_link(f"#{anchor(record, point)}", f"{where}: {_PANELS[name]}: {text}")
     if found is None:
         _square(drawing, *place, "–" if name == "floor" else source["word"], NO_RESULT, size=8)
     else:

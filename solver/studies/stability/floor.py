@@ -18,7 +18,7 @@ from collections.abc import Iterator
 import meshio
 import numpy as np
 
-from solver.case.reader import Case
+from solver.case.model import Case
 from solver.mechanics.fem.elasticity import internal_force, nodal_stress
 from solver.mesh import transform
 from solver.simulation.problem import ContactProblem
@@ -46,12 +46,12 @@ def floor(
     amount = fit @ exact.astype(float)
     remainder = (exact - motions.astype(np.longdouble) @ amount).reshape(scene.points.shape)
     found = []
-    for straining in _roundings(remainder):
-        internal = internal_force(scene.points, scene.blocks, straining, extended=True)
+    for deformation in _roundings(remainder):
+        internal = internal_force(scene.points, scene.blocks, deformation, extended=True)
         internal += scene.mean.force(mean_stress)
         left = scene.free.basis.T @ (scene.force - internal).astype(float).ravel()
         pressure = system.multiplier(left)
-        stress = nodal_stress(scene.points, scene.blocks, straining, extended=True)
+        stress = nodal_stress(scene.points, scene.blocks, deformation, extended=True)
         stress += scene.mean.nodal_stress(mean_stress, scene.blocks)
         error = float(np.abs(pressure / state.pressure - 1).max(initial=0.0))
         found.append((error, stress_error(stress, scene, state)))
@@ -79,7 +79,7 @@ def upper_nodes(scene: Scene) -> np.ndarray:
     """Which nodes (n,) of the cut mesh belong to the upper body."""
     upper = np.zeros(len(scene.points), dtype=bool)
     for name, cells in scene.mesh.cells.items():
-        upper[cells[scene.mesh.members(name, scene.volume_groups[UPPER])].ravel()] = True
+        upper[cells[scene.mesh.members(name, scene.given.groups[UPPER])].ravel()] = True
     return upper
 
 

@@ -1,14 +1,16 @@
 """The page of numerical stability, its table for machines, and which points do not hold."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from solver.report import formats
-from solver.report.html import environment
+from solver.report.html import render
 from solver.report.tables import as_csv
-from solver.studies.infsup import page as infsup
+from solver.studies.infsup.page import sections
+from solver.studies.infsup.records import InfSupRecord, failures
+from solver.studies.points import Record
 from solver.studies.stability.figure import anchor, draw_key, draw_map
 from solver.system.errors import InputError
 from solver.system.files import write_text
@@ -25,7 +27,6 @@ MEASURES = {
     "moment": "balance, moments",
     "residual": "residual",
 }
-Record = Mapping[str, Any]
 
 
 def read_records(paths: Sequence[Path]) -> list[Record]:
@@ -46,7 +47,7 @@ def write_stability(
     folder: Path,
     quick: bool,
     log: Callable[[str], Any] = print,
-    theory: infsup.Record | None = None,
+    theory: InfSupRecord | None = None,
 ) -> None:
     """Write the page, the table and the failures of the sweeps into `folder`.
 
@@ -55,7 +56,7 @@ def write_stability(
     """
     stem = "stability-quick" if quick else "stability"
     lines = [line for record in records for line in complaints(record)]
-    lines += infsup.failures(theory) if theory else []
+    lines += failures(theory) if theory else []
     contents = {
         PAGE: _to_html(records, quick, lines, theory),
         TABLE: as_csv([row for record in records for row in _rows(record)]),
@@ -89,24 +90,23 @@ def outcome(records: Sequence[Record]) -> str:
 
 
 def _to_html(
-    records: Sequence[Record], quick: bool, lines: Sequence[str], theory: infsup.Record | None
+    records: Sequence[Record], quick: bool, lines: Sequence[str], theory: InfSupRecord | None
 ) -> str:
-    return (
-        environment()
-        .get_template("stability.html.jinja")
-        .render(
-            records=records,
-            quick=quick,
-            outcome=outcome(records),
-            complaints=lines,
-            theory=infsup.sections(theory) if theory else "",
-            table=f"stability{'-quick' * quick}{TABLE}",
-            map=draw_map(records),
-            key=draw_key(),
-            anchor=anchor,
-            measures=MEASURES,
-            seconds=sum(record["cpu_seconds"] for record in records),
-        )
+    return render(
+        Path(__file__).with_name("page.html.jinja"),
+        title="Numerical stability",
+        records=records,
+        quick=quick,
+        outcome=outcome(records),
+        good=bool(records) and not lines,
+        complaints=lines,
+        theory=sections(theory) if theory else "",
+        table=f"stability{'-quick' * quick}{TABLE}",
+        map=draw_map(records),
+        key=draw_key(),
+        anchor=anchor,
+        measures=MEASURES,
+        seconds=sum(record["cpu_seconds"] for record in records),
     )
 
 

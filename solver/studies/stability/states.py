@@ -1,7 +1,7 @@
 """The exact answer of a sweep's point, in extended precision: a uniform state in each body.
 
     compression  σ = −p n⊗n, both blocks free to widen; n points from the lower block to the upper
-    hydrostatic  σ = −p I in the plane or in space, in both bodies of one material
+    hydrostatic  σ = −p I in 2D or 3D, in both bodies of one material
 
 The blocks are those of the recipes: they stand on a corner of the lower block, over which a corner
 of the upper one comes down by what gap there is. `transform:` moves these corners with the mesh.
@@ -14,7 +14,8 @@ from typing import Any
 import meshio
 import numpy as np
 
-from solver.case.reader import Case, Material
+from solver.case.material import Material
+from solver.case.model import Case
 from solver.mesh import transform
 from solver.studies.stability.sweeps import HYDROSTATIC
 
@@ -40,13 +41,13 @@ class State:
     volumetric: np.ndarray
 
     def displacement(self, points: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Displacement (n, dim) at points (n, dim); `upper` (n,) tells the body."""
+        """Displacement (n, dim) at points (n, dim); `upper` (n,): whether in the upper body."""
         body = upper.astype(int)
         moved = np.einsum("nij,nj->ni", self.strain[body], points - self.corner[body])
         return moved + body[:, None] * self.lowered
 
     def stress_at(self, upper: np.ndarray) -> np.ndarray:
-        """Stress (n, 6) in the bodies that `upper` (n,) tells."""
+        """Stress (n, 6) in the upper body where `upper` (n,), else in the lower one."""
         return self.stress[upper.astype(int)].astype(float)
 
 

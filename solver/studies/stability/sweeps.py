@@ -21,23 +21,63 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta, field
 
-from solver.case.descriptions import file_beside
 from solver.case.expressions import Expression
-from solver.case.reader import Case, parse_case
-from solver.case.schemas import SWEEP_SCHEMA
+from solver.case.model import Case
+from solver.case.reader import parse_case
+from solver.case.typed import ONCE, FieldError, Section, Text, read_as
 from solver.case.yaml import read_mapping
-from solver.system.errors import InputError
 
 COMPRESSION, HYDROSTATIC = "compression", "hydrostatic"
-Value = float | list[float]
+Value = Annotated[
+    float | Annotated[tuple[float, ...], Meta(min_length=1, max_length=3)],
+    Meta(description="a number, or a list of up to three"),
+]
+_SWAPS = {"first": (False,), "swapped": (True,), "both": (False, True)}
+
+
+class _Mesh(Section, frozen=True):
+    case: Path
+    change: dict[str, Any] = field(name="set")
+
+
+class SweepFile(Section, frozen=True):
+    """The keys of a sweep."""
+
+    title: Text
+    breaks: Text
+    values: Annotated[
+        tuple[Value, ...],
+        Meta(
+            min_length=6,
+            description="a list of at least six numbers, or lists of up to three",
+            extra_json_schema={"uniqueItems": True},
+        ),
+    ]
+    quick: Annotated[tuple[Value, ...], ONCE]
+    meshes: Annotated[dict[str, _Mesh], Meta(min_length=1)]
+    order: Annotated[int, Meta(ge=0, description="a whole number, not negative")] = 0
+    state: Literal["compression", "hydrostatic"] = "compression"
+    labels: tuple[Text, ...] = ()
+    beyond: tuple[Value, ...] = ()
+    directions: Literal["first", "swapped", "both"] = "first"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.labels and len(self.labels) != len(self.values):
+            raise FieldError(("labels",), f"must be as many as values: {len(self.values)}")
+        for key in ("quick", "beyond"):
+            for i, value in enumerate(getattr(self, key)):
+                if value not in self.values:
+                    raise FieldError((key, i), "is none of the values")
 
 
 @dataclass(frozen=True)
-class Series:
+class SweepSeries:
     """The points of a sweep on one mesh in one direction."""
 
     mesh: str
@@ -62,7 +102,7 @@ class Sweep:
     values: tuple[Value, ...]
     labels: tuple[str, ...]
     beyond: tuple[Value, ...]
-    series: tuple[Series, ...]
+    series: tuple[SweepSeries, ...]
     cases: Mapping[str, Mapping[str, Any]]
     changes: Mapping[str, Mapping[str, Any]]
 
@@ -78,43 +118,32 @@ def read_sweep(path: Path, quick: bool = False) -> Sweep:
 
     `InputError` says what is refused, and what is allowed.
     """
-    content = read_mapping(path, SWEEP_SCHEMA)
-    values, labels = content["values"], content.get("labels")
-    if labels is not None and len(labels) != len(values):
-        raise InputError(path, "labels", len(labels), f"must be as many as values: {len(values)}")
-    shown = dict(zip(map(str, values), labels or map(_shown, values), strict=True))
-    for key in ("quick", "beyond"):
-        for value in content.get(key, []):
-            if value not in values:
-                raise InputError(path, key, value, "is none of the values")
-    chosen = content["quick"] if quick else values
-    directions = {"first": [False], "swapped": [True], "both": [False, True]}
+    content = read_as(SweepFile, read_mapping(path), path)
+    labels = content.labels or tuple(map(_shown, content.values))
+    shown = dict(zip(content.values, labels, strict=True))
+    chosen = content.quick if quick else content.values
     return Sweep(
         name=path.stem,
         path=path,
-        title=content["title"],
-        breaks=" ".join(content["breaks"].split()),
-        order=content.get("order", 0),
-        state=content.get("state", COMPRESSION),
-        values=tuple(chosen),
-        labels=tuple(shown[str(value)] for value in chosen),
-        beyond=tuple(content.get("beyond", [])),
+        title=content.title,
+        breaks=" ".join(content.breaks.split()),
+        order=content.order,
+        state=content.state,
+        values=chosen,
+        labels=tuple(shown[value] for value in chosen),
+        beyond=content.beyond,
         series=tuple(
-            Series(mesh, swapped)
-            for mesh in content["meshes"]
-            for swapped in directions[content.get("directions", "first")]
+            SweepSeries(mesh, swapped)
+            for mesh in content.meshes
+            for swapped in _SWAPS[content.directions]
         ),
-        cases={name: _base(path, name, item) for name, item in content["meshes"].items()},
-        changes={name: item["set"] for name, item in content["meshes"].items()},
+        cases={name: read_mapping(item.case) for name, item in content.meshes.items()},
+        changes={name: item.change for name, item in content.meshes.items()},
     )
 
 
-def _base(path: Path, name: str, item: Mapping[str, Any]) -> dict[str, Any]:
-    return read_mapping(file_beside(path, f"meshes.{name}.case", item["case"]))
-
-
 def _shown(value: Value) -> str:
-    if isinstance(value, list):
+    if isinstance(value, tuple):
         return " × ".join(f"{v:g}" for v in value)
     if value != 0 and not 1e-3 <= abs(value) < 1e4:
         mantissa, exponent = f"{value:.9e}".split("e")
@@ -138,7 +167,7 @@ def _at(item: Any, value: Value, where: Path, key: str) -> Any:
     if not (isinstance(item, str) and item.startswith("=")):
         return item
     place = np.zeros((1, 3))
-    numbers = value if isinstance(value, list) else [value]
+    numbers = value if isinstance(value, tuple) else (value,)
     place[0, : len(numbers)] = numbers
     found = float(Expression(item[1:], str(where), key)(place)[0])
     # A division or a seed is a whole number.

@@ -27,64 +27,76 @@ A point is one problem, pair, treatment, level and linear solver. Its name is th
 file: `patch-2d/tria3-quad4/lac/4`, `patch-2d/tria3-quad4/lac+cholmod/4`.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-import yaml
+from msgspec import Meta, structs
 
-from solver.case.descriptions import file_beside, point_of, refuse_twins, refuse_unknown
-from solver.case.reader import Case, parse_case
-from solver.case.schemas import STUDY_SCHEMA
+from solver.case.model import Case
+from solver.case.reader import parse_case
+from solver.case.typed import (
+    ONCE,
+    FieldError,
+    Positive,
+    Section,
+    Text,
+    read_as,
+    refuse_twins,
+    refuse_unknown,
+)
 from solver.case.yaml import read_mapping
 from solver.mesh.catalogue import BY_NAME
-from solver.studies.work_precision import FULL, QUICK
+from solver.mesh.size import Size, of_bodies, of_body
+from solver.studies import FULL
+from solver.studies.keys import Cell, Count, Counts, ErrorName, Name, Seconds
+from solver.studies.points import PointStudy
 from solver.system.errors import InputError
 
-FILE_NAME = "study.yaml"
 AUTO = "auto"
+_START = 1.5  # seconds: libraries loaded, mesh made, record written
+_Division = Annotated[int, Meta(ge=2, le=1024, description="a whole number from 2 to 1024")]
+Pair = Annotated[tuple[Cell, Cell], Meta(description="a list of two cell types: slave, master")]
 
 
-class _Plain(yaml.SafeDumper):
-    """Writes out what occurs twice: case files have no aliases."""
-
-    def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002 -- PyYAML asks for it
-        """Always."""
-        return True
-
-
-@dataclass(frozen=True)
-class Treatment:
+class StudyTreatment(Section, frozen=True):
     """A way to treat the interface; `slaves` are the only slave cells that it is for, if any."""
 
-    name: str
-    title: str
-    zone: Mapping[str, Any]
-    slaves: tuple[str, ...] = ()
+    name: Name
+    title: Text
+    zone: Annotated[dict[str, Any], Meta(description="what is set in the contact of a case")]
+    slaves: Annotated[tuple[Cell, ...], ONCE] = ()
 
 
-@dataclass(frozen=True)
-class Reference:
+class Reference(Section, frozen=True):
     """The regular mesh that stands for an exact solution, and how far it may be off, by error."""
 
-    cells: str
-    divisions: tuple[int, int]
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
+    cells: Literal["QUAD4", "QUAD8", "QUAD9"]
+    divisions: Annotated[
+        tuple[_Division, _Division], Meta(description="a list of two whole numbers, 2 at least")
+    ]
+    uncertainty: dict[ErrorName, Positive]
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(Section, frozen=True, dict=True):
     """A case file, the pairs (slave, master) of cell types put into it, and its levels."""
 
-    name: str
-    title: str
-    description: str
+    name: Name
+    title: Text
     case: Path
-    pairs: tuple[tuple[str, str], ...]
-    levels: tuple[int, ...]
+    pairs: Annotated[tuple[Pair, ...], ONCE]
+    levels: Counts
+    description: str = ""
     reference: Reference | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for i, (slave, master) in enumerate(self.pairs):
+            if BY_NAME[slave].dim != BY_NAME[master].dim:
+                raise FieldError(("pairs", i), "must be of one dimension")
 
     @cached_property
     def template(self) -> dict[str, Any]:
@@ -106,15 +118,27 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Point:
+class StudyPoint:
     """What one measurement is of."""
 
     problem: Problem
     slave: str
     master: str
-    treatment: Treatment
+    treatment: StudyTreatment
     level: int
+    repetitions: int
     linear_solver: str = AUTO
+
+    @property
+    def mesh(self) -> Size:
+        """About the size of its mesh."""
+        pairs = zip((self.slave, self.master), self.problem.divisions, strict=True)
+        return of_bodies([of_body(cells, divisions, self.level) for cells, divisions in pairs])
+
+    @property
+    def seconds(self) -> float:
+        """About how long the point takes."""
+        return _START + (1 + self.repetitions) * self.mesh.seconds
 
     @property
     def pair(self) -> str:
@@ -147,25 +171,58 @@ class Point:
             "mesh": mesh,
             "contact": [zone | self.treatment.zone for zone in template["contact"]],
         }
-        return parse_case(yaml.dump(content, Dumper=_Plain), self.problem.case)
+        return parse_case(json.dumps(content), self.problem.case)
 
 
-@dataclass(frozen=True)
-class Study:
+class _SolverChoice(Section, frozen=True):
+    problem: Name
+    pair: Pair
+    treatment: Name
+    solvers: Annotated[tuple[Literal["pardiso", "cholmod", "rslab", "superlu"], ...], ONCE]
+
+
+class _QuickStudy(Section, frozen=True):
+    repetitions: Count
+    levels: Count
+    pairs: Annotated[dict[str, Annotated[tuple[Pair, ...], ONCE]], Meta(min_length=1)]
+
+
+class StudyFile(Section, frozen=True):
+    """The keys of `study.yaml`."""
+
+    title: Text
+    threads: Count
+    repetitions: Count
+    limit: Seconds
+    treatments: Annotated[tuple[StudyTreatment, ...], Meta(min_length=1)]
+    problems: Annotated[tuple[Problem, ...], Meta(min_length=1)]
+    linear_solvers: tuple[_SolverChoice, ...] = ()
+    quick: _QuickStudy | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        refuse_twins("treatments", self.treatments)
+        refuse_twins("problems", self.problems)
+        problems, treatments = _by_name(self.problems), _by_name(self.treatments)
+        for i, item in enumerate(self.linear_solvers):
+            key = ("linear_solvers", i)
+            refuse_unknown((*key, "problem"), item.problem, "problem", problems)
+            refuse_unknown((*key, "treatment"), item.treatment, "treatment", treatments)
+        for name in self.quick.pairs if self.quick else ():
+            refuse_unknown(("quick", "pairs", name), name, "problem", problems)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(PointStudy):
     """All of it. `varied`: (problem, slave, master, treatment, linear solver) beside `auto`."""
 
-    path: Path
-    title: str
-    size: str
-    threads: int
     repetitions: int
-    limit: float
-    treatments: tuple[Treatment, ...]
+    treatments: tuple[StudyTreatment, ...]
     problems: tuple[Problem, ...]
     varied: tuple[tuple[str, str, str, str, str], ...] = ()
 
     @cached_property
-    def points(self) -> tuple[Point, ...]:
+    def points(self) -> tuple[StudyPoint, ...]:
         """Every point, level by level within each curve."""
         curves = [
             (problem, slave, master, treatment, AUTO)
@@ -177,89 +234,44 @@ class Study:
         problems, treatments = _by_name(self.problems), _by_name(self.treatments)
         curves += [(problems[p], s, m, treatments[t], solver) for p, s, m, t, solver in self.varied]
         return tuple(
-            Point(p, s, m, t, k, solver) for p, s, m, t, solver in curves for k in p.levels
+            StudyPoint(p, s, m, t, k, self.repetitions, solver)
+            for p, s, m, t, solver in curves
+            for k in p.levels
         )
-
-    def point(self, name: str) -> Point:
-        """The point of that name; InputError where there is none."""
-        return point_of(self.path, self.points, name)
 
 
 def read_study(path: Path, size: str = FULL) -> Study:
     """The study in a file, or its quick part; InputError says what is refused, what allowed."""
-    content = read_mapping(path, STUDY_SCHEMA)
-    treatments = tuple(
-        Treatment(t["name"], t["title"], t["zone"], tuple(t.get("slaves", ())))
-        for t in content["treatments"]
+    content = read_as(StudyFile, read_mapping(path), path)
+    problems = tuple(
+        structs.replace(problem, levels=tuple(sorted(problem.levels)))
+        for problem in content.problems
     )
-    problems = tuple(_problem(path, i, p) for i, p in enumerate(content["problems"]))
-    refuse_twins(path, "treatments", treatments)
-    refuse_twins(path, "problems", problems)
     study = Study(
         path=path,
-        title=content["title"],
+        title=content.title,
         size=size,
-        threads=content["threads"],
-        repetitions=content["repetitions"],
-        limit=float(content["limit"]),
-        treatments=treatments,
+        threads=content.threads,
+        repetitions=content.repetitions,
+        limit=content.limit,
+        treatments=content.treatments,
         problems=problems,
-        varied=tuple(_varied(path, content, problems, treatments)),
+        varied=tuple(
+            (item.problem, *item.pair, item.treatment, solver)
+            for item in content.linear_solvers
+            for solver in item.solvers
+        ),
     )
-    return study if size == FULL else _quick(study, content)
-
-
-def _problem(path: Path, index: int, item: Mapping[str, Any]) -> Problem:
-    case = file_beside(path, f"problems[{index}].case", item["case"])
-    pairs = tuple((slave, master) for slave, master in item["pairs"])
-    for number, pair in enumerate(pairs):
-        if BY_NAME[pair[0]].dim != BY_NAME[pair[1]].dim:
-            key, allowed = f"problems[{index}].pairs[{number}]", "must be of one dimension"
-            raise InputError(path, key, list(pair), allowed)
-    reference = None
-    if given := item.get("reference"):
-        first, second = given["divisions"]
-        reference = Reference(given["cells"], (first, second), given["uncertainty"])
-    return Problem(
-        name=item["name"],
-        title=item["title"],
-        description=item.get("description", ""),
-        case=case,
-        pairs=pairs,
-        levels=tuple(sorted(item["levels"])),
-        reference=reference,
+    if size == FULL:
+        return study
+    if content.quick is None:
+        raise InputError(path, "quick", None, "this key is needed for the quick study")
+    known, quick = _by_name(problems), content.quick
+    chosen = tuple(
+        structs.replace(known[name], pairs=pairs, levels=known[name].levels[: quick.levels])
+        for name, pairs in quick.pairs.items()
     )
-
-
-def _varied(
-    path: Path,
-    content: Mapping[str, Any],
-    problems: Sequence[Problem],
-    treatments: Sequence[Treatment],
-) -> Iterable[tuple[str, str, str, str, str]]:
-    """The curves whose linear solver is chosen; refuses one whose problem or treatment is not."""
-    known = {"problem": _by_name(problems), "treatment": _by_name(treatments)}
-    for i, item in enumerate(content.get("linear_solvers", ())):
-        for key, names in known.items():
-            refuse_unknown(path, f"linear_solvers[{i}].{key}", item[key], key, names)
-        for solver in item["solvers"]:
-            yield item["problem"], *item["pair"], item["treatment"], solver
-
-
-def _quick(study: Study, content: Mapping[str, Any]) -> Study:
-    """The part under `quick`: a few pairs of some problems, the coarse levels alone."""
-    if "quick" not in content:
-        raise InputError(study.path, "quick", None, "this key is needed for the quick study")
-    quick, problems = content["quick"], _by_name(study.problems)
-    chosen = []
-    for name, pairs in quick["pairs"].items():
-        refuse_unknown(study.path, f"quick.pairs.{name}", name, "problem", problems, pairs)
-        levels = problems[name].levels[: quick["levels"]]
-        kept = tuple((slave, master) for slave, master in pairs)
-        chosen.append(replace(problems[name], pairs=kept, levels=levels))
-    return replace(
-        study, repetitions=quick["repetitions"], problems=tuple(chosen), varied=(), size=QUICK
-    )
+    return replace(study, repetitions=quick.repetitions, problems=chosen, varied=())
 
 
 def _by_name(items: Iterable[Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from markupsafe import Markup
@@ -15,9 +16,11 @@ from solver.report.axes import (
     draw_level,
     round_off,
 )
-from solver.report.marks import MARKS, draw_marks
-from solver.report.svg import INK, MUTED, RED, Drawing, Style
-from solver.studies.work_precision.records import ERRORS, Line, Measured, Panel, shown
+from solver.report.html import NORMS
+from solver.report.marks import MARKS
+from solver.report.svg import INK, MUTED, RED, Drawing
+from solver.studies.plots import PlotLine
+from solver.studies.work_precision.records import LevelLine, Panel, TimedSolve, shown
 
 PLOT, HEIGHT, LEFT, RIGHT, APART = 268, 340, 58, 112, 14
 # A row of the legend, about the width of a letter in it, the height of a label.
@@ -33,48 +36,36 @@ _DASHES: tuple[tuple[float, ...], ...] = ((), (6, 3), (1.5, 3), (7, 2, 1.5, 2))
 
 
 class Looks:
-    """Colour, mark and dashes of every line: one colour a kind of treatment, one mark a line."""
+    """The look of every line: one colour a kind of treatment, one mark a line."""
 
-    def __init__(self, lines: Sequence[Line]):
-        self._looks: dict[str, tuple[str, str, int]] = {}
+    def __init__(self, lines: Sequence[LevelLine]):
+        self._looks: dict[str, PlotLine] = {}
         kinds: dict[str, int] = {}
         for line in lines:
             if line.title not in self._looks:
-                kind = self._kind(line)
+                kind = f"{line.treatment.zone.get('treatment')} {line.linear_solver}"
                 variant = kinds[kind] = kinds.get(kind, -1) + 1
-                color = _COLORS[list(kinds).index(kind) % len(_COLORS)]
-                mark = MARKS[len(self._looks) % len(MARKS)]
-                self._looks[line.title] = color, mark, variant
+                self._looks[line.title] = PlotLine(
+                    line.title,
+                    np.empty(0),
+                    np.empty(0),
+                    color=_COLORS[list(kinds).index(kind) % len(_COLORS)],
+                    mark=MARKS[len(self._looks) % len(MARKS)],
+                    dashes=_DASHES[variant % len(_DASHES)],
+                    filled=not variant,
+                    width=1.7,
+                )
 
-    @staticmethod
-    def _kind(line: Line) -> str:
-        """What lines of one colour have in common."""
-        return f"{line.treatment.zone.get('treatment')} {line.linear_solver}"
-
-    def line(self, title: str) -> dict[str, Style]:
-        """The style of a treatment's line."""
-        color, _, variant = self._looks[title]
-        dashes = _DASHES[variant % len(_DASHES)]
-        style: dict[str, Style] = {"stroke": color, "stroke_width": 1.7}
-        return style | {"stroke_dasharray": dashes} if dashes else style
-
-    def draw_marks(self, drawing: Drawing, title: str, at: np.ndarray, size: float = 3.5) -> None:
-        """Draw the marks of a treatment."""
-        color, mark, variant = self._looks[title]
-        draw_marks(drawing, mark, at, color, filled=not variant, size=size)
-
-    def draw_key(self, drawing: Drawing, title: str, x: float, y: float) -> None:
-        """Draw a piece of a treatment's line with its mark, 38 pixels long, and its name."""
-        drawing.line(x, y, x + 38, y, **self.line(title))
-        self.draw_marks(drawing, title, np.array([[x + 19.0, y]]))
-        drawing.text(x + 44, y + 4, title, color=INK)
+    def __getitem__(self, title: str) -> PlotLine:
+        """A line of a treatment's look, without points."""
+        return self._looks[title]
 
 
 def draw_figure(panel: Panel, looks: Looks) -> Markup:
     """All pairs of a panel side by side, with the same scales."""
     pairs = panel.pairs
     width = LEFT + len(pairs) * (PLOT + APART) - APART + RIGHT
-    name = ERRORS[panel.error]
+    name = NORMS[panel.error]
     legend = _legend(panel, width)
     drawing = Drawing(
         width,
@@ -83,7 +74,9 @@ def draw_figure(panel: Panel, looks: Looks) -> Markup:
     )
     drawing.text(LEFT, HEIGHT + 10, panel.problem.title, weight="bold")
     for title, at, row in legend:
-        looks.draw_key(drawing, title, at, HEIGHT + 6 + _ROW * row)
+        level = HEIGHT + 6 + _ROW * row
+        looks[title].draw_key(drawing, at, level, 38)
+        drawing.text(at + 44, level + 4, title, color=INK)
     points = [m for line in panel.lines for m in line.having(panel.error)]
     times = np.array([[m.time.low, m.time.high] for m in points])
     errors = np.array([shown(m.error(panel.error) or 0) for m in points])
@@ -100,14 +93,15 @@ def draw_figure(panel: Panel, looks: Looks) -> Markup:
         draw_level(drawing, x, y, LIMIT, "0.1 %" if last else "", RED)
         if panel.uncertainty:
             label = "reference ±" if last else ""
-            # Its label keeps off that of the limit.
+            # Its label must not cover the label of the limit.
             below = float(y(panel.uncertainty) - y(LIMIT))
             lowered = math.copysign(max(0.0, _LABEL - abs(below)), below)
             draw_level(drawing, x, y, panel.uncertainty, label, MUTED, (6, 4), lowered)
         drawing.text(start + PLOT, 14, pair, "end", color=INK, weight="bold")
         for line in panel.lines:
             if line.pair == pair:
-                _draw_line(drawing, x, y, line, panel.error, looks)
+                for run in _runs(line, panel.error, looks[line.title]):
+                    run.draw(drawing, x, y)
     return drawing.svg()
 
 
@@ -147,37 +141,35 @@ def _heights(
     return Scale(low, top, bottom - _STRIP, 42, log=True)
 
 
-def _draw_line(drawing: Drawing, x: Scale, y: Scale, line: Line, error: str, looks: Looks) -> None:
-    """A line through its levels; across each mark the range of times, larger marks on finer ones.
+def _runs(line: LevelLine, error: str, look: PlotLine) -> list[PlotLine]:
+    """A line through its levels, with the range of times; larger marks on finer levels.
 
-    The line is broken where a level between has no solve.
+    It is broken where a level between has no solve.
     """
-    style = looks.line(line.title)
-    for run in _unbroken(line, error):
-        times = np.array([[m.time.low, m.time.median, m.time.high] for m in run])
-        heights = y([shown(m.error(error) or 0) for m in run])
-        at = np.column_stack([x(times[:, 1]), heights])
-        drawing.polygons(at[None], closed=False, **style)
-        ends = np.stack([x(times[:, [0, 2]]), np.repeat(heights[:, None], 2, axis=1)], axis=2)
-        drawing.polygons(ends, closed=False, stroke=style["stroke"], stroke_width=1)
-        for m, place in zip(run, at, strict=True):
-            rank = line.levels.index(m)
-            drawing.open_link("#", _tip(line, m, error))
-            looks.draw_marks(drawing, line.title, place[None], 2.3 + 0.6 * rank)
-            drawing.close_link()
+    return [
+        replace(
+            look,
+            x=np.array([m.time.median for m in run]),
+            y=np.array([shown(m.error(error) or 0) for m in run]),
+            spans=np.array([[m.time.low, m.time.high] for m in run]),
+            sizes=[2.3 + 0.6 * line.levels.index(m) for m in run],
+            tips=[_tip(line, m, error) for m in run],
+        )
+        for run in _unbroken(line, error)
+    ]
 
 
-def _tip(line: Line, m: Measured, error: str) -> str:
+def _tip(line: LevelLine, m: TimedSolve, error: str) -> str:
     return (
         f"{line.title}, {m.label}: error {m.error(error):.2g}, {m.time.median:.3g} s "
         f"({m.time.low:.3g} … {m.time.high:.3g} s), {m.record['dofs']} unknowns"
     )
 
 
-def _unbroken(line: Line, error: str) -> list[list[Measured]]:
+def _unbroken(line: LevelLine, error: str) -> list[list[TimedSolve]]:
     """Runs of neighbouring levels that have this error."""
     having = line.having(error)
-    runs: list[list[Measured]] = [[]]
+    runs: list[list[TimedSolve]] = [[]]
     for m in line.levels:
         if m in having:
             runs[-1].append(m)
@@ -187,6 +179,6 @@ def _unbroken(line: Line, error: str) -> list[list[Measured]]:
 
 
 def draw_note(panel: Panel) -> str:
-    """How the marks tell the levels, in words."""
+    """How the marks show the levels, in words."""
     levels = ", ".join(map(str, panel.problem.levels))
     return f"Marks grow with the level: {levels} times the divisions of the coarsest mesh."

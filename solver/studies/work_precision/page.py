@@ -4,33 +4,29 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver.report import measured, raster, stages
-from solver.report.html import environment
+from solver.report import stages
+from solver.report.html import NORMS, render
 from solver.report.tables import as_csv
+from solver.studies.points import REFUSED, SOLVED, disturbed, facts, outcome, page_name
 from solver.studies.timing import TOTAL, spread
-from solver.studies.work_precision import FULL, words
 from solver.studies.work_precision.description import AUTO, Problem, Study
 from solver.studies.work_precision.figure import LIMIT, Looks, draw_figure, draw_note
-from solver.studies.work_precision.point import SOLVED
 from solver.studies.work_precision.records import (
     ERRORS,
     TARGETS,
-    Line,
-    Measured,
+    TIE,
+    LevelLine,
     Panel,
+    TimedSolve,
     failures,
     lines,
     panels,
     read_points,
 )
+from solver.system.files import write_text
 
 # The errors that the table at the top shows.
 _OVERVIEW = ("pressure_l2", "pressure_means", "displacement_l2", "stress_l2")
-
-
-def page_name(study: Study) -> str:
-    """The name of the page, of its table and of the folder of its figures."""
-    return "study" if study.size == FULL else f"study-{study.size}"
 
 
 def write_study(
@@ -40,41 +36,28 @@ def write_study(
 
     Logs one line: what was measured, and where the page is.
     """
-    from solver.system.files import replacing, write_text
-
-    points = read_points(study, results)
-    name = page_name(study)
+    points, name = read_points(study, results), page_name("study", study.size)
     sections = [_section(problem, points) for problem in study.problems]
     solvers = _linear_solvers(study, points)
-    contents = {f"{name}.html": _to_html(study, points, sections, solvers)}
-    contents[f"{name}.csv"] = as_csv(rows(points))
-    figures = {
-        f"{name}/{part['file']}": part["figure"]
-        for section in (*sections, *solvers)
-        for part in section["panels"]
-    }
-    for file, content in (contents | figures).items():
-        write_text(folder / file, content)
-    for file, figure in figures.items() if raster.available() else ():
-        with replacing((folder / file).with_suffix(".png")) as temporary:
-            temporary.write_bytes(raster.to_png(figure))
+    for section in (*sections, *solvers):
+        for part in section["panels"]:
+            write_text(folder / name / part["file"], part["figure"])
+    write_text(folder / f"{name}.csv", as_csv(rows(points)))
+    write_text(folder / f"{name}.html", _to_html(study, points, name, sections, solvers))
     log(f"{outcome(points)} Page: {folder / name}.html")
 
 
-def outcome(points: Sequence[Measured]) -> str:
-    """How many points there are, and how many have no solve."""
-    lost = sum(not m.solved for m in points)
-    text = f"{len(points) - lost} of {len(points)} points are measured."
-    return text + (f" {lost} have no solve, each with its reason." if lost else "")
-
-
-def rows(points: Sequence[Measured]) -> list[dict[str, Any]]:
+def rows(points: Sequence[TimedSolve]) -> list[dict[str, Any]]:
     """One row for each point, those without a solve too: errors, and times with their spread."""
-    names = dict.fromkeys(stage for m in points for stage in m.record["times"])
-    return [_row(m, list(names)) for m in points]
+    names = _stage_names(points)
+    return [_row(m, names) for m in points]
 
 
-def _row(m: Measured, stage_names: Sequence[str]) -> dict[str, Any]:
+def _stage_names(points: Sequence[TimedSolve]) -> list[str]:
+    return list(dict.fromkeys(stage for m in points for stage in m.record.get("times", ())))
+
+
+def _row(m: TimedSolve, stage_names: Sequence[str]) -> dict[str, Any]:
     record, p = m.record, m.point
     row = {
         "problem": p.problem.name,
@@ -90,7 +73,7 @@ def _row(m: Measured, stage_names: Sequence[str]) -> dict[str, Any]:
     row |= {error: m.error(error) for error in ERRORS}
     for stage in stage_names:
         for kind in ("wall", "cpu"):
-            values = record["times"].get(stage, {}).get(kind)
+            values = record.get("times", {}).get(stage, {}).get(kind)
             found = spread(values) if values else None
             for key in ("median", "low", "high"):
                 row[f"{stage}_{kind}_{key}"] = getattr(found, key, None)
@@ -99,94 +82,72 @@ def _row(m: Measured, stage_names: Sequence[str]) -> dict[str, Any]:
     return row | {"threads": record.get("threads"), "load": record.get("load")}
 
 
-def _section(problem: Problem, points: Sequence[Measured]) -> dict[str, Any]:
-    """A problem: its words, and its panels with their figures, tables and paragraphs."""
+def _section(problem: Problem, points: Sequence[TimedSolve]) -> dict[str, Any]:
+    """A problem: its panels with figures and tables, and where the time goes."""
     mine = [m for m in points if m.point.problem is problem and m.point.linear_solver == AUTO]
-    found = lines(mine)
-    return {
-        "id": problem.name,
-        "title": problem.title,
-        "description": problem.description,
-        "reference": problem.reference,
-    } | _shown(problem, found)
+    return {"id": problem.name, "problem": problem} | _shown(problem, lines(mine))
 
 
-def _shown(problem: Problem, found: Sequence[Line]) -> dict[str, Any]:
+def _shown(problem: Problem, found: Sequence[LevelLine], prefix: str = "") -> dict[str, Any]:
     looks = Looks(found)
+    finest = ((line, [m for m in line.levels if m.solved][-1:]) for line in found)
     return {
-        "panels": [_part(panel, looks) for panel in panels(problem, found)],
-        "costs": _costs(found),
+        "panels": [_part(panel, looks, prefix) for panel in panels(problem, found)],
+        "costs": [(line, m) for line, last in finest for m in last],
     }
 
 
-def _part(panel: Panel, looks: Looks) -> dict[str, Any]:
+def _part(panel: Panel, looks: Looks, prefix: str) -> dict[str, Any]:
     return {
         "panel": panel,
-        "file": f"{panel.name}.svg",
+        "file": f"{prefix}{panel.name}.svg",
         "figure": draw_figure(panel, looks),
         "note": draw_note(panel),
-        "text": words.paragraph(panel),
-        "fastest": {target: panel.ranked(target)[:1] for target in TARGETS},
+        "quickest": {target: panel.quickest(target) for target in TARGETS},
     }
 
 
-def _costs(found: Sequence[Line]) -> list[tuple[Line, Measured]]:
-    """The finest solve of every line, for the table of where the time goes."""
-    return [
-        (line, solved[-1]) for line in found if (solved := [m for m in line.levels if m.solved])
-    ]
+def _linear_solvers(study: Study, points: Sequence[TimedSolve]) -> list[dict[str, Any]]:
+    """A section for each problem and pair on which the linear solver is varied.
 
-
-def _linear_solvers(study: Study, points: Sequence[Measured]) -> list[dict[str, Any]]:
-    """A section for each problem and pair on which the linear solver is varied."""
-    problems = {problem.name: problem for problem in study.problems}
+    The linear solver changes the time alone: one error is enough.
+    """
     sections = []
-    for name, slave, master, treatment in dict.fromkeys(v[:4] for v in study.varied):
+    for chosen in dict.fromkeys(varied[:4] for varied in study.varied):
         mine = [
             m
             for m in points
             for p in [m.point]
-            if (p.problem.name, p.slave, p.master, p.treatment.name)
-            == (name, slave, master, treatment)
+            if (p.problem.name, p.slave, p.master, p.treatment.name) == chosen
         ]
-        problem = problems[name]
-        shown = _shown(problem, lines(mine))
-        # The linear solver changes the time; one error tells what was bought with it.
-        first = shown["panels"][:1]
-        for part in first:
-            part["file"] = f"linear-solver-{part['file']}"
-        title = f"{problem.title}, {slave}–{master}"
-        sections.append({"title": title} | shown | {"panels": first})
+        found = _shown(mine[0].point.problem, lines(mine), "linear-solver-")
+        sections.append(found | {"panels": found["panels"][:1]})
     return sections
 
 
 def _to_html(
     study: Study,
-    points: Sequence[Measured],
+    points: Sequence[TimedSolve],
+    name: str,
     sections: Sequence[dict[str, Any]],
     solvers: Sequence[dict[str, Any]],
 ) -> str:
-    solved = [m.record for m in points if m.solved]
-    return (
-        environment()
-        .get_template("study.html.jinja")
-        .render(
-            study=study,
-            name=page_name(study),
-            sections=sections,
-            solvers=solvers,
-            outcome=outcome(points),
-            failures=failures(points),
-            facts=measured.facts(solved),
-            disturbed=measured.disturbed(solved),
-            good=all(m.record["outcome"] in (SOLVED, "refused") for m in points),
-            repetitions=study.repetitions,
-            targets=TARGETS,
-            limit=LIMIT,
-            errors=ERRORS,
-            overview=_OVERVIEW,
-            png=raster.available(),
-            words=words,
-            stages=stages.colors(s for m in points for s in m.record["times"] if s != TOTAL),
-        )
+    return render(
+        Path(__file__).with_name("page.html.jinja"),
+        title=study.title + f" ({study.size})" * (name != "study"),
+        name=name,
+        sections=sections,
+        solvers=solvers,
+        outcome=outcome(points),
+        good=all(m.record["outcome"] in (SOLVED, REFUSED) for m in points),
+        failures=failures(points),
+        facts=facts(points),
+        disturbed=disturbed(points),
+        repetitions=study.repetitions,
+        targets=TARGETS,
+        tie=f"{100 * (TIE - 1):.0f} %",
+        limit=LIMIT,
+        errors=NORMS,
+        overview=_OVERVIEW,
+        stages=stages.colors(s for s in _stage_names(points) if s != TOTAL),
     )

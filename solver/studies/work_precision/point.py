@@ -1,80 +1,63 @@
-"""One point of the study: measured in a process of its own, and recorded whatever happens there.
+"""One point of the study, measured in a process of its own.
 
-The record is a JSON object:
+Beside the keys of `studies.points` its record has:
 
-    point problem slave master treatment level linear_solver     what it is of
-    outcome reason           solved, refused, failed or crashed, and why
-    dim dofs macro_elements iterations factor                    the solve's size; who solved it
-    errors                   against the exact solution, by the names of solver.verification.norms
-    times                    by stage and `total`: wall and cpu seconds of every repetition
-    process                  wall and cpu seconds, peak memory in MB, of the process up to the end
-                             of its first solve: start-up, meshing, one solve
-    whole                    wall seconds that the point took, all repetitions included
-    threads cores load machine     what it ran on; load: the machine's when it began, 1 minute
+problem slave master treatment level linear_solver     what it is of
+dim dofs macro_elements iterations factor              the solve's size; its linear solver
+errors                   against the exact solution, by the names of `verification.norms`
+times                    by stage and `total`: wall and cpu seconds of every repetition
+process                  wall and cpu seconds, peak memory in MB, of the process up to the end
+of its first solve: start-up, meshing, one solve
 """
 
 import json
-import os
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from solver.studies.work_precision.description import Point, Study
-from solver.system.clock import now
+from solver.studies.points import SOLVED, Record, measure_apart, surroundings
+from solver.studies.timing import TOTAL, repeated, spread
+from solver.studies.work_precision.description import Study, StudyPoint, read_study
+from solver.system.clock import SOLVING, Clock, now
 from solver.system.errors import InputError
 from solver.system.files import replacing
-from solver.system.process import cores_for, run_apart
+from solver.system.process import cores_for, used_since
 
-SOLVED = "solved"
-_UNKNOWN: dict[str, Any] = {
-    "dim": None,
-    "dofs": None,
-    "macro_elements": None,
-    "iterations": None,
-    "factor": None,
-    "errors": {},
-    "times": {},
-    "process": {},
-    "machine": {},
-}
+_UNKNOWN: dict[str, Any] = dict.fromkeys(
+    ("dim", "dofs", "macro_elements", "iterations", "factor")
+) | {key: {} for key in ("errors", "times", "process", "machine")}
 
 
-def measure_apart(study: Study, point: Point, output: Path, reference: Path | None) -> str:
+def measure_point(study: Study, point: StudyPoint, output: Path, reference: Path | None) -> str:
     """Measure a point in a new process, write its record to `output`; the record in one line.
 
-    `reference` is the result that stands for an exact solution, where the problem has none. Raises
-    InputError where the machine has not the cores that the study asks for.
+    `reference` is the result that is taken for exact, where the problem has no exact solution.
+    Raises InputError where the machine has not the cores that the study asks for.
     """
-    cores = cores_for(study.threads)
+    started, cores = now(), cores_for(study.threads)
     if len(cores) < study.threads:
         allowed = f"more than the {len(cores)} cores that may be used here"
         raise InputError(study.path, "threads", study.threads, allowed)
-    about = _identity(point) | {
-        "threads": study.threads,
-        "cores": cores,
-        "load": round(os.getloadavg()[0], 2),
+    about = {
+        "point": point.name,
+        "problem": point.problem.name,
+        "slave": point.slave,
+        "master": point.master,
+        "treatment": point.treatment.name,
+        "level": point.level,
+        "linear_solver": point.linear_solver,
     }
-    started = now()
+    about |= surroundings(cores)
+    job = {"study": str(study.path), "size": study.size, "point": point.name}
+    job["reference"] = str(reference or "")
     with replacing(output) as temporary:
-        job = {
-            "study": str(study.path),
-            "size": study.size,
-            "point": point.name,
-            "reference": str(reference) if reference else None,
-            "output": str(temporary),
-            "started": started,
-        }
-        found = _UNKNOWN | _in_process(job, study.limit, cores)
+        found = _UNKNOWN | measure_apart(measure, job, temporary, cores, study.limit)
         record = about | found | {"whole": now() - started}
         temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    return told(record)
+    return _line(record)
 
 
-def told(record: Mapping[str, Any]) -> str:
-    """What came of a point, in one line."""
-    from solver.studies.timing import TOTAL, spread
-
+def _line(record: Record) -> str:
     if record["outcome"] != SOLVED:
         return f"{record['point']}: {record['outcome']}: {record['reason']}"
     time = spread(record["times"][TOTAL]["wall"])
@@ -84,26 +67,40 @@ def told(record: Mapping[str, Any]) -> str:
     )
 
 
-def _in_process(job: Mapping[str, Any], limit: float, cores: list[int]) -> dict[str, Any]:
-    """What the measuring process found, or why it found nothing."""
-    command = [sys.executable, "-m", "solver.studies.work_precision.measure", json.dumps(job)]
-    done = run_apart(command, cores, limit)
-    if done.status == 0:
-        return json.loads(Path(job["output"]).read_text(encoding="utf-8"))
-    return _ended("failed" if done.status is None else "crashed", done.reason)
+def measure(job: Mapping[str, Any]) -> dict[str, Any]:
+    """Measure a point in this process: a first solve as a warm-up, then the repetitions.
 
+    Raises InputError and SolveError.
+    """
+    from solver.mechanics.linear.direct import force_solver
+    from solver.simulation.simulate import simulate
+    from solver.studies.work_precision.reference import read_reference
+    from solver.system.provenance import gather
+    from solver.verification.norms import errors
+    from solver.verification.run import mesh_of
 
-def _ended(outcome: str, reason: str) -> dict[str, Any]:
-    return {"outcome": outcome, "reason": reason}
+    study = read_study(Path(job["study"]), job["size"])
+    point = study.point(job["point"])
+    case = point.case()
+    mesh = mesh_of(case)
 
+    def run(clock: Clock) -> Any:
+        return simulate(case, mesh, clock=clock)
 
-def _identity(point: Point) -> dict[str, Any]:
+    with force_solver(point.linear_solver):
+        solution = run(Clock())
+        process = used_since(job["started"])
+        times = repeated(run, study.repetitions)
+    exact = read_reference(Path(job["reference"])) if job["reference"] else None
+    order = dict.fromkeys([stage for stage in (*SOLVING, *times) if stage in times])
     return {
-        "point": point.name,
-        "problem": point.problem.name,
-        "slave": point.slave,
-        "master": point.master,
-        "treatment": point.treatment.name,
-        "level": point.level,
-        "linear_solver": point.linear_solver,
+        "dim": solution.mesh.points.shape[1],
+        "dofs": solution.dofs,
+        "macro_elements": solution.macro_elements,
+        "iterations": solution.iterations,
+        "factor": solution.linear_solver,
+        "errors": errors(solution, exact),
+        "times": {stage: times[stage] for stage in order},
+        "process": process,
+        "machine": gather(case.path, None),
     }

@@ -1,46 +1,40 @@
 """The study's points as the page shows them: their records, lines of levels, the cheapest way."""
 
-import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from solver.mechanics.linear.backends import BACKENDS
 from solver.report.axes import EPSILON
-from solver.studies.fits import ROUND_OFF, Slope, fit_slope
+from solver.studies.fits import ROUND_OFF, Fit, fit_order
+from solver.studies.points import MeasuredPoint, read_record
 from solver.studies.timing import TOTAL, Spread, medians, spread
-from solver.studies.work_precision.description import AUTO, Point, Problem, Study, Treatment
-from solver.studies.work_precision.point import SOLVED
+from solver.studies.work_precision.description import (
+    AUTO,
+    Problem,
+    Study,
+    StudyPoint,
+    StudyTreatment,
+)
 
-# Errors in the order in which they are shown, with what they are errors of.
-ERRORS = {
-    "pressure_l2": "pressure, L2",
-    "pressure_means": "pressure, macro-element means",
-    "pressure_max": "pressure, maximum",
-    "pressure_oscillation": "pressure, oscillation",
-    "displacement_l2": "displacement, L2",
-    "displacement_h1": "displacement, H1",
-    "stress_l2": "stress, L2",
-    "stress_max": "stress, maximum",
-}
-_NUMBER = re.compile(r"\b\d[\d.e+-]*")
+# Errors in the order in which they are shown.
+ERRORS = (
+    *("pressure_l2", "pressure_means", "pressure_max", "pressure_oscillation"),
+    *("displacement_l2", "displacement_h1", "stress_l2", "stress_max"),
+)
 TARGETS = {1e-2: "1 %", 1e-3: "0.1 %", 1e-4: "0.01 %", 1e-6: "10⁻⁶"}
+TIE = 1.1
+"""Times of two treatments that differ by less than this factor are equal within noise."""
+_NUMBER = re.compile(r"\b\d[\d.e+-]*")
 
 
 @dataclass(frozen=True)
-class Measured:
+class TimedSolve(MeasuredPoint):
     """One point of the study with its record."""
 
-    point: Point
-    record: Mapping[str, Any]
-
-    @property
-    def solved(self) -> bool:
-        """Whether there is a solve to show."""
-        return self.record["outcome"] == SOLVED
+    point: StudyPoint
 
     @cached_property
     def time(self) -> Spread:
@@ -60,7 +54,7 @@ class Measured:
 
     def error(self, name: str) -> float | None:
         """An error against the exact solution; None where there is none."""
-        return self.record["errors"].get(name)
+        return self.record["errors"].get(name) if self.solved else None
 
     @property
     def label(self) -> str:
@@ -69,46 +63,47 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Line:
+class LevelLine:
     """The levels of one problem, pair, treatment and linear solver, coarsest first."""
 
     problem: Problem
     pair: str
-    treatment: Treatment
+    treatment: StudyTreatment
     linear_solver: str
-    levels: Sequence[Measured]
+    levels: Sequence[TimedSolve]
 
     @property
     def title(self) -> str:
         """Its treatment, and the linear solver where that is chosen."""
-        if self.linear_solver == AUTO:
-            return self.treatment.title
-        return f"{self.treatment.title}, {BACKENDS[self.linear_solver].name}"
+        return _title(self.treatment, self.linear_solver)
 
-    def having(self, error: str) -> list[Measured]:
+    def having(self, error: str) -> list[TimedSolve]:
         """The levels that are solved and have this error."""
-        return [m for m in self.levels if m.solved and m.error(error) is not None]
+        return [m for m in self.levels if m.error(error) is not None]
 
-    def reaching(self, error: str, target: float) -> list[Measured]:
+    def values(self, error: str) -> list[float]:
+        """The errors of these levels."""
+        return [m.error(error) or 0.0 for m in self.having(error)]
+
+    def reaching(self, error: str, target: float) -> list[TimedSolve]:
         """The levels from which on no error is above the target: one by accident does not count."""
-        found: list[Measured] = []
-        for m in reversed(self.having(error)):
-            if not (m.error(error) or 0) <= target:
+        found: list[TimedSolve] = []
+        for m, value in zip(
+            reversed(self.having(error)), reversed(self.values(error)), strict=True
+        ):
+            if not value <= target:
                 break
             found.append(m)
         return found
 
-    def order(self, error: str) -> Slope | None:
+    def order(self, error: str) -> Fit | None:
         """The observed order over the finest levels."""
-        found = self.having(error)
-        return fit_slope([1 / m.point.level for m in found], [m.error(error) or 0 for m in found])
+        return fit_order([1 / m.point.level for m in self.having(error)], self.values(error))
 
     def at_round_off(self, error: str) -> bool:
         """Whether every level is solved and its error rounding."""
-        found = self.having(error)
-        return len(found) == len(self.levels) and all(
-            (m.error(error) or 0) <= ROUND_OFF for m in found
-        )
+        found = self.values(error)
+        return len(found) == len(self.levels) and all(value <= ROUND_OFF for value in found)
 
 
 @dataclass(frozen=True)
@@ -117,7 +112,7 @@ class Panel:
 
     problem: Problem
     error: str
-    lines: Sequence[Line]
+    lines: Sequence[LevelLine]
 
     @property
     def name(self) -> str:
@@ -140,25 +135,32 @@ class Panel:
         """The treatments."""
         return list(dict.fromkeys(line.title for line in self.lines))
 
-    def of(self, title: str) -> list[Line]:
+    def of(self, title: str) -> list[LevelLine]:
         """The lines of a treatment, pair by pair."""
         return [line for line in self.lines if line.title == title]
 
-    def cheapest(self, title: str, target: float) -> Measured | None:
+    def cheapest(self, title: str, target: float) -> TimedSolve | None:
         """The quickest solve of a treatment that reaches the target; None: never."""
         good = [m for line in self.of(title) for m in line.reaching(self.error, target)]
         return min(good, key=lambda m: m.time.median, default=None)
 
-    def ranked(self, target: float) -> list[tuple[str, Measured]]:
-        """The treatments that reach the target with their quickest solves, quickest first."""
-        found = [(title, self.cheapest(title, target)) for title in self.titles]
-        reached = [(title, m) for title, m in found if m is not None]
-        return sorted(reached, key=lambda pair: pair[1].time.median)
+    def quickest(self, target: float) -> dict[str, TimedSolve]:
+        """The treatments that reach the target soonest, with their solves, quickest first.
 
-    def finest(self, title: str) -> float | None:
-        """The smallest error of a treatment on the finest mesh of a pair; None without a solve."""
-        found = [x.having(self.error)[-1] for x in self.of(title) if x.having(self.error)]
-        return min((m.error(self.error) or 0.0 for m in found), default=None)
+        More than one where ranges of repetitions overlap, or medians differ by less than `TIE`.
+        """
+        found = {title: m for title in self.titles if (m := self.cheapest(title, target))}
+        ranked = dict(sorted(found.items(), key=lambda item: item[1].time.median))
+        best = [m.time for m in ranked.values()][:1]
+        return {
+            title: m
+            for title, m in ranked.items()
+            if m.time.low <= best[0].high or m.time.median < TIE * best[0].median
+        }
+
+    def solved(self, title: str) -> bool:
+        """Whether a treatment has a solve at all."""
+        return any(line.having(self.error) for line in self.of(title))
 
 
 def shown(error: float) -> float:
@@ -166,41 +168,27 @@ def shown(error: float) -> float:
     return max(error, EPSILON / 4)
 
 
-def read_points(study: Study, folder: Path) -> list[Measured]:
+def read_points(study: Study, folder: Path) -> list[TimedSolve]:
     """All points of a study with their records in `folder`; one without a record says so."""
-    return [Measured(point, _read(folder / f"{point.name}.json")) for point in study.points]
+    files = ((p, folder / f"{p.name}.json") for p in study.points)
+    return [TimedSolve(read_record(file, "errors", "times"), p) for p, file in files]
 
 
-def _read(path: Path) -> Mapping[str, Any]:
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        record["outcome"], record["errors"], record["times"], record["reason"]
-    except OSError:
-        return _nothing("not measured")
-    except (ValueError, KeyError, TypeError):
-        return _nothing("the record cannot be read")
-    return record
-
-
-def _nothing(reason: str) -> dict[str, Any]:
-    return {"outcome": "missing", "reason": reason, "errors": {}, "times": {}}
-
-
-def lines(points: Iterable[Measured]) -> list[Line]:
+def lines(points: Iterable[TimedSolve]) -> list[LevelLine]:
     """Points of one problem, pair, treatment and linear solver together."""
-    found: dict[tuple, list[Measured]] = {}
+    found: dict[tuple, list[TimedSolve]] = {}
     for m in points:
         p = m.point
         key = (p.problem.name, p.slave, p.master, p.treatment.name, p.linear_solver)
         found.setdefault(key, []).append(m)
     return [
-        Line(first.problem, first.pair, first.treatment, first.linear_solver, members)
+        LevelLine(first.problem, first.pair, first.treatment, first.linear_solver, members)
         for members in found.values()
         for first in [members[0].point]
     ]
 
 
-def panels(problem: Problem, found: Sequence[Line]) -> list[Panel]:
+def panels(problem: Problem, found: Sequence[LevelLine]) -> list[Panel]:
     """A panel for each error that any of a problem's lines has."""
     return [
         Panel(problem, error, found)
@@ -209,23 +197,26 @@ def panels(problem: Problem, found: Sequence[Line]) -> list[Panel]:
     ]
 
 
-def failures(points: Sequence[Measured]) -> list[tuple[str, str, str]]:
+def failures(points: Sequence[TimedSolve]) -> list[tuple[str, str, str]]:
     """Points without a solve: (outcome and reason, treatment, where) for each reason.
 
-    Reasons that differ in numbers alone are told once.
+    Reasons that differ in numbers alone are shown once.
     """
-    found: dict[tuple[str, str, str], list[str]] = {}
-    told: dict[str, str] = {}
+    found: dict[tuple[str, str], dict[str, list[str]]] = {}
+    shown: dict[str, str] = {}
     for m in points:
         if not m.solved:
             p = m.point
-            why = f"{m.record['outcome']}: {m.record['reason']}"
-            why = told.setdefault(_NUMBER.sub("#", why), why)
-            solver = "" if p.linear_solver == AUTO else f", {BACKENDS[p.linear_solver].name}"
-            what = f"{p.treatment.title}{solver}"
-            place = f"{p.problem.title}, {p.pair}"
-            found.setdefault((why, what, place), []).append(str(p.level))
-    merged: dict[tuple[str, str], list[str]] = {}
-    for (why, what, place), levels in found.items():
-        merged.setdefault((why, what), []).append(f"{place}: level {', '.join(levels)}")
-    return [(why, what, "; ".join(places)) for (why, what), places in merged.items()]
+            why = shown.setdefault(_NUMBER.sub("#", m.why_not), m.why_not)
+            places = found.setdefault((why, _title(p.treatment, p.linear_solver)), {})
+            places.setdefault(f"{p.problem.title}, {p.pair}", []).append(str(p.level))
+    return [
+        (why, what, "; ".join(f"{place}: level {', '.join(k)}" for place, k in places.items()))
+        for (why, what), places in found.items()
+    ]
+
+
+def _title(treatment: StudyTreatment, linear_solver: str) -> str:
+    if linear_solver == AUTO:
+        return treatment.title
+    return f"{treatment.title}, {BACKENDS[linear_solver].name}"

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions import ElasticSolution, Part
 from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.small_matrices import invert

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from solver.case.reader import EXACT, Material, parse_case
+from solver.case.material import Material
+from solver.case.model import EXACT
+from solver.case.reader import parse_case
 from solver.case.solutions import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.nested import NestedCylinders

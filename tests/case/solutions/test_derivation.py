@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 
 E, KAPPA, C = sp.symbols("E kappa c", positive=True)

@@ -3,15 +3,19 @@
 import numpy as np
 import pytest
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, ParameterError
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.nested import NestedCylinders, NestedSpheres
+from solver.case.solutions.oval import OvalCylinders
+from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
+from solver.case.solutions.waves import Waves2d, Waves3d
 from solver.mechanics.fem.stress import traction
 
 SOFT, HARD = Material(2000.0, 0.3), Material(70000.0, 0.2)
 RADII = (20.0, 30.0, 40.0)
+WAVE = {"amplitude": 0.01, "mean_pressure": 60.0}
 
 
 def nested(cls, inner=SOFT, outer=HARD, pressure=25.0, interference=0.01):
@@ -25,8 +29,14 @@ ALL = [
     Hydrostatic(pressure=25.0, material=SOFT, dim=3),
     nested(NestedCylinders),
     nested(NestedSpheres),
+    OvalCylinders(radii=RADII, inner=SOFT, outer=HARD, pressure=25.0, interference=0.01, wave=3.0),
     Parabola2d(material=Material(3.0, 0.0)),
     Paraboloid3d(material=Material(3.0, 0.0)),
+    *(cls(bottom=SOFT, top=HARD, size=1.0, **WAVE) for cls in (Waves2d, Waves3d)),
+    *(
+        cls(bottom=SOFT, top=HARD, size=2.0, coefficients=(9.0, 1.0, -4.0, 2.0, 3.0))
+        for cls in (PolynomialPressure2d, PolynomialPressure3d)
+    ),
 ]
 
 
@@ -44,6 +54,8 @@ def points_of(solution: ElasticSolution, part: int) -> np.ndarray:
         return x / np.linalg.norm(x, axis=1, keepdims=True) * radius
     if isinstance(solution, UniformCompression):
         x[:, -1] += 1.0 if part else -1.0
+    if isinstance(solution, (Waves2d, PolynomialPressure2d)):
+        x[:, -1] *= 1.0 if part else -1.0
     return x
 
 
@@ -113,7 +125,47 @@ def test_the_parts_touch_and_press_without_friction(solution):
     if len(solution.parts) == 2:
         jump = solution.displacement(x, 1) - solution.displacement(x, 0)
         opening = np.einsum("ni,ni->n", jump, normal)
-        np.testing.assert_allclose(opening, getattr(solution, "interference", 0.0), atol=1e-14)
+        np.testing.assert_allclose(opening, opening_of(solution, x), atol=1e-14)
+
+
+def opening_of(solution: ElasticSolution, x: np.ndarray) -> np.ndarray | float:
+    """By how much the interface opens: against an interference, or to close the waves."""
+    if isinstance(solution, Waves2d):
+        return -solution.amplitude * (1 - np.cos(np.pi * x[:, :-1]).prod(axis=1))
+    return getattr(solution, "interference", 0.0)
+
+
+@pytest.mark.parametrize("cls", [Waves2d, Waves3d])
+def test_waves_on_high_layers_press_as_on_half_spaces(cls):
+    """p₁ = π E* Δ / λ in two dimensions, √2 times that for square waves (Johnson et al. 1985)."""
+    count = 6.0  # half waves within the height: the layers are 3 wavelengths high
+    n = (count,) * (cls.dim - 1)
+    solution = cls(bottom=SOFT, top=HARD, size=1.0, amplitude=1e-3, mean_pressure=1e4, half_waves=n)
+    x = np.zeros((1, cls.dim))
+    modulus = 1 / sum((1 - m.poisson**2) / m.young for m in (SOFT, HARD))
+    expected = np.sqrt(cls.dim - 1) * np.pi * modulus * 1e-3 / (2 / count)
+    assert solution.contact_pressure(x)[0] - 1e4 == pytest.approx(expected, rel=1e-7)
+
+
+@pytest.mark.parametrize("part", [0, 1])
+def test_the_far_faces_of_wavy_layers_stay_flat_and_slide(part):
+    solution = Waves3d(bottom=SOFT, top=HARD, size=1.0, **WAVE)
+    x = np.random.default_rng(3).uniform(0, 1, (20, 3))
+    x[:, 2] = 1.0 if part else -1.0
+    moved = -solution.approach if part else 0.0
+    np.testing.assert_allclose(solution.displacement(x, part)[:, 2], moved, atol=1e-15)
+    np.testing.assert_allclose(solution.stress(x, part)[:, 4:], 0.0, atol=1e-12)
+
+
+def test_waves_that_the_mean_pressure_does_not_close_are_refused():
+    with pytest.raises(ParameterError, match="mean_pressure"):
+        Waves2d(bottom=SOFT, top=HARD, size=1.0, amplitude=0.01, mean_pressure=1.0)
+
+
+def test_a_polynomial_pressure_is_that_polynomial():
+    solution = PolynomialPressure3d(bottom=SOFT, top=HARD, size=2.0, coefficients=(1.0, 0.0, 8.0))
+    x = np.array([[1.0, 2.0, 0.0]])
+    assert solution.contact_pressure(x)[0] == pytest.approx(2 * 1 + 8 * (0.25 + 1.0))
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -234,3 +286,15 @@ def test_a_point_is_taken_by_its_place_unless_its_part_is_given():
 def test_parameters_are_validated(make):
     with pytest.raises(ParameterError):
         make()
+
+
+def test_a_wave_of_pressure_leaves_bore_and_outside_as_they_have_to_be():
+    """The bore carries its pressure alone; the outside has no shear."""
+    solution = OvalCylinders(radii=RADII, inner=SOFT, outer=HARD, pressure=25.0, wave=3.0)
+    angle = np.linspace(0.1, 1.4, 7)
+    normal = np.column_stack([np.cos(angle), np.sin(angle)])
+    bore = traction(solution.stress(RADII[0] * normal, 0), normal)
+    np.testing.assert_allclose(bore, -25.0 * normal, atol=1e-11)
+    outside = traction(solution.stress(RADII[2] * normal, 1), normal)
+    along = outside[:, 0] * normal[:, 1] - outside[:, 1] * normal[:, 0]
+    np.testing.assert_allclose(along, 0.0, atol=1e-11)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from solver.case.reader import Material
+from solver.case.material import Material
 from solver.case.solutions.base import ParameterError
 from solver.case.solutions.hertz import HertzApproach, HertzCylinder, HertzSphere
 

@@ -72,6 +72,53 @@ def test_stress_of_a_linear_field_is_exact_at_every_node(name):
     assert stress == pytest.approx(np.tile(wanted, (len(points), 1)), abs=1e-12)
 
 
+def varying(name):
+    """A function of the reference cell at its nodes (n,), and its gradient there as recovered.
+
+    The gradient is linear, so that a linear fit through quadrature points has it at the nodes. On
+    PYRA5 no such function exists: that of ξη/(1−ζ), (η/(1−ζ), ξ/(1−ζ), ξη/(1−ζ)²), is fitted by
+    multiples of η, ξ and ξη/(1−ζ), for the points are symmetric in ξ and in η.
+    """
+    kind = BY_NAME[name]
+    x = kind.nodes
+    if name == "PYRA5":
+        points = volume_rule(name)[0]
+        (xi, eta), top = points[:, :2].T, 1 - points[:, 2]
+        product = xi * eta / top
+        slope, height = (eta**2 / top).sum() / (eta**2).sum(), (product**2 / top).sum()
+        edge = np.append(x[:4, 0] * x[:4, 1], 0.0)
+        along = height / (product**2).sum()
+        return edge, np.c_[slope * x[:, 1], slope * x[:, 0], along * edge]
+    pairs = {"QUAD4": [(0, 1)], "PENTA6": [(0, 2), (1, 2)], "HEXA8": [(0, 1), (1, 2), (0, 2)]}
+    every = [(i, j) for i in range(kind.dim) for j in range(i, kind.dim)]
+    values, slope = np.zeros(len(x)), np.zeros_like(x)
+    for factor, (i, j) in enumerate(pairs.get(name, every), start=1):
+        values += factor * x[:, i] * x[:, j]
+        slope[:, i] += factor * x[:, j]
+        slope[:, j] += factor * x[:, i]
+    return values, slope
+
+
+@pytest.mark.parametrize("name", [n for n in VOLUMES if n not in ("TRIA3", "TETRA4")])
+def test_a_linear_stress_is_exact_at_every_node(name):
+    """In TRIA3 and TETRA4 it cannot vary; in every other type nodes have stresses of their own."""
+    kind, dim = BY_NAME[name], BY_NAME[name].dim
+    values, slope = varying(name)
+    rng = np.random.default_rng(5)
+    affine = np.eye(dim) + 0.2 * rng.uniform(-1, 1, (dim, dim))
+    points, direction = kind.nodes @ affine.T, rng.uniform(1, 2, dim)
+    block = Block(kind, np.arange(kind.n_nodes)[None], np.array([1.5]), np.array([0.7]))
+    stress = nodal_stress(points, [block], np.outer(values, direction))
+    gradient = direction[:, None] * (slope @ np.linalg.inv(affine))[:, None, :]
+    strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
+    wanted = 1.5 * np.einsum("nii->n", strain)[:, None, None] * np.eye(3)
+    wanted[:, :dim, :dim] += 2 * 0.7 * strain
+    components = wanted[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    assert stress == pytest.approx(components, abs=1e-12)
+    neighbour = np.roll(components, 1, axis=0)
+    assert np.abs(stress - neighbour).max() > 0.1
+
+
 @pytest.mark.parametrize(
     ("name", "mesh", "element"),
     [

@@ -11,10 +11,9 @@ from solver.mechanics.fem.elasticity import Block, internal_force, nodal_stress
 from solver.mechanics.fem.mixed import split
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME
-from solver.simulation.cures import Cures
+from solver.simulation.options import LEAN, Options, Safeguards
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
-from solver.system.clock import Clock
 from solver.system.errors import InputError
 from solver.verification.norms import errors as norms
 from solver.verification.results import read_result, write_result
@@ -34,14 +33,15 @@ PAIRS = [
 ]
 
 
-def patch(bottom, top, counts, material, move=0.0, **options):
+def patch(bottom, top, counts, material, move=0.0, options=LEAN, **as_solved):
     """Relative errors of pressure and stress of the patch test in a material `{…}`."""
     mesh = block_mesh(bottom, top, counts)
     if move:
         mesh = straightened(moved(mesh, move))
     dim = mesh.points.shape[1]
     source = block_case(dim).source.replace("{all: {young: 2000.0, poisson: 0.3}}", material)
-    solution = simulate(parse_case(source, Path("patch.yaml")), mesh, **options)
+    case = parse_case(source, Path("patch.yaml")).as_solved(**as_solved)
+    solution = simulate(case, mesh, options)
     pressure = np.abs(solution.zones[0].multiplier / 25 - 1).max()
     return pressure, np.abs(solution.nodal_normal_stress / 25 + 1).max()
 
@@ -71,11 +71,11 @@ def test_either_way_to_cut_hexahedra(cells, hexahedra):
 @pytest.mark.parametrize(("bottom", "top", "counts"), [PAIRS[1], PAIRS[4], PAIRS[6]])
 def test_the_displacement_form_loses_the_digits(bottom, top, counts):
     """ε / (1 − 2ν) is what it keeps in double precision, whether chosen or the cure turned off."""
-    double = Cures(extended=False)
-    lost = patch(bottom, top, counts, everywhere(0.499999999, "displacement"), cures=double)
+    double = Options(safeguards=Safeguards(extended=False))
+    lost = patch(bottom, top, counts, everywhere(0.499999999, "displacement"), options=double)
     assert min(lost) > 1e-9
-    double = Cures(extended=False, mixed=False)
-    assert patch(bottom, top, counts, everywhere(0.499999999), cures=double) == lost
+    double = Options(safeguards=Safeguards(extended=False, mixed=False))
+    assert patch(bottom, top, counts, everywhere(0.499999999), options=double) == lost
 
 
 @pytest.mark.parametrize(("bottom", "top", "counts"), [PAIRS[1], PAIRS[4]])
@@ -129,7 +129,7 @@ def test_how_many_unknowns_a_cell_has(name, size):
 def test_the_pieces_of_a_cut_cell_share_their_constant():
     mesh = block_mesh("HEXA8", "HEXA8", (2, 1))
     case = parse_case(block_case(3).source.replace("0.3", "0.4999999"), Path("patch.yaml"))
-    scene = build_scene(case, mesh, False, None, Clock())
+    scene = build_scene(case, mesh)
     assert scene.mean.size == 2**3 + 1
     assert scene.mean.n_cells == 2**3 + 1 + 2**2 * 4
 
@@ -155,7 +155,7 @@ def test_ordinary_material_stays_as_it_is():
 @pytest.mark.parametrize(("poisson", "mixed"), [(0.499, False), (0.4991, True)])
 def test_it_is_taken_above_the_bound(poisson, mixed):
     case = parse_case(block_case(2).source.replace("0.3", str(poisson)), Path("patch.yaml"))
-    scene = build_scene(case, block_mesh("QUAD4", "QUAD4"), False, None, Clock())
+    scene = build_scene(case, block_mesh("QUAD4", "QUAD4"))
     assert (scene.mean.size > 0) is mixed
 
 

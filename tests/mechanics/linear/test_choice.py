@@ -12,7 +12,7 @@ from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.choice import against_condensation
 from solver.mechanics.linear.condensation import condense, saddle_point
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
-from solver.mechanics.linear.direct import standing_for_auto
+from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.multigrid import Unknowns
 
 needs_pardiso = pytest.mark.skipif(
@@ -54,7 +54,7 @@ def test_wide_constraints_are_not_condensed():
     matrix, constraints = chain_over_floor(1200)
     why = against_condensation(matrix, constraints)
     assert why == "a condensed system would fill in: one constraint holds 1201 unknowns"
-    with standing_for_auto("cholmod"):
+    with force_solver("cholmod"):
         assert not against_condensation(matrix, constraints)
 
 

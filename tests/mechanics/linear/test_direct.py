@@ -13,7 +13,7 @@ from solver.mechanics.linear.direct import (
     BACKENDS,
     factorise,
     factorise_indefinite,
-    standing_for_auto,
+    force_solver,
 )
 from solver.mechanics.linear.krylov import ROUGH
 from solver.system.errors import SolveError
@@ -236,7 +236,7 @@ def test_singular_saddle_point_is_refused(kind):
 
 def test_a_chosen_solver_stands_for_auto_within_its_block(kind):
     before = factorise(laplacian(3)).name
-    with standing_for_auto(kind):
+    with force_solver(kind):
         assert factorise(laplacian(3)).name == BACKENDS[kind].name
         assert factorise(laplacian(3), "superlu").name == "SuperLU"
     assert factorise(laplacian(3)).name == before
@@ -244,10 +244,10 @@ def test_a_chosen_solver_stands_for_auto_within_its_block(kind):
 
 def test_what_a_chosen_solver_cannot_do_is_no_other_s_work(monkeypatch):
     with (
-        standing_for_auto("cholmod"),
+        force_solver("cholmod"),
         pytest.raises(SolveError, match="CHOLMOD factors positive definite matrices only"),
     ):
         factorise_indefinite(saddle(4))
     monkeypatch.setitem(BACKENDS, "rslab", replace(BACKENDS["rslab"], available=lambda: False))
-    with standing_for_auto("rslab"), pytest.raises(SolveError, match="rslab is not installed"):
+    with force_solver("rslab"), pytest.raises(SolveError, match="rslab is not installed"):
         factorise(laplacian(3))

@@ -40,13 +40,13 @@ def one_cell(name, faces, distortion=0.05):
     return meshio.Mesh(points, blocks, cell_sets=sets)
 
 
-def cut_cell(name, faces, into_hexahedra=False, distortion=0.05, without_need=False):
+def cut_cell(name, faces, into_hexahedra=False, distortion=0.05):
     mesh = one_cell(name, faces, distortion)
-    blocks = [b for f in faces for b in boundary_faces(mesh, f"face{f}", "test", "slave")]
+    blocks = [b for f in faces for b in boundary_faces(mesh, f"face{f}")]
     macro = [np.array([k]) for k in range(len(blocks))]
     hexahedra = [into_hexahedra] * len(blocks)
     cells = volume_cells(mesh)
-    result = cut(mesh.points, cells, blocks, macro, hexahedra, without_need=without_need)
+    result = cut(mesh.points, cells, blocks, macro, hexahedra)
     return mesh, result
 
 
@@ -101,33 +101,14 @@ def test_table_of_the_method(name, face, hexahedra, pieces, new):
 
 
 @pytest.mark.parametrize(
-    ("name", "pieces", "new"),
-    [
-        ("TRIA6", {"TRIA6": 2}, 3),
-        ("QUAD8", {"QUAD8": 4}, 11),
-        ("QUAD9", {"QUAD9": 4}, 14),
-        ("HEXA27", {"HEXA27": 6}, 50),
-    ],
+    ("name", "hexahedra"),
+    [(name, hexahedra) for name in VOLUMES for hexahedra in (False, True)],
 )
-def test_cells_that_need_no_cut_can_be_cut(name, pieces, new):
-    """Nodes of the parent that the cut meets, as the middle of an edge, are the only ones there."""
-    mesh, result = cut_cell(name, [0], distortion=0.0, without_need=True)
-    assert {t: len(c) for t, c in result.cells.items()} == pieces
-    assert len(result.points) - len(mesh.points) == new
-    used = np.unique(np.concatenate([c.ravel() for c in result.cells.values()]))
-    assert len(used) == len(result.points) == len(np.unique(result.points.round(9), axis=0))
-
-
-@pytest.mark.parametrize(
-    ("name", "hexahedra", "without_need"),
-    [(name, hexahedra, False) for name in VOLUMES for hexahedra in (False, True)]
-    + [(name, False, True) for name in ("TRIA6", "QUAD8", "QUAD9", "HEXA27")],
-)
-def test_every_choice_of_up_to_three_slave_faces_is_cut_conformingly(name, hexahedra, without_need):
+def test_every_choice_of_up_to_three_slave_faces_is_cut_conformingly(name, hexahedra):
     kind = BY_NAME[name]
     choices = [c for n in (1, 2, 3) for c in combinations(range(len(kind.faces)), n)]
     for faces in choices:
-        mesh, result = cut_cell(name, list(faces), hexahedra, without_need=without_need)
+        mesh, result = cut_cell(name, list(faces), hexahedra)
         whole = volume(mesh.points, volume_cells(mesh))
         # physical_gradients refuses cells whose Jacobian is not positive
         assert volume(result.points, result.cells) == pytest.approx(whole, rel=1e-2)
@@ -138,7 +119,7 @@ def test_every_choice_of_up_to_three_slave_faces_is_cut_conformingly(name, hexah
             f: frozenset(own[f] & set(range(kind.n_vertices))) for f in range(len(kind.faces))
         }
         for f in range(len(kind.faces)):
-            cut_away = f in faces and (without_need or needs_cut(kind.faces[f].type))
+            cut_away = f in faces and needs_cut(kind.faces[f].type)
             assert (corners[f] in outer) != cut_away
         slaves = [
             frozenset(map(int, row[: s.type.n_vertices]))

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.case.reader import Material, load_case, parse_case
+from solver.case.material import Material
+from solver.case.reader import load_case, parse_case
 from solver.case.solutions import SOLUTIONS
 from solver.mechanics.fem.faces import surface_points
 from solver.mechanics.mortar.treatments import TREATMENTS

@@ -164,7 +164,7 @@ def test_renumber_is_the_same_mesh_in_another_order(name):
         ({"translate": 3}, "transform.translate = 3: must be a list of 2 numbers"),
         ({"translate": [1, 2, 3]}, "transform.translate = [1, 2, 3]: must be a list of 2 numbers"),
         ({"rotate": "x"}, "transform.rotate = 'x': must be a number"),
-        ({"renumber": -1}, "transform.renumber.seed = -1: must be a whole number from 0 on"),
+        ({"renumber": -1}, "transform.renumber.seed = -1: must be a whole number from 0 to 100000"),
         ({"perturb": {"seed": 1}}, "transform.perturb.amplitude: must be a positive number"),
         ({"perturb": 5.0}, "transform.perturb.amplitude = 5.0: folds cells over: must be smaller"),
     ],

@@ -162,6 +162,9 @@ def test_mirrored_cells_are_turned(tmp_path):
         ("100, S3", "101, S3", "surface front = 101: no such cell"),
         (" lower, S2", " lowest, S2", "surface slave = 'lowest': no such set"),
         (" 7, 8\n", " 7\n", "*ELEMENT: each C3D8R must have 8 nodes"),
+        (" 99, 7., 7., 7.\n", " 5, 7., 7., 7.\n", "*NODE = 5: two nodes have this number"),
+        (" 202, 11, 13", " 100, 11, 13", "*ELEMENT = 100: two cells have this number"),
+        (" 202, 11, 13", " 201, 11, 13", "*ELEMENT = 201: two cells have this number"),
         ("*INCLUDE, INPUT=none.inp", "", ""),
     ],
 )

@@ -243,7 +243,10 @@ GOOD = {"cells": "QUAD4", "divisions": [2, 2]}
         (recipe(GOOD, GOOD, True), "mesh.size = True: must be a positive number"),
         (recipe(GOOD, GOOD, float("nan")), "mesh.size = nan: must be a positive number"),
         (recipe(GOOD | {"cells": "QUAD5"}, GOOD), "mesh.bottom.cells = 'QUAD5': allowed: TRIA3, "),
-        (recipe(GOOD, {"cells": "QUAD4"}), "mesh.top.divisions: must be a whole number from 1 on"),
+        (
+            recipe(GOOD, {"cells": "QUAD4"}),
+            "mesh.top.divisions: must be a whole number from 1 to 100000",
+        ),
         (
             recipe(GOOD, GOOD | {"divisions": [2, 0]}),
             "mesh.top.divisions = [2, 0]: must be a whole",
@@ -289,3 +292,37 @@ def test_what_gmsh_cannot_do_is_told_in_one_line(monkeypatch):
 def test_nothing_on_standard_output(capfd):
     generate(recipe(block("TETRA10"), block("HEXA20")), "case.yaml")
     assert capfd.readouterr().out == ""
+
+
+def test_the_size_of_inner_cells_is_a_length():
+    def inner(size, length):
+        body = {"cells": "TRIA3", "divisions": [4, 4], "inner": length, "algorithm": "delaunay"}
+        mesh = generate(recipe(body, block("TRIA3"), size), "case.yaml")
+        (cells,) = members(mesh, "bottom")
+        corners = mesh.points[cells]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        rim = (np.abs(corners - [size / 2, -size / 2]) > size / 2 - 1e-9 * size).any(axis=2)
+        return len(cells), edges[~rim.any(axis=1)].mean()
+
+    count, length = inner(8.0, 0.5)
+    assert 0.8 < length / 0.5 < 1.2
+    assert inner(8.0, 1.0)[0] < count / 2
+    # All lengths three times as large: the same mesh.
+    again = inner(24.0, 1.5)
+    assert (again[0], again[1] / 3) == (count, pytest.approx(length, rel=0.01))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "allowed"),
+    [
+        ("divisions", [10**200, 2], "must be a whole number from 1 to 100000"),
+        ("far", 10**200, "must be a whole number from 1 to 100000"),
+        ("inner", 10**200, "must be a positive number"),
+    ],
+)
+def test_numbers_beyond_all_measure_are_refused(key, value, allowed):
+    body = {"cells": "TRIA3", "divisions": [2, 2], key: value}
+    with pytest.raises(InputError, match=rf"mesh\.bottom\.{key} = .*: {allowed}"):
+        generate(recipe(body, block("TRIA3")), "case.yaml")
+    with pytest.raises(InputError, match=r"mesh\.size = .*must be a positive number"):
+        generate(recipe(block("TRIA3"), block("TRIA3"), 1e300), "case.yaml")

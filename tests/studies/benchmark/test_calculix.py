@@ -9,7 +9,7 @@ import pytest
 from solver.mechanics.fem.faces import boundary_faces, volume_cells
 from solver.mesh import generate, read_mesh
 from solver.studies.benchmark import calculix
-from solver.studies.scaling.description import Point, Series
+from solver.studies.scaling.description import ScalingPoint, SizeSeries
 from solver.system.errors import SolveError
 from solver.system.process import cores_for
 
@@ -29,7 +29,9 @@ TABLE = """
 def small(cells):
     """Two blocks of few cells: the case and its mesh."""
     template = ROOT / "cases/scaling/templates/space.yaml"
-    point = Point(Series("few", cells, template, cells, (3, 2), False, (200,), (100, 1000)), 200)
+    point = ScalingPoint(
+        SizeSeries("few", cells, template, cells, (3, 2), (200,), fit=(100, 1000)), 200
+    )
     case = point.parsed(Path("few.yaml"))
     return case, generate(case.mesh, "few")
 
@@ -47,7 +49,7 @@ def test_the_deck_holds_the_mesh_and_its_surfaces(cells, tmp_path):
     assert np.allclose(np.sort(corners, axis=0), np.sort(expected, axis=0), atol=1e-11)
     [zone] = case.zones
     for group in (zone.slave, zone.master):
-        ours, theirs = (boundary_faces(m, group, "deck", group) for m in (mesh, again))
+        ours, theirs = (boundary_faces(m, group) for m in (mesh, again))
         assert sum(len(b.nodes) for b in theirs) == sum(len(b.nodes) for b in ours)
         assert all(np.abs(again.points[b.nodes][..., 2]).max() < 1e-12 for b in theirs)
 
@@ -56,7 +58,7 @@ def test_loads_and_supports_stand_in_the_deck():
     case, mesh = small("HEXA8")
     lines = list(calculix.deck_lines(case, mesh))
     loads = [line for line in lines if line.endswith(", 25.0")]
-    top = sum(len(block.nodes) for block in boundary_faces(mesh, "press", "deck", "press"))
+    top = sum(len(block.nodes) for block in boundary_faces(mesh, "press"))
     assert len(loads) == top
     assert len({line.split(",")[0] for line in loads}) == top
     held = lines[lines.index("*BOUNDARY") + 1 : lines.index("*DLOAD")]

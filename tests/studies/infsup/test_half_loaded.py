@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.studies.infsup.half_loaded import Profile, profile_pair
+from solver.studies.infsup.half_loaded import PressureProfile, profile_pair
 
 
 @pytest.mark.parametrize("cells", ["TRIA3", "QUAD4", "QUAD8"])
@@ -30,4 +30,6 @@ def test_contact_that_opens_does_not_pull_and_carries_the_load():
 
 
 def test_the_oscillation_is_the_largest_second_difference():
-    assert Profile("QUAD4", True, True, [0, 1, 2, 3], [0.0, 1.0, 0.0, -1.0]).oscillation == 2.0
+    assert (
+        PressureProfile("QUAD4", True, True, [0, 1, 2, 3], [0.0, 1.0, 0.0, -1.0]).oscillation == 2.0
+    )

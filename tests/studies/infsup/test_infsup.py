@@ -7,8 +7,8 @@ import pytest
 from solver.case.reader import parse_case
 from solver.simulation.scene import build_scene
 from solver.studies.infsup.constant import inf_sup_constant
-from solver.studies.infsup.description import Ladder, run
-from solver.system.clock import Clock
+from solver.studies.infsup.description import InfSupLadder
+from solver.studies.infsup.point import run
 from tests.scenes import block_case, block_mesh
 
 
@@ -27,7 +27,7 @@ def constants(cells, counts, coarser=4, treatment="lac", hexahedra="pyramids", c
             held = f"  - {{group: base, fix: {axes}}}\n  - {{group: press, fix: {axes}}}\n"
             text = text.replace(free, held)
         case = parse_case(text, Path("infsup.yaml"))
-        found.append(inf_sup_constant(build_scene(case, mesh, False, None, Clock())))
+        found.append(inf_sup_constant(build_scene(case, mesh)))
     return found
 
 
@@ -99,7 +99,7 @@ def test_the_other_stable_treatments_level_off_too(treatment, coarser):
 )
 def test_simplices_prisms_and_pyramids_level_off_with_the_cut_alone(cells, contact, levels):
     cut, uncut = (
-        run(Ladder(cells, cut, True, 2, contact, levels=levels), lambda _: None)
+        run(InfSupLadder(cells, cut, True, 2, contact, levels=levels), lambda _: None)
         for cut in (True, False)
     )
     assert cut.levels_off

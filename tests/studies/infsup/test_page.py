@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from solver.commands.cli import main
-from solver.studies.infsup.description import Ladder, read_ladders, run
-from solver.studies.infsup.half_loaded import Profile
-from solver.studies.infsup.page import failures, read_record, sections, write_page, write_record
+from solver.studies.infsup.description import InfSupLadder, read_ladders
+from solver.studies.infsup.half_loaded import PressureProfile
+from solver.studies.infsup.page import sections, write_page
+from solver.studies.infsup.point import run
+from solver.studies.infsup.records import failures, read_record, write_record
 from solver.system.errors import InputError
 
 FILE = Path(__file__).parents[3] / "cases/stability/infsup/infsup.yaml"
@@ -22,7 +24,7 @@ cells: [{cells: QUAD4}, {cells: QUAD9, cut: false}, {cells: HEXA8, hexahedra: he
 
 def ladder(constants, cut=True, levels=(4, 8, 16)):
     constants = list(constants)
-    return Ladder(
+    return InfSupLadder(
         "QUAD4",
         cut,
         clamped=True,
@@ -35,7 +37,7 @@ def ladder(constants, cut=True, levels=(4, 8, 16)):
 
 
 def profile(pressure, cut=True):
-    return Profile("QUAD4", cut, True, list(range(len(pressure))), pressure)
+    return PressureProfile("QUAD4", cut, True, list(range(len(pressure))), pressure)
 
 
 def test_the_file_asks_for_every_cell_type_that_is_cut():

@@ -1,60 +1,17 @@
-"""Slopes fitted to errors that fall with a known order; ladders read from their files."""
+"""Ladders read from their files, and the orders of theory on a small one."""
 
-from math import sqrt
 from pathlib import Path
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from solver.case.reader import load_case
 from solver.simulation.simulate import simulate
-from solver.studies.fits import ROUND_OFF, THEORY, element_size, fit_slope, is_rounding
+from solver.studies.fits import fit_order
 from solver.studies.orders.description import read_ladders
+from solver.studies.orders.theory import THEORY, element_size
 from solver.system.errors import InputError
 from solver.verification.norms import errors
 from solver.verification.run import mesh_of, refined
-
-SIZES = 2.0 ** -np.arange(1, 6)
-
-
-@given(st.floats(0.2, 4), st.floats(1e-4, 1e4))
-def test_an_exact_power_is_found_without_spread(order, factor):
-    slope = fit_slope(SIZES, factor * SIZES**order)
-    assert slope.value == pytest.approx(order, abs=1e-12)
-    assert slope.spread < 1e-12
-
-
-def test_only_the_finest_sizes_count_in_whatever_order():
-    errors = SIZES**2
-    errors[:2] = 7.0, 0.1
-    mixed = [3, 0, 4, 1, 2]
-    assert fit_slope(SIZES[mixed], errors[mixed]).value == pytest.approx(2)
-
-
-def test_the_spread_is_the_standard_error_of_the_slope():
-    """Log2 errors −0, −1, −4 at log2 sizes −0, −1, −2: slope 2, residuals −1/3, 2/3, −1/3.
-
-    The sum of their squares is 2/3, with one degree of freedom, over Sxx = 2: √(1/3).
-    """
-    slope = fit_slope([1, 1 / 2, 1 / 4], [1, 1 / 2, 1 / 16])
-    assert slope.value == pytest.approx(2)
-    assert slope.spread == pytest.approx(sqrt(1 / 3))
-
-
-def test_no_slope_from_two_points_from_rounding_or_without_refinement():
-    assert fit_slope([1, 0.5], [1, 0.5]) is None
-    assert fit_slope([1, 0.5, 0.25], [1e-3, ROUND_OFF, 1e-14]) is None
-    assert fit_slope([0.5, 0.5, 0.5], [1, 2, 3]) is None
-    assert fit_slope([1, 0.5, 0.25], [1, np.nan, 0.1]) is None
-    assert fit_slope([], []) is None
-
-
-def test_rounding_is_told_from_an_unknown_slope():
-    assert is_rounding(SIZES, [1, 1, 1e-13, 1e-14, 0])
-    assert not is_rounding(SIZES, [1, 1, 1e-3, 1e-14, 0])
-    assert not is_rounding([], [])
 
 
 def test_size_of_macro_elements_on_a_line_and_on_a_surface():
@@ -102,7 +59,7 @@ def test_ladders_as_their_file_gives_them(file):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("levels: [1, 2, 4]", "levels: [0, 1]", r"levels\[0\] = 0: .*positive whole number"),
+        ("levels: [1, 2, 4]", "levels: [0, 1]", r"levels\[0\] = 0: .*whole number from 1 to 1024"),
         ("levels: [1, 2, 4]", "levels: [2, 2]", r"levels = \[2, 2\]: .*each once"),
         ("displacement_l2: 1.9}", "displacment_l2: 1.9}", "did you mean displacement_l2"),
         ("- {case: tria3.yaml,", "- {", r"ladders\[0\].case: this key is needed"),
@@ -138,7 +95,7 @@ def test_a_small_ladder_shows_the_orders_of_theory(cells, displacement, gradient
     case = load_case(MANUFACTURED / f"{cells}.yaml")
     levels = [solved(refined(case, factor)) for factor in (1, 2, 4)]
     slopes = {
-        error: fit_slope([level["size"] for level in levels], [level[error] for level in levels])
+        error: fit_order([level["size"] for level in levels], [level[error] for level in levels])
         for error in ("displacement_l2", "displacement_h1", "pressure_l2", "pressure_means")
     }
     assert slopes["displacement_l2"].value >= displacement

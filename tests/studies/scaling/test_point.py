@@ -5,12 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from solver.commands.cli import main
 from solver.studies.scaling import point as measuring
 from solver.studies.scaling.description import read_scaling
 from solver.studies.scaling.point import measure_point
-from solver.verification.verdict import to_json, without_result
+from solver.verification.judge import without_result
+from solver.verification.verdict import to_json
 
 FILE = Path(__file__).parents[3] / "cases/scaling/scaling.yaml"
 
@@ -19,7 +21,9 @@ FILE = Path(__file__).parents[3] / "cases/scaling/scaling.yaml"
 def scaling():
     """The project's family with its plane series small."""
     full = read_scaling(FILE)
-    small = [replace(s, sizes=(500,)) for s in full.series if s.name in ("quad4", "fine-master")]
+    small = [
+        structs.replace(s, sizes=(500,)) for s in full.series if s.name in ("quad4", "fine-master")
+    ]
     return replace(full, series=tuple(small), threads=1)
 
 
@@ -79,7 +83,9 @@ def test_a_process_that_dies_is_recorded(scaling, tmp_path, instead):
 @pytest.mark.parametrize("word", ["refused", "failed", "crashed"])
 def test_a_solve_without_a_result_is_recorded(scaling, tmp_path, instead, word):
     verdict = without_result(word, "memory = 5 unknowns: needs 2 GB", Path("quad4-500.yaml"))
-    instead(f"while [ $# -gt 1 ]; do shift; done; cat > \"$1\" <<'END'\n{to_json(verdict)}\nEND")
+    instead(
+        f"while [ $# -gt 1 ]; do shift; done; cat > \"$1\" <<'END'\n{to_json(verdict.plain())}\nEND"
+    )
     found, line = record(scaling, "quad4/500", tmp_path)
     assert (found["outcome"], found["reason"]) == (word, "memory = 5 unknowns: needs 2 GB")
     assert line == f"quad4/500: {word}: {found['reason']}"

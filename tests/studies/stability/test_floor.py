@@ -13,7 +13,6 @@ from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.studies.stability.floor import floor, misplaced, upper_nodes
 from solver.studies.stability.states import exact_state
-from solver.system.clock import Clock
 from tests.scenes import block_case, block_mesh
 
 MESHES = {2: ("TRIA3", "QUAD4"), 3: ("TETRA4", "HEXA8")}
@@ -27,7 +26,7 @@ def solved(dim, spec="", poisson=0.3, cells=None):
     case = parse_case(text + (f"transform: {spec}\n" if spec else ""), Path("point.yaml"))
     raw = block_mesh(*(cells or MESHES[dim]))
     mesh = transform(raw, case.transform) if case.transform else raw
-    problem = ContactProblem(build_scene(case, mesh, False, None, Clock()))
+    problem = ContactProblem(build_scene(case, mesh))
     return case, raw, mesh, problem, problem.solve(1.0)
 
 
@@ -53,7 +52,7 @@ def test_the_exact_state_is_what_the_solver_finds(dim, poisson):
     assert found.pressure == pytest.approx(np.full(len(found.pressure), 25.0), rel=1e-11)
     assert found.displacement == pytest.approx(exact, abs=1e-11 * np.abs(exact).max())
     stress = nodal_stress(scene.points, scene.blocks, exact)
-    stress += scene.mean.nodal_stress(found.mean_stress, scene.blocks)
+    stress += scene.mean.nodal_stress(found.iterate.mean_stress, scene.blocks)
     assert stress == pytest.approx(state.stress_at(upper), abs=1e-9)
 
 
@@ -98,7 +97,7 @@ def solved_with_form(poisson):
     text = block_case(2).source.replace("poisson: 0.3", f"poisson: {poisson}")
     case = parse_case(text, Path("point.yaml"))
     raw = block_mesh(*MESHES[2])
-    problem = ContactProblem(build_scene(case, raw, False, None, Clock()))
+    problem = ContactProblem(build_scene(case, raw))
     return case, raw, raw, problem, problem.solve(1.0)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from solver.simulation.cures import ALL
+from solver.simulation.options import Safeguards
 from solver.studies.stability import points
 from solver.studies.stability.points import run_sweep
 from solver.studies.stability.sweeps import read_sweep
@@ -77,6 +77,6 @@ def test_the_map_without_cures_is_of_a_plain_implementation(tmp_path):
     sweep = read_sweep(SWEEPS / "tiny-pressure.yaml")
     made = points._Meshes()
     point = points._Point(sweep, sweep.series[0], 1e-12, "tiny")
-    assert points._measured(point, made, ALL)["pressure"] < 1e-12
-    without = points._measured(point, made, replace(ALL, gap_threshold=False))
+    assert points._measured(point, made, Safeguards())["pressure"] < 1e-12
+    without = points._measured(point, made, Safeguards(gap_threshold=False))
     assert without["pressure"] > 1e-3

@@ -48,7 +48,7 @@ def test_a_value_takes_its_place_in_the_case(file):
     assert case.mesh["bottom"] == {"cells": "QUAD4", "divisions": [6, 3]}
     assert case.materials["all"].young == 1.5
     assert case.materials["all"].poisson == 0.3
-    assert sweep.case("2D", [1, 2]).materials["all"].young == 2.5
+    assert sweep.case("2D", (1.0, 2.0)).materials["all"].young == 2.5
     assert sweep.labels == ("1", "2", "3", "4", "1e6", "1 × 2")
     assert sweep.breaks == "Nowhere, so far."
     assert [series.name for series in sweep.series] == ["2D", "2D, swapped"]
@@ -64,9 +64,9 @@ def test_the_quick_version_has_fewer_values(file):
     [
         ("beyond: [1.0e+6]", "beyonds: []", "beyonds.*did you mean beyond"),
         ("[1, 2, 3, 4, 1.0e+6, [1, 2]]", "[1, 2]", "values.*at least six"),
-        ("quick: [1.0e+6]", "quick: [7]", "quick = 7: is none of the values"),
+        ("quick: [1.0e+6]", "quick: [7]", r"quick\[0\] = 7: is none of the values"),
         ("quick: [1.0e+6]", "quick: []", "quick"),
-        ("beyond: [1.0e+6]", "labels: [a]", "labels = 1: must be as many as values: 6"),
+        ("beyond: [1.0e+6]", "labels: [a]", r"labels = \['a'\]: must be as many as values: 6"),
         ("case: base.yaml", "case: other.yaml", "meshes.2D.case = 'other.yaml': no such file"),
         ("directions: both", "directions: all", "must be first, swapped or both"),
     ],

@@ -121,8 +121,8 @@ def test_the_project_s_own_study_is_what_its_page_promises():
     ("old", "new", "message"),
     [
         ("{problem: plane, pair: [QUAD4", "{problem: plan, pair: [QUAD4", "no such problem; did"),
-        ("treatment: lac, solvers", "treatment: lax, solvers", "there is no such treatment; did"),
-        ("pairs: {space: ", "pairs: {spice: ", "there is no such problem; did you mean space"),
+        ("treatment: lac, solvers", "treatment: lax, solvers", "no such treatment; did"),
+        ("pairs: {space: ", "pairs: {spice: ", "no such problem; did you mean space"),
     ],
 )
 def test_names_that_nothing_has(file, old, new, message):

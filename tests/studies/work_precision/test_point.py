@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from solver.commands.cli import main
-from solver.studies.work_precision import point as measuring
+from solver.studies import points as measuring
 from solver.studies.work_precision.description import read_study
-from solver.studies.work_precision.point import measure_apart
+from solver.studies.work_precision.point import measure_point
 from solver.system.clock import SOLVING
 from solver.system.errors import InputError
 
@@ -41,7 +41,7 @@ def study(tmp_path):
 def record(study, name, folder):
     """The record of a point, and the line that was said of it."""
     output = folder / "record.json"
-    line = measure_apart(study, study.point(name), output, None)
+    line = measure_point(study, study.point(name), output, None)
     assert [path.name for path in folder.glob("*record*")] == ["record.json"]
     return json.loads(output.read_text()), line
 
@@ -91,7 +91,7 @@ def test_a_process_that_dies_is_recorded(study, tmp_path, monkeypatch):
 def test_more_threads_than_there_are_cores_are_refused(study, tmp_path):
     many = replace(study, threads=len(os.sched_getaffinity(0)) + 1)
     with pytest.raises(InputError, match=r"threads = \d+: more than the \d+ cores"):
-        measure_apart(many, many.points[0], tmp_path / "record.json", None)
+        measure_point(many, many.points[0], tmp_path / "record.json", None)
 
 
 def test_a_reference_is_asked_for_where_there_is_no_exact_solution(tmp_path, capsys):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from solver.case.solutions import ElasticSolution
 from solver.simulation.simulate import simulate
@@ -21,7 +22,7 @@ def solution():
     """The half-loaded block on a coarse regular mesh."""
     study = read_study(FILE)
     point = next(p for p in study.points if p.problem.reference)
-    case = point.reference_case(replace(point.problem.reference, divisions=(8, 6)))
+    case = point.reference_case(structs.replace(point.problem.reference, divisions=(8, 6)))
     return simulate(case, mesh_of(case))
 
 

@@ -1,0 +1,130 @@
+"""What a case is, as typed objects: supports, loads, contact zones, references."""
+
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from solver.case.expressions import Expression
+from solver.case.material import Material
+
+if TYPE_CHECKING:
+    from solver.case.solutions.base import ExactSolution
+
+
+class Exact(Enum):
+    """`solution` in place of a value: what the case's exact solution has there."""
+
+    VALUE = "solution"
+
+
+EXACT = Exact.VALUE
+Scalar = float | Expression
+Vector = tuple[Scalar, ...]
+LOAD_KINDS = ("pressure", "traction", "body_force")
+SWAPPED = "-swapped"
+
+
+@dataclass(frozen=True)
+class Support:
+    """Imposed displacements of a group: direction (x, y, z, normal) to value."""
+
+    group: str
+    fix: dict[str, Scalar | Exact]
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load on a group: `kind` is one of LOAD_KINDS; a pressure is a scalar, positive inwards."""
+
+    group: str
+    kind: str
+    value: Scalar | Vector | Exact
+
+
+@dataclass(frozen=True)
+class Zone:
+    """One contact zone: its slave and master face groups, and how the interface is treated.
+
+    `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
+    gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
+    quadratic, smooth or automatic.
+    """
+
+    slave: str
+    master: str
+    name: str = "contact"
+    hexahedra: str = "pyramids"
+    treatment: str = "lac"
+    normal: str = "element"
+    interference: float = 0.0
+    points: int | None = None
+    clearance: Scalar | None = None
+    recovery: str = "none"
+
+
+@dataclass(frozen=True)
+class Observation:
+    """The macro-element of a zone nearest to a point, to be reported at every step."""
+
+    zone: str
+    nearest: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case: one file, ready to be solved once its mesh is there.
+
+    `mesh` is the file's mapping, the key `file` replaced by `path`, relative to the case file.
+    `tolerance` holds the overrides by check name, under `all` where one number was given. `units`
+    names those of length and stress, for labels alone. `source` is the file's text. `family` is the
+    name of the file's folder. `reference_uncertainty` is relative, `reference_code` has the keys
+    name and version. `swapped` and `hexahedra`: how the case is solved, as `as_solved` was told.
+    """
+
+    name: str
+    family: str
+    path: Path
+    title: str
+    source: str
+    mesh: dict[str, Any]
+    materials: dict[str, Material]
+    supports: tuple[Support, ...]
+    loads: tuple[Load, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    rigid: frozenset[str] = frozenset()
+    transform: dict[str, Any] | None = None
+    plane: str | None = None
+    directions: str = "first"
+    steps: tuple[float, ...] = (1.0,)
+    observe: tuple[Observation, ...] = ()
+    reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
+    reference_kind: str | None = None
+    reference_uncertainty: float | None = None
+    reference_code: dict[str, str] | None = None
+    reference_remark: str = ""
+    solution: "ExactSolution | None" = None
+    tolerance: dict[str, float] = field(default_factory=dict)
+    counts: dict[str, dict[str, int]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    swapped: bool = False
+    hexahedra: str | None = None
+
+    def as_solved(self, swapped: bool = False, hexahedra: str | None = None) -> "Case":
+        """The case with slave and master exchanged, or with slave hexahedra cut in another way."""
+        zones = tuple(
+            replace(
+                zone,
+                slave=zone.master if swapped else zone.slave,
+                master=zone.slave if swapped else zone.master,
+                hexahedra=hexahedra or zone.hexahedra,
+            )
+            for zone in self.zones
+        )
+        return replace(self, zones=zones, swapped=swapped, hexahedra=hexahedra)
+
+    def zone_key(self, number: int, side: str) -> str:
+        """The key of the file under which the group stands that is solved as slave or master."""
+        if self.swapped:
+            side = {"slave": "master", "master": "slave"}[side]
+        return f"contact[{number}].{side}"

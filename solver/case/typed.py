@@ -1,0 +1,245 @@
+"""Files declared as types: a class names the keys of a file, reads it, and is its JSON Schema.
+
+    class Way(Section, frozen=True):
+        title: Text
+        solver: Literal["auto", "rslab"] = "auto"
+        sizes: Annotated[tuple[Size, ...], ONCE] = ()
+
+`read_as` turns the content of a file into an object of the class. A value that does not fit is
+refused with its key and what is allowed. The words for that are the `description` in the type's
+`Meta`; a type without one is described by its parts. The `title` says what a key is.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from functools import cache, partial
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+
+import msgspec
+from msgspec import Meta, Struct
+
+from solver.system.errors import InputError, hint, key_path
+from solver.system.files import is_file
+
+Text = Annotated[str, Meta(min_length=1, description="text")]
+Version = Annotated[str, Meta(min_length=1, description="text (in quotes if it is a number)")]
+Number = Annotated[float, Meta(ge=-1e30, le=1e30, description="a number from -1e30 to 1e30")]
+Positive = Annotated[float, Meta(gt=0, le=1e30, description="a positive number up to 1e30")]
+ONCE = Meta(min_length=1, extra_json_schema={"uniqueItems": True})
+"""Of a list: it has items, and they differ."""
+
+_WORDS = {
+    Path: "the path of a file",
+    str: "text",
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+}
+Keys = tuple[str | int, ...]
+Convert = Callable[[Any, Any], Any]
+AnySection = TypeVar("AnySection", bound="Section")
+
+
+class FieldError(ValueError):
+    """What is wrong with a value of a section, and the keys that lead to it in there."""
+
+    def __init__(self, keys: Keys, problem: str, value: object = None):
+        self.keys, self.problem, self.value = keys, problem, value
+        super().__init__(problem)
+
+
+class Section(Struct, frozen=True, forbid_unknown_fields=True):
+    """A mapping in a file, with a field for each key.
+
+    A subclass may check its values in `__post_init__`, and raise `FieldError`.
+    """
+
+    def __post_init__(self) -> None:
+        for name in _different(type(self)):
+            items = getattr(self, name)
+            if len({repr(item) for item in items}) < len(items):
+                allowed = f"must be {described(fields(type(self))[name].type)}, each once"
+                raise FieldError((name,), allowed)
+
+
+def read_as(kind: type[AnySection], content: object, where: Path) -> AnySection:
+    """An object of the class from the content of the file `where`; raises `InputError`.
+
+    A `Path` in the class is a file that has to be there, named relative to `where`.
+    """
+    convert = partial(msgspec.convert, dec_hook=partial(_file_beside, where))
+    try:
+        if not _has_null(content):
+            return convert(content, kind)
+    except msgspec.ValidationError:
+        pass
+    fault = _fault(convert, content, kind, ())
+    raise InputError(where, key_path(fault.keys) or "file", fault.value, fault.problem)
+
+
+def _file_beside(where: Path, kind: type, value: object) -> Path:
+    if kind is not Path or not isinstance(value, str) or not value:
+        raise FieldError((), f"must be {_WORDS[Path]}")
+    file = where.parent / value
+    if not is_file(file):
+        raise FieldError((), "no such file")
+    return file
+
+
+def refuse_twins(key: str, items: Iterable[Any]) -> None:
+    """Raise `FieldError` for the first name in a list, under `key`, that occurs twice."""
+    seen: set[str] = set()
+    for i, item in enumerate(items):
+        if item.name in seen:
+            raise FieldError((key, i, "name"), "the name is given twice; each needs its own")
+        seen.add(item.name)
+
+
+def refuse_unknown(keys: Keys, name: str, kind: str, known: Collection[str]) -> None:
+    """Raise `FieldError` where a name is none of the known ones of its kind."""
+    if name not in known:
+        raise FieldError(keys, f"no such {kind}; {hint(name, known)}")
+
+
+def json_schema(kind: type[Section]) -> dict[str, Any]:
+    """The JSON Schema of a class, for editors."""
+    draft = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": draft, **msgspec.json.schema(kind, schema_hook=lambda _: {"type": "string"})}
+
+
+@cache
+def fields(kind: type[Section]) -> dict[str, Any]:
+    """The keys of a class, with their types and defaults."""
+    return {field.encode_name: field for field in msgspec.structs.fields(kind)}
+
+
+def described(kind: Any) -> str:
+    """What a type allows, in words."""
+    if said := _said(kind, "description"):
+        return said
+    kind = _bare(kind)
+    if get_origin(kind) is Literal:
+        *rest, last = map(str, get_args(kind))
+        return f"{', '.join(rest)} or {last}" if rest else last
+    if is_section(kind):
+        return f"{{{', '.join(fields(kind))}}}"
+    if get_origin(kind) in (list, tuple):
+        return f"a list of {described(get_args(kind)[0])}"
+    if get_origin(kind) is dict:
+        return "a mapping of keys to values"
+    parts = [part for part in _parts(kind) if part is not NoneType]
+    return _WORDS.get(kind) or " or ".join(map(described, parts if parts != [kind] else []))
+
+
+def title_of(kind: Any) -> str:
+    """What a key is, in words."""
+    return _said(kind, "title")
+
+
+def is_section(kind: Any) -> bool:
+    """Whether a type is a mapping with a field for each key."""
+    return isinstance(kind, type) and issubclass(kind, Section)
+
+
+def _said(kind: Any, what: str) -> str:
+    """The title or description of a type; of a union, that of its first part that has one."""
+    if get_origin(kind) is Annotated:
+        metas = reversed(kind.__metadata__)
+        said = (getattr(meta, what, None) for meta in metas)
+        return next(filter(None, said), "") or _said(kind.__origin__, what)
+    if get_origin(kind) in (Union, UnionType):
+        others = [part for part in get_args(kind) if part is not NoneType]
+        return _said(others[0], what) if len(others) == 1 else ""
+    return ""
+
+
+def _bare(kind: Any) -> Any:
+    return _bare(kind.__origin__) if get_origin(kind) is Annotated else kind
+
+
+def _parts(kind: Any) -> list[Any]:
+    """The members of a union, or the type itself."""
+    kind = _bare(kind)
+    if get_origin(kind) in (Union, UnionType):
+        return [part for member in get_args(kind) for part in _parts(member)]
+    return [kind]
+
+
+@cache
+def _different(kind: type[Section]) -> list[str]:
+    """The fields whose items must differ."""
+    return [
+        field.name
+        for field in fields(kind).values()
+        if any(meta.extra_json_schema for meta in getattr(field.type, "__metadata__", ()))
+    ]
+
+
+def _has_null(value: object) -> bool:
+    """Whether a key has no value."""
+    if isinstance(value, dict):
+        return any(item is None or _has_null(item) for item in value.values())
+    return isinstance(value, list) and any(map(_has_null, value))
+
+
+def _fits(convert: Convert, value: object, kind: Any) -> bool:
+    try:
+        convert(value, kind)
+    except msgspec.ValidationError:
+        return False
+    return not _has_null(value)
+
+
+def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
+    """The innermost value that does not fit its type, and why."""
+    for part in _parts(kind):
+        if not _is_like(part, value):
+            continue
+        if is_section(part) and (fault := _wrong_key(value, fields(part), keys)):
+            return fault
+        for key, item, inner in _children(convert, value, part):
+            if inner is None:
+                names = get_args(_bare(get_args(part)[0]))
+                return FieldError((*keys, key), f"unknown key; {hint(str(key), names)}", item)
+            if (item is None and isinstance(value, dict)) or not _fits(convert, item, inner):
+                return _fault(convert, item, inner, (*keys, key))
+    try:
+        convert(value, kind)
+    except msgspec.ValidationError as error:
+        if isinstance(own := error.__cause__, FieldError):
+            for key in own.keys:
+                value = value[key]
+            return FieldError((*keys, *own.keys), own.problem, value)
+    return FieldError(keys, f"must be {described(kind)}", value)
+
+
+def _is_like(kind: Any, value: object) -> bool:
+    """Whether a type is of mappings as the value is one, or of lists as it is one."""
+    if isinstance(value, dict):
+        return is_section(kind) or get_origin(kind) is dict
+    return isinstance(value, list) and get_origin(kind) in (list, tuple)
+
+
+def _wrong_key(value: Any, known: Any, keys: Keys) -> FieldError | None:
+    """The first key that is unknown, else the first that is missing."""
+    for key in value:
+        if key not in known:
+            return FieldError((*keys, key), f"unknown key; {hint(key, known)}", value[key])
+    missing = (name for name in known if known[name].required and name not in value)
+    name = next(missing, None)
+    return name and FieldError((*keys, name), "this key is needed")
+
+
+def _children(convert: Convert, value: Any, kind: Any) -> Iterator[tuple[str | int, object, Any]]:
+    """The keys of a value, what each holds, and its type; None as the type of an unknown key."""
+    if is_section(kind):
+        yield from ((key, item, fields(kind)[key].type) for key, item in value.items())
+    elif get_origin(kind) is dict:
+        of_key, of_item = get_args(kind)
+        for key, item in value.items():
+            yield key, item, of_item if _fits(convert, key, of_key) else None
+    else:
+        inner = get_args(kind)
+        for i, item in enumerate(value):
+            yield i, item, inner[i] if len(inner) > i and Ellipsis not in inner else inner[0]

@@ -1,0 +1,210 @@
+"""The commands of the studies: each measures points, or writes the page of what was measured."""
+
+import argparse
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from solver.commands.options import add_command, add_threads
+from solver.studies import FULL, QUICK, SIZES
+from solver.system.errors import InputError
+
+RECORD, FOLDER = "RECORD.json", "DIR"
+
+
+def add_commands(commands: Any) -> None:
+    """Add the commands of all studies to those of the program."""
+    _add_orders(commands)
+    study = commands.add_parser("study", help="error against run time: points and their page")
+    _add_study(study.add_subparsers(title="commands", metavar="COMMAND", required=True))
+    scaling = commands.add_parser("scaling", help="growth with size: points and their page")
+    _add_scaling(scaling.add_subparsers(title="commands", metavar="COMMAND", required=True))
+    _add_benchmark(commands)
+    _add_stability(commands)
+    _add_infsup(commands)
+
+
+def _output(command: argparse.ArgumentParser, metavar: str) -> None:
+    command.add_argument("-o", "--output", type=Path, required=True, metavar=metavar)
+
+
+def _sized(
+    commands: Any, name: str, run: Any, purpose: str, file: str, output: str
+) -> argparse.ArgumentParser:
+    """A command on the file that describes a study, or on its quick part."""
+    command = add_command(commands, name, run, purpose)
+    command.add_argument("study", type=Path, metavar=file)
+    command.add_argument("--size", choices=SIZES, default=FULL)
+    _output(command, output)
+    return command
+
+
+def _quick(command: argparse.ArgumentParser, what: str) -> None:
+    """What a command takes that measures many points in one process."""
+    _output(command, RECORD)
+    command.add_argument("--quick", action="store_true", help=what)
+    add_threads(command)
+
+
+def _add_orders(commands: Any) -> None:
+    command = add_command(commands, "orders", _orders, "write the page of orders of convergence")
+    command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
+    command.add_argument("--results", type=Path, required=True, metavar=FOLDER, help="the levels")
+    _output(command, FOLDER)
+
+
+def _orders(options: argparse.Namespace) -> int:
+    from solver.studies.orders.description import read_ladders
+    from solver.studies.orders.page import write_orders
+
+    write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
+    return 0
+
+
+def _add_study(commands: Any) -> None:
+    file = "STUDY.yaml"
+    purpose = "measure one point, in a process of its own"
+    point = _sized(commands, "point", _study_point, purpose, file, RECORD)
+    point.add_argument("point", metavar="POINT", help="PROBLEM/SLAVE-MASTER/TREATMENT/LEVEL")
+    point.add_argument("--reference", type=Path, metavar="RESULT.vtkhdf", help="taken for exact")
+    purpose = "solve a problem on its refined mesh"
+    reference = _sized(commands, "reference", _reference, purpose, file, "RESULT.vtkhdf")
+    reference.add_argument("problem", metavar="PROBLEM")
+    page = _sized(commands, "page", _study_page, "write the page of all points", file, FOLDER)
+    page.add_argument("--results", type=Path, required=True, metavar=FOLDER, help="the records")
+
+
+def _study_point(options: argparse.Namespace) -> int:
+    from solver.studies.work_precision.description import read_study
+    from solver.studies.work_precision.point import measure_point
+
+    study = read_study(options.study, options.size)
+    point = study.point(options.point)
+    if point.problem.reference and not options.reference:
+        problem = f"{point.problem.name} has no exact solution: name a result by --reference"
+        raise InputError(options.study, "reference", None, problem)
+    print(measure_point(study, point, options.output, options.reference))
+    return 0
+
+
+def _reference(options: argparse.Namespace) -> int:
+    from solver.studies.work_precision.description import read_study
+    from solver.studies.work_precision.reference import write_reference
+
+    write_reference(read_study(options.study, options.size), options.problem, options.output)
+    return 0
+
+
+def _study_page(options: argparse.Namespace) -> int:
+    from solver.studies.work_precision.description import read_study
+    from solver.studies.work_precision.page import write_study
+
+    write_study(read_study(options.study, options.size), options.results, options.output)
+    return 0
+
+
+def _add_scaling(commands: Any) -> None:
+    file = "SCALING.yaml"
+    purpose = "solve one point, in a process of its own"
+    point = _sized(commands, "point", _scaling_point, purpose, file, RECORD)
+    point.add_argument("point", metavar="POINT", help="SERIES/SIZE")
+    page = _sized(commands, "page", _scaling_page, "write the page of all points", file, FOLDER)
+    page.add_argument("--results", type=Path, required=True, metavar=FOLDER, help="the records")
+
+
+def _scaling_point(options: argparse.Namespace) -> int:
+    from solver.studies.scaling.description import read_scaling
+    from solver.studies.scaling.point import measure_point
+
+    scaling = read_scaling(options.study, options.size)
+    print(measure_point(scaling, scaling.point(options.point), options.output))
+    return 0
+
+
+def _scaling_page(options: argparse.Namespace) -> int:
+    from solver.studies.scaling.description import read_scaling
+    from solver.studies.scaling.page import write_scaling
+
+    write_scaling(read_scaling(options.study, options.size), options.results, options.output)
+    return 0
+
+
+def _add_benchmark(commands: Any) -> None:
+    command = add_command(commands, "benchmark", _benchmark, "measure ratios side by side")
+    command.add_argument("benchmark", type=Path, metavar="BENCHMARK.yaml")
+    command.add_argument("--quick", action="store_true", help="on tiny meshes, for a first look")
+    _output(command, RECORD)
+
+
+def _benchmark(options: argparse.Namespace) -> int:
+    from solver.studies.benchmark.description import read_benchmark
+    from solver.studies.benchmark.page import as_text
+    from solver.studies.benchmark.run import run_benchmark
+    from solver.system.files import write_text
+    from solver.verification.verdict import to_json
+
+    benchmark = read_benchmark(options.benchmark, QUICK if options.quick else FULL)
+    record = run_benchmark(benchmark, partial(print, file=sys.stderr, flush=True))
+    write_text(options.output, to_json(record) + "\n")
+    print(as_text(record))
+    return 0
+
+
+def _add_stability(commands: Any) -> None:
+    purpose = "push one quantity of a case through its values"
+    command = add_command(commands, "sweep", _sweep, purpose)
+    command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
+    _quick(command, "some of the values only")
+
+    purpose = "write the page of numerical stability"
+    command = add_command(commands, "stability", _stability, purpose)
+    command.add_argument("records", type=Path, nargs="+", metavar=RECORD)
+    _output(command, FOLDER)
+    command.add_argument("--quick", action="store_true", help="say that values are left out")
+    command.add_argument("--infsup", type=Path, metavar=RECORD, help="show its record too")
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    from solver.studies.stability.points import run_sweep
+    from solver.studies.stability.sweeps import read_sweep
+
+    record = run_sweep(read_sweep(options.sweep, options.quick), options.output, print)
+    return 0 if all(point["holds"] for point in record["points"]) else 1
+
+
+def _stability(options: argparse.Namespace) -> int:
+    from solver.studies.infsup.records import read_record
+    from solver.studies.stability.page import read_records, write_stability
+
+    theory = read_record(options.infsup) if options.infsup else None
+    records = read_records(options.records)
+    write_stability(records, options.output, options.quick, theory=theory)
+    return 0
+
+
+def _add_infsup(commands: Any) -> None:
+    purpose = "run the inf-sup test and the half-loaded block"
+    command = add_command(commands, "infsup", _infsup, purpose)
+    command.add_argument("ladders", type=Path, metavar="INFSUP.yaml")
+    _quick(command, "fewer levels")
+
+    purpose = "write the page of the inf-sup test"
+    command = add_command(commands, "infsup-page", _infsup_page, purpose)
+    command.add_argument("record", type=Path, metavar=RECORD)
+    _output(command, FOLDER)
+
+
+def _infsup(options: argparse.Namespace) -> int:
+    from solver.studies.infsup.point import measure
+
+    measure(options.ladders, options.output, options.quick, partial(print, flush=True))
+    return 0
+
+
+def _infsup_page(options: argparse.Namespace) -> int:
+    from solver.studies.infsup.page import write_page
+    from solver.studies.infsup.records import read_record
+
+    write_page(read_record(options.record), options.output)
+    return 0

@@ -1,0 +1,181 @@
+"""The systems that a contact problem solves: one for each group of bodies that contact joins.
+
+A group is factored again only when its own closed multipliers change. A body outside every zone is
+factored once, whatever the contact status of the others.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from solver.mechanics.fem.bodies import joined_bodies
+from solver.mechanics.linear.choice import LinearSolver, against_condensation
+from solver.mechanics.linear.condensation import (
+    CondensedSystem,
+    ConstrainedSystem,
+    condense,
+    saddle_point,
+)
+from solver.mechanics.linear.direct import Factor
+from solver.mechanics.linear.krylov import EPSILON
+from solver.mechanics.linear.multigrid import Unknowns
+from solver.system.errors import SolveError
+
+_NOTHING_OWN = "constraints without an unknown of their own leave a saddle point"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A group of bodies: masks of its free unknowns (n,) and of its multipliers (k,)."""
+
+    unknowns: np.ndarray
+    multipliers: np.ndarray
+
+
+def parts_of(constraints: sparse.csr_matrix, bodies: np.ndarray, n_bodies: int) -> list[Part]:
+    """The groups of bodies that no row of `constraints` (k, n) joins; one part if that is all.
+
+    `bodies` (n,) of the unknowns.
+    """
+    everything = Part(*(np.ones(n, dtype=bool) for n in reversed(constraints.shape)))
+    if n_bodies == 1:
+        return [everything]
+    group = joined_bodies(constraints, bodies, n_bodies)[bodies]
+    numbers = np.unique(group)
+    if len(numbers) == 1:
+        return [everything]
+    mine = [group == number for number in numbers]
+    return [Part(m, np.diff(constraints[:, np.flatnonzero(m)].tocsr().indptr) > 0) for m in mine]
+
+
+@dataclass(frozen=True)
+class IndependentSystems:
+    """Systems without common unknowns: `parts` with their unknowns and closed multipliers."""
+
+    parts: Sequence[tuple[np.ndarray, np.ndarray, ConstrainedSystem]]
+    n_multipliers: int
+
+    @property
+    def _largest(self) -> ConstrainedSystem:
+        return max(self.parts, key=lambda part: len(part[0]))[2]
+
+    @property
+    def factor(self) -> Factor | LinearSolver:
+        """The solver of the largest system."""
+        return self._largest.factor
+
+    @property
+    def why(self) -> str:
+        """Why it was chosen."""
+        return f"{self._largest.why}; largest of {len(self.parts)} systems"
+
+    @property
+    def doubt(self) -> str:
+        """The first of its parts."""
+        return next((system.doubt for _, _, system in self.parts if system.doubt), "")
+
+    def correction(
+        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
+    ) -> np.ndarray:
+        """See `ConstrainedSystem`."""
+        change = np.zeros_like(force)
+        for unknowns, mine, system in self.parts:
+            change[unknowns] = system.correction(force[unknowns], violation[mine], accuracy)
+        return change
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """See `ConstrainedSystem`."""
+        found = np.zeros((self.n_multipliers, *force.shape[1:]))
+        for unknowns, mine, system in self.parts:
+            found[mine] = system.multiplier(force[unknowns])
+        return found
+
+    def imbalance(self, force: np.ndarray) -> float:
+        """See `ConstrainedSystem`."""
+        return max(system.imbalance(force[unknowns]) for unknowns, _, system in self.parts)
+
+
+class Systems:
+    """K x = f + Gᵀ p under the constraints of closed multipliers, factored and kept.
+
+    `matrix` K (n, n), `constraints` (k, n) of all multipliers, `own` (n,) the unknowns that may be
+    eliminated by condensation, None where some multiplier has none: then the saddle point is
+    factored. `unknowns` describes each.
+    """
+
+    def __init__(
+        self,
+        matrix: sparse.csr_matrix,
+        constraints: sparse.csr_matrix,
+        own: np.ndarray | None,
+        unknowns: Unknowns,
+        parts: Sequence[Part],
+    ):
+        self._matrix, self._constraints, self._own = matrix, constraints, own
+        self._unknowns, self._parts = unknowns, parts
+        self._kept: dict[int, tuple[bytes, ConstrainedSystem]] = {}
+        self._gave_up: dict[int, str] = {}
+        self.latest: ConstrainedSystem | None = None
+
+    def forget(self) -> None:
+        """Keep no factor."""
+        for number in list(self._kept):
+            self._drop(number)
+
+    def _drop(self, number: int) -> None:
+        """Drop a part's system, and remember why multigrid failed on it, if it did."""
+        system = self._kept.pop(number)[1]
+        if isinstance(system, CondensedSystem) and system.factor.gave_up:
+            self._gave_up[number] = system.factor.gave_up
+
+    def closed(self, closed: np.ndarray) -> ConstrainedSystem:
+        """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
+        if len(self._parts) == 1:
+            self.latest = self._of(0, None, closed)
+            return self.latest
+        found = []
+        for number, part in enumerate(self._parts):
+            unknowns = np.flatnonzero(part.unknowns)
+            system = self._of(number, unknowns, closed & part.multipliers)
+            found.append((unknowns, np.flatnonzero(part.multipliers[closed]), system))
+        self.latest = IndependentSystems(found, int(closed.sum()))
+        return self.latest
+
+    def _of(self, number: int, chosen: np.ndarray | None, closed: np.ndarray) -> ConstrainedSystem:
+        """The system of one part, of the `chosen` unknowns; None: of all."""
+        key = closed.tobytes()
+        if number not in self._kept or self._kept[number][0] != key:
+            # The previous factor releases its memory first.
+            if number in self._kept:
+                self._drop(number)
+            self._kept[number] = key, self._factored(number, chosen, closed)
+        return self._kept[number][1]
+
+    def _factored(
+        self, number: int, chosen: np.ndarray | None, closed: np.ndarray
+    ) -> ConstrainedSystem:
+        matrix, constraints = self._matrix, self._constraints[closed]
+        own, unknowns = self._own, self._unknowns
+        if chosen is not None:
+            matrix, constraints = matrix[chosen][:, chosen], constraints[:, chosen]
+            own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
+        if own is None:
+            return _saddle_point(matrix, constraints)
+        if why := against_condensation(matrix, constraints):
+            try:
+                return saddle_point(matrix, constraints, why, weighted=False)
+            except SolveError:
+                pass  # pivots that no order of elimination avoids: condensation needs none of them
+        return condense(matrix, constraints, own, unknowns, self._gave_up.get(number, ""))
+
+
+def _saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> ConstrainedSystem:
+    try:
+        return saddle_point(matrix, constraints, _NOTHING_OWN)
+    except SolveError as error:
+        raise SolveError(
+            f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
+            "another, as where they outnumber the slave nodes or supports hold these"
+        ) from None

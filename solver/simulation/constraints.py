@@ -1,0 +1,142 @@
+"""The contact constraints of a scene: one row for each multiplier of all zones."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from solver.mechanics.fem.bodies import unheld_motion
+from solver.mechanics.linear.condensation import choose_pivots
+from solver.simulation.naming import body_names
+from solver.simulation.scene import Scene
+from solver.system.errors import InputError
+
+# A macro-element covered by less than this share of its area is out of contact.
+MIN_COVERAGE = 0.01
+# Multipliers whose coefficients on free unknowns are below this share of all are inactive.
+_ACTIVE = 1e-12
+# Coverage above one by more than this means that the master surface lies there twice.
+_TWICE = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactConstraints:
+    """∫ gap = initial + gaps · u, seen by k multipliers.
+
+    `gaps` (k, n_dofs); `on_free` (k, n_free) the same on free unknowns; `initial` (k,); `area`,
+    `covered` (k,) whole and intersected; `eligible` (k,) may close; `inactive_multipliers` (k,)
+    move nothing; `slave` (n_dofs,) marks the degrees of freedom of slave nodes, `own` (n_free,) the
+    free unknowns there.
+    """
+
+    gaps: sparse.csr_matrix
+    on_free: sparse.csr_matrix
+    initial: np.ndarray
+    area: np.ndarray
+    covered: np.ndarray
+    eligible: np.ndarray
+    inactive_multipliers: np.ndarray
+    slave: np.ndarray
+    own: np.ndarray
+
+    @cached_property
+    def dependent(self) -> np.ndarray:
+        """The numbers of eligible multipliers without a free unknown of their own."""
+        _, _, found = choose_pivots(self.on_free[self.eligible], self.own)
+        return np.flatnonzero(self.eligible)[~found]
+
+
+def contact_constraints(scene: Scene) -> ContactConstraints:
+    """Those of all zones; raises InputError where a zone cannot be in contact."""
+    operators = [zone.operator for zone in scene.zones]
+    empty = sparse.csr_matrix((0, scene.n_dofs))
+    gaps = sparse.vstack([empty, *(o.matrix for o in operators)]).tocsr()
+    on_free = (gaps @ scene.free.basis).tocsr()
+    initial, area, covered = (
+        np.concatenate([np.empty(0), *(getattr(o, k) for o in operators)])
+        for k in ("initial", "area", "covered")
+    )
+    touching = covered / area > MIN_COVERAGE
+    _refuse_surfaces(scene, touching)
+    # Supports may hold the nodes of both surfaces. Macro-elements that were cut to own a free
+    # unknown all act, or are refused.
+    active = _row_sizes(on_free) > _ACTIVE * _row_sizes(gaps)
+    for zone in scene.zones:
+        active[zone.numbers] |= zone.treatment.cut
+    slave = _slave_dofs(scene)
+    return ContactConstraints(
+        gaps=gaps,
+        on_free=on_free,
+        initial=initial,
+        area=area,
+        covered=covered,
+        eligible=touching & active & ~scene.rest.unloaded_multipliers,
+        inactive_multipliers=touching & ~active,
+        slave=slave,
+        own=np.asarray(abs(scene.free.basis).T @ slave.astype(float)) > 0,
+    )
+
+
+def _row_sizes(matrix: sparse.csr_matrix) -> np.ndarray:
+    return np.sqrt(np.asarray(matrix.multiply(matrix).sum(axis=1)).ravel())
+
+
+def _slave_dofs(scene: Scene) -> np.ndarray:
+    """Which degrees of freedom (n_dofs,) belong to slave nodes."""
+    dim, slave = scene.points.shape[1], np.zeros(scene.n_dofs, dtype=bool)
+    for zone in scene.zones:
+        for faces in zone.sub_faces:
+            slave[(dim * faces.nodes[..., None] + np.arange(dim)).ravel()] = True
+    return slave
+
+
+def free_motion(
+    scene: Scene,
+    motions: sparse.csc_matrix,
+    constraints: ContactConstraints,
+    closed: np.ndarray,
+) -> str:
+    """What moves freely with `closed` (k,) multipliers, in words; empty where nothing does.
+
+    `motions` (n_dofs, r): the rigid motions of all bodies.
+    """
+    per_area = sparse.diags(1 / constraints.covered[closed]) @ constraints.gaps[closed]
+    found = unheld_motion(motions, scene.free.basis, per_area, scene.n_bodies)
+    if found is None:
+        return ""
+    return f"nothing keeps {body_names(scene)[found[0]]} from a free motion ({found[1]})"
+
+
+def refuse_unsolvable(
+    scene: Scene, motions: sparse.csc_matrix, constraints: ContactConstraints
+) -> None:
+    """Raise InputError where a body moves freely, or a cut macro-element owns no free unknown."""
+    if moves := free_motion(scene, motions, constraints, constraints.eligible):
+        allowed = f"{moves}, even with all of the contact closed; add a support"
+        raise InputError(scene.case.path, "supports", None, allowed)
+    lost = constraints.dependent
+    for zone in scene.zones:
+        mine = lost[(lost >= zone.numbers.start) & (lost < zone.numbers.stop)] - zone.first
+        if zone.treatment.cut and len(mine):
+            place = zone.operator.surface.centre[mine[0]] + scene.origin
+            at = ", ".join(f"{x:.6g}" for x in place)
+            allowed = (
+                f"{len(mine)} macro-elements of zone {zone.zone.name} (the first, number "
+                f"{mine[0]}, at ({at})) have no free unknown of their own: supports or "
+                "another zone hold their inner nodes"
+            )
+            raise InputError(scene.case.path, "supports", None, allowed)
+
+
+def _refuse_surfaces(scene: Scene, touching: np.ndarray) -> None:
+    for i, zone in enumerate(scene.zones):
+        key, master, slave = scene.case.zone_key(i, "master"), zone.zone.master, zone.zone.slave
+        surface = zone.operator.surface
+        worst = float((surface.covered / surface.area).max())
+        if worst > 1 + _TWICE:
+            allowed = f"covers a macro-element {worst:.3g} times: it must not fold over itself"
+            raise InputError(scene.case.path, key, master, allowed)
+        if not touching[zone.numbers].any():
+            allowed = f"does not lie over {slave} anywhere along the normals of {slave}"
+            raise InputError(scene.case.path, key, master, allowed)

@@ -1,0 +1,91 @@
+"""An approximate solution of the contact problem with given closed multipliers."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from solver.mechanics.fem.elasticity import Sizes, internal_force, sizes, stiffness
+from solver.simulation.constraints import ContactConstraints
+from solver.simulation.displacement import Displacement
+from solver.simulation.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactIterate:
+    """Displacement and mean stress (of cells in mixed form) under loads `force` (n, dim).
+
+    The gaps of the multipliers `closed` (k,) are to vanish; see `condensation.Iterate`. `extended`:
+    internal forces are summed in extended precision.
+    """
+
+    scene: Scene
+    constraints: ContactConstraints
+    closed: np.ndarray
+    force: np.ndarray
+    displacement: Displacement
+    mean_stress: np.ndarray
+    extended: bool = False
+
+    @property
+    def deformation(self) -> np.ndarray:
+        """Both parts (2, n, dim) of the displacement less a rigid motion of each body."""
+        return self.displacement.deformation.reshape(2, *self.force.shape)
+
+    @cached_property
+    def defect(self) -> np.ndarray:
+        """By how much the mean stress differs from λ div u; see `mechanics.fem.mixed`."""
+        return self.scene.mean.defect(self.deformation, self.mean_stress)
+
+    @cached_property
+    def internal(self) -> np.ndarray:
+        """Internal forces (n, dim)."""
+        points, blocks = self.scene.points, self.scene.blocks
+        if self.scene.options.safeguards.differences:
+            internal = internal_force(points, blocks, self.deformation, self.extended)
+        else:
+            product = stiffness(points, blocks)[0] @ self.displacement.total
+            internal = product.reshape(self.force.shape)
+        return internal + self.scene.mean.force(self.mean_stress)
+
+    @cached_property
+    def sizes(self) -> Sizes:
+        """How large its stresses are, and the terms that they are summed from."""
+        return sizes(self.scene.points, self.scene.blocks, self.deformation)
+
+    @property
+    def gap(self) -> np.ndarray:
+        """The average gap (k,); zero for multipliers that are out of contact."""
+        known = self.constraints.eligible | self.scene.rest.unloaded_multipliers
+        covered = np.where(known, self.constraints.covered, np.inf)
+        return (self.constraints.initial + self._opening(self.constraints.gaps)) / covered
+
+    def _opening(self, gaps: sparse.csr_matrix) -> np.ndarray:
+        dim = self.scene.points.shape[1]
+        return self.displacement.opening(gaps, dim, self.scene.options.safeguards.differences)
+
+    @cached_property
+    def opening_size(self) -> np.ndarray:
+        """The sum of the sizes (k,) of what changes ∫ gap."""
+        dim = self.scene.points.shape[1]
+        return self.displacement.opening_size(self.constraints.gaps, dim)
+
+    def residual(self) -> np.ndarray:
+        """The forces (n_free,) that internal ones leave, without those of contact."""
+        return self.scene.free.basis.T @ (self.force - self.internal).astype(float).ravel()
+
+    def condensed(self, force: np.ndarray) -> np.ndarray:
+        """The forces (n_free,) to balance once the change of mean stress is eliminated."""
+        return force + self.scene.free.basis.T @ self.scene.mean.condensed_force(self.defect)
+
+    def violation(self) -> np.ndarray:
+        """By how much ∫ gap of the closed multipliers is below zero."""
+        gaps, initial = self.constraints.gaps[self.closed], self.constraints.initial[self.closed]
+        return -(initial + self._opening(gaps))
+
+    def advanced(self, change: np.ndarray) -> "ContactIterate":
+        """The iterate with the free unknowns changed by `change` (n_free,)."""
+        move = self.scene.free.basis @ change
+        stress = self.mean_stress + self.scene.mean.change(move, self.defect)
+        return replace(self, displacement=self.displacement.moved(move), mean_stress=stress)

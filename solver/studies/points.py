@@ -1,0 +1,218 @@
+"""Points of a study: each measured in processes of its own, and recorded whatever happens there.
+
+A record is a JSON object. Every one has these keys:
+
+    point                    its name, the path of its record without suffix
+    outcome reason           solved, refused, failed, crashed or missing, and why
+    threads cores load       what it ran on; load: the machine's when it began, over 1 minute
+    whole                    wall seconds that the point took
+    machine                  as `system.provenance.gather` describes it
+"""
+
+import json
+import os
+import statistics
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from solver.studies import FULL
+from solver.system.clock import now
+from solver.system.errors import InputError, SolveError, hint
+from solver.system.process import run_apart
+
+SOLVED, REFUSED, FAILED, CRASHED, MISSING = "solved", "refused", "failed", "crashed", "missing"
+# A machine that was busier than this when a point began may have disturbed it.
+_BUSY = 1.0
+_PACKAGES = ("python", "numpy", "scipy")
+
+Record = Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointStudy:
+    """A study measured point by point, each on `threads` cores and for at most `limit` seconds.
+
+    Each point has a `name`, and the `seconds` that it takes, about.
+    """
+
+    path: Path
+    title: str
+    size: str
+    threads: int
+    limit: float
+
+    @cached_property
+    def points(self) -> Sequence[Any]:
+        """Every point."""
+        raise NotImplementedError
+
+    def point(self, name: str) -> Any:
+        """The point of that name; InputError where there is none."""
+        known = {point.name: point for point in self.points}
+        if name not in known:
+            raise InputError(self.path, "point", name, f"no such point; {hint(name, known)}")
+        return known[name]
+
+
+@dataclass(frozen=True)
+class MeasuredPoint:
+    """A point with its record."""
+
+    record: Record
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a solve to show."""
+        return self.record["outcome"] == SOLVED
+
+    @property
+    def why_not(self) -> str:
+        """Why there is none."""
+        return f"{self.record['outcome']}: {self.record['reason']}"
+
+
+def ended(outcome: str, reason: str) -> dict[str, str]:
+    """How a point ended, as a part of its record."""
+    return {"outcome": outcome, "reason": reason}
+
+
+def surroundings(cores: Sequence[int]) -> dict[str, Any]:
+    """What a point that begins now runs on, as a part of its record."""
+    return {"threads": len(cores), "cores": list(cores), "load": round(os.getloadavg()[0], 2)}
+
+
+def read_record(path: Path, *keys: str) -> dict[str, Any]:
+    """A record, where it is solved with these keys.
+
+    One that says why for a file that is missing or cannot be read.
+    """
+    try:
+        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        solved = record["outcome"] == SOLVED
+        [record[key] for key in ("point", "reason", *(keys if solved else ()))]
+    except OSError:
+        return ended(MISSING, "not measured")
+    except (ValueError, KeyError, TypeError):
+        return ended(MISSING, "the record cannot be read")
+    return record
+
+
+def measure_apart(
+    work: Callable[[Any], Mapping[str, Any]],
+    job: Mapping[str, Any],
+    output: Path,
+    cores: Sequence[int],
+    limit: float,
+) -> dict[str, Any]:
+    """What a function of a module finds for `job` in a new process, with outcome and reason.
+
+    The process writes it to `output`. Its libraries read the number of threads when they are
+    loaded, and peak memory is the process's own: hence a process for each point. In the job, the
+    key `started` is added: when the process was started, by `clock.now`.
+    """
+    task: dict[str, Any] = {"module": work.__module__, "work": work.__name__, "output": str(output)}
+    task |= {"job": {**job, "started": now()}}
+    command = [sys.executable, "-m", __name__, json.dumps(task)]
+    done = run_apart(command, cores, limit)
+    if done.status == 0:
+        return json.loads(output.read_text(encoding="utf-8"))
+    return ended(FAILED if done.status is None else CRASHED, done.reason)
+
+
+def _work(task: Mapping[str, Any]) -> None:
+    """Do it in this process, and write what was found or why there is nothing."""
+    from solver.verification.verdict import to_json
+
+    try:
+        found = getattr(import_module(task["module"]), task["work"])(task["job"])
+        found = ended(SOLVED, "") | found
+    except InputError as error:
+        found = ended(REFUSED, error.told)
+    except SolveError as error:
+        found = ended(FAILED, str(error))
+    Path(task["output"]).write_text(to_json(found), encoding="utf-8")
+
+
+def announcement(study: PointStudy, folder: Path, pending: Collection[str]) -> str:
+    """What is about to be measured and how long it will take; records are in `folder`."""
+    model = {point.name: point.seconds for point in study.points}
+    if not pending:
+        return f"{study.title}: all {len(model)} points are measured."
+    earlier = measured_before(folder / f"{name}.json" for name in model)
+    seconds = expected(model, pending, earlier, study.limit)
+    basis = "from earlier measurements" if earlier else "from a model, not from this machine"
+    shown = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
+    return (
+        f"{study.title}: {len(pending)} of {len(model)} points to measure, one at a time, "
+        f"on {study.threads} of this machine's cores: about {shown} ({basis})."
+    )
+
+
+def expected(
+    model: Mapping[str, float], pending: Iterable[str], earlier: Mapping[str, float], limit: float
+) -> float:
+    """Seconds that the points of these names will take, each at most `limit`.
+
+    `earlier` has the seconds that points took before; the others are taken from the model, scaled
+    to fit those.
+    """
+    ratios = [earlier[name] / seconds for name, seconds in model.items() if name in earlier]
+    scale = statistics.median(ratios) if ratios else 1.0
+    return sum(min(earlier.get(name) or scale * model[name], limit) for name in pending)
+
+
+def measured_before(files: Iterable[Path]) -> dict[str, float]:
+    """The seconds that points took, by name, from the records there are."""
+    found = {}
+    for record in map(read_record, files):
+        try:
+            found[str(record["point"])] = float(record["whole"])
+        except (KeyError, TypeError, ValueError):
+            continue  # a record that cannot be read is no measurement
+    return found
+
+
+def page_name(name: str, size: str) -> str:
+    """The name of a study's page, of its tables and of the folder of its figures."""
+    return name if size == FULL else f"{name}-{size}"
+
+
+def outcome(points: Sequence[MeasuredPoint]) -> str:
+    """How many points have a solve."""
+    lost = sum(not m.solved for m in points)
+    text = f"{len(points) - lost} of {len(points)} points are measured."
+    return text + (f" {lost} have no solve, each with its reason." if lost else "")
+
+
+def disturbed(points: Sequence[MeasuredPoint]) -> int:
+    """How many points began while other work kept the machine busy."""
+    return sum(m.solved and m.record["load"] > m.record["threads"] + _BUSY for m in points)
+
+
+def facts(points: Sequence[MeasuredPoint]) -> list[tuple[str, str]]:
+    """When, on which machine and with what points were measured; empty where none is."""
+    records = [m.record for m in points if m.solved]
+    if not records:
+        return []
+
+    def all_of(key: str) -> str:
+        return ", ".join(sorted({str(r["machine"].get(key, "")) for r in records}))
+
+    times = sorted(r["machine"]["time_utc"][:16].replace("T", " ") for r in records)
+    return [
+        ("Measured", " … ".join(dict.fromkeys([times[0], times[-1]])) + " UTC"),
+        ("Machine", all_of("cpu")),
+        ("Threads", ", ".join(sorted({str(r["threads"]) for r in records}))),
+        ("Revision", all_of("revision")),
+        ("Versions", ", ".join(f"{p} {all_of(p)}" for p in _PACKAGES)),
+        ("Begun while the machine was busy", f"{disturbed(points)} of {len(records)}"),
+    ]
+
+
+if __name__ == "__main__":
+    _work(json.loads(sys.argv[1]))

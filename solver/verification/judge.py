@@ -1,0 +1,189 @@
+"""From a solution and its checks, or from what ended a solve, to its verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.case import job_name
+from solver.simulation.accuracy import Accuracy, beyond_small_strain
+from solver.verification.verdict import (
+    FAILED,
+    PASSED,
+    SOLVED,
+    UNRELIABLE,
+    Body,
+    CheckError,
+    CheckResult,
+    Sides,
+    Verdict,
+)
+
+if TYPE_CHECKING:
+    from solver.case.model import Case
+    from solver.simulation.solution import Solution
+
+NOT_VERIFIED = "not verified: the case gives no reference"
+# The checks that say how accurate a solve is: their errors are relative to the reference.
+ACCURACY = (
+    "multiplier",
+    "element_pressure",
+    "nodal_stress",
+    "surface_stress_slave",
+    "surface_stress_master",
+    "displacement",
+    "stress_components",
+    "integration_stress",
+)
+# What a verdict takes from a solution as it is.
+_OF_SOLUTION = (
+    *("dofs", "macro_elements", "iterations", "linear_solver", "linear_iterations"),
+    *(
+        "matrix_entries",
+        "length",
+        "load_scale",
+        "strain",
+        "rotation",
+        "stage_cpu_seconds",
+        "cpu_seconds",
+    ),
+    *("peak_memory_mb", "accuracy", "errors"),
+)
+
+
+def judge(
+    solution: Solution,
+    checks: Sequence[CheckResult],
+    result: str | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    sha256: str | None = None,
+) -> Verdict:
+    """The verdict of a solve that came to its end: `passed` when every check holds.
+
+    `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
+    the checks say, where rounding may have left less than four digits (then `attainable`, the
+    relative error that rounding alone may cause, is the first reason) or where strain or rotation
+    is beyond small strain. `result` is the name of the result file beside the verdict and `sha256`
+    its hash.
+    """
+    accuracy = Accuracy(solution.accuracy)
+    large = beyond_small_strain(solution.case, solution.strain, solution.rotation)
+    unreliable = [reason for reason in (accuracy.reason, large) if reason]
+    reasons = unreliable + [check.reason for check in checks if not check.passed]
+    word = PASSED if any(check.verifies for check in checks) else SOLVED
+    if reasons:
+        word = UNRELIABLE if unreliable else FAILED
+    seconds = solution.seconds
+    zones = solution.zones
+    return Verdict(
+        **_identity(solution.case, solution.swapped, solution.hexahedra),
+        verdict=word,
+        passed=word == PASSED,
+        reason=_first_of(reasons) or (NOT_VERIFIED if word == SOLVED else ""),
+        result=result,
+        result_sha256=sha256,
+        **{name: getattr(solution, name) for name in _OF_SOLUTION},
+        seconds={**seconds, "total": seconds.get("total", sum(seconds.values()))},
+        pressure=_extremes(zone.multiplier for zone in zones),
+        stress=_extremes([solution.nodal_normal_stress[solution.body >= 0]]),
+        gap=_extremes(zone.gap for zone in zones),
+        status=_extremes(zone.closed.astype(int) for zone in zones),
+        coverage=_extremes(zone.coverage for zone in zones),
+        worst=_worst(checks),
+        closest_to_tolerance=_closest(checks),
+        bodies=_bodies(solution),
+        plan=[list(entry) for entry in solution.plan],
+        checks=list(checks),
+        attainable=accuracy.estimate,
+        provenance=dict(provenance or {}),
+    )
+
+
+def without_result(
+    word: str,
+    reason: str,
+    case: Case | Path,
+    swapped: bool = False,
+    hexahedra: str | None = None,
+    transient: bool = False,
+) -> Verdict:
+    """The verdict of a solve that was refused, failed or crashed, for the reason given.
+
+    `case` is the path of the case file where the file itself could not be read.
+    """
+    identity = _identity(case, swapped, hexahedra)
+    return Verdict(**identity, verdict=word, reason=reason, transient=transient)
+
+
+def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[str, Any]:
+    """What singles out a solve, and where its reference comes from."""
+    found: dict[str, Any] = {
+        "swapped": swapped,
+        "direction": "swapped" if swapped else "first",
+        "variant": hexahedra or "",
+    }
+    if isinstance(case, Path):
+        name, family = case.stem, case.resolve().parent.name
+    else:
+        name, family = case.name, case.family
+        found |= {
+            "title": case.title,
+            "zones": [Sides(name=z.name, slave=z.slave, master=z.master) for z in case.zones],
+            "reference_kind": case.reference_kind,
+            "reference_uncertainty": case.reference_uncertainty,
+            "reference_code": case.reference_code,
+            "reference_remark": case.reference_remark,
+            "reference_solution": case.solution.name if case.solution else None,
+        }
+    return found | {"case": name, "family": family, "job": job_name(name, swapped, hexahedra)}
+
+
+def _bodies(solution: Solution) -> list[Body]:
+    counts = solution.case.counts
+    return [
+        Body(
+            **asdict(body),
+            reference_cells=counts.get(body.name, {}).get("cells"),
+            reference_faces=counts.get(body.name, {}).get("faces"),
+        )
+        for body in solution.bodies
+    ]
+
+
+def _first_of(reasons: Sequence[str]) -> str:
+    if len(reasons) < 2:
+        return "".join(reasons)
+    return f"{reasons[0]} (and {len(reasons) - 1} more)"
+
+
+def _extremes(arrays: Iterable[np.ndarray]) -> list[Any] | None:
+    values = [array for array in arrays if len(array)]
+    if not values:
+        return None
+    joined = np.concatenate(values)
+    return [joined.min().item(), joined.max().item()]
+
+
+def _worst(checks: Sequence[CheckResult]) -> CheckError | None:
+    """The check of `ACCURACY` with the largest error; where none ran, that of the norms checked."""
+    relative = [check for check in checks if check.name in ACCURACY]
+    relative = relative or [check for check in checks if check.norm == "error"]
+    found = [CheckError(name=c.name, zone=c.zone, error=c.error) for c in relative]
+    return max(found, key=_size, default=None)
+
+
+def _size(check: CheckError) -> float:
+    """The error, infinite where it is not a number: no error is worse."""
+    return math.inf if math.isnan(check.error) else check.error
+
+
+def _closest(checks: Iterable[CheckResult]) -> CheckError | None:
+    nearest = max(checks, key=lambda check: check.share, default=None)
+    if nearest is None:
+        return None
+    return CheckError(name=nearest.name, zone=nearest.zone, error=nearest.error)

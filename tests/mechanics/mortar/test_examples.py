@@ -1,0 +1,44 @@
+"""The examples in the docstrings of the mortar package hold, and every public function has one."""
+
+import doctest
+import inspect
+from importlib import import_module
+from pkgutil import iter_modules
+
+import numpy as np
+import pytest
+
+from solver.mechanics import mortar
+from solver.mesh.catalogue import BY_NAME
+from tests.patches import segment_pair
+
+NAMES = [module.name for module in iter_modules(mortar.__path__)]
+MODULES = [import_module(f"{mortar.__name__}.{name}") for name in NAMES]
+PUBLIC = {
+    name: value for module in MODULES for name, value in vars(module).items() if name[0] != "_"
+}
+
+
+@pytest.mark.parametrize("module", MODULES, ids=NAMES)
+def test_examples(module):
+    points, slave, master = segment_pair([0.0, 2.0], [0.0, 1.0, 2.0], 0.5)
+    known = (
+        PUBLIC
+        | vars(module)
+        | {
+            "np": np,
+            "BY_NAME": BY_NAME,
+            "points": points,
+            "slave": slave,
+            "master": master,
+        }
+    )
+    result = doctest.testmod(module, extraglobs=known)
+    assert result.failed == 0
+    public = [
+        function
+        for key, function in inspect.getmembers(module, inspect.isfunction)
+        if function.__module__ == module.__name__ and not key.startswith("_")
+    ]
+    assert [f.__name__ for f in public if ">>>" not in f.__doc__] == []
+    assert public or result.attempted == 0

@@ -1,0 +1,229 @@
+"""Segments against areas and distances known by hand: bent edges, steps, faces behind others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.mechanics.fem import shape_functions
+from solver.mechanics.mortar.facets import facets
+from solver.mechanics.mortar.operator import LAC, gap_operator
+from solver.mechanics.mortar.regions import Regions, clip_to_face, quadrature, without_face
+from solver.mesh.catalogue import BY_NAME
+
+RAW = replace(LAC, closure=False)
+
+
+def bent_face(kind, amount, seed):
+    """Nodes (n, 2) of a face whose mid-edge nodes are moved by up to `amount` of an edge."""
+    rng = np.random.default_rng(seed)
+    places = BY_NAME[kind].nodes.copy()
+    n, edges = BY_NAME[kind].n_vertices, len(BY_NAME[kind].edges)
+    places[n : n + edges] += amount * rng.uniform(-1, 1, (edges, 2))
+    return places
+
+
+def is_valid(kind, places):
+    ticks = np.linspace(0, 1, 41)
+    grid = np.array([(x, y) for x in ticks for y in ticks if kind != "TRIA6" or x + y <= 1])
+    slopes = shape_functions(kind).gradients(grid)
+    return np.linalg.det(np.einsum("ad,qat->qdt", places, slopes)).min() > 0
+
+
+def facing(slave, master, height=0.0):
+    """A slave face (type, places) seen from below and master faces (type, places) above it."""
+    points = np.concatenate([np.pad(places, ((0, 0), (0, 1))) for _, places in [slave, *master]])
+    first = len(slave[1])
+    points[first:, 2] = height
+    lower = facets(points, BY_NAME[slave[0]], np.arange(first)[None], np.array([0]))
+    upper = []
+    for kind, places in master:
+        # Seen from the other side, the face goes round the other way.
+        nodes = (first + np.arange(len(places)))[list(BY_NAME[kind].mirror)]
+        upper.append(facets(points, BY_NAME[kind], nodes[None], np.array([0])))
+        first += len(places)
+    return points, [lower], upper
+
+
+@pytest.mark.parametrize("kind", ["TRIA6", "QUAD8", "QUAD9"])
+@pytest.mark.parametrize("amount", [0.05, 0.1, 0.15])
+def test_a_bent_face_under_a_large_one_is_covered(kind, amount):
+    big = ("QUAD4", np.array([[-3.0, -2.0], [5.0, -3.0], [4.0, 4.0], [-2.0, 5.0]]))
+    faces = [bent_face(kind, amount, seed) for seed in range(10)]
+    valid = [places for places in faces if is_valid(kind, places)]
+    assert len(valid) > 5
+    for places in valid:
+        points, slave, master = facing((kind, places), [big])
+        surface = gap_operator(slave, master, 1, len(points), 9.0, RAW).surface
+        assert surface.covered == pytest.approx(surface.area, rel=1e-14)
+
+
+@pytest.mark.parametrize("kind", ["TRIA6", "QUAD8", "QUAD9"])
+@pytest.mark.parametrize("amount", [0.05, 0.1])
+def test_bent_master_faces_share_a_bent_slave_face(kind, amount):
+    """Four bent faces around an inner node: together they cover it, and linear fields are exact."""
+    rng = np.random.default_rng(3)
+    corner = np.array([[-2, -2], [2, -2], [2, 2], [-2, 2], [0, -2], [2, 0], [0, 2], [-2, 0.0]])
+    corner = np.vstack([corner, [0.4, 0.3]])
+    middle = {}
+
+    def quad(*vertices):
+        rim = [corner[v] for v in vertices]
+        for a, b in zip(vertices, np.roll(vertices, -1), strict=True):
+            inner = {a, b} - {0, 1, 2, 3} == {a, b} and 8 in (a, b)
+            bend = amount * rng.uniform(-1, 1, 2) * inner
+            rim.append(middle.setdefault(frozenset((a, b)), (corner[a] + corner[b]) / 2 + bend))
+        return "QUAD8", np.array(rim)
+
+    master = [quad(0, 4, 8, 7), quad(4, 1, 5, 8), quad(8, 5, 2, 6), quad(7, 8, 6, 3)]
+    points, slave, masters = facing((kind, bent_face(kind, amount, 1)), master, 0.25)
+    operator = gap_operator(slave, masters, 1, len(points), 9.0, RAW)
+    area = operator.surface.area
+    assert operator.surface.covered == pytest.approx(area, rel=1e-14)
+    assert operator.initial == pytest.approx(0.25 * area, rel=1e-14)
+    field = np.zeros_like(points)
+    field[:, 2] = points @ [0.7, -0.4, 0.0]
+    assert operator.matrix @ field.ravel() == pytest.approx(0.0, abs=1e-15)
+    assert operator.segments > 4
+
+
+def test_half_of_a_bent_face_by_hand():
+    """The cap of height ⅕ over a unit square, and the square: the master covers x > ½."""
+    places = BY_NAME["QUAD8"].nodes.copy()
+    places[6] += [0.0, 0.2]
+    half = ("QUAD4", np.array([[0.5, -1.0], [2.0, -1.0], [2.0, 3.0], [0.5, 3.0]]))
+    points, slave, master = facing(("QUAD8", places), [half])
+    surface = gap_operator(slave, master, 1, len(points), 9.0, RAW).surface
+    assert surface.area == pytest.approx([1 + 2 / 3 * 0.2], rel=1e-14)
+    assert surface.covered == pytest.approx(surface.area / 2, rel=1e-14)
+
+
+def test_a_cap_and_a_dent_by_hand():
+    """A square less the region 0 ≤ y ≤ 4 h x (1 − x), of area ⅔ h; and what lies in both."""
+    square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
+    low = square * [1.0, 0.5]
+    bulge = np.zeros((1, 4, 2))
+    bulge[0, 0] = [0.0, 0.3]
+    region = Regions(start=low, bulge=np.zeros((1, 4, 2)), count=np.array([4]))
+    for parts, area in (
+        (clip_to_face(region, square, bulge), 0.5 - 0.2),
+        (without_face(region, square, bulge), 0.2),
+        (clip_to_face(region, square, -bulge), 0.5),
+        (without_face(region, square, -bulge), 0.0),
+    ):
+        weights = [w.sum() for _, part in parts for _, _, w in quadrature(part, 2)]
+        assert sum(weights) == pytest.approx(area, abs=1e-15)
+
+
+def test_points_of_a_sliver_stay_near_it():
+    """Between two arcs that differ by round-off, where area and moment are round-off as well."""
+    start = np.array([[[1.0, 0.0], [0.3, 0.2], [0.0, 0.1], [0.3, 0.2]]])
+    bulge = np.array([[[0.01, 0.1], [0.0, 0.02], [0.0, 0.02], [0.01, 0.1]]])
+    for seed in range(20):
+        noise = 1e-16 * np.random.default_rng(seed).normal(size=start.shape)
+        region = Regions(start=start + noise, bulge=bulge, count=np.array([4]))
+        for _, points, weights in quadrature(region, 2):
+            assert np.abs(weights.sum()) < 0.1
+            assert np.abs(points).max() < 1.2
+
+
+def edges(slave, masters):
+    """Slave edges on y = 0 between the places `slave`, and master edges (x, x, y) above."""
+    points = [(x, 0.0) for x in slave]
+    lower = np.array([[i + 1, i] for i in range(len(slave) - 1)])
+    upper = len(points) + np.arange(2 * len(masters)).reshape(-1, 2)
+    points = np.array([*points, *((x, m[2]) for m in masters for x in m[:2])])
+    kind = BY_NAME["SEG2"]
+    lower = facets(points, kind, lower, np.arange(len(lower)))
+    return points, [lower], [facets(points, kind, upper, np.arange(len(upper)))]
+
+
+@pytest.mark.parametrize("depth", [0.3, 3.0, 50.0])
+def test_the_lower_side_of_a_step_is_not_in_contact(depth):
+    """A macro-element that lies 70 % over the upper side sees that side alone."""
+    points, slave, master = edges([0, 1, 2], [(0, 1, 0.0), (1, 1.7, 0.0), (1.7, 3, depth)])
+    operator = gap_operator(slave, master, 2, len(points), 60.0)
+    assert operator.covered == pytest.approx([1.0, 0.7])
+    assert operator.initial == pytest.approx([0.0, 0.0], abs=1e-15)
+
+
+def test_a_face_beyond_the_reach_of_contact_covers_nothing():
+    """The reach is half the extent of the slave surface, here 1.5."""
+    for depth, covered in ((1.4, 1.0), (1.6, 0.0)):
+        points, slave, master = edges([0, 1, 2, 3], [(0, 2, 0.0), (2, 4, depth)])
+        operator = gap_operator(slave, master, 3, len(points), 60.0)
+        assert operator.covered == pytest.approx([1.0, 1.0, covered])
+
+
+def test_sloping_surfaces_stay_whole():
+    """A master surface of slope 0.4 over one macro-element of size 2 is one surface."""
+    points = np.array([[0, 0], [1, 0], [2, 0], [0, 0], [1, 0.4], [2, 0.8]])
+    kind = BY_NAME["SEG2"]
+    slave = facets(points, kind, np.array([[1, 0], [2, 1]]), np.array([0, 0]))
+    master = facets(points, kind, np.array([[3, 4], [4, 5]]), np.array([0, 1]))
+    operator = gap_operator([slave], [master], 1, len(points), 9.0)
+    assert operator.covered == pytest.approx([2.0])
+    assert operator.initial == pytest.approx([0.8])
+
+
+def test_the_nearer_of_two_edges_counts():
+    shelves = [(0.2, 0.6, 0.01), (0.0, 0.3, 0.02), (0.5, 0.7, -0.05)]
+    points, slave, master = edges([0, 1], shelves)
+    operator = gap_operator(slave, master, 1, len(points), 9.0)
+    assert operator.covered == pytest.approx([0.7])
+    assert operator.initial == pytest.approx([0.4 * 0.01 + 0.2 * 0.02 - 0.1 * 0.05])
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.05])
+def test_the_nearer_of_two_faces_counts(bend):
+    """Shelves (x, x, y, y, z) over the unit square, and a floor behind all of them.
+
+    With a bend, the edge of the nearest shelf at x = 0.6 is a cap of ⅔ · 0.5 · bend.
+    """
+    shelves = [(0.2, 0.6, 0.2, 0.7, 0.01), (0.0, 0.3, 0.0, 0.5, 0.02), (0.5, 0.9, 0.1, 0.9, 0.03),
+               (0.0, 1.0, 0.0, 1.0, 0.04)]  # fmt: skip
+    square = BY_NAME["QUAD8"].nodes
+    points, faces = [np.pad(square, ((0, 0), (0, 1)))], []
+    for low, high, left, right, z in shelves:
+        place = square * [high - low, right - left] + [low, left]
+        place[5, 0] += bend * (z == 0.01)
+        faces.append(8 * len(points) + np.array(BY_NAME["QUAD8"].mirror))
+        points.append(np.column_stack([place, np.full(8, z)]))
+    points = np.concatenate(points)
+    slave = facets(points, BY_NAME["QUAD8"], np.arange(8)[None], np.array([0]))
+    master = facets(points, BY_NAME["QUAD8"], np.array(faces), np.arange(4))
+    operator = gap_operator([slave], [master], 1, len(points), 9.0)
+    cap = 2 / 3 * 0.5 * bend
+    area = np.array([0.2 + cap, 0.15 - 0.03, 0.32 - 0.05 - cap, 0.0])
+    area[3] = 1 - area.sum()
+    assert operator.covered == pytest.approx([1.0], rel=1e-14)
+    assert operator.initial == pytest.approx([area @ [0.01, 0.02, 0.03, 0.04]], rel=1e-13)
+
+
+def test_candidates_without_common_area():
+    """A bent edge beside a master edge: their balls meet, their normals' lines do not."""
+    points = np.array([[1, 0], [0, 0], [0.5, 0.05], [1.1, 0.1], [2, 0.1], [1.5, 0.15]])
+    kind = BY_NAME["SEG3"]
+    slave = facets(points, kind, np.array([[0, 1, 2]]), np.array([0]))
+    master = facets(points, kind, np.array([[3, 4, 5]]), np.array([0]))
+    operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    assert operator.segments == 0
+    assert operator.covered == pytest.approx([0.0])
+
+
+@pytest.mark.parametrize("kind", ["TRIA6", "QUAD8", "QUAD9"])
+def test_faces_of_a_sphere_are_covered(kind):
+    """Faces bent out of their plane are covered to the accuracy of their area's quadrature."""
+
+    def on_sphere(places, radius):
+        x, y = 0.4 * (places - 0.4).T
+        return radius * np.stack([np.sin(x), np.cos(x) * np.sin(y), np.cos(x) * np.cos(y)], axis=1)
+
+    square = BY_NAME["QUAD9"]
+    above = 3 * square.nodes[list(square.mirror)] - 1
+    points = np.concatenate([on_sphere(BY_NAME[kind].nodes, 1.0), on_sphere(above, 1.01)])
+    n = BY_NAME[kind].n_nodes
+    slave = facets(points, BY_NAME[kind], np.arange(n)[None], np.array([0]))
+    master = facets(points, square, np.arange(n, len(points))[None], np.array([0]))
+    surface = gap_operator([slave], [master], 1, len(points), 9.0).surface
+    assert surface.covered == pytest.approx(surface.area, rel=1e-6)

@@ -1,0 +1,100 @@
+"""The estimate of rounding bounds the true errors, and does not exceed them without end."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.case.reader import parse_case
+from solver.mechanics.fem.elasticity import Block, largest_strain
+from solver.mesh import generate, transform
+from solver.mesh.catalogue import BY_NAME
+from solver.simulation.accuracy import Accuracy
+from solver.simulation.simulate import simulate
+from solver.studies.stability.states import exact_state
+from solver.studies.stability.sweeps import read_sweep
+from solver.verification.judge import judge
+from solver.verification.results import read_result, write_result
+from tests.scenes import POISSON, YOUNG, block_case, block_mesh
+
+SWEEPS = Path(__file__).parents[2] / "cases/stability/sweeps"
+USELESS = 1000.0  # an estimate that exceeds the error by more
+
+
+def error_over_estimate(sweep, mesh, value, young=2000.0, refine=1, state="compression"):
+    """The largest error of pressure and stress over the estimate, in a uniform state.
+
+    `young` is the modulus of the lower body, whose stress state is that of the upper one.
+    """
+    case = read_sweep(SWEEPS / f"{sweep}.yaml").case(mesh, value)
+    lower = "bottom" if "bottom" in case.materials else "all"
+    soft = replace(case.materials[lower], young=young)
+    case = replace(
+        case, mesh=case.mesh | {"refine": refine}, materials={**case.materials, lower: soft}
+    )
+    raw = generate(case.mesh, "test")
+    exact = exact_state(case, state, raw)
+    found = simulate(case, transform(raw, case.transform, "test") if case.transform else raw)
+    stress = exact.stress_at(found.body == found.body[found.zones[0].master_nodes[0]])
+    errors = [np.abs(zone.multiplier / exact.pressure - 1).max() for zone in found.zones]
+    errors.append(np.abs(found.stress - stress).max() / exact.pressure)
+    return max(errors) / Accuracy(found.accuracy).estimate
+
+
+@pytest.mark.parametrize("young", [20.0, 2000.0, 2e5])
+@pytest.mark.parametrize(("mesh", "refine"), [("2D", 1), ("2D", 4), ("3D", 1), ("3D", 2)])
+@pytest.mark.parametrize("distance", [1e4, 2.3e7])
+def test_turned_and_far_away(mesh, refine, young, distance):
+    """Rounded coordinates tilt faces, along which bodies of unlike stiffness slide far."""
+    share = error_over_estimate("turned-and-far", mesh, distance, young, refine)
+    assert (1 / USELESS if young == 2000.0 else 0) < share < 1
+
+
+@pytest.mark.parametrize("height", [1e-13, 1e-12, 1e-10, 1e-9])
+def test_faces_that_count_as_flat(height):
+    share = error_over_estimate("warp", "3D", height, state="hydrostatic")
+    assert 1 / USELESS < share < 1
+
+
+@pytest.mark.parametrize("sweep", ["rotation", "tiny-pressure", "poisson", "warp"])
+def test_plain_rounding(sweep):
+    found = read_sweep(SWEEPS / f"{sweep}.yaml")
+    for value in found.values[:4]:
+        share = error_over_estimate(sweep, "2D", value, state=found.state)
+        assert 1 / USELESS < share < 1
+
+
+def pressed(pressure):
+    """The patch test in the plane: the strain along y is −(1 − ν²) p / E."""
+    text = block_case(2).source.replace("pressure: 25.0", f"pressure: {pressure}")
+    return simulate(parse_case(text, Path("pressed.yaml")), block_mesh("QUAD4", "TRIA3"))
+
+
+@pytest.mark.parametrize(
+    ("pressure", "noted", "unreliable"),
+    [(15.0, False, False), (25.0, True, False), (2.5e5, True, True)],
+)
+def test_large_strain_is_noted_or_unreliable(pressure, noted, unreliable, tmp_path):
+    found = pressed(pressure)
+    strain = (1 - POISSON**2) * pressure / YOUNG
+    assert found.strain == pytest.approx(strain, rel=1e-12)
+    assert found.rotation < 1e-13 * strain
+    assert any(line.what.startswith("largest strain") for line in found.plan) == noted
+    file = tmp_path / "r.vtkhdf"
+    write_result(file, found, [], {})
+    for solution in (found, read_result(file).solution):
+        verdict = judge(solution, [])
+        assert (verdict.verdict == "unreliable") == unreliable
+        assert verdict.strain == found.strain
+        assert ("strain 1.1e+02 with rotation" in verdict.reason) == unreliable
+
+
+def test_strain_and_rotation_of_a_known_motion():
+    """Simple shear u = (a y, 0): principal strains ± a / 2, rotation a / 2."""
+    points = np.array([[0.1, 0.3], [2.2, 0.1], [0.4, 1.7]])
+    block = Block(BY_NAME["TRIA3"], np.array([[0, 1, 2]]), np.ones(1), np.ones(1))
+    shear = 0.3 * np.stack([points[:, 1], np.zeros(3)], axis=1)
+    assert largest_strain(points, [block], shear) == pytest.approx((0.15, 0.15), rel=1e-13)
+    turn = np.array([[0.0, -0.2], [0.2, 0.0]])
+    assert largest_strain(points, [block], points @ turn.T) == pytest.approx((0, 0.2), abs=1e-15)

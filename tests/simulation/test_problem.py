@@ -1,0 +1,243 @@
+"""Contact without tension and overlap, whatever the units, loads, zones and stiffnesses."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.case.reader import parse_case
+from solver.mechanics.mortar.status import StatusResult
+from solver.mechanics.mortar.treatments import TREATMENTS
+from solver.mesh import generate
+from solver.simulation import problem
+from solver.simulation.consistency import inconsistency
+from solver.simulation.problem import ContactProblem
+from solver.simulation.scene import build_scene
+from solver.simulation.simulate import simulate
+from solver.system.errors import SolveError
+from tests.scenes import block_mesh
+from tests.simulation.test_unloaded import SCENE, side_by_side
+
+CASE = """
+name: blocks
+mesh: {recipe: blocks}
+plane: strain
+materials: {top: {young: TOP, poisson: 0.3}, bottom: {young: BOTTOM, poisson: 0.3}}
+supports:
+  - {group: base, fix: [y]}
+  - {group: symx, fix: [x]}
+"""
+PRESSED = "loads:\n  - {group: press, pressure: 25.0}\n"
+
+
+def blocks(rest, young=2000.0, top=None, zone=""):
+    """A case of two blocks with further supports and loads."""
+    text = CASE.replace("TOP", repr(top or young)).replace("BOTTOM", repr(young)) + rest
+    text += "contact:\n  - {name: interface, slave: bottom_contact, master: top_contact"
+    return parse_case(f"{text}{zone}}}\n", Path("blocks.yaml"))
+
+
+def moved(value):
+    """The upper face moved by a value."""
+    return f"  - {{group: press, fix: {{y: {value}}}}}\n"
+
+
+# 80 combinations of unit and size are tried, the treatments in turn.
+COMBINATIONS = [(10.0**a, 10.0**b) for a in range(-9, 7, 2) for b in range(-6, 14, 2)]
+
+
+@pytest.mark.parametrize("treatment", TREATMENTS)
+def test_blocks_pulled_apart_open_in_every_unit(treatment):
+    first = list(TREATMENTS).index(treatment)
+    for size, young in COMBINATIONS[first :: len(TREATMENTS)]:
+        case = blocks(moved(repr(1e-3 * size)), young, zone=f", treatment: {treatment}")
+        zone = simulate(case, block_mesh("QUAD4", "QUAD4", (4, 3), size)).zones[0]
+        assert not zone.closed.any(), (size, young)
+        assert not zone.multiplier.any()
+        assert zone.gap == pytest.approx(1e-3 * size, rel=1e-9)
+
+
+@pytest.mark.parametrize("treatment", TREATMENTS)
+def test_bent_contact_is_the_same_in_every_unit(treatment):
+    """Pressed in at one end, lifted at the other: some macro-elements close."""
+    found = []
+    first = list(TREATMENTS).index(treatment)
+    for size, young in [(1.0, 1.0), *COMBINATIONS[first :: len(TREATMENTS)]]:
+        case = blocks(
+            moved(f"1e-3*(2*x - {0.7 * size!r})"), young, zone=f", treatment: {treatment}"
+        )
+        zone = simulate(case, block_mesh("QUAD4", "QUAD4", (4, 3), size)).zones[0]
+        found.append(zone.multiplier / young)
+    assert 0 < (found[0] > 0).sum() < 4
+    assert np.abs(np.array(found) - found[0]).max() < 1e-11 * found[0].max()
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-6, 1.0])
+def test_moved_together_blocks_in_contact_carry_nothing(size):
+    """Round-off of a large rigid motion is no tension: nothing opens and leaves the upper block."""
+    rest = "  - {group: base, fix: {y: 0.125}}\n".replace("0.125", repr(0.1 * size))
+    case = parse_case(
+        blocks("").source.replace("  - {group: base, fix: [y]}\n", rest), Path("moved.yaml")
+    )
+    found = simulate(case, block_mesh("TRIA3", "QUAD8", (4, 3), size))
+    assert np.abs(found.displacement[:, 1] - 0.1 * size).max() < 1e-12 * size
+    assert np.abs(found.zones[0].multiplier).max() < 1e-11 * 2000.0
+
+
+def test_loads_on_held_nodes_hide_no_tension():
+    """1e14 pushes on the foot, which supports hold; the blocks are pulled apart by 1e-3."""
+    rest = moved(1e-3) + "loads:\n  - {group: base, traction: [0.0, 1.0e14]}\n"
+    zone = simulate(blocks(rest), block_mesh("QUAD4", "QUAD4", (4, 3))).zones[0]
+    assert not zone.closed.any()
+    assert not zone.multiplier.any()
+
+
+@pytest.mark.parametrize("stiff", [1e3, 1e18])
+def test_one_zones_pressure_hides_no_tension_in_another(stiff):
+    """The near pair bears 1e14 times what the far one would bear in tension."""
+    text = SCENE.replace("{all: {young: 2000.0", f"{{all: {{young: {stiff!r}")
+    text = text.replace("pressure: 25.0", f"pressure: {1e-2 * stiff!r}").replace(
+        "loads:", "  - {group: press_far, fix: {y: 1.0e-16}}\nloads:"
+    )
+    mesh = side_by_side(*(block_mesh("QUAD4", "TRIA3", (4, 3)) for _ in range(2)))
+    near, far = simulate(parse_case(text, Path("beside.yaml")), mesh).zones
+    assert near.multiplier == pytest.approx(1e-2 * stiff, rel=1e-12)
+    assert not far.closed.any()
+    assert not far.multiplier.any()
+
+
+def punch(seed):
+    """A case of stiff and soft blocks under a random load, pressed over a random clearance."""
+    rng = np.random.default_rng(seed)
+    ratio, stiff = 10.0 ** rng.uniform(0, 5), rng.choice(["top", "bottom"])
+    young = {"top": 2000.0, "bottom": 2000.0}
+    young[stiff] *= ratio
+    a, b, c = rng.uniform(-2, 2, 3)
+    height, waves = 10.0 ** rng.uniform(-5, -3), rng.uniform(3, 40)
+    load = f"loads:\n  - {{group: press, pressure: '1 + {a}*x + {b}*cos(3*x) + {c}*sin(7*x)'}}\n"
+    clearance = f", clearance: '{height}*(1 + sin({waves}*x))'"
+    return blocks(load, young["bottom"], young["top"], clearance)
+
+
+# Those whose status Newton's steps alone do not find, and some others.
+@pytest.mark.parametrize("seed", [0, 1, 4, 7, 15, 50, 57, 73, 79])
+def test_punches_of_any_stiffness_end_with_pressure_and_gap_complementary(seed):
+    found = simulate(punch(seed), block_mesh_of(60, 17))
+    zone = found.zones[0]
+    assert 0 < zone.closed.sum() < 60
+    assert zone.multiplier.min() >= 0
+    assert zone.gap.min() > -1e-10 * np.abs(found.displacement).max()
+    assert not (zone.multiplier[~zone.closed] > 0).any()
+    assert np.abs(zone.gap[zone.closed]).max() < 1e-10 * zone.gap.max()
+
+
+def block_mesh_of(*faces):
+    """QUAD4 blocks with so many faces on the contact of each."""
+    sides = {
+        name: {"cells": "QUAD4", "divisions": [count, 10]}
+        for name, count in zip(("bottom", "top"), faces, strict=True)
+    }
+    return generate({"recipe": "blocks", "size": 1.0, **sides}, "test")
+
+
+def slender(length):
+    """Blocks of height 1: each of four slave faces lies below two and a half master faces."""
+    bottom = {"cells": "TRIA3", "divisions": [4, 4]}
+    top = {"cells": "QUAD8", "divisions": [10, 10]}
+    size = [length, 1.0]
+    return generate({"recipe": "blocks", "size": size, "bottom": bottom, "top": top}, "test")
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("length", [1e4, 1e5])
+def test_slender_blocks_are_solved(length, swapped):
+    """The upper one bends so easily, (height / length)^4, that its stiffness is singular."""
+    found = simulate(blocks(PRESSED).as_solved(swapped), slender(length))
+    assert np.abs(found.zones[0].multiplier / 25 - 1).max() < 1e-11
+    assert np.abs(found.stress[:, 1] / 25 + 1).max() < 1e-6
+
+
+def test_a_load_that_bends_them_between_the_macro_elements_is_refused():
+    wave = PRESSED.replace("25.0", "'25 + 10*cos(8e-5*3.141592653589793*x)'")
+    with pytest.raises(SolveError, match=r"singular|not positive definite"):
+        simulate(blocks(wave), slender(1e5))
+
+
+def test_a_body_that_its_loads_pull_away_is_not_searched_for_long(monkeypatch):
+    """The load on the whole is a pull: no macro-element system of unit gaps is worth forming."""
+    monkeypatch.setattr(problem, "_COLUMNS", 0)
+    pull = PRESSED.replace("25.0", "'25.0 - 60*x'")
+    with pytest.raises(SolveError, match="nothing keeps top from a free motion"):
+        simulate(blocks(pull), block_mesh("QUAD4", "TRIA3", (6, 4)))
+
+
+@pytest.fixture
+def bent():
+    """A problem with an open end, and its state."""
+    case = blocks("loads:\n  - {group: press, pressure: '60.0 - 115*x'}\n")
+    scene = build_scene(case, block_mesh("QUAD4", "TRIA3", (6, 4)))
+    assembled = ContactProblem(scene)
+    return assembled, assembled.solve(1.0)
+
+
+def test_a_further_load_is_solved_with_the_status_kept(bent):
+    """A tenth of the load more is a tenth more of all, gaps of the closed ones apart."""
+    assembled, state = bent
+    found = assembled.corrected(state, 0.1 * state.force)
+    closed = state.status.closed
+    assert 0 < closed.sum() < len(closed)
+    assert (found.status.closed == closed).all()
+    assert found.pressure == pytest.approx(1.1 * state.pressure, rel=1e-11)
+    assert found.displacement == pytest.approx(1.1 * state.displacement, rel=1e-9, abs=1e-12)
+    assert np.abs(found.gap[closed]).max() < 1e-15
+    assert found.residual < 1e-14
+
+
+def test_what_gaps_bring_up_is_what_opening_takes_away(bent):
+    """Forces |T| p = W ḡ + q of the state, with q those of all macro-elements closed."""
+    assembled, state = bent
+    area = assembled.constraints.covered
+    stiffness = assembled._gap_stiffness(1.0)
+    closed = assembled.solve(1.0, bilateral=True).pressure
+    assert area * state.pressure == pytest.approx(
+        stiffness @ state.gap + area * closed, abs=1e-10 * closed.max()
+    )
+    assert stiffness == pytest.approx(stiffness.T, abs=1e-11 * stiffness.max())
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("multiplier", "contact bears tension, a pressure of -2.5"),
+        ("gap", "overlap, a gap of -2.5"),
+    ],
+)
+def test_a_result_in_tension_or_overlap_is_unsound(name, message):
+    mesh = block_mesh("QUAD4", "QUAD4", (4, 3))
+    found = simulate(blocks(PRESSED), mesh)
+    assert not inconsistency(found)
+    getattr(found.zones[0], name)[1] = -2.5e-12
+    assert not inconsistency(found)
+    getattr(found.zones[0], name)[1] = -2.5
+    assert f"zone interface: {'the surfaces ' * (name == 'gap')}{message}" in inconsistency(found)
+
+
+@pytest.mark.parametrize("step", [0, 1])
+def test_tension_in_any_load_step_is_noticed_whatever_the_search_found(step, monkeypatch):
+    """The search ends at once with all closed, in one of two steps."""
+    case = blocks("loads:\n  - {group: press, pressure: '60.0 - 115*x'}\n")
+    case = replace(case, steps=(1.0, 0.5))
+    true, steps = problem.find_status, iter(range(2))
+
+    def stays(solve, start, eligible, *more):
+        if next(steps) != step:
+            return true(solve, start, eligible, *more)
+        solve(eligible)
+        return StatusResult(eligible, 1, [])
+
+    monkeypatch.setattr(problem, "find_status", stays)
+    with pytest.raises(
+        SolveError, match=f"load factor {case.steps[step]:g}: contact bears tension"
+    ):
+        simulate(case, block_mesh("QUAD4", "TRIA3", (6, 4)))

@@ -1,0 +1,86 @@
+"""The benchmark's arithmetic: ratios; what is said of a way without a solve."""
+
+from solver.studies.benchmark.page import as_text, batched, compared, ratios, seconds
+
+PROCESS = {"wall": 9.0, "cpu": 8.0, "peak_memory_mb": 1500.0}
+
+
+def way(title, *totals, **more):
+    """A way with warm repetitions of these processor seconds, or none."""
+    times = {"total": {"cpu": list(totals), "wall": list(totals)}} if totals else {}
+    return {
+        "way": title,
+        "outcome": "solved",
+        "reason": "",
+        "process": PROCESS,
+        "times": times,
+        "dofs": 12345,
+        "linear_solver": "a factor",
+        "linear_iterations": 0,
+        "pressure_max": 3e-15,
+        **more,
+    }
+
+
+LOST = {"way": "another", "outcome": "missing", "reason": "not installed", "times": {}}
+
+
+def test_a_ways_time_is_the_median_of_its_repetitions_else_of_the_process():
+    assert seconds(way("a", 3.0, 1.0, 2.0)) == 2.0
+    assert seconds(way("a")) == 8.0
+    assert seconds(way("a"), "wall") == 9.0
+    assert seconds(LOST) is None
+
+
+def test_ratios_are_those_to_the_first_way():
+    ways = [way("a", 2.0), way("b", 1.0), LOST, way("c", 5.0)]
+    assert ratios(ways) == [1.0, 0.5, None, 2.5]
+    assert ratios([LOST, way("b", 1.0)]) == [None, None]
+
+
+def test_a_comparison_in_lines():
+    ways = [way("a", 2.0), way("b", 1.0, linear_iterations=7), LOST]
+    ways.append(way("c", 1.0, pressure_max=0.0, resolved=2e-7))
+    comparison = {"title": "T", "series": "HEXA8", "repetitions": 1, "ways": ways}
+    title, rows = compared(comparison)
+    assert title == "T (HEXA8, 12,345 unknowns; a warm solve)"
+    assert rows == [
+        ["a", "2.00 s", "×1.00", "1.50 GB", "pressure error 3.0e-15", "a factor"],
+        ["b", "1.00 s", "×0.50", "1.50 GB", "pressure error 3.0e-15", "a factor, 7 iterations"],
+        ["another", "missing: not installed"],
+        ["c", "1.00 s", "×0.50", "1.50 GB", "pressure error < 2e-07", "a factor"],
+    ]
+
+
+def test_the_batch_in_lines():
+    each = [{"case": "a", "cpu": 1.5}, {"case": "b", "cpu": 2.5}]
+    passes = [{"cpu": 1.5, "wall": 1.0}, {"cpu": 1.0, "wall": 1.0}]
+    together = {"outcome": "solved", "process": {"cpu": 3.0}, "passes": passes}
+    batch = {"title": "T", "most": 2.0, "each": each, "together": together}
+    # The process less its second pass: what it would have taken without.
+    assert batched(batch)[1] == [
+        ["a process each", "4.00 s", "×1.00"],
+        ["one process", "2.00 s", "×0.50"],
+        ["one warm process", "1.00 s", "×0.25", "goal: under 2 s"],
+    ]
+    lost = {"outcome": "crashed", "reason": "out of luck"}
+    assert batched(batch | {"together": lost})[1][1] == ["one process", "crashed: out of luck"]
+
+
+def test_the_whole_record_as_text():
+    each = [{"case": "a", "cpu": 1.5}]
+    lost = {"outcome": "crashed", "reason": "out of luck"}
+    record = {
+        "title": "Ratios",
+        "machine": {"cpu": "a cpu", "time_utc": "2026"},
+        "threads": 2,
+        "load": 0.5,
+        "whole": 9,
+        "comparisons": [{"title": "T", "series": "S", "repetitions": 0, "ways": [way("a"), LOST]}],
+        "batch": {"title": "B", "most": 2.0, "each": each, "together": lost},
+        "start": {"help": {"cpu": 0.25}, "plane": {"cpu": 1.0, "case": "c.yaml"}},
+    }
+    lines = as_text(record).splitlines()
+    assert lines[0] == "Ratios: a cpu, 2 threads, 2026"
+    assert "  another                    missing: not installed" in lines
+    assert lines[-1] == "benchmark took 9 s"
