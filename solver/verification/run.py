@@ -13,7 +13,7 @@ from solver.case.model import Case
 from solver.case.reader import check_mesh_file, load_case
 from solver.mesh import generate, read_mesh, transform
 from solver.mesh.files.vtkhdf import check_name
-from solver.mesh.size import check_memory
+from solver.mesh.size import check_memory, of_mesh
 from solver.simulation.options import LEAN, Options
 from solver.simulation.simulate import simulate
 from solver.simulation.solution import Solution
@@ -34,6 +34,9 @@ from solver.verification.verdict import (
     Verdict,
     write_verdict,
 )
+
+# The part of the estimated nodes that a mesh has for certain.
+_SURELY = 0.8
 
 Log = Callable[[str], Any]
 
@@ -67,12 +70,18 @@ def refined(case: Case, factor: int) -> Case:
     return replace(case, mesh=mesh, counts={})
 
 
-def mesh_of(case: Case) -> meshio.Mesh:
-    """The case's mesh, read or generated, its transform applied."""
+def mesh_of(case: Case, memory_check: bool = True) -> meshio.Mesh:
+    """The case's mesh, read or generated, its transform applied.
+
+    `memory_check`: MachineError before it is generated, where no solve on it could fit in memory.
+    """
     if "path" in case.mesh:
         check_mesh_file(case)
         mesh = read_mesh(case.mesh["path"])
     else:
+        if memory_check:
+            size = of_mesh(case.mesh, case.path.parent)
+            check_memory(int(_SURELY * size.points), size.dim, case.path, lambda _: None)
         mesh = generate(case.mesh, str(case.path))
     return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
 
@@ -178,7 +187,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> Verdic
     check_name(output)
     output.parent.mkdir(parents=True, exist_ok=True)
     with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
-        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
+        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
     # What was accepted is a result on the case's own mesh.

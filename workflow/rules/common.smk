@@ -113,10 +113,12 @@ MESH_CONTENT = contents(*MESH_SOURCES)
 def watched(*files):
     """The user's files as inputs of a job; what they hold is among its parameters, and counts.
 
-    Their dates do not: a clock may be wrong. Left out are those that are missing, which the solver
-    reports, those of the future, and those whose names Snakemake takes for patterns.
+    Their dates do not: a clock may be wrong. Left out are those that are missing or
+    unreadable, which the solver reports, those of the future, and those whose names Snakemake
+    takes for patterns.
     """
     found = [f for f in files if os.path.isfile(f) and not re.search(r"[{}\n]", f)]
+    found = [f for f in found if os.access(f, os.R_OK)]
     return [ancient(f) for f in found if os.stat(f).st_mtime <= time.time()]
 
 
@@ -140,7 +142,10 @@ def find_jobs():
     )
     if done.returncode:
         refuse((done.stderr.strip() or "cases: they cannot be listed").splitlines()[-1])
-    jobs = [Job(**of, folder=folder_of(of["family"])) for of in json.loads(done.stdout)]
+    jobs = [
+        Job(**of, folder=folder_of(of["family"]))
+        for of in json.loads(done.stdout.splitlines()[-1])
+    ]
     return {(job.folder, job.name): job for job in jobs}
 
 
