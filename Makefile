@@ -164,7 +164,8 @@ LOCK := $(ALONE) uv pip compile --quiet --universal --python-version 3.11 \
 
 lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
 	@$(INSTALL) lock
-	@$(LOCK) $(ARGS) pyproject.toml --output-file requirements.txt
+	@$(LOCK) $(ARGS) pyproject.toml --group pyproject.toml:batch \
+	  --output-file requirements.txt
 	@for group in build mkl slurm gallery test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done

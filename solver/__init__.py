@@ -1,6 +1,7 @@
 """Verification of mortar contact: meshes, solves, checks and reports cases.
 
-As a library: `from solver import solve_case` (see `solver.api`).
+As a library: `from solver import solve_case`, or `from mortarcheck import solve_case` where it is
+installed (see `solver.api`).
 """
 
 from typing import TYPE_CHECKING, Any
@@ -12,17 +13,21 @@ if TYPE_CHECKING:
 __all__ = ["InputError", "SolveError", "Solved", "solve_case"]
 
 _HOME = {
-    "InputError": "solver.system.errors",
-    "SolveError": "solver.system.errors",
-    "Solved": "solver.api",
-    "solve_case": "solver.api",
+    "InputError": ".system.errors",
+    "SolveError": ".system.errors",
+    "Solved": ".api",
+    "solve_case": ".api",
 }
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first asked for: `import solver` alone loads nothing."""
+    if name == "__version__":
+        from solver.system.package import project_version
+
+        return project_version()
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(_HOME[name]), name)
+    return getattr(import_module(_HOME[name], __name__), name)

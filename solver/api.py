@@ -31,6 +31,7 @@ from solver.mesh.tidy import tidy
 from solver.simulation.options import Options
 from solver.simulation.solution import Solution, ZoneResult
 from solver.system.errors import InputError, key_path
+from solver.system.progress import saying
 from solver.system.provenance import gather
 from solver.verification.judge import judge
 from solver.verification.results import write_result
@@ -42,7 +43,10 @@ MeshLike: TypeAlias = meshio.Mesh | str | os.PathLike[str]
 
 # What messages name where there is no file.
 _NO_FILE, _NO_MESH_FILE = "case", "mesh"
-_CUTS = ("pyramids", "hexahedra")
+_CHOICES = {
+    "hexahedra": ("pyramids", "hexahedra"),
+    "recovery": ("none", "linear", "quadratic", "smooth", "automatic"),
+}
 
 
 def solve_case(
@@ -51,6 +55,7 @@ def solve_case(
     *,
     swapped: bool = False,
     hexahedra: str | None = None,
+    recovery: str | None = None,
     everything: bool = False,
     memory_check: bool = True,
     log: Callable[[str], Any] = lambda _: None,
@@ -61,9 +66,10 @@ def solve_case(
     working directory; numbers may be NumPy's), or a `Case`. `mesh`, a mesh file or a
     `meshio.Mesh` with named cell sets, is taken as it is in place of the case's own, and a
     mapping then needs no key `mesh`. `swapped` exchanges slave and master, `hexahedra` (pyramids
-    or hexahedra) overrides how slave hexahedra are cut. `everything`: what the scene does not need
-    is done all the same (see `solver.simulation.options`). With `memory_check` a solve that cannot
-    fit into memory is not begun. `log` is given lines on how it goes: `log=print`.
+    or hexahedra) overrides how slave hexahedra are cut, `recovery` (none, linear, quadratic, smooth
+    or automatic) how the pressure is recovered from constants. `everything`: what the scene does
+    not need is done all the same (see `solver.simulation.options`). With `memory_check` a solve
+    that cannot fit into memory is not begun. `log` is given lines on how it goes: `log=print`.
 
     A case of a file on its own mesh is held against its accepted values too.
 
@@ -71,15 +77,17 @@ def solve_case(
         InputError: case or mesh are refused, in one line: file, key, value, what is allowed.
         SolveError: there is no solution to be found: no convergence, a singular system.
     """
-    if hexahedra not in (None, *_CUTS):
-        raise InputError("solve_case", "hexahedra", hexahedra, f"allowed: {', '.join(_CUTS)}")
-    given = _case(case, mesh).as_solved(swapped, hexahedra)
+    for key, value in (("hexahedra", hexahedra), ("recovery", recovery)):
+        if value not in (None, *_CHOICES[key]):
+            raise InputError("solve_case", key, value, f"allowed: {', '.join(_CHOICES[key])}")
+    given = _case(case, mesh).as_solved(swapped, hexahedra, recovery)
     made = mesh_of(given) if mesh is None else _mesh(mesh)
-    if memory_check:
-        check_memory(len(made.points), made.points.shape[1], given.path, log)
     accepted = mesh is None and given.path.is_file()
     options = Options.everything() if everything else Options()
-    solution, checks = solve_checked(given, made, options, accepted, log=log)
+    with saying(log):
+        if memory_check:
+            check_memory(len(made.points), made.points.shape[1], given.path)
+        solution, checks = solve_checked(given, made, options, accepted)
     file = given.mesh.get("path") if mesh is None else mesh
     provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
     return Solved(solution, checks, provenance)

@@ -3,22 +3,21 @@
 A page asks for one by a line `<!-- table: NAME -->`, which a forge does not show.
 """
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, fields
 from importlib import import_module
 from inspect import getdoc
-from typing import Any
+from typing import Any, get_args, get_origin
 
-from solver.case.material import Material
-from solver.case.model import Case, Zone
-from solver.case.schemas import CASE_SCHEMA
+from msgspec import NODEFAULT
+
+from solver.case.file import CaseFile
 from solver.case.solutions import SOLUTIONS
+from solver.case.typed import Section, described, is_section, titles_of
+from solver.case.typed import fields as keys_of
 from solver.report.html import MEANING
 from solver.verification.checks import CHECKS, RELATIVE, Check
 
-# What the objects of a case file become, which knows the defaults of their keys.
-_CLASSES = {"": Case, "contact[]": Zone, "materials.*": Material}
 _RECIPES = (
     "solver.mesh.recipes.blocks",
     "solver.mesh.recipes.hybrid",
@@ -28,36 +27,28 @@ _RECIPES = (
 
 def case_keys() -> str:
     """Every key of a case file: what it is, what is allowed, its default."""
-    schema = json.loads(CASE_SCHEMA.read_text(encoding="utf-8"))
-    rows = [
-        (f"`{path}`", key["title"], _allowed(schema, key), "needed" if needed else _default(path))
-        for path, key, needed in _keys(schema, "")
-    ]
-    return _table(("key", "what it is", "allowed", "default"), rows)
+    return _table(("key", "what it is", "allowed", "default"), list(_keys(CaseFile, "")))
 
 
-def _keys(schema: Mapping[str, Any], path: str) -> Iterator[tuple[str, Mapping[str, Any], bool]]:
-    """Path, schema and whether it is needed, of each key that has a title."""
-    for name, key in schema.get("properties", {}).items():
-        if "title" in key:
-            here = f"{path}.{name}".lstrip(".")
-            yield here, key, name in schema.get("required", ())
-            yield from _keys(key, here)
-    for part, ending in (("items", "[]"), ("additionalProperties", ".*")):
-        if isinstance(schema.get(part), Mapping):
-            yield from _keys(schema[part], path + ending)
+def _keys(kind: type[Section], path: str) -> Iterator[tuple[str, ...]]:
+    """The rows of a class of keys, and of those inside."""
+    for name, title in titles_of(kind).items():
+        field, here = keys_of(kind)[name], f"{path}.{name}".lstrip(".")
+        default = "needed" if field.required else _default(field.default)
+        yield f"`{here}`", title, described(field.type), default
+        yield from _inside(field.type, here)
 
 
-def _allowed(schema: Mapping[str, Any], key: Mapping[str, Any]) -> str:
-    named = key.get("$ref", "").rpartition("/")[2]
-    return key.get("description") or schema["$defs"][named]["description"]
+def _inside(kind: Any, path: str) -> Iterator[tuple[str, ...]]:
+    if is_section(kind):
+        yield from _keys(kind, path)
+    ending = {tuple: "[]", dict: ".*"}.get(get_origin(kind), "")
+    for part in get_args(kind):
+        yield from _inside(part, path + ending)
 
 
-def _default(path: str) -> str:
-    place, _, name = path.rpartition(".")
-    known = {field.name: field.default for field in fields(_CLASSES.get(place, ()) or Case)}
-    value = known.get(name, MISSING) if place in _CLASSES else MISSING
-    if value in (MISSING, None, "", ()):
+def _default(value: Any) -> str:
+    if value in (NODEFAULT, None, "", ()):
         return ""
     return f"`{list(value) if isinstance(value, tuple) else value}`"
 

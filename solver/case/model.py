@@ -79,7 +79,8 @@ class Case:
     `tolerance` holds the overrides by check name, under `all` where one number was given. `units`
     names those of length and stress, for labels alone. `source` is the file's text. `family` is the
     name of the file's folder. `reference_uncertainty` is relative, `reference_code` has the keys
-    name and version. `swapped` and `hexahedra`: how the case is solved, as `as_solved` was told.
+    name and version. `swapped`, `hexahedra` and `recovery`: how the case is solved, as `as_solved`
+    was told.
     """
 
     name: str
@@ -109,19 +110,26 @@ class Case:
     units: dict[str, str] = field(default_factory=dict)
     swapped: bool = False
     hexahedra: str | None = None
+    recovery: str | None = None
 
-    def as_solved(self, swapped: bool = False, hexahedra: str | None = None) -> "Case":
-        """The case with slave and master exchanged, or with slave hexahedra cut in another way."""
+    def as_solved(
+        self, swapped: bool = False, hexahedra: str | None = None, recovery: str | None = None
+    ) -> "Case":
+        """The case with slave and master exchanged, another cut of hexahedra, another recovery.
+
+        A recovery concerns the zones that have one constant pressure per macro-element.
+        """
         zones = tuple(
             replace(
                 zone,
                 slave=zone.master if swapped else zone.slave,
                 master=zone.slave if swapped else zone.master,
                 hexahedra=hexahedra or zone.hexahedra,
+                recovery=recovery or zone.recovery,
             )
             for zone in self.zones
         )
-        return replace(self, zones=zones, swapped=swapped, hexahedra=hexahedra)
+        return replace(self, zones=zones, swapped=swapped, hexahedra=hexahedra, recovery=recovery)
 
     def zone_key(self, number: int, side: str) -> str:
         """The key of the file under which the group stands that is solved as slave or master."""

@@ -4,15 +4,20 @@
 mesh.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgspec import structs
+
 from solver.case.expressions import Expression
+from solver.case.file import CaseFile
 from solver.case.material import Material
 from solver.case.model import EXACT, LOAD_KINDS, Case, Load, Observation, Support, Zone
 from solver.case.rules import check_rules
-from solver.case.schemas import CASE_SCHEMA, validate
+from solver.case.typed import read_as
 from solver.case.yaml import parse_mapping, read_text
 from solver.system.errors import InputError, key_path
 from solver.system.files import is_file
@@ -20,7 +25,7 @@ from solver.system.files import is_file
 if TYPE_CHECKING:
     from solver.case.solutions import ExactSolution
 
-# What an exact solution must have to stand in for the value under a key, displacement for supports.
+# The quantity of an exact solution that `solution` means under a key; in supports, displacement.
 _QUANTITY = {
     "contact_pressure": "contact_pressure",
     "normal_stress": "stress",
@@ -42,8 +47,7 @@ def load_case(path: str | Path) -> Case:
 def parse_case(text: str, path: Path) -> Case:
     """The case in a text; `path` serves its family, its relative paths and the messages."""
     content = parse_mapping(text, path)
-    validate(content, CASE_SCHEMA, path)
-    case = _Reader(path, content).case(text)
+    case = _Reader(path, content, read_as(CaseFile, content, path)).case(text)
     check_rules(case)
     return case
 
@@ -56,94 +60,75 @@ def check_mesh_file(case: Case) -> None:
 
 
 class _Reader:
-    """Turns a mapping that the schema has passed into typed objects."""
+    """Turns the keys of a file into a case: expressions are parsed, the solution is made."""
 
-    def __init__(self, path: Path, content: dict[str, Any]):
-        self.path = path
-        self.content = content
+    def __init__(self, path: Path, content: dict[str, Any], file: CaseFile):
+        self.path, self.content, self.file = path, content, file
         self.materials = {
-            group: Material(float(m["young"]), float(m["poisson"]), m.get("form", "automatic"))
-            for group, m in content["materials"].items()
+            group: Material(**structs.asdict(keys)) for group, keys in file.materials.items()
         }
-        self.zones = tuple(map(self.zone, range(len(content.get("contact", [])))))
+        self.zones = tuple(map(self.zone, range(len(file.contact))))
         self.solution = self.exact_solution()
 
     def case(self, source: str) -> Case:
-        content = self.content
-        reference = content.get("reference", {})
-        # Left out where the file does not give them, for the defaults of `Case` to hold.
-        given: dict[str, Any] = {
-            key: content[key]
-            for key in ("transform", "plane", "directions", "counts", "units")
-            if key in content
-        }
-        if "steps" in content:
-            given["steps"] = tuple(map(float, content["steps"]))
-        return Case(
-            name=content["name"],
-            family=self.path.resolve().parent.name or "cases",
-            path=self.path,
-            title=content.get("title", ""),
-            source=source,
-            mesh=self.mesh(),
-            materials=self.materials,
-            supports=tuple(map(self.support, range(len(content["supports"])))),
-            loads=tuple(map(self.load, range(len(content.get("loads", []))))),
-            zones=self.zones,
-            rigid=frozenset(
-                group for group, body in content.get("bodies", {}).items() if body.get("rigid")
-            ),
-            observe=tuple(
-                Observation(item["zone"], tuple(map(float, item["nearest"])))
-                for item in content.get("observe", [])
-            ),
-            reference_kind=reference.get("kind"),
-            reference_uncertainty=reference.get("uncertainty"),
-            reference_code=reference.get("code"),
-            reference_remark=reference.get("remark", ""),
-            solution=self.solution,
-            reference={
-                key: self.value_or_exact("reference", key) for key in reference if key in _QUANTITY
-            },
-            tolerance=self.tolerance(),
-            **given,
-        )
-
-    def mesh(self) -> dict[str, Any]:
-        mesh = dict(self.content["mesh"])
+        file, reference = self.file, self.file.reference
+        tolerance = file.tolerance if isinstance(file.tolerance, dict) else {"all": file.tolerance}
+        mesh = dict(file.mesh)
         if "file" in mesh:
             mesh["path"] = self.path.parent / mesh.pop("file")
-        return mesh
+        return Case(
+            name=file.name,
+            family=self.path.resolve().parent.name or "cases",
+            path=self.path,
+            title=file.title,
+            source=source,
+            mesh=mesh,
+            materials=self.materials,
+            supports=tuple(map(self.support, range(len(file.supports)))),
+            loads=tuple(map(self.load, range(len(file.loads)))),
+            zones=self.zones,
+            rigid=frozenset(group for group, body in file.bodies.items() if body.rigid),
+            transform=self.content.get("transform"),
+            plane=file.plane,
+            directions=file.directions,
+            steps=file.steps,
+            observe=tuple(Observation(item.zone, item.nearest) for item in file.observe),
+            reference={
+                key: self.value_or_exact("reference", key)
+                for key in self.content.get("reference", ())
+                if key in _QUANTITY
+            },
+            reference_kind=reference.kind if reference else None,
+            reference_uncertainty=reference.uncertainty if reference else None,
+            reference_code=structs.asdict(reference.code) if reference and reference.code else None,
+            reference_remark=reference.remark if reference else "",
+            solution=self.solution,
+            tolerance={check: value for check, value in tolerance.items() if value is not None},
+            counts=self.content.get("counts", {}),
+            units=self.content.get("units", {}),
+        )
 
     def support(self, index: int) -> Support:
-        item = self.content["supports"][index]
-        if isinstance(item["fix"], list):
-            return Support(item["group"], dict.fromkeys(item["fix"], 0.0))
+        item = self.file.supports[index]
+        if isinstance(item.fix, tuple):
+            return Support(item.group, dict.fromkeys(item.fix, 0.0))
         keys = ("supports", index, "fix")
-        fix = {axis: self.value_or_exact(*keys, axis) for axis in item["fix"]}
-        return Support(item["group"], fix)
+        return Support(item.group, {axis: self.value_or_exact(*keys, axis) for axis in item.fix})
 
     def zone(self, index: int) -> Zone:
-        item = dict(self.content["contact"][index])
-        if "interference" in item:
-            item["interference"] = float(item["interference"])
-        if "clearance" in item:
-            item["clearance"] = self.value("contact", index, "clearance")
-        return Zone(**item)
+        keys = structs.asdict(self.file.contact[index])
+        if keys["clearance"] is not None:
+            keys["clearance"] = self.value("contact", index, "clearance")
+        return Zone(**keys)
 
     def load(self, index: int) -> Load:
-        item = self.content["loads"][index]
-        kind = next(kind for kind in LOAD_KINDS if kind in item)
-        return Load(item["group"], kind, self.value_or_exact("loads", index, kind))
+        item = self.file.loads[index]
+        kind = next(kind for kind in LOAD_KINDS if getattr(item, kind) is not None)
+        return Load(item.group, kind, self.value_or_exact("loads", index, kind))
 
-    def tolerance(self) -> dict[str, float]:
-        given = self.content.get("tolerance", {})
-        given = given if isinstance(given, dict) else {"all": given}
-        return {check: float(value) for check, value in given.items()}
-
-    def exact_solution(self) -> "ExactSolution | None":
-        """The solution that the reference names, told what the case says already."""
-        given = self.content.get("reference", {}).get("solution")
+    def exact_solution(self) -> ExactSolution | None:
+        """The solution that the reference names, made with what the case says already."""
+        given = self.file.reference.solution if self.file.reference else None
         if given is None:
             return None
         from solver.case.solutions import Known, build
@@ -151,14 +136,14 @@ class _Reader:
         known = Known(
             where=self.path,
             materials=self.materials,
-            dimension=2 if "plane" in self.content else 3,
-            pressure=_only(load.get("pressure") for load in self.content.get("loads", [])),
+            dimension=2 if self.file.plane else 3,
+            pressure=_only(load.pressure for load in self.file.loads),
             interference=_only(zone.interference for zone in self.zones),
         )
         return build(given, known)
 
     def value_or_exact(self, *keys: str | int) -> Any:
-        """EXACT where `solution` stands under the keys; refused where that does not tell it."""
+        """The value of a key, or EXACT for `solution`; refused where the solution has none."""
         if self.given(*keys) != EXACT.value:
             return self.value(*keys)
         quantity = _QUANTITY.get(str(keys[-1]), "displacement")
@@ -169,14 +154,14 @@ class _Reader:
         raise InputError(self.path, key_path(keys), EXACT.value, allowed)
 
     def given(self, *keys: str | int) -> Any:
-        """What stands under the keys in the file."""
+        """The content of a key."""
         value: Any = self.content
         for key in keys:
             value = value[key]
         return value
 
     def value(self, *keys: str | int) -> Any:
-        """The number, expression, tuple or mapping of them that stands under the keys."""
+        """The number, expression, tuple or mapping of them that a key holds."""
         value = self.given(*keys)
         if isinstance(value, list):
             return tuple(self.value(*keys, i) for i in range(len(value)))

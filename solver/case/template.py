@@ -5,11 +5,12 @@ from pathlib import Path
 from solver.case.reader import parse_case
 from solver.system.errors import InputError
 from solver.system.files import write_text
+from solver.system.package import PROGRAM
 
 TEMPLATE = """\
 # A case file: change it to your problem, then
-#   python -m solver validate --mesh FILE                    says whether it is valid
-#   python -m solver solve FILE -o {name}.vtkhdf     solves and checks it
+#   {program} validate --mesh FILE    says whether it is valid
+#   {program} solve FILE -o {name}.vtkhdf    solves and checks it
 # Paths are relative to this file. Units are yours: lengths, forces, stresses that fit together.
 
 name: {name}
@@ -56,6 +57,8 @@ contact:
     normal: element                      # gaps are measured along: element (normals of faces),
                                          # nodal (their means at the nodes)
     interference: 0.0                    # overlap at the start, of bodies modelled apart
+    recovery: none                       # of a pressure of higher order from constants: none,
+                                         # linear, quadratic, smooth, or automatic by the cells
 #   clearance: 0.0                       # the gap at the start, a number or an expression, in place
                                          # of the one between the faces as meshed
 
@@ -83,7 +86,7 @@ tolerance: 1.0e-3                        # or by check: {{multiplier: 1.0e-6, el
 
 def write_template(name: str, path: Path) -> None:
     """Write a commented case of that name; InputError for a bad name or a file already there."""
-    text = TEMPLATE.format(name=name)
+    text = TEMPLATE.format(name=name, program=PROGRAM)
     parse_case(text, path)
     if path.exists():
         raise InputError(path, "file", None, "is there already; choose another with -o")

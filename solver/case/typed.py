@@ -2,16 +2,18 @@
 
     class Way(Section, frozen=True):
         title: Text
-        solver: Literal["auto", "rslab"] = "auto"
+        solver: Literal["auto", "cholmod"] = "auto"
         sizes: Annotated[tuple[Size, ...], ONCE] = ()
 
 `read_as` turns the content of a file into an object of the class. A value that does not fit is
 refused with its key and what is allowed. The words for that are the `description` in the type's
-`Meta`; a type without one is described by its parts. The `title` says what a key is.
+`Meta`; a type without one is described by its parts.
 """
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from functools import cache, partial
+from inspect import getdoc
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
@@ -104,8 +106,29 @@ def refuse_unknown(keys: Keys, name: str, kind: str, known: Collection[str]) -> 
 
 def json_schema(kind: type[Section]) -> dict[str, Any]:
     """The JSON Schema of a class, for editors."""
-    draft = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": draft, **msgspec.json.schema(kind, schema_hook=lambda _: {"type": "string"})}
+    schema = msgspec.json.schema(kind, schema_hook=lambda _: {"type": "string"})
+    for part in schema["$defs"].values():
+        part["description"], titles = _headed(part.get("description", ""))
+        for name, key in part["properties"].items():
+            if "default" in key and key["default"] is None:  # the key may be left out
+                others = [one for one in key.pop("anyOf") if one != {"type": "null"}]
+                key.update(others[0] if len(others) == 1 else {"anyOf": others})
+                del key["default"]
+            if name in titles:
+                key["title"] = titles[name]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def titles_of(kind: type[Section]) -> dict[str, str]:
+    """What each key of a class is, from the lines `key: title` of its docstring."""
+    return _headed(getdoc(kind) or "")[1]
+
+
+def _headed(text: str) -> tuple[str, dict[str, str]]:
+    """The first part of a docstring, and its titles; further lines of a title are indented."""
+    found = re.findall(r"^([a-z_]+): (.+(?:\n {2,}.+)*)$", text, re.MULTILINE)
+    head = text.split("\n\n", maxsplit=1)[0]
+    return " ".join(head.split()), {key: " ".join(title.split()) for key, title in found}
 
 
 @cache
@@ -116,7 +139,7 @@ def fields(kind: type[Section]) -> dict[str, Any]:
 
 def described(kind: Any) -> str:
     """What a type allows, in words."""
-    if said := _said(kind, "description"):
+    if said := _description(kind):
         return said
     kind = _bare(kind)
     if get_origin(kind) is Literal:
@@ -132,25 +155,19 @@ def described(kind: Any) -> str:
     return _WORDS.get(kind) or " or ".join(map(described, parts if parts != [kind] else []))
 
 
-def title_of(kind: Any) -> str:
-    """What a key is, in words."""
-    return _said(kind, "title")
-
-
 def is_section(kind: Any) -> bool:
     """Whether a type is a mapping with a field for each key."""
     return isinstance(kind, type) and issubclass(kind, Section)
 
 
-def _said(kind: Any, what: str) -> str:
-    """The title or description of a type; of a union, that of its first part that has one."""
+def _description(kind: Any) -> str:
+    """What the `Meta` of a type says, also of a type that may be left out."""
     if get_origin(kind) is Annotated:
-        metas = reversed(kind.__metadata__)
-        said = (getattr(meta, what, None) for meta in metas)
-        return next(filter(None, said), "") or _said(kind.__origin__, what)
+        said = (getattr(meta, "description", None) for meta in reversed(kind.__metadata__))
+        return next(filter(None, said), "") or _description(kind.__origin__)
     if get_origin(kind) in (Union, UnionType):
         others = [part for part in get_args(kind) if part is not NoneType]
-        return _said(others[0], what) if len(others) == 1 else ""
+        return _description(others[0]) if len(others) == 1 else ""
     return ""
 
 
@@ -172,7 +189,8 @@ def _different(kind: type[Section]) -> list[str]:
     return [
         field.name
         for field in fields(kind).values()
-        if any(meta.extra_json_schema for meta in getattr(field.type, "__metadata__", ()))
+        for meta in getattr(field.type, "__metadata__", ())
+        if meta.extra_json_schema and "uniqueItems" in meta.extra_json_schema
     ]
 
 
@@ -200,8 +218,11 @@ def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
             return fault
         for key, item, inner in _children(convert, value, part):
             if inner is None:
-                names = get_args(_bare(get_args(part)[0]))
-                return FieldError((*keys, key), f"unknown key; {hint(str(key), names)}", item)
+                of_key = get_args(part)[0]
+                names = get_args(_bare(of_key)) if get_origin(_bare(of_key)) is Literal else ()
+                problem = f"unknown key; {hint(str(key), names)}" if names else ""
+                problem = problem or f"the key must be {described(of_key)}"
+                return FieldError((*keys, key), problem, item)
             if (item is None and isinstance(value, dict)) or not _fits(convert, item, inner):
                 return _fault(convert, item, inner, (*keys, key))
     try:
@@ -209,7 +230,7 @@ def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
     except msgspec.ValidationError as error:
         if isinstance(own := error.__cause__, FieldError):
             for key in own.keys:
-                value = value[key]
+                value = value.get(key) if isinstance(value, dict) else value[key]
             return FieldError((*keys, *own.keys), own.problem, value)
     return FieldError(keys, f"must be {described(kind)}", value)
 

@@ -6,9 +6,11 @@ imported when it runs, so that help comes at once.
 """
 
 import argparse
+import io
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,12 +20,24 @@ from typing import TYPE_CHECKING
 from solver.commands import jobs, studies
 from solver.commands.options import add_command, add_threads, limit_threads
 from solver.system.errors import InputError, SolveError, of_machine
+from solver.system.package import PROGRAM, PROJECT, project_version
 
 if TYPE_CHECKING:
     from solver.verification.run import Job
     from solver.verification.verdict import CheckResult
 
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
+
+
+def run() -> int:
+    """Run the command of this process; its exit status."""
+    # Lines leave as they are written, so that the last line of a log is what was said last.
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
+    # An unsound result is refused in one line, to which earlier warnings of libraries add nothing.
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+    return main()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,9 +72,8 @@ def _unexpected(error: Exception) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m solver", description="Verified contact solves."
-    )
+    parser = argparse.ArgumentParser(prog=PROGRAM, description="Verified contact solves.")
+    parser.add_argument("--version", nargs=0, action=_Version, help="print the version and end")
     parser.set_defaults(threads=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
@@ -139,12 +152,25 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+class _Version(argparse.Action):
+    """Prints the version, which is looked up only then."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(PROJECT, project_version())
+        parser.exit()
+
+
 def _add_job(command: argparse.ArgumentParser) -> None:
     """What singles out one solve: case, mesh, direction, variant."""
     command.add_argument("case", type=Path, metavar="CASE.yaml")
     command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, taken as it is")
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
     command.add_argument("--hexahedra", choices=("pyramids", "hexahedra"), help="how they are cut")
+    command.add_argument(
+        "--recovery",
+        choices=("none", "linear", "quadratic", "smooth", "automatic"),
+        help="how constant pressures are recovered from, in place of what the case says",
+    )
     command.add_argument(
         "--refine", type=int, default=1, metavar="N", help="multiply the recipe's divisions"
     )
@@ -162,18 +188,20 @@ def _mesh(options: argparse.Namespace) -> int:
 def _job(options: argparse.Namespace) -> "Job":
     from solver.verification.run import Job
 
-    return Job(options.case, options.mesh, options.swap, options.hexahedra, options.refine)
+    given = vars(options)
+    told = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
+    return Job(swapped=options.swap, **told)
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from solver.system.progress import telling
+    from solver.system.progress import saying, telling
     from solver.verification.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
-    with telling(options.verbose, options.quiet):
-        verdict = solve(job, options.output, options.verdict, log)
+    with telling(options.verbose, options.quiet), saying(log):
+        verdict = solve(job, options.output, options.verdict)
     return PASSED if verdict.sound else FAILED
 
 
@@ -280,7 +308,7 @@ def _new(options: argparse.Namespace) -> int:
     name = options.name or (options.output.stem if options.output else "new-case")
     path = options.output or Path(f"{name}.yaml")
     write_template(name, path)
-    print(f"{path}: written; next: python -m solver solve {path} -o {name}.vtkhdf")
+    print(f"{path}: written; next: {PROGRAM} solve {path} -o {name}.vtkhdf")
     return PASSED
 
 

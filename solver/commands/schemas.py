@@ -12,20 +12,23 @@ from solver.system.files import write_text
 
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
-    "benchmark": "solver.studies.benchmark.description:BenchmarkFile",
-    "family": "solver.report.families:FamilyFile",
-    "infsup": "solver.studies.infsup.description:InfSupFile",
-    "ladders": "solver.studies.orders.description:LaddersFile",
-    "scaling": "solver.studies.scaling.description:ScalingFile",
-    "study": "solver.studies.work_precision.description:StudyFile",
-    "sweep": "solver.studies.stability.sweeps:SweepFile",
+    "benchmark": "..studies.benchmark.description:BenchmarkFile",
+    "case": "..case.file:CaseFile",
+    "family": "..report.families:FamilyFile",
+    "infsup": "..studies.infsup.description:InfSupFile",
+    "ladders": "..studies.orders.description:LaddersFile",
+    "scaling": "..studies.scaling.description:ScalingFile",
+    "study": "..studies.work_precision.description:StudyFile",
+    "sweep": "..studies.stability.description:SweepFile",
 }
 
 
 def schema_text(name: str) -> str:
     """The JSON Schema of a kind of file, as written to disk."""
     module, kind = TYPES[name].split(":")
-    return json.dumps(json_schema(getattr(import_module(module), kind)), indent=2) + "\n"
+    return (
+        json.dumps(json_schema(getattr(import_module(module, __package__), kind)), indent=2) + "\n"
+    )
 
 
 if __name__ == "__main__":

@@ -20,11 +20,11 @@ from contextlib import suppress
 from functools import partial
 from typing import NoReturn
 
-import solver
 from solver.commands.warm import GREETING, LIMIT, THREADS, outcome
+from solver.system.package import PACKAGE
 
 # What the solver imports only where it is needed; what is missing here, the command will say.
-_LATE = ("gmsh", "jsonschema.validators", "skfem.element", "rslab", "cvxopt")
+_LATE = ("gmsh", "jsonschema.validators", "skfem.element", "cvxopt")
 _INPUT = 0
 _BUG = 70
 
@@ -56,7 +56,10 @@ def _reap(options: int = 0) -> None:
 
 def load() -> None:
     """Import all of the solver, and keep it out of the collector's way: forks share it."""
-    ours = [module.name for module in pkgutil.walk_packages(solver.__path__, "solver.")]
+    ours = [
+        module.name
+        for module in pkgutil.walk_packages(sys.modules[PACKAGE].__path__, f"{PACKAGE}.")
+    ]
     for name in (*_LATE, *ours):
         if not name.endswith("__main__"):
             with suppress(ImportError, OSError):
@@ -87,10 +90,10 @@ def _run(command: Sequence[str], streams: Sequence[int]) -> int:
     for number, stream in enumerate((nothing, *streams)):
         os.dup2(stream, number)
         os.close(stream)
-    sys.argv = ["solver", *command]
+    sys.argv = [PACKAGE, *command]
     sys.orig_argv = [sys.executable, "-m", *sys.argv]
     try:
-        runpy.run_module("solver", run_name="__main__", alter_sys=True)
+        runpy.run_module(PACKAGE, run_name="__main__", alter_sys=True)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else _BUG
     return 0

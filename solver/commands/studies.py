@@ -166,8 +166,8 @@ def _add_stability(commands: Any) -> None:
 
 
 def _sweep(options: argparse.Namespace) -> int:
-    from solver.studies.stability.points import run_sweep
-    from solver.studies.stability.sweeps import read_sweep
+    from solver.studies.stability.description import read_sweep
+    from solver.studies.stability.point import run_sweep
 
     record = run_sweep(read_sweep(options.sweep, options.quick), options.output, print)
     return 0 if all(point["holds"] for point in record["points"]) else 1

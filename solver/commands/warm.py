@@ -16,6 +16,8 @@ import sys
 import time
 from contextlib import suppress
 
+# The package's folder; this file runs as a script, which knows no package.
+PACKAGE = os.path.abspath(__file__).rsplit("/", 3)[1]  # noqa: PTH100 -- pathlib is long to import
 SOCKET = "WARM_SOLVER"
 LIMIT = 1 << 16  # bytes of a message
 # A fork keeps the threads that its libraries were loaded with.
@@ -33,8 +35,8 @@ def main(benchmark: str, command: list[str]) -> int:
     place = os.environ.get(SOCKET)
     ended = _warm(place, command) if place else None
     if ended is None:
-        python = sys.executable
-        ended = outcome(os.spawnv(os.P_NOWAIT, python, [python, "-Es", "-m", "solver", *command]))
+        cold = [sys.executable, "-Es", "-m", PACKAGE, *command]
+        ended = outcome(os.spawnv(os.P_NOWAIT, sys.executable, cold))
     _write_benchmark(benchmark, time.monotonic() - started, ended)
     status = os.waitstatus_to_exitcode(ended["status"])
     return status if status >= 0 else 128 - status

@@ -9,7 +9,8 @@ usual one is for a warning, and a cluster is asked for the most, in case a facto
 was measured from 10,000 to 1,000,000 unknowns on two cores, meshing included.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import logging
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -19,6 +20,9 @@ from typing import Any
 from solver.mesh.catalogue import BY_NAME
 from solver.system.errors import MachineError
 from solver.system.memory import available
+from solver.system.progress import OUTCOME
+
+_LOG = logging.getLogger(__name__)
 
 # Nodes of a piece of a grid: at its corner, and within each of its edges, faces and volume. A piece
 # is one cell, two prisms, or six pyramids about a point.
@@ -149,10 +153,8 @@ def _body(section: Any) -> tuple[str, list[int]] | None:
     return (cells, divisions) if valid and whole else None
 
 
-def check_memory(
-    points: int, dim: int, where: object, log: Callable[[str], object], free: float | None = None
-) -> None:
-    """Raise MachineError where a solve on a mesh of `points` cannot fit; warn where it may not.
+def check_memory(points: int, dim: int, where: object, free: float | None = None) -> None:
+    """Raise MachineError where a solve on a mesh of `points` cannot fit; log where it may not.
 
     `where` is the file to name, `free` the memory there is (default: `available`).
     """
@@ -167,7 +169,8 @@ def check_memory(
             "to try all the same: --no-memory-check",
         )
     if need.usual > free:
-        log(f"memory may run out: about {_gigabytes(need.usual)} of {_gigabytes(free)} free")
+        told = _gigabytes(need.usual), _gigabytes(free)
+        _LOG.log(OUTCOME, "memory may run out: about %s of %s free", *told)
 
 
 def _gigabytes(size: float) -> str:

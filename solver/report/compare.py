@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from solver.report.differences import Comparison, Pair, read_batch
-from solver.report.html import environment
+from solver.report.html import TEMPLATES, render
 from solver.report.tables import md
 from solver.system.files import write_text
 
@@ -46,7 +46,7 @@ def verdict(found: Comparison) -> str:
 
 
 def sections(found: Comparison) -> dict[str, list[Pair]]:
-    """The solves whose verdicts are told, under their headings, new failures first."""
+    """The solves with a verdict to report, by heading, new failures first."""
     named = {
         "Worse than before": found.worse,
         "Not passed, as before": found.still,
@@ -82,14 +82,11 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def to_html(found: Comparison) -> str:
     """The page."""
-    return (
-        environment()
-        .get_template("compare.html.jinja")
-        .render(
-            found=found,
-            outcome=verdict(found),
-            sections=sections(found),
-            changes=CHANGES,
-            times=TIMES,
-        )
+    return render(
+        TEMPLATES / "compare.html.jinja",
+        found=found,
+        outcome=verdict(found),
+        sections=sections(found),
+        changes=CHANGES,
+        times=TIMES,
     )

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 import meshio
 import numpy as np
 
+from solver.mechanics.fem.faces import corner_sets
 from solver.mesh.catalogue import cell_type
 
 
@@ -34,24 +35,14 @@ def boundary_faces(mesh: meshio.Mesh) -> Iterator[tuple[str, np.ndarray]]:
             for face in cell_type(block.type).faces:
                 by_type.setdefault(face.type, []).append(block.data[:, list(face.nodes)])
     faces = {kind: np.concatenate(parts) for kind, parts in by_type.items()}
-    keys = [_key(nodes[:, : cell_type(kind).n_vertices]) for kind, nodes in faces.items()]
-    if not keys:
-        return
-    _, inverse, counts = np.unique(
-        np.concatenate(keys), axis=0, return_inverse=True, return_counts=True
-    )
+    corners = [nodes[:, : cell_type(kind).n_vertices] for kind, nodes in faces.items()]
+    keys = corner_sets(corners)
+    _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     alone = counts[inverse.ravel()] == 1
     start = 0
     for kind, nodes in faces.items():
         yield kind, nodes[alone[start : start + len(nodes)]]
         start += len(nodes)
-
-
-def _key(vertices: np.ndarray) -> np.ndarray:
-    """Faces by their vertices in order of number, (n, 4); triangles are padded with -1."""
-    padded = np.full((len(vertices), 4), -1)
-    padded[:, : vertices.shape[1]] = vertices
-    return np.sort(padded, axis=1)
 
 
 def macro_edges(faces: Iterable[tuple[str, np.ndarray, np.ndarray]]) -> np.ndarray:

@@ -14,7 +14,7 @@ from solver.report import formats
 from solver.report.rows import Row, counted, families
 
 _FAILURES, _ERRORS = ("failed", "unreliable"), ("crashed", "refused")
-# Of the provenance of a suite's solves, what tells one run from another.
+# The parts of the provenance that identify a run.
 _PROPERTIES = ("revision", "cpu", "cores", "platform", "python", "numpy", "scipy", "scikit-fem")
 
 

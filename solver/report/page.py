@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from solver.report import stages
-from solver.report.html import MEANING, NORMS, environment
+from solver.report.html import MEANING, NORMS, TEMPLATES, render
 from solver.report.pictures import picture
-from solver.report.plan import left_out
 from solver.report.rows import Row, counted
 from solver.report.sections import FamilySection
 from solver.report.tables import outcome
@@ -14,45 +13,58 @@ from solver.report.tables import outcome
 # Pages beside the report that other commands write.
 _PAGES = ("orders", "study", "stability", "gallery")
 
+# What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
+LEFT_OUT = {
+    "quadrature": "more Gauss points, closure of integrals",
+    "unloaded": "groups of bodies that nothing moves",
+    "status": "further active-set solves and factors",
+}
+
 
 def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
     rows = [row for section in sections for row in section.rows]
     checks = {check.name: check for row in rows for check in row.verdict.checks}
-    return (
-        environment()
-        .get_template("summary.html.jinja")
-        .render(
-            rows=rows,
-            pages={name for name in _PAGES if (folder / f"{name}.html").is_file()},
-            bad=[row for row in rows if not row.sound],
-            outcome=outcome(rows),
-            counts=counted(rows),
-            families=sections,
-            facts=_facts(rows),
-            checks=[checks[name] for name in sorted(checks, key=_order)],
-            meaning=MEANING,
-            stages=_stages(rows),
-            folder=folder,
-        )
+    return render(
+        TEMPLATES / "summary.html.jinja",
+        rows=rows,
+        pages={name for name in _PAGES if (folder / f"{name}.html").is_file()},
+        bad=[row for row in rows if not row.sound],
+        outcome=outcome(rows),
+        counts=counted(rows),
+        families=sections,
+        facts=_facts(rows),
+        checks=[checks[name] for name in sorted(checks, key=_order)],
+        meaning=MEANING,
+        stages=_stages(rows),
+        folder=folder,
     )
 
 
 def family_page(section: FamilySection, folder: Path) -> str:
     """The page of a family: problem, reference, figures, its solves case by case."""
-    return (
-        environment()
-        .get_template("family.html.jinja")
-        .render(
-            section=section,
-            orders=(folder / "orders.html").is_file(),
-            norms=NORMS,
-            stages=_stages(section.rows),
-            picture=lambda row: picture(row, section.pictures),
-            left_out=left_out(section.rows),
-            folder=folder,
-        )
+    return render(
+        TEMPLATES / "family.html.jinja",
+        section=section,
+        orders=(folder / "orders.html").is_file(),
+        norms=NORMS,
+        stages=_stages(section.rows),
+        picture=lambda row: picture(row, section.pictures),
+        left_out=left_out(section.rows),
+        folder=folder,
     )
+
+
+def left_out(rows: Sequence[Row]) -> list[tuple[str, str, int]]:
+    """What solves left out: by switch its title, the reasons given, and in how many solves."""
+    found = []
+    for switch, title in LEFT_OUT.items():
+        lines = [(row.name, line) for row in rows for line in row.verdict.plan]
+        reasons = [(name, line[1]) for name, line in lines if switch in line[2:]]
+        if reasons:
+            names, whys = map(dict.fromkeys, zip(*reasons, strict=True))
+            found.append((title, "; ".join(whys), len(names)))
+    return found
 
 
 def _facts(rows: Sequence[Row]) -> list[tuple[str, str]]:

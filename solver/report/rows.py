@@ -15,7 +15,7 @@ from solver.verification.verdict import CRASHED, WORDS, Body, Verdict, read_verd
 
 @dataclass(frozen=True)
 class Row:
-    """One verdict, and the folder it lies in."""
+    """One verdict, and its folder."""
 
     verdict: Verdict
     folder: Path
@@ -32,7 +32,7 @@ class Row:
 
     @property
     def anchor(self) -> str:
-        """Where the solve stands on the page: its own, also where families share names."""
+        """The solve's own anchor on the page, also where families share names."""
         return f"{self.group}/{self.name}"
 
     @property
@@ -85,13 +85,13 @@ class Row:
         return {name: value for name, value in errors if not math.isnan(value)}
 
     def origin(self, kinds: Mapping[str, str]) -> str:
-        """Where the reference comes from, given the kinds in words; empty where there is none."""
+        """The origin of the reference, with the kinds in words; empty without a reference."""
         kind, code = self.verdict.reference_kind or "", self.verdict.reference_code
         named = f": {code.get('name')} {code.get('version')}" if code else ""
         return f"{kinds.get(kind, kind)}{named}"
 
     def files(self, folder: Path) -> list[tuple[str, str]]:
-        """What lies in the solve's folder: names, and paths as seen from `folder`."""
+        """The files in the solve's folder: names, and paths relative to `folder`."""
         found = {"result": self.result_file, "verdict": self.folder / "verdict.json"}
         found["log"] = self.folder / "log"
         return [

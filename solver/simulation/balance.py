@@ -68,6 +68,8 @@ def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | N
     if not scene.zones or any(zone.operator.nodes is not None for zone in scene.zones):
         return nothing
     rows = _free_slave_rows(scene)
+    if not rows.shape[0]:
+        return nothing
     integrals = sparse.hstack([_integrals(scene, zone) for zone in scene.zones], format="csr")
     integrals = (rows @ integrals).tocsr()
     size = abs(integrals).max(axis=0).toarray().ravel()

@@ -35,8 +35,8 @@ _EXTEND = 3e-11
 _CHANGE = 1e-4
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
-# Columns solved at once for the stiffness that gaps see.
-_COLUMNS = 64
+# Entries of the solutions that are kept at once for the stiffness that gaps see.
+_AT_ONCE = 1 << 23
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,12 +109,12 @@ class ContactProblem:
 
     @property
     def linear_solver(self) -> str:
-        """The name of what solved the last system."""
+        """The name of the solver of the last system."""
         return self.system.factor.name if self.system else "none"
 
     @property
     def why_solver(self) -> str:
-        """Why that was chosen."""
+        """Why it was chosen."""
         return self.system.why if self.system else ""
 
     @property
@@ -160,7 +160,7 @@ class ContactProblem:
     def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
         """The state with another `correction` (n, dim), its status kept.
 
-        Solved from the state for the change alone, on the factor kept since.
+        Only the change is solved for, on the factor that the state was solved with.
         """
         start = replace(state.iterate, force=state.force + correction)
         scale = max(state.force_scale, np.abs(correction).max())
@@ -268,17 +268,17 @@ class ContactProblem:
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")
         system, area = self._systems.closed(eligible), self.constraints.covered[eligible]
-        found = np.zeros((len(area), len(area)))
-        for first in range(0, len(area), _COLUMNS):
-            imposed = np.diag(area)[:, first : first + _COLUMNS]
-            nothing = np.zeros((self.matrix.shape[0], imposed.shape[1]))
-            change = system.correction(nothing, imposed)
-            found[:, first : first + _COLUMNS] = system.multiplier(-(self.matrix @ change))
-        return area[:, None] * found
+        found, size = np.zeros((len(area), len(area))), self.matrix.shape[0]
+        for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
+            imposed = np.zeros((len(area), len(some)))
+            imposed[some, np.arange(len(some))] = area[some]
+            change = system.correction(np.zeros((size, len(some))), imposed)
+            found[:, some] = area[:, None] * system.multiplier(-(self.matrix @ change))
+        return found
 
 
 def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """The stiffness of the free unknowns, and its diagonal (n_dofs,), that of held ones too."""
+    """The stiffness of the free unknowns, and the diagonal (n_dofs,) for all degrees of freedom."""
     free, mean = scene.free, scene.mean
     matrix, diagonal = stiffness(scene.points, scene.blocks, free.selection)
     if free.selection is None:
@@ -289,7 +289,7 @@ def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
 
 
 def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
-    """What the free unknowns of a scene stand for, given the rigid motions of its bodies."""
+    """The meaning of a scene's free unknowns, given the rigid motions of its bodies."""
     basis, dim = scene.free.basis, scene.points.shape[1]
     node = nodes_of_unknowns(basis, dim)
     together = basis.T @ whole_motions(motions, scene.n_bodies)

@@ -25,14 +25,21 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, kw_only=True)
 class _Zone:
-    """A zone's reconstruction among the macro-elements that are closed."""
+    """A zone's reconstruction among the macro-elements that are closed: as applied, and as read."""
 
     numbers: slice
     recovery: Recovery
+    applied: Reconstruction
     reconstruction: Reconstruction
 
     def coefficients(self, pressure: np.ndarray) -> np.ndarray:
-        """C (m · k,) of the pressures (k,) of all multipliers."""
+        """C (m · k,) of the pressures (k,) of all multipliers, as applied."""
+        return np.asarray(self.applied.matrix @ pressure[self.numbers])
+
+    def read(self, pressure: np.ndarray, applied: np.ndarray) -> np.ndarray:
+        """C (m · k,) as read: what was applied, where that is all there is to it."""
+        if self.reconstruction is self.applied and self.recovery.form.sweeps:
+            return applied
         return np.asarray(self.reconstruction.matrix @ pressure[self.numbers])
 
 
@@ -88,8 +95,10 @@ def recovered(
 def _zone(zone: ZoneScene, closed: np.ndarray) -> _Zone:
     recovery = zone.operator.recovery
     assert recovery is not None
-    reconstruction = recovery.reconstruction(closed[zone.numbers])
-    return _Zone(numbers=zone.numbers, recovery=recovery, reconstruction=reconstruction)
+    applied = read = recovery.reconstruction(closed[zone.numbers], applied=True)
+    if not recovery.form.keeps_means:
+        read = recovery.reconstruction(closed[zone.numbers])
+    return _Zone(numbers=zone.numbers, recovery=recovery, applied=applied, reconstruction=read)
 
 
 def _corrected(
@@ -108,7 +117,5 @@ def _corrected(
             break
         last = last + problem.pressure_change(state.status.closed, following - force)
         pressure, force = pressure + _RELAXATION * (last - pressure), following
-    for i, zone in enumerate(zones):
-        if not zone.recovery.form.sweeps:
-            applied[i] = zone.coefficients(state.pressure)
-    return state, applied
+    read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
+    return state, read

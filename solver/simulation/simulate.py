@@ -2,9 +2,7 @@
 
 import logging
 import resource
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import meshio
 import numpy as np
@@ -35,8 +33,7 @@ from solver.simulation.unloaded import without_unloaded
 from solver.system.clock import Clock, processor_time
 from solver.system.errors import SolveError
 from solver.system.memory import peak_mb
-
-Log = Callable[[str], Any]
+from solver.system.progress import OUTCOME
 
 _LOG = logging.getLogger(__name__)
 # Half, but for round-off.
@@ -48,7 +45,6 @@ def simulate(
     mesh: meshio.Mesh,
     options: Options = LEAN,
     clock: Clock | None = None,
-    log: Log = lambda _: None,
 ) -> Solution:
     """Solve a case on its mesh; the case may be swapped (see `Case.as_solved`).
 
@@ -62,22 +58,23 @@ def simulate(
     if options.shortcuts.unloaded:
         with clock.stage("assembly"):
             scene = without_unloaded(scene)
-    log(f"{scene.n_dofs} unknowns, {sum(z.count for z in scene.zones)} macro-elements")
+    macro_elements = sum(zone.count for zone in scene.zones)
+    _LOG.log(OUTCOME, "%d unknowns, %d macro-elements", scene.n_dofs, macro_elements)
     with clock.stage("assembly"):
         problem = ContactProblem(scene)
-    solution = solve_problem(problem, clock, log)
+    solution = solve_problem(problem, clock)
     solution.cpu_seconds = processor_time() - started
     solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
 
 
-def solve_problem(problem: ContactProblem, clock: Clock, log: Log = lambda _: None) -> Solution:
+def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     """Solve an assembled problem at all load factors; how it was assembled goes on record."""
     plan = list(decided(problem))
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
     with clock.stage("solve"):
-        states, recovered = _walk(problem, problem.scene.case.steps, log)
+        states, recovered = _walk(problem, problem.scene.case.steps)
     plan += noted(problem, states)
     with clock.stage("recovery"):
         solution = _recover(problem, states, recovered, plan)
@@ -88,9 +85,7 @@ def solve_problem(problem: ContactProblem, clock: Clock, log: Log = lambda _: No
     return solution
 
 
-def _walk(
-    problem: ContactProblem, steps: tuple[float, ...], log: Log
-) -> tuple[list[Equilibrium], Recovered]:
+def _walk(problem: ContactProblem, steps: tuple[float, ...]) -> tuple[list[Equilibrium], Recovered]:
     """Solve the load factors in turn, each from the status of the one before.
 
     With the states the pressure recovered in the last one.
@@ -104,10 +99,9 @@ def _walk(
             raise SolveError(f"load factor {factor:g}: contact bears tension or surfaces overlap")
         state, fields = recovered(problem, state, factor)
         states.append(state)
-        log(
-            f"load factor {factor:g}: {state.status.iterations} iterations, "
-            f"{int(state.status.closed.sum())} closed, residual {state.residual:.1e}"
-        )
+        closed = int(state.status.closed.sum())
+        told = factor, state.status.iterations, closed, state.residual
+        _LOG.log(OUTCOME, "load factor %g: %d iterations, %d closed, residual %.1e", *told)
     return states, fields
 
 

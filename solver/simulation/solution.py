@@ -7,6 +7,7 @@ open, stress is positive in tension.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -125,10 +126,20 @@ class ZoneResult:
     @property
     def relative_pressure_error(self) -> float | None:
         """The estimated L2 error of the constants over their norm; None where there is none."""
-        if self.pressure_error is None:
-            return None
-        whole = float(np.sqrt((self.area * self.coverage) @ self.multiplier**2))
-        return float(np.linalg.norm(self.pressure_error)) / whole if whole else 0.0
+        return pressure_error([self])
+
+
+def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
+    """The estimated L2 error of the constants of zones over their norm; None where unknown."""
+    known = [zone for zone in zones if zone.pressure_error is not None]
+    if not known:
+        return None
+    scale = max(float(zone.multiplier.max(initial=0.0)) for zone in known)
+    if not scale > 0:
+        return 0.0
+    errors = [np.asarray(zone.pressure_error) / scale for zone in known]
+    whole = [zone.area * zone.coverage * (zone.multiplier / scale) ** 2 for zone in known]
+    return float(np.linalg.norm(np.concatenate(errors)) / np.sqrt(np.concatenate(whole).sum()))
 
 
 @dataclass
@@ -210,6 +221,11 @@ class Solution:
         return self.case.hexahedra
 
     @property
+    def pressure_error_estimate(self) -> float | None:
+        """The estimated L2 error of constant pressures, over all zones and relative."""
+        return pressure_error(self.zones)
+
+    @property
     def job(self) -> str:
         """The name of this solve, as of its folder and its file of accepted values."""
-        return job_name(self.case.name, self.swapped, self.hexahedra)
+        return job_name(self.case.name, self.swapped, self.hexahedra, self.case.recovery)

@@ -7,6 +7,7 @@ from msgspec import Meta
 from solver.case.typed import ONCE
 
 Cut = Literal["pyramids", "hexahedra"]
+Recovered = Literal["none", "linear", "quadratic", "smooth", "automatic"]
 if TYPE_CHECKING:  # cells, errors and degrees are looked up by text
     Cell: TypeAlias = str
     ErrorName: TypeAlias = str

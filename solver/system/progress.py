@@ -1,23 +1,55 @@
-"""What a solve tells while it works: lines with the time on the terminal, or where asked for.
+"""What a solve reports while it works, by the standard library's logging.
 
-Modules log to the logger of their own name, each stage, each solution and its residual; nobody sees
-that, unless `telling` is around it or the program that uses the solver listens to `solver`.
+Modules log to the logger of their own name: outcomes at the level `OUTCOME`, which `saying` hands
+to a function, and details (each stage, each solution and its residual) as information, which
+`telling` writes with the time. Without either nothing is written, unless the program that uses the
+solver listens to the package's logger, `solver` or `mortarcheck`.
 """
 
 import logging
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from logging.handlers import MemoryHandler
-from threading import Timer
+from threading import Timer, get_ident
 
+from solver.system.package import PACKAGE
+
+OUTCOME = 25
+"""The level of what a solve says of its course, between information and warnings."""
 # A solve that ends sooner tells nothing on a terminal.
 PATIENCE = 2.0
 
 
+class _Saying(logging.Handler):
+    """Hands outcomes that this thread logs to a function."""
+
+    def __init__(self, say: Callable[[str], object]):
+        super().__init__(OUTCOME)
+        self._say, self._thread = say, get_ident()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.thread == self._thread:
+            self._say(record.getMessage())
+
+
+@contextmanager
+def saying(say: Callable[[str], object]) -> Iterator[None]:
+    """Hand each outcome that is logged to a function, such as `print`."""
+    logger, handler = logging.getLogger(PACKAGE), _Saying(say)
+    before = logger.level
+    logger.setLevel(min(logger.getEffectiveLevel(), OUTCOME))
+    logger.addHandler(handler)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)
+
+
 @contextmanager
 def telling(verbose: bool, quiet: bool = False) -> Iterator[None]:
-    """Write what the solver logs to the standard error: where it is a terminal, or `verbose`.
+    """Write details that the solver logs to the standard error: on a terminal, or if `verbose`.
 
     On a terminal nothing is written before `PATIENCE` seconds are over, then all of it.
     """
@@ -26,10 +58,11 @@ def telling(verbose: bool, quiet: bool = False) -> Iterator[None]:
         return
     lines = logging.StreamHandler(sys.stderr)
     lines.setFormatter(logging.Formatter("%(asctime)s %(message)s", "%H:%M:%S"))
+    lines.addFilter(lambda record: record.levelno < OUTCOME)
     held = MemoryHandler(0 if verbose else sys.maxsize, sys.maxsize, lines, flushOnClose=False)
     patience = Timer(PATIENCE, _release, [held])
     patience.daemon = True
-    logger = logging.getLogger("solver")
+    logger = logging.getLogger(PACKAGE)
     before = logger.level, logger.propagate
     logger.addHandler(held)
     logger.setLevel(logging.INFO)

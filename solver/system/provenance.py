@@ -12,6 +12,8 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from solver.system.package import PROJECT, in_project, project_version
+
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "gmsh")
 _THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
@@ -23,9 +25,9 @@ def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
     """
     return {
         "python": platform.python_version(),
+        PROJECT: project_version(),
         **{package: _version(package) for package in PACKAGES},
-        # Also where the batch starts it with other options of Python (warm.py).
-        "command": shlex.join(["python", *(a for a in sys.orig_argv[1:] if a != "-Es")]),
+        "command": shlex.join(_command()),
         "revision": _revision(),
         "case_sha256": _sha256(case),
         "mesh_sha256": _sha256(mesh),
@@ -44,8 +46,17 @@ def _version(package: str) -> str:
         return ""
 
 
+def _command() -> list[str]:
+    """What a user types for the same, also where the batch adds options of Python (warm.py)."""
+    if Path(sys.argv[0]).name == PROJECT:
+        return [PROJECT, *sys.argv[1:]]
+    return ["python", *(a for a in sys.orig_argv[1:] if a != "-Es")]
+
+
 def _revision() -> str:
-    """The git revision of the project, marked where files differ from it."""
+    """The git revision of the project, marked where files differ from it; empty if installed."""
+    if not in_project():
+        return ""
     command = ["git", "describe", "--always", "--abbrev=12", "--dirty"]
     try:
         done = subprocess.run(

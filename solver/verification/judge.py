@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from solver.simulation.solution import Solution
 
 NOT_VERIFIED = "not verified: the case gives no reference"
+# What `Case.as_solved` is told.
+Told = tuple[bool, str | None, str | None]
 # The checks that say how accurate a solve is: their errors are relative to the reference.
 ACCURACY = (
     "multiplier",
@@ -52,7 +54,7 @@ _OF_SOLUTION = (
         "stage_cpu_seconds",
         "cpu_seconds",
     ),
-    *("peak_memory_mb", "accuracy", "errors"),
+    *("peak_memory_mb", "accuracy", "errors", "pressure_error_estimate"),
 )
 
 
@@ -81,7 +83,7 @@ def judge(
     seconds = solution.seconds
     zones = solution.zones
     return Verdict(
-        **_identity(solution.case, solution.swapped, solution.hexahedra),
+        **_identity(solution.case, (solution.swapped, solution.hexahedra, solution.case.recovery)),
         verdict=word,
         passed=word == PASSED,
         reason=_first_of(reasons) or (NOT_VERIFIED if word == SOLVED else ""),
@@ -108,24 +110,25 @@ def without_result(
     word: str,
     reason: str,
     case: Case | Path,
-    swapped: bool = False,
-    hexahedra: str | None = None,
+    told: Told = (False, None, None),
     transient: bool = False,
 ) -> Verdict:
     """The verdict of a solve that was refused, failed or crashed, for the reason given.
 
-    `case` is the path of the case file where the file itself could not be read.
+    `case` is the path of the case file where the file itself could not be read; `told` is what
+    `Case.as_solved` was told.
     """
-    identity = _identity(case, swapped, hexahedra)
-    return Verdict(**identity, verdict=word, reason=reason, transient=transient)
+    return Verdict(**_identity(case, told), verdict=word, reason=reason, transient=transient)
 
 
-def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[str, Any]:
+def _identity(case: Case | Path, told: Told) -> dict[str, Any]:
     """What singles out a solve, and where its reference comes from."""
+    swapped, hexahedra, recovery = told
     found: dict[str, Any] = {
         "swapped": swapped,
         "direction": "swapped" if swapped else "first",
         "variant": hexahedra or "",
+        "recovery": recovery or "",
     }
     if isinstance(case, Path):
         name, family = case.stem, case.resolve().parent.name
@@ -140,7 +143,7 @@ def _identity(case: Case | Path, swapped: bool, hexahedra: str | None) -> dict[s
             "reference_remark": case.reference_remark,
             "reference_solution": case.solution.name if case.solution else None,
         }
-    return found | {"case": name, "family": family, "job": job_name(name, swapped, hexahedra)}
+    return found | {"case": name, "family": family, "job": job_name(name, *told)}
 
 
 def _bodies(solution: Solution) -> list[Body]:

@@ -11,7 +11,7 @@ from solver.case.solutions import ExactSolution
 from solver.mesh.catalogue import cell_type
 from solver.simulation.solution import NodalContact, ZoneResult
 
-# Pairs of neighbours (k, 2), each once, and which places (m,) lie at the rim.
+# Pairs of neighbours (k, 2), each once, and which places (m,) are at the rim.
 Neighbours = tuple[np.ndarray, np.ndarray]
 
 
@@ -44,7 +44,7 @@ def second_difference(neighbours: Neighbours, error: np.ndarray, smooth: np.ndar
 
 
 def _macro_elements(zone: ZoneResult) -> Neighbours:
-    """Macro-elements that share an edge of their sub-faces, in the plane an end."""
+    """Macro-elements that share an edge of their sub-faces, or in 2D an end."""
     sides, owner = [], []
     for name, nodes, macro in zone.faces:
         kind = cell_type(name)
@@ -63,7 +63,7 @@ def _macro_elements(zone: ZoneResult) -> Neighbours:
 
 
 def _nodes(zone: ZoneResult, nodal: NodalContact) -> Neighbours:
-    """Multipliers that follow each other along the edges of faces, in the plane along the faces."""
+    """Multipliers that follow each other along the edges of faces, in 2D along the faces."""
     steps = []
     for name, nodes, _ in zone.faces:
         kind = cell_type(name)

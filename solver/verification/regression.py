@@ -1,9 +1,9 @@
 """Accepted values: what a solve gave when a person last looked at it, kept under version control.
 
-They lie beside the case file, in `regression/JOB.json`, one line a check, apart from the reference:
-a reference says what is right, an accepted value what was computed. Both extremes of a check may
-move by 1e-9 of its scale; a value below 1e-12 of the scale is kept as zero, and digits past the
-twelfth are dropped, so that round-off never shows as a difference.
+They are kept beside the case file, in `regression/JOB.json`, one line a check, apart from the
+reference: a reference says what is right, an accepted value what was computed. Both extremes of a
+check may move by 1e-9 of its scale; a value below 1e-12 of the scale is kept as zero, and digits
+past the twelfth are dropped, so that round-off never shows as a difference.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The result file: one HDF5 file that is also a VTKHDF grid, written whole or not at all.
 
-`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; beside it lies everything that
-the checks need again, so that a file can be judged without solving:
+`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; the file has everything else
+that the checks need, so that it can be judged without solving:
 
-    /case          source text, name, family, path, swapped, hexahedra
+    /case          source text, name, family, path, swapped, hexahedra, recovery
     /solve         lengths, sizes, cost and the linear solver of the solve
     /accuracy      what rounding alone may change, relative, by cause
     /errors        norms of the error against the case's exact solution, if it names one
@@ -148,7 +148,7 @@ def read_result(path: str | Path) -> Result:
     except InputError:
         raise
     except Exception as error:
-        # Whatever the reader trips over lies in the file, as where another version wrote it.
+        # Any error of the reader is caused by the file, which another version may have written.
         fault = " ".join(f"{type(error).__name__}: {error}".split())
         raise _no_result(path, fault) from error
     if fault:
@@ -289,12 +289,16 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
         path=str(case.path.resolve()),
         swapped=solution.swapped,
         hexahedra=solution.hexahedra or "",
+        recovery=case.recovery or "",
     )
 
 
 def _read_case(group: h5py.Group) -> Case:
     case = parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
-    return case.as_solved(bool(group.attrs["swapped"]), group.attrs["hexahedra"] or None)
+    told = group.attrs
+    return case.as_solved(
+        bool(told["swapped"]), told["hexahedra"] or None, told["recovery"] or None
+    )
 
 
 def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:

@@ -1,11 +1,10 @@
 """One job from case file to verdict: mesh, solve, checks, result file, verdict."""
 
+import logging
 import os
 import signal
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import meshio
 
@@ -20,6 +19,7 @@ from solver.simulation.solution import Solution
 from solver.system.clock import Clock, processor_time
 from solver.system.errors import InputError, MachineError, SolveError, of_machine
 from solver.system.files import last_line
+from solver.system.progress import OUTCOME
 from solver.system.provenance import gather
 from solver.verification.checks import run_checks
 from solver.verification.judge import judge, without_result
@@ -38,12 +38,12 @@ from solver.verification.verdict import (
 # The part of the estimated nodes that a mesh has for certain.
 _SURELY = 0.8
 
-Log = Callable[[str], Any]
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Job:
-    """One solve of a case: which mesh, which direction, which way to cut hexahedra.
+    """One solve of a case: which mesh, which direction, which cut of hexahedra, which recovery.
 
     `mesh` is a mesh file taken as it is; None means the case's own, its transform applied.
     `refine` multiplies the divisions of the case's recipe. `memory_check`: refused where its memory
@@ -54,9 +54,19 @@ class Job:
     mesh: Path | None = None
     swapped: bool = False
     hexahedra: str | None = None
+    recovery: str | None = None
     refine: int = 1
     memory_check: bool = True
     everything: bool = False
+
+    @property
+    def told(self) -> tuple[bool, str | None, str | None]:
+        """What `Case.as_solved` is told."""
+        return self.swapped, self.hexahedra, self.recovery
+
+    def of(self, case: Case) -> Case:
+        """The case as this job solves it."""
+        return case.as_solved(*self.told)
 
 
 def refined(case: Case, factor: int) -> Case:
@@ -86,7 +96,7 @@ def mesh_of(case: Case, memory_check: bool = True) -> meshio.Mesh:
     return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
 
 
-def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> Verdict:
+def solve(job: Job, output: Path, verdict_file: Path | None) -> Verdict:
     """Solve, check, write the result; the verdict, also written to `verdict_file` if given.
 
     Where there is no result, the verdict that says why is written all the same, and the exception
@@ -94,19 +104,17 @@ def solve(job: Job, output: Path, verdict_file: Path | None, log: Log) -> Verdic
     """
     case: Case | None = None
     try:
-        case = refined(load_case(job.case), job.refine).as_solved(job.swapped, job.hexahedra)
-        verdict = _solve(job, case, output, verdict_file or output, log)
+        case = job.of(refined(load_case(job.case), job.refine))
+        verdict = _solve(job, case, output, verdict_file or output)
     except Exception as error:
         if verdict_file:
             word, reason, transient = _ending(error)
-            ended = without_result(
-                word, reason, case or job.case, job.swapped, job.hexahedra, transient
-            )
+            ended = without_result(word, reason, case or job.case, job.told, transient)
             write_verdict(verdict_file, ended)
         raise
     if verdict_file:
         write_verdict(verdict_file, verdict)
-    log(verdict.summary)
+    _LOG.log(OUTCOME, "%s", verdict.summary)
     return verdict
 
 
@@ -116,14 +124,13 @@ def solve_checked(
     options: Options = LEAN,
     accepted: bool = True,
     clock: Clock | None = None,
-    log: Log = lambda _: None,
 ) -> tuple[Solution, list[CheckResult]]:
     """Solve a case on its mesh and run its checks, those of `accepted` values too if asked.
 
     The time of every stage is added to `clock`, where one is given.
     """
     clock = clock or Clock()
-    solution = simulate(case, mesh, options, clock, log)
+    solution = simulate(case, mesh, options, clock)
     with clock.stage("checks"):
         solution.errors = errors(solution)
         checks = run_checks(solution, accepted_values(solution) if accepted else {})
@@ -146,7 +153,7 @@ def record_crash(
     The reason is its exit status, as far as known, and the last line of the log.
     """
     try:
-        case: Case | Path = load_case(job.case).as_solved(job.swapped, job.hexahedra)
+        case: Case | Path = job.of(load_case(job.case))
     except InputError:
         case = job.case
     said = last_line(log_file)
@@ -154,7 +161,7 @@ def record_crash(
         reason = _death(status) + (f"; last words: {said}" if said else "")
     else:
         reason = said or "the process died without a word"
-    verdict = without_result(CRASHED, reason, case, job.swapped, job.hexahedra, transient=True)
+    verdict = without_result(CRASHED, reason, case, job.told, transient=True)
     write_verdict(verdict_file, verdict)
     return verdict
 
@@ -172,16 +179,16 @@ def record_refusal(case: Path, verdict_file: Path, reason: str) -> Verdict:
 
 def _death(status: int) -> str:
     """What an exit status says of how a process ended; shells add 128 to a signal's number."""
-    told = f"died with exit status {status}"
+    died = f"died with exit status {status}"
     names = {128 + number: number.name for number in signal.Signals}
     if status not in names:
-        return told
+        return died
     hint = ", as a system does that runs out of memory" * (names[status] == "SIGKILL")
-    return f"{told}, ended by {names[status]}{hint}"
+    return f"{died}, ended by {names[status]}{hint}"
 
 
-def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> Verdict:
-    """The verdict of a solve that comes to its end; `beside` lies where the verdict will."""
+def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
+    """The verdict of a solve that comes to its end; `beside` is the path of the verdict."""
     started, clock = processor_time(), Clock()
     # Better refused now than after the solve.
     check_name(output)
@@ -189,11 +196,11 @@ def _solve(job: Job, case: Case, output: Path, beside: Path, log: Log) -> Verdic
     with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check)
     if job.memory_check:
-        check_memory(len(mesh.points), mesh.points.shape[1], case.path, log)
+        check_memory(len(mesh.points), mesh.points.shape[1], case.path)
     # What was accepted is a result on the case's own mesh.
     accepted = job.refine == 1
     options = Options.everything() if job.everything else Options()
-    solution, checks = solve_checked(case, mesh, options, accepted, clock, log)
+    solution, checks = solve_checked(case, mesh, options, accepted, clock)
     solution.cpu_seconds = processor_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
     with clock.stage("write"):

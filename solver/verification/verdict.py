@@ -27,6 +27,8 @@ REFUSED, CRASHED = "refused", "crashed"
 WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, SOLVED, PASSED)
 T = TypeVar("T")
 _DIGEST = "digest"
+# An estimate of the pressure's error below this one is not worth a word.
+_NEGLIGIBLE = 1e-10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +134,8 @@ class Verdict:
 
     `worst` is the check with the largest relative error, `closest_to_tolerance` the one nearest to
     its tolerance or furthest past it. Pairs are minimum and maximum over all zones; `seconds` has
-    wall times by stage and their `total`. `transient`: the reason lies in the machine (memory,
+    wall times by stage and their `total`. `pressure_error_estimate` is relative and in L2: how far
+    constant pressures are from a reconstruction. `transient`: the machine is the reason (memory,
     disk, a kill), so that the same solve may succeed another time.
     """
 
@@ -143,6 +146,7 @@ class Verdict:
     swapped: bool = False
     direction: str = ""
     variant: str = ""
+    recovery: str = ""
     zones: list[Sides] = field(default_factory=list)
     reference_kind: str | None = None
     reference_uncertainty: float | None = None
@@ -162,6 +166,7 @@ class Verdict:
     matrix_entries: int | None = None
     length: float | None = None
     load_scale: float | None = None
+    pressure_error_estimate: float | None = None
     strain: float | None = None
     rotation: float | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -196,6 +201,8 @@ class Verdict:
         if self.reason:
             return f"{line}: {self.reason}"
         error = f", worst error {self.worst.error:.1e} ({self.worst.name})" if self.worst else ""
+        if (self.pressure_error_estimate or 0.0) > _NEGLIGIBLE:
+            error += f", constant pressures within {self.pressure_error_estimate:.1e} (estimated)"
         return f"{line}{error}, {self.seconds['total']:.2f} s"
 
     def plain(self) -> dict[str, Any]:
@@ -227,9 +234,9 @@ def read_verdict(path: str | Path) -> Verdict:
 def flaw(path: str | Path, case: str | Path | None = None) -> str:
     """Why a verdict file cannot be relied on, in one line; empty where it can.
 
-    It must be as it was written and lie in the folder of its own family and job (where that is in
-    `results`), its result beside it as it was then. `case` is the case file that it must be of, as
-    the file is now. Reads the whole result.
+    It must be as it was written, in the folder of its own family and job (where that is in
+    `results`), and its result must be the one it names. `case` is the case file that it must be
+    of, in its present state. Reads the whole result.
     """
     path = Path(path)
     try:

@@ -3,18 +3,21 @@
 import json
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.case.expressions import Expression
+from solver.case.file import CaseFile, CheckName
 from solver.case.material import Material
 from solver.case.model import Case, Load, Observation, Support, Zone
 from solver.case.reader import check_mesh_file, load_case, parse_case
-from solver.case.schemas import CASE_SCHEMA
 from solver.case.solutions.uniform import Hydrostatic
+from solver.case.typed import described, fields, is_section
 from solver.case.yaml import parse_mapping
+from solver.commands.schemas import FOLDER
 from solver.system.errors import InputError
 from solver.verification.checks import CHECKS
 
@@ -394,41 +397,36 @@ def test_a_plane_case_does_not_speak_of_z(old, new, message):
 
 
 def test_every_check_may_have_its_tolerance():
-    schema = json.loads(CASE_SCHEMA.read_text())
-    names = set(schema["properties"]["tolerance"]["properties"])
-    assert names == {"all"} | {check.name for check in CHECKS}
+    assert set(get_args(CheckName)) == {"all"} | {check.name for check in CHECKS}
 
 
-def test_every_value_of_the_schema_says_what_is_allowed():
-    def bare(schema, path):
-        if "$ref" not in schema and "description" not in schema:
-            yield path
-        for name, inner in schema.get("properties", {}).items():
-            yield from bare(inner, f"{path}.{name}")
-        for key in ("items", "additionalProperties"):
-            if isinstance(schema.get(key), dict):
-                yield from bare(schema[key], f"{path}.{key}")
+def sections(kind=CaseFile):
+    """The classes of a case file, found in the types of the keys."""
+    found = {kind}
+    parts = [field.type for field in fields(kind).values()]
+    while parts:
+        part = parts.pop()
+        if is_section(part) and part not in found:
+            found |= sections(part)
+        parts += get_args(part)
+    return found
 
-    schema = json.loads(CASE_SCHEMA.read_text())
-    assert not list(bare(schema, "case"))
-    assert all("description" in inner for inner in schema["$defs"].values())
+
+def test_every_key_says_what_is_allowed():
+    for kind in sections():
+        for name, field in fields(kind).items():
+            assert described(field.type), (kind, name)
 
 
 def test_snakemake_validates_by_the_same_schema():
     validate = pytest.importorskip("snakemake.utils").validate
     workflow_error = pytest.importorskip("snakemake.exceptions").WorkflowError
-    validate(dict(BASE), str(CASE_SCHEMA))
+    validate(dict(BASE), str(FOLDER / "case.schema.json"))
     with pytest.raises(workflow_error, match="'stress' is not one of"):
-        validate({**BASE, "plane": "stress"}, str(CASE_SCHEMA))
+        validate({**BASE, "plane": "stress"}, str(FOLDER / "case.schema.json"))
 
 
-def _keys(schema):
-    for name, inner in schema.get("properties", {}).items():
-        yield name
-        yield from _keys(inner)
-
-
-KEYS = sorted({*_keys(json.loads(CASE_SCHEMA.read_text())), "all", "group", "fix", "file", "x"})
+KEYS = sorted({key for kind in sections() for key in fields(kind)} | {"all", "x"})
 WORDS = [*KEYS, "S", "M", "25*x", "strain", "both", "analytical", "1/", "", "../a"]
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers(-3, 3) | st.floats(-2, 2) | st.sampled_from(WORDS),

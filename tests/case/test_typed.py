@@ -17,6 +17,7 @@ WHERE = Path("box.yaml")
 CASES = Path(__file__).parents[2] / "cases"
 FILES = {
     "benchmark": "scaling/benchmark.yaml",
+    "case": "ssnp170/[a-e].yaml",
     "family": "*/family.yaml",
     "infsup": "stability/infsup/*.yaml",
     "ladders": "*/orders.yaml",

@@ -68,6 +68,14 @@ def test_passed_is_0(small, capsys):
     assert capsys.readouterr().out.splitlines()[-1].startswith("small: passed, worst error ")
 
 
+def test_without_a_reference_a_solve_is_solved_with_0_and_not_passed(small, capsys):
+    (small / "c.yaml").write_text(PLANE[: PLANE.index("reference:")])
+    status, verdict = solve(small)
+    assert (status, verdict["verdict"], verdict["passed"]) == (0, "solved", False)
+    assert capsys.readouterr().out.splitlines()[-1] == f"small: solved: {verdict['reason']}"
+    assert main(["check", str(small / "out/r.vtkhdf")]) == 0
+
+
 def test_a_failed_check_is_1_and_leaves_its_result(small):
     change(small, "contact_pressure: 25.0", "contact_pressure: 26.0")
     status, verdict = solve(small)
@@ -213,7 +221,7 @@ def test_accepted_values_are_written_below_the_current_folder_alone(small, capsy
         ("size: 50.0", "size: 1.0e+300", 2),
         ("divisions: 3", f"divisions: [{'9' * 200}, 2]", 2),
         ("pressure: 25.0}]", f"pressure: x{'.a' * 499}}}]", 2),
-        ("pressure: 25.0}]", "pressure: 1.0e+300}]", 1),
+        ("pressure: 25.0}]", "pressure: 1.0e+300}]", 2),
     ],
 )
 def test_numbers_beyond_all_measure_end_in_one_line(small, old, new, status):

@@ -1,7 +1,6 @@
 """The pages: links as a forge follows them, parts made from the sources, formulas."""
 
 import importlib
-import json
 import re
 import subprocess
 import sys
@@ -10,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from solver.case.schemas import CASE_SCHEMA
+from solver.case.file import Pick
 from solver.case.solutions import SOLUTIONS
+from solver.case.typed import fields
 from solver.mesh.recipes import _RECIPES
 from solver.report.html import NORMS
 from solver.verification.checks import CHECKS
+from tests.case.test_case import sections
 
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"
@@ -56,29 +57,15 @@ def test_links_lead_to_files_and_headings(page):
         assert not anchor or anchor in slugs(target), link
 
 
-def titled(schema: dict, path: str) -> Iterator[tuple[str, bool]]:
-    """Every key of the schema, found anew: its path, and whether it has a title."""
-    for name, key in schema.get("properties", {}).items():
-        yield f"{path}{name}", "title" in key
-        yield from titled(key, f"{path}{name}.")
-    for part, ending in (("items", "[]."), ("additionalProperties", "*.")):
-        if isinstance(schema.get(part), dict):
-            inside = path[:-1] + ending if ending == "[]." else path + ending
-            yield from titled(schema[part], inside)
-
-
 def test_every_key_of_a_case_file_is_in_the_table(site):
     table = site("tables").case_keys()
-    keys = dict(titled(json.loads(CASE_SCHEMA.read_text()), ""))
-    untold = {key for key, has_title in keys.items() if not has_title}
-    # Named by what they are: checks, and components of the stress.
-    assert all(key.startswith(("tolerance.", "reference.stress.")) for key in untold)
-    assert len(keys) - len(untold) > 70
-    for key in keys.keys() - untold:
-        assert f"| `{key}` |" in table
+    for kind in sections() - {Pick}:
+        for name in fields(kind):
+            assert re.search(rf"^\| `([^`]*\.)?{name}` \| ", table, re.MULTILINE), (kind, name)
+    assert table.count("\n| `") > 60
     assert "| `contact[].hexahedra` | into what slave hexahedra are cut | " in table
     assert "pyramids or hexahedra | `pyramids` |" in table
-    assert "| a positive number | needed |" in table
+    assert "| a positive number up to 1e30 | needed |" in table
     assert "`directions` | solved once, or again with slave and master exchanged | " in table
 
 

@@ -24,7 +24,7 @@ HEAD = """\
 Every message with which the program refuses its input or gives up a solve, by the module that says
 it. `…` stands for what changes from one to another. A message starts with the file and, mostly, the
 key and its value; one line, exit status 2 for input, 3 for a solve. Keys that the schema of a case
-file refuses are told what is allowed there by the schema's own words (`solver/case/schemas/`).
+file refuses say what is allowed by the words of their types (`solver/case/file.py`).
 
 The table is made from the sources by `python -m tests.faults.refusals`; a test keeps it so.
 

@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 from solver.commands.cli import main
-from tests.report.test_report import BATCH, NASTY, read_page, verdict
+from tests.report.test_report import BATCH, NASTY, Page, verdict
 from tests.workflow.projects import ROOT
 
 SCALE = 25.0
@@ -31,8 +31,7 @@ def compare(tmp_path, capsys, this, base=BATCH):
     """Exit status, Markdown, page."""
     before, now = write(tmp_path / "before", base), write(tmp_path / "now", this)
     status = main(["compare", str(before), str(now)])
-    text = "".join(read_page(now / "report", "compare.html").text)
-    return status, capsys.readouterr().out, " ".join(text.split())
+    return status, capsys.readouterr().out, Page(now / "report/compare.html").text
 
 
 def rows(markdown, heading):

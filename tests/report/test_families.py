@@ -3,7 +3,6 @@
 import json
 import re
 import xml.etree.ElementTree as ET
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from solver.simulation.solution import NodalContact
 from solver.verification.results import write_result
 from tests import handmade
 from tests.report.test_pictures import SVG, polygons
-from tests.report.test_report import CHECK, verdict
+from tests.report.test_report import CHECK, Page, verdict
 from tests.report.verdicts import put
 
 FAMILY = """\
@@ -91,8 +90,8 @@ def test_a_file_that_is_refused_is_told_and_the_report_is_written(
     assert message in read_family(file).complaint
     logged = report(tmp_path, [verdict("a", "passed", family="blocks")], file)
     assert message in logged
-    assert str(file) in text_of(tmp_path / "blocks.html")
-    assert str(file) in text_of(tmp_path / "summary.html")
+    assert str(file) in Page(tmp_path / "blocks.html").text
+    assert str(file) in Page(tmp_path / "summary.html").text
 
 
 OURS = sorted(Path("cases").glob("*/family.yaml"))
@@ -137,38 +136,6 @@ def report(folder, verdicts, *families):
     return "\n".join(logged)
 
 
-class Text(HTMLParser):
-    """Visible text, and the cells of tables row by row."""
-
-    def __init__(self):
-        super().__init__()
-        self.text, self.rows, self.inside = [], [], ""
-
-    def handle_starttag(self, tag, _):
-        self.inside = tag
-        if tag == "tr":
-            self.rows.append([])
-        elif tag in ("td", "th") and self.rows:
-            self.rows[-1].append("")
-
-    def handle_data(self, data):
-        if self.inside not in ("style", "script"):
-            self.text.append(data)
-            if self.rows and self.rows[-1]:
-                self.rows[-1][-1] += data
-
-
-def parsed(path):
-    page = Text()
-    page.feed(path.read_text())
-    page.rows = [[" ".join(cell.split()) for cell in row] for row in page.rows if row]
-    return page
-
-
-def text_of(path):
-    return " ".join("".join(parsed(path).text).split())
-
-
 REFINED = {"reference_kind": "refined", "reference_uncertainty": 2e-3}
 OTHER = {"reference_kind": "other_code", "reference_code": {"name": "solver", "version": "14.6"}}
 
@@ -182,9 +149,9 @@ def test_kinds_of_reference_are_kept_apart_with_uncertainty_code_and_version(tmp
         verdict("e", "passed", **OTHER),
     ]
     report(tmp_path, verdicts)
-    rows = parsed(tmp_path / "fam.html").rows
+    rows = Page(tmp_path / "fam.html").rows
     first = [row[0] for row in rows]
-    for page_rows in (first, [row[0] for row in parsed(tmp_path / "summary.html").rows]):
+    for page_rows in (first, [row[0] for row in Page(tmp_path / "summary.html").rows]):
         heads = [cell for cell in page_rows if cell.startswith("Reference: ")]
         assert heads == [
             "Reference: an exact solution",
@@ -234,17 +201,17 @@ def test_a_solve_that_is_held_against_norms_alone_shows_the_largest(tmp_path):
     errors = {"pressure_means": 0.125, "peak": 0.25, "pressure_l2": 0.3}
     worst = {"name": "peak", "error": 0.25}
     report(tmp_path, [verdict("a", "passed", checks=checks, errors=errors, worst=worst)])
-    rows = parsed(tmp_path / "fam.html").rows
+    rows = Page(tmp_path / "fam.html").rows
     assert any("2.5e-01peak, of 5.0e-01" in cell for row in rows for cell in row)
     assert ["a", "3.0e-01", "1.2e-01"] in [row[:3] for row in rows]  # in L2, and at means
-    assert "Not drawn" not in text_of(tmp_path / "fam.html")
+    assert "Not drawn" not in Page(tmp_path / "fam.html").text
 
 
 def test_the_cost_of_each_family_is_told(tmp_path):
     verdicts = [verdict("a", "passed"), verdict("b", "passed", family="other", cpu_seconds=2.0)]
     logged = report(tmp_path, verdicts)
     assert "Processor time by family (solves): fam 0.7 s (1), other 2.0 s (1)." in logged
-    assert "2.00 s of processor time" in text_of(tmp_path / "summary.html")
+    assert "2.00 s of processor time" in Page(tmp_path / "summary.html").text
 
 
 def test_a_profile_shows_every_macro_element_and_its_deviation(tmp_path):

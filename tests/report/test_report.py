@@ -5,12 +5,17 @@ import json
 import re
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
+from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
 
 from solver.report import write_report
-from tests.report.verdicts import put
+from solver.report.page import LEFT_OUT, left_out
+from solver.report.rows import Row
+from solver.simulation.options import Shortcuts
+from solver.verification.judge import without_result
+from tests.report.verdicts import put, record
 
 NASTY = """<script>alert('1 & 2')</script> "quoted" | a_b * `c`"""
 CHECK = {
@@ -81,26 +86,8 @@ def verdict(job, word, reason="", **more):
 
 def unfinished(job, word, reason):
     """A verdict without a result, as the solver writes it."""
-    nothing = dict.fromkeys(
-        [
-            "dofs",
-            "macro_elements",
-            "iterations",
-            "linear_solver",
-            "length",
-            "load_scale",
-            "cpu_seconds",
-            "peak_memory_mb",
-            "pressure",
-            "stress",
-            "gap",
-            "status",
-            "coverage",
-            "worst",
-        ]
-    )
-    empty = {"seconds": {}, "bodies": [], "plan": [], "checks": [], "provenance": {}}
-    return verdict(job, word, reason) | nothing | empty | {"reference_kind": None, "zones": []}
+    found = without_result(word, reason, Path("case.yaml")).plain()
+    return found | {"case": job, "family": "fam", "job": job}
 
 
 BATCH = [
@@ -131,26 +118,29 @@ def report(tmp_path_factory):
 
 
 class Page(HTMLParser):
-    """The elements, identifiers and visible text of a page."""
+    """The elements, attributes and visible text of a page, and the cells of its tables by row."""
 
-    def __init__(self):
+    def __init__(self, path):
         super().__init__()
-        self.tags, self.values, self.text = [], [], []
+        self.tags, self.values, self.rows, self._parts = [], [], [], []
+        self.feed(path.read_text())
+        self.close()
+        self.rows = [[" ".join(cell.split()) for cell in row] for row in self.rows if row]
+        self.text = " ".join("".join(self._parts).split())
 
     def handle_starttag(self, tag, attributes):
         self.tags.append(tag)
         self.values += attributes
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th") and self.rows:
+            self.rows[-1].append("")
 
     def handle_data(self, data):
         if self.tags[-1:] not in (["style"], ["script"]):
-            self.text.append(data)
-
-
-def read_page(folder, name="summary.html"):
-    page = Page()
-    page.feed((folder / name).read_text())
-    page.close()
-    return page
+            self._parts.append(data)
+            if self.rows and self.rows[-1]:
+                self.rows[-1][-1] += data
 
 
 def test_every_solve_stands_in_every_output(report):
@@ -162,9 +152,9 @@ def test_every_solve_stands_in_every_output(report):
         assert {row["job"] for row in csv.DictReader(stream)} == everyone
     cases = ET.parse(folder / "junit.xml").iter("testcase")
     assert {case.get("name") for case in cases} == everyone
-    values = read_page(folder, "fam.html").values
+    values = Page(folder / "fam.html").values
     assert {value for key, value in values if key == "id"} >= {f"fam/{name}" for name in everyone}
-    links = {unquote(value) for key, value in read_page(folder).values if key == "href"}
+    links = {unquote(value) for key, value in Page(folder / "summary.html").values if key == "href"}
     assert links >= {f"fam.html#fam/{name}" for name in everyone}
     markdown = (folder / "summary.md").read_text()
     for name in everyone - {NASTY}:
@@ -179,7 +169,7 @@ def test_every_solve_stands_in_every_output(report):
 def test_reasons_stand_in_every_output(report):
     folder, _ = report
     reason = "the refinement did not converge"
-    text = "".join(read_page(folder).text)
+    text = Page(folder / "summary.html").text
     assert reason in text
     assert f"multiplier: {NASTY}" in text
     for name in ("summary.json", "summary.csv", "summary.md", "junit.xml", "failures.txt"):
@@ -196,25 +186,10 @@ def test_failures_come_first_then_names_in_their_natural_order(report):
     assert [job for word, job in rows if word == "passed"] == ["fam-a2", "fam-a10"]
 
 
-def test_junit_tells_failures_from_errors(report):
-    folder, _ = report
-    suites = ET.parse(folder / "junit.xml").getroot()
-    [suite] = suites
-    assert suite.get("tests") == "8"
-    assert suite.get("failures") == "2"
-    assert suite.get("errors") == "4"
-    ending = {case.get("name"): [e.tag for e in case] for case in suites.iter("testcase")}
-    assert ending["fam-a2"] == []
-    assert ending["fam-bad"] == ending["fam-odd"] == ["failure"]
-    assert ending["fam-no"] == ending["fam-dead"] == ending["fam-broken"] == ["error"]
-    messages = {e.get("message") for e in suites.iter("failure")}
-    assert f"multiplier: {NASTY}" in messages
-
-
 @pytest.mark.parametrize("name", ["summary.html", "fam.html"])
 def test_pages_ask_for_nothing_from_outside(report, name):
     folder, _ = report
-    page = read_page(folder, name)
+    page = Page(folder / name)
     assert not {"link", "img", "iframe", "object"} & set(page.tags)
     assert page.tags.count("script") == 1  # our own, and nothing that a verdict brought in
     assert "src" not in {key for key, _ in page.values}
@@ -230,9 +205,9 @@ def test_pages_ask_for_nothing_from_outside(report, name):
 
 def test_pages_show_counts_beside_the_reference_and_say_which_sign(report):
     folder, _ = report
-    text = " ".join("".join(read_page(folder).text).split())
+    text = Page(folder / "summary.html").text
     assert "LAGS_C is negative in compression in the reference code" in text
-    text = " ".join("".join(read_page(folder, "fam.html").text).split())
+    text = Page(folder / "fam.html").text
     assert "12 / 80" in text
     assert "no value accepted yet" in text
     assert "Not drawn" in text
@@ -255,6 +230,60 @@ def test_a_batch_that_passed_leaves_no_failures(tmp_path):
     write_report([path], tmp_path / "report", logged.append)
     assert (tmp_path / "report" / "failures.txt").read_text() == ""
     assert logged[0].startswith("The one solve passed.")
+
+
+def test_a_solve_without_a_reference_has_its_own_word_and_is_no_failure(tmp_path):
+    made = [verdict("fam-a", "passed"), verdict("fam-free", "solved", "not verified: no reference")]
+    paths = [put(tmp_path / each["job"] / "verdict.json", each) for each in made]
+    logged, out = [], tmp_path / "report"
+    write_report(paths, out, logged.append)
+    assert (out / "failures.txt").read_text() == ""
+    assert logged[0].startswith("2 solves: 1 solved, 1 passed.")
+    assert '<span class="badge solved">solved</span>' in (out / "fam.html").read_text()
+    told = {each["job"]: each for each in json.loads((out / "summary.json").read_text())}
+    assert (told["fam-free"]["verdict"], told["fam-free"]["passed"]) == ("solved", False)
+    assert 'failures="0"' in (out / "junit.xml").read_text()
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"[" * 100_000, b"[]", b'{"family": 1}', b""])
+def test_a_damaged_verdict_is_a_row_of_the_report(tmp_path, content):
+    path = put(tmp_path / "fam" / "fam-a" / "verdict.json", verdict("fam-a", "passed"))
+    path.write_bytes(content)
+    write_report([path], tmp_path / "report", lambda _: None)
+    failures = (tmp_path / "report" / "failures.txt").read_text()
+    assert failures.startswith("fam-a: crashed: ")
+    assert failures.endswith("solve again\n")
+
+
+def test_exchanged_verdicts_are_found_out(tmp_path):
+    one, two = (
+        put(tmp_path / "results" / "fam" / job / "verdict.json", verdict(job, "passed"))
+        for job in ("fam-a", "fam-b")
+    )
+    content = one.read_bytes()
+    one.write_bytes(two.read_bytes())
+    two.write_bytes(content)
+    write_report([one, two], tmp_path / "report", lambda _: None)
+    failures = (tmp_path / "report" / "failures.txt").read_text()
+    assert failures == (
+        "fam-a: crashed: the verdict is that of fam/fam-b; solve again\n"
+        "fam-b: crashed: the verdict is that of fam/fam-a; solve again\n"
+    )
+
+
+def test_what_the_solves_of_a_family_left_out():
+    plan = [
+        ["interface: plain Gauss rules", "every face is an affine image", "quadrature"],
+        ["no second active-set solve", "complementary", "status"],
+        ["linear solver: CHOLMOD", "in the plane a factor is small", ""],
+        ["a line of", "another version"],
+    ]
+    rows = [Row(record(verdict(name, "passed", plan=plan)), Path()) for name in "ab"]
+    assert left_out(rows) == [
+        (LEFT_OUT["quadrature"], "every face is an affine image", 2),
+        (LEFT_OUT["status"], "complementary", 2),
+    ]
+    assert LEFT_OUT.keys() == vars(Shortcuts()).keys()
 
 
 def test_a_batch_of_nothing_is_no_success(tmp_path):

@@ -12,8 +12,8 @@ from solver.mesh import generate, transform
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.accuracy import Accuracy
 from solver.simulation.simulate import simulate
+from solver.studies.stability.description import read_sweep
 from solver.studies.stability.states import exact_state
-from solver.studies.stability.sweeps import read_sweep
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from tests.scenes import POISSON, YOUNG, block_case, block_mesh
@@ -55,6 +55,11 @@ def test_turned_and_far_away(mesh, refine, young, distance):
 def test_faces_that_count_as_flat(height):
     share = error_over_estimate("warp", "3D", height, state="hydrostatic")
     assert 1 / USELESS < share < 1
+
+
+@pytest.mark.parametrize("height", [0.2, 0.3, 0.4])
+def test_warped_faces(height):
+    assert error_over_estimate("warp", "3D", height, state="hydrostatic") < 1
 
 
 @pytest.mark.parametrize("sweep", ["rotation", "tiny-pressure", "poisson", "warp"])

@@ -116,7 +116,7 @@ def test_random_problems_whose_state_is_not_uniform(seed):
 def test_a_plane_solve_imports_nothing_of_three_dimensions(tmp_path):
     code = (
         "import sys; from pathlib import Path; from solver.verification.run import Job, solve\n"
-        f"solve(Job(Path({str(CASES / 'b.yaml')!r})), Path('r.vtkhdf'), None, print)\n"
+        f"solve(Job(Path({str(CASES / 'b.yaml')!r})), Path('r.vtkhdf'), None)\n"
         "print(*sorted(sys.modules))"
     )
     done = subprocess.run(

@@ -16,7 +16,7 @@ from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import SolveError
-from tests.scenes import block_mesh
+from tests.scenes import block_case, block_mesh
 from tests.simulation.test_unloaded import SCENE, side_by_side
 
 CASE = """
@@ -164,9 +164,17 @@ def test_a_load_that_bends_them_between_the_macro_elements_is_refused():
         simulate(blocks(wave), slender(1e5))
 
 
+def test_a_slender_body_in_space_does_not_turn_about_its_own_axis():
+    """10⁷ times as long as thick; contact holds the upper body against that turn as well."""
+    mesh = block_mesh("HEXA8", "HEXA8", (2, 3))
+    mesh.points[:, 0] *= 1e7
+    zone = simulate(block_case(3), mesh).zones[0]
+    assert np.abs(zone.multiplier / 25 - 1).max() < 1e-9
+
+
 def test_a_body_that_its_loads_pull_away_is_not_searched_for_long(monkeypatch):
     """The load on the whole is a pull: no macro-element system of unit gaps is worth forming."""
-    monkeypatch.setattr(problem, "_COLUMNS", 0)
+    monkeypatch.setattr(problem, "_AT_ONCE", 0)
     pull = PRESSED.replace("25.0", "'25.0 - 60*x'")
     with pytest.raises(SolveError, match="nothing keeps top from a free motion"):
         simulate(blocks(pull), block_mesh("QUAD4", "TRIA3", (6, 4)))

@@ -3,6 +3,7 @@
 import logging
 import re
 import sys
+from threading import Thread
 
 import pytest
 
@@ -68,6 +69,20 @@ def test_what_was_held_back_is_told_once_it_takes_long(capsys, monkeypatch):
         log.info("second")
         lines = capsys.readouterr().err.splitlines()
     assert [line[9:] for line in lines] == ["first", "second"]
+
+
+def test_outcomes_of_a_thread_go_to_its_function():
+    said, log = [], logging.getLogger("solver.any")
+    before = logging.getLogger("solver").level
+    with progress.saying(said.append):
+        log.log(progress.OUTCOME, "%d unknowns", 3)
+        log.info("a detail")
+        other = Thread(target=log.log, args=(progress.OUTCOME, "of another solve"))
+        other.start()
+        other.join()
+    log.log(progress.OUTCOME, "nobody listens")
+    assert said == ["3 unknowns"]
+    assert logging.getLogger("solver").level == before
 
 
 def test_the_logger_is_left_as_it_was(solve):

@@ -101,7 +101,7 @@ def test_the_other_direction_exchanges_slave_and_master(tmp_path):
 @pytest.mark.parametrize("word", ["refused", "failed", "crashed"])
 def test_a_solve_without_an_end_has_the_same_keys(tmp_path, word):
     solution = plane(tmp_path)
-    verdict = without_result(word, "said why", solution.case, swapped=True).plain()
+    verdict = without_result(word, "said why", solution.case, (True, None, None)).plain()
     assert verdict.keys() == verdict_of(solution).keys()
     assert (verdict["verdict"], verdict["passed"], verdict["reason"]) == (word, False, "said why")
     assert verdict["job"] == "two-blocks-swapped"

@@ -256,7 +256,7 @@ def again_for(job):
 
 @cache
 def ladders():
-    """The jobs of all ladders by (family, folder), and their levels."""
+    """The jobs of all ladders by (family, folder), their levels, and options of a solve."""
     from solver.commands.jobs import jobs_of
     from solver.studies.orders.description import read_ladders
     from solver.system.errors import InputError
@@ -269,13 +269,11 @@ def ladders():
             refuse(error)
         for ladder in family.ladders:
             for one in jobs_of(ladder.case):
-                of = {
-                    **vars(one),
-                    "name": ladder.folder(one.swap),
-                    "hexahedra": ladder.hexahedra,
-                }
+                name = ladder.folder(one.swap)
+                of = {**vars(one), "name": name, "hexahedra": ladder.hexahedra}
                 job = Job(**of, folder=folder_of(family.name))
-                found[job.folder, job.name] = job, ladder.levels
+                options = f" --recovery {ladder.recovery}" if ladder.recovery else ""
+                found[job.folder, job.name] = job, ladder.levels, options
     return found
 
 
@@ -283,10 +281,16 @@ def level_of(w):
     return ladders()[w.family, w.job][0]
 
 
+def options_of_level(w):
+    """How the command line is told which level of which ladder this is."""
+    job, _, options = ladders()[w.family, w.job]
+    return f"--refine {w.level} {options_of(job)}{options}"
+
+
 def level_folders():
     """Where the results of all levels lie."""
     return [
         f"results/orders/{family}/{name}/{level}"
-        for (family, name), (_, levels) in ladders().items()
+        for (family, name), (_, levels, _) in ladders().items()
         for level in levels
     ]

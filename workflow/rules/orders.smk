@@ -21,7 +21,7 @@ use rule solve as solve_level with:
         file=lambda w: level_of(w).file,
         mesh="''",
         content=lambda w: contents(level_of(w).file) + SOLVER_CONTENT,
-        options=lambda w: f"--refine {w.level} {options_of(level_of(w))}",
+        options=options_of_level,
         refusal="''",
     message:
         "solve {wildcards.job} refined {wildcards.level} times"

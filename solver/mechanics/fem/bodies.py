@@ -19,20 +19,19 @@ def body_numbers(n_nodes: int, cells: dict[str, np.ndarray]) -> np.ndarray:
 def rigid_motions(points: np.ndarray, body: np.ndarray) -> sparse.csc_matrix:
     """Rigid motions (n_dofs, n_bodies · 3 or 6): translations, then turns about body centres.
 
-    Turns are scaled by the body's size, so that all columns are of the same order.
+    The largest displacement of each column is one: a slender body is turned about its own axis by a
+    larger angle than about others.
     """
     n, dim = points.shape
     count = np.bincount(body)
     centre = np.stack([np.bincount(body, points[:, d]) / count for d in range(dim)], axis=1)
     arm = points - centre[body]
-    size = np.zeros(len(count))
-    np.maximum.at(size, body, np.linalg.norm(arm, axis=1))
-    arm /= size[body][:, None]
     fields = [np.tile(np.eye(dim)[d], (n, 1)) for d in range(dim)]
-    if dim == 2:
-        fields.append(np.stack([-arm[:, 1], arm[:, 0]], axis=1))
-    else:
-        fields += [np.cross(np.eye(3)[d], arm) for d in range(3)]
+    turns = [np.stack([-arm[:, 1], arm[:, 0]], axis=1)]
+    for turn in turns if dim == 2 else [np.cross(np.eye(3)[d], arm) for d in range(3)]:
+        size = np.zeros(len(count))
+        np.maximum.at(size, body, np.linalg.norm(turn, axis=1))
+        fields.append(turn / np.where(size > 0, size, 1.0)[body][:, None])
     per_body = len(fields)
     rows = np.tile(np.arange(n * dim), per_body)
     columns = np.concatenate([np.repeat(body * per_body + k, dim) for k in range(per_body)])

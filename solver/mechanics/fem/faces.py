@@ -46,7 +46,7 @@ def boundary_faces(mesh: meshio.Mesh, group: str) -> list[FaceBlock]:
 
     Raises FaceError for a face with no cell behind it, with a cell on both sides, or listed twice.
     """
-    wanted = _corner_sets(_group_faces(mesh, group))
+    wanted = corner_sets(_group_faces(mesh, group))
     marked = np.zeros(len(mesh.points), dtype=bool)
     marked[wanted[wanted >= 0]] = True
     sides = _candidate_sides(mesh, marked)
@@ -83,7 +83,7 @@ def _group_faces(mesh: meshio.Mesh, group: str) -> list[np.ndarray]:
     return found
 
 
-def _corner_sets(faces: list[np.ndarray]) -> np.ndarray:
+def corner_sets(faces: list[np.ndarray]) -> np.ndarray:
     """Sorted corner nodes of faces as rows (n, 4), filled up with −1."""
     rows = [np.full((len(f), 4), -1) for f in faces]
     for row, face in zip(rows, faces, strict=True):
@@ -102,7 +102,7 @@ def _candidate_sides(mesh: meshio.Mesh, marked: np.ndarray) -> list[_Side]:
             nodes = cells[near][:, corner]
             hit = marked[nodes].all(axis=1)
             if hit.any():
-                sides.append(_Side(kind, local, near[hit], _corner_sets([nodes[hit]])))
+                sides.append(_Side(kind, local, near[hit], corner_sets([nodes[hit]])))
     return sides
 
 

@@ -6,7 +6,6 @@ raises `BreakdownError` at a pivot that it cannot use. The solve takes and retur
 the factor's memory is released with the last reference to the solve.
 """
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -33,13 +32,6 @@ class Backend:
     factor: Callable[[csr_matrix, bool], Solve]
 
 
-def threads() -> int:
-    """Cores that this process may use, limited by OMP_NUM_THREADS where it is set."""
-    allowed = len(os.sched_getaffinity(0))
-    wish = os.environ.get("OMP_NUM_THREADS", "")
-    return min(allowed, int(wish)) if wish.isdigit() and int(wish) else allowed
-
-
 def _pardiso(upper: csr_matrix, definite: bool) -> Solve:
     kind = pardiso.POSITIVE_DEFINITE if definite else pardiso.INDEFINITE
     try:
@@ -50,20 +42,6 @@ def _pardiso(upper: csr_matrix, definite: bool) -> Solve:
         if error.code == pardiso.NO_MEMORY:
             raise MemoryError("no room for the factor of the stiffness matrix") from error
         raise
-
-
-def _rslab(upper: csr_matrix, definite: bool) -> Solve:
-    import rslab
-
-    # Read by columns, the rows of the upper triangle are the columns of the lower one.
-    lower = csc_matrix((upper.data, upper.indices, upper.indptr), shape=upper.shape)
-    try:
-        factor = rslab.ldlt(lower, threads=threads())
-    except RuntimeError as error:
-        raise BreakdownError from error
-    if definite and factor.inertia[0] != upper.shape[0]:
-        raise BreakdownError
-    return factor.solve_many
 
 
 def _cholmod(upper: csr_matrix, definite: bool) -> Solve:
@@ -106,7 +84,6 @@ def _superlu(upper: csr_matrix, definite: bool) -> Solve:
 
 BACKENDS = {
     "pardiso": Backend("PARDISO (MKL)", True, pardiso.available, _pardiso),
-    "rslab": Backend("rslab", True, lambda: find_spec("rslab") is not None, _rslab),
     "cholmod": Backend("CHOLMOD", False, lambda: find_spec("cvxopt") is not None, _cholmod),
     "superlu": Backend("SuperLU", False, lambda: True, _superlu),
 }

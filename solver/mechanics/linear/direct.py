@@ -106,8 +106,8 @@ def factorise(
 ) -> Factor:
     """Factor a symmetric positive definite `matrix` (n, n), of which the upper triangle is read.
 
-    `kind`: auto, pardiso, rslab, cholmod or superlu. `precision` of the factor: auto, double or
-    single (pardiso and rslab); solutions have double precision either way. `dim`, the dimension
+    `kind`: auto, pardiso, cholmod or superlu. `precision` of the factor: auto, double or single
+    (pardiso alone); solutions have double precision either way. `dim`, the dimension
     of the mesh behind the matrix, guides the choice for auto.
 
     Raises SolveError where the matrix is not positive definite, or singular to working precision:
@@ -125,9 +125,7 @@ def factorise(
     scale = _power_of_two(1 / np.sqrt(diagonal))
     upper = _scaled(upper, scale)
     light = dim == 2 or upper.nnz <= LIGHT
-    backend = _choose(
-        kind, ("cholmod", "pardiso", "rslab") if light else ("pardiso", "rslab", "cholmod")
-    )
+    backend = _choose(kind, ("cholmod", "pardiso") if light else ("pardiso", "cholmod"))
     if precision == "auto":
         precision = "single" if dim == 3 and upper.shape[0] >= SINGLE_FROM else "double"
     if precision == "single" and backend.single:
@@ -140,7 +138,7 @@ def factorise(
 def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Factor:
     """Factor a symmetric indefinite `matrix` (n, n), a saddle point; see `factorise`.
 
-    `kind`: auto, pardiso, rslab or superlu. Here the scaled matrix has its largest entry in each
+    `kind`: auto, pardiso or superlu. Here the scaled matrix has its largest entry in each
     row near one.
     """
     upper = _upper_triangle(matrix)
@@ -148,7 +146,6 @@ def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Fact
     for _ in range(3):
         scale *= _power_of_two(1 / np.sqrt(_largest_in_row(_scaled(upper, scale))))
     upper = _scaled(upper, scale)
-    # Not rslab: it pivots within a supernode, where a multiplier's zero may be alone.
     backend = _choose(kind, ("pardiso",))
     return _factorise_double(backend, upper, scale, definite=False, limit=SINGULAR_INDEFINITE)
 

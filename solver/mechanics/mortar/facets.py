@@ -103,7 +103,11 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
 
 
 def tangents_of(normal: np.ndarray) -> np.ndarray:
-    """Unit tangents (n, dim − 1, dim) that complete unit normals (n, dim) to frames."""
+    """Unit tangents (n, dim − 1, dim) that complete unit normals (n, dim) to frames.
+
+    >>> tangents_of(np.array([[0.0, 1.0]])).tolist()
+    [[[-1.0, 0.0]]]
+    """
     if normal.shape[1] == 2:
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
     axis = np.zeros_like(normal)
@@ -197,19 +201,18 @@ def _newton(
     distance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, distances, and the sizes (f, q) of the last steps; done faces are left alone."""
-    place, distance = place.copy(), distance.copy()
-    size = np.zeros(distance.shape)
-    rows = np.arange(len(corner))
-    for _ in range(_NEWTON_STEPS):
-        step = _newton_step(
-            kind, corner[rows], target[rows], direction[rows], place[rows], distance[rows]
-        )
+    step = _newton_step(kind, corner, target, direction, place, distance)
+    place, distance = place - step[..., :-1], distance - step[..., -1]
+    size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+    for _ in range(_NEWTON_STEPS - 1):
+        rows = np.flatnonzero(~(size <= _CONVERGED).all(axis=1))
+        if not len(rows):
+            break
+        given = (values[rows] for values in (corner, target, direction, place, distance))
+        step = _newton_step(kind, *given)
         place[rows] -= step[..., :-1]
         distance[rows] -= step[..., -1]
         size[rows] = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
-        rows = rows[~(size[rows] <= _CONVERGED).all(axis=1)]
-        if not len(rows):
-            break
     return place, distance, size
 
 

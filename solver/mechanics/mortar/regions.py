@@ -18,6 +18,8 @@ from solver.mechanics.fem.gauss import gauss_rule
 
 # Edges whose middle is off the chord by less than this share of it are straight.
 _BENT = 1e-13
+# The centroid of a region with less than this share of the square of its extent is not looked for.
+_THIN = 1e-3
 # Halvings after which an interval within [0, 1] is as short as rounding allows.
 _HALVINGS = 54
 
@@ -270,10 +272,9 @@ def quadrature(regions: Regions, degree: int) -> list[Pieces]:
     for which, points, weights in _fan(regions, middle, 1):
         area += np.bincount(which, weights.sum(axis=1), minlength=len(middle))
         np.add.at(moment, which, np.einsum("sq,sqd->sd", weights, points - middle[which][:, None]))
-    shift = moment / np.where(area == 0, 1.0, area)[:, None]
-    # That of a sliver may be lost in round-off, and lie anywhere.
-    size = np.where(regions.used[..., None], np.abs(regions.start - middle[:, None]), 0.0)
-    shift[(np.abs(shift) > size.max(axis=1)).any(axis=1)] = 0.0
+    extent = np.where(regions.used[..., None], np.abs(regions.start - middle[:, None]), 0.0)
+    thin = np.abs(area) <= _THIN * extent.max(axis=(1, 2)) ** 2
+    shift = np.where(thin[:, None], 0.0, moment / np.where(thin, 1.0, area)[:, None])
     return _fan(regions, middle + shift, degree)
 
 

@@ -20,12 +20,12 @@ from solver.system.errors import InputError
 
 # Modules with a function `read(path)` that gives the mesh as it stands in the file.
 _READERS = {
-    ".med": "solver.mesh.files.med",
-    ".mmed": "solver.mesh.files.med",
-    ".msh": "solver.mesh.files.msh",
-    ".inp": "solver.mesh.files.abaqus",
-    ".vtu": "solver.mesh.files.vtu",
-    ".vtkhdf": "solver.mesh.files.vtkhdf",
+    ".med": ".med",
+    ".mmed": ".med",
+    ".msh": ".msh",
+    ".inp": ".abaqus",
+    ".vtu": ".vtu",
+    ".vtkhdf": ".vtkhdf",
 }
 
 
@@ -36,7 +36,7 @@ def read(path: Path) -> meshio.Mesh:
         raise InputError(path, "extension", path.suffix, f"allowed: {', '.join(_READERS)}")
     if not path.is_file():
         raise InputError(path, "mesh", None, "no such file")
-    reader = import_module(_READERS[suffix])
+    reader = import_module(_READERS[suffix], __package__)
     # Our own files are hashed: what they hold is what was written.
     read_by = read_here if suffix == ".vtkhdf" else read_apart
     mesh = read_by(lambda file: tidy(reader.read(file), file), path)

@@ -14,13 +14,13 @@ from solver.mesh.tidy import tidy
 from solver.system.errors import InputError
 
 _RECIPES = {
-    "blocks": "solver.mesh.recipes.blocks:blocks",
-    "rings": "solver.mesh.recipes.mapped:rings",
-    "shells": "solver.mesh.recipes.mapped:shells",
-    "wavy": "solver.mesh.recipes.mapped:wavy",
-    "parabola": "solver.mesh.recipes.mapped:parabola",
-    "hertz": "solver.mesh.recipes.mapped:hertz",
-    "punch": "solver.mesh.recipes.mapped:punch",
+    "blocks": ".blocks:blocks",
+    "rings": ".mapped:rings",
+    "shells": ".mapped:shells",
+    "wavy": ".mapped:wavy",
+    "parabola": ".mapped:parabola",
+    "hertz": ".mapped:hertz",
+    "punch": ".mapped:punch",
 }
 
 
@@ -32,7 +32,7 @@ def generate(recipe: Mapping[str, Any], where: str) -> meshio.Mesh:
     """
     keys = Keys(recipe, where, "mesh")
     module, function = _RECIPES[keys.choice("recipe", _RECIPES)].split(":")
-    make = getattr(import_module(module), function)
+    make = getattr(import_module(module, __package__), function)
     try:
         raw = make(keys)
     except Exception as error:

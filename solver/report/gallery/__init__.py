@@ -33,7 +33,7 @@ def write_gallery(
     is newer than its result and the drawing stays.
     """
     from solver.report.gallery.probe import set_up
-    from solver.report.html import environment
+    from solver.report.html import TEMPLATES, render
     from solver.report.rows import families, read_rows
     from solver.system.files import write_text
 
@@ -42,18 +42,15 @@ def write_gallery(
     draw, ending = _drawing(plain=bool(reason))
     pictures = [_picture(row, folder, draw, ending) for row in read_rows(verdicts)]
     by_family = families([picture.row for picture in pictures])
-    page = (
-        environment()
-        .get_template("gallery.html.jinja")
-        .render(
-            families={
-                name: [p for p in pictures if p.row.group == name and (p.path or p.reason)]
-                for name in by_family
-            },
-            reason=reason,
-            versions=_versions(),
-            folder=folder,
-        )
+    page = render(
+        TEMPLATES / "gallery.html.jinja",
+        families={
+            name: [p for p in pictures if p.row.group == name and (p.path or p.reason)]
+            for name in by_family
+        },
+        reason=reason,
+        versions=_versions(),
+        folder=folder,
     )
     write_text(folder / PAGE, page)
     drawn = sum(bool(picture.path) for picture in pictures)
@@ -63,12 +60,25 @@ def write_gallery(
 def _drawing(plain: bool) -> tuple[Draw, str]:
     """What draws a result into a file, and the ending of these files."""
     if plain:
-        from solver.report.gallery.plain import draw
+        return _draw_plain, "-plain.svg"
+    from solver.report.gallery.drawing import draw
 
-        return draw, "-plain.svg"
-    from solver.report.gallery.drawing import draw as by_pyvista
+    return draw, ".png"
 
-    return by_pyvista, ".png"
+
+def _draw_plain(result: Path, target: Path) -> None:
+    """The report's own drawing with the bodies deformed, as SVG."""
+    from solver.report.layout import magnification
+    from solver.report.plane import draw_plane
+    from solver.report.space import draw_space
+    from solver.system.files import write_text
+    from solver.verification.results import read_result
+
+    solution = read_result(result).solution
+    factor = magnification(solution.displacement, solution.length)
+    draw = draw_plane if solution.mesh.points.shape[1] == 2 else draw_space
+    title = f"{solution.job}: bodies deformed (displacement × {factor:g}), contact pressure"
+    write_text(target, draw(solution, title, factor))
 
 
 def _picture(row: Row, folder: Path, draw: Draw, ending: str) -> Picture:

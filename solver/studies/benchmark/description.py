@@ -11,7 +11,7 @@
         repetitions: 1            # after the first solve, in one process; 0: the first one counts
         ways:
           - {title: as chosen}
-          - {title: rslab, solver: rslab}            # the linear solver
+          - {title: CHOLMOD, solver: cholmod}        # the linear solver
           - {title: without MKL, free: true}         # free software alone
           - {title: not cut, treatment: uncut}       # of the interface
           - {title: no cures, cures: false}          # see `solver.simulation.options`
@@ -41,7 +41,7 @@ class Way(Section, frozen=True):
     """One way to solve; see the module's text."""
 
     title: Text
-    solver: Literal["auto", "multigrid", "pardiso", "rslab", "cholmod", "superlu"] = "auto"
+    solver: Literal["auto", "multigrid", "pardiso", "cholmod", "superlu"] = "auto"
     free: bool = False
     treatment: Text = "lac"
     cures: bool = True

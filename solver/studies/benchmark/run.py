@@ -1,6 +1,5 @@
 """Runs the benchmark: each way in a process of its own, one after the other, nothing beside it."""
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from solver.studies.points import FAILED, MISSING, SOLVED, ended, measure_apart,
 from solver.studies.scaling.description import ScalingPoint
 from solver.system.clock import now
 from solver.system.errors import SolveError
+from solver.system.package import COMMAND
 from solver.system.process import cores_for, run_apart
 
 Record = dict[str, Any]
@@ -41,7 +41,7 @@ class Bench:
 
     def command(self, *arguments: object) -> Record:
         """What a command of the program took."""
-        command = [sys.executable, "-m", "solver", *map(str, arguments)]
+        command = [*COMMAND, *map(str, arguments)]
         done = run_apart(command, self.cores, self.limit)
         return done.used | {"status": done.status}
 

@@ -58,7 +58,7 @@ def batch(job: Mapping[str, Any]) -> dict[str, Any]:
         wall, cpu = now(), processor_time()
         for number, (case, mesh) in enumerate(job["cases"]):
             verdict = folder / f"{number}.json"
-            solve_job(Job(Path(case), Path(mesh)), verdict.with_suffix(".vtkhdf"), verdict, _silent)
+            solve_job(Job(Path(case), Path(mesh)), verdict.with_suffix(".vtkhdf"), verdict)
         passes.append({"wall": now() - wall, "cpu": processor_time() - cpu})
     return {"process": used_since(job["started"]), "passes": passes}
 
@@ -68,7 +68,3 @@ def _without_mkl() -> None:
     from solver.mechanics.linear.backends import BACKENDS
 
     BACKENDS["pardiso"] = replace(BACKENDS["pardiso"], available=lambda: False)
-
-
-def _silent(line: str) -> None:
-    """Print nothing."""

@@ -13,6 +13,7 @@
       - {case: press-fit.yaml, problem: press fit}    # has plots of its own
       - {case: lying.yaml, label: PENTA6 on its side}  # else the slave's cells, and their cut
       - {case: hexa20.yaml, hexahedra: hexahedra, levels: [1, 2, 3, 4]}
+      - {case: tria6.yaml, recovery: quadratic}      # in place of the case's own
       - {case: sphere.yaml, finest: {peak: 0.01}}     # largest error allowed at the finest level
 
 A ladder is solved in every direction of its case.
@@ -26,7 +27,7 @@ from msgspec import Meta, field, structs
 from solver.case import job_name
 from solver.case.typed import Number, Positive, Section, read_as
 from solver.case.yaml import read_mapping
-from solver.studies.keys import Counts, Cut, Degree, ErrorName
+from solver.studies.keys import Counts, Cut, Degree, ErrorName, Recovered
 
 Slopes = dict[ErrorName, Number]
 _Orders = Annotated[
@@ -48,12 +49,13 @@ class Ladder(Section, frozen=True):
     problem: str = ""
     label: str = ""
     hexahedra: Cut | None = None
+    recovery: Recovered | None = None
     observed: Slopes = field(name="reference_code", default_factory=dict)
     finest: dict[ErrorName, Positive] = field(default_factory=dict)
 
     def folder(self, swapped: bool) -> str:
         """The name of the folder in which the results of one direction lie."""
-        return job_name(self.case.stem, swapped, self.hexahedra)
+        return job_name(self.case.stem, swapped, self.hexahedra, self.recovery)
 
 
 class ReferenceCode(Section, frozen=True):

@@ -38,7 +38,7 @@ def _line(curve: Curve, sizes: np.ndarray, errors: np.ndarray) -> PlotLine:
     """Linear cells dashed with hollow marks, quadratic ones solid; a variant is dotted."""
     color, mark = look_of(curve.slave_cells[0].name, _LOOKS)
     linear = curve.degree == "linear"
-    variant = curve.ladder.hexahedra or curve.ladder.label
+    variant = curve.ladder.hexahedra or curve.ladder.recovery or curve.ladder.label
     dashes: tuple[float, ...] = (1.5, 3) if variant else (6, 3) if linear else ()
     errors = np.maximum(errors, EPSILON / 4)
     return PlotLine(curve.label, sizes, errors, color, mark, dashes, filled=not linear)

@@ -61,7 +61,8 @@ class Curve:
             return self.ladder.label
         names = " + ".join(dict.fromkeys(cell.name for cell in self.slave_cells))
         cut = f" cut into {self.ladder.hexahedra}" if self.ladder.hexahedra else ""
-        return (names or self.name) + cut
+        with_ = f", {self.ladder.recovery}" if self.ladder.recovery else ""
+        return (names or self.name) + cut + with_
 
     @cached_property
     def degree(self) -> str:

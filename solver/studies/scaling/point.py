@@ -16,7 +16,6 @@ operating system reports processor time and peak memory of the whole process. Be
 """
 
 import json
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from solver.studies.scaling.description import Scaling, ScalingPoint
 from solver.system.clock import now
 from solver.system.files import write_text
 from solver.system.memory import available
+from solver.system.package import COMMAND
 from solver.system.process import cores_for, run_apart
 from solver.verification.verdict import read_verdict
 
@@ -73,13 +73,12 @@ def _solve(
     """What the processes found and took; their files are not kept."""
     case, mesh, verdict = folder / "case.yaml", folder / "mesh.vtkhdf", folder / "verdict.json"
     case.write_text(point.source(), encoding="utf-8")
-    solver = [sys.executable, "-m", "solver"]
-    meshed = run_apart([*solver, "mesh", str(case), "-o", str(mesh)], cores, limit, memory)
+    meshed = run_apart([*COMMAND, "mesh", str(case), "-o", str(mesh)], cores, limit, memory)
     found = {"meshing": meshed.used, "process": {}} | dict.fromkeys(_FROM_VERDICT)
     found |= {"verdict": None, "faces": None, "machine": {}}
     if meshed.status != 0:
         return found | ended(FAILED, f"no mesh: {meshed.reason}")
-    command = [*solver, "solve", str(case), "--mesh", str(mesh), "-o", str(folder / "r.vtkhdf")]
+    command = [*COMMAND, "solve", str(case), "--mesh", str(mesh), "-o", str(folder / "r.vtkhdf")]
     done = run_apart([*command, "--verdict", str(verdict)], cores, limit, memory)
     found["process"] = done.used
     if not verdict.is_file():

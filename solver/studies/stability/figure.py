@@ -23,7 +23,7 @@ MOST_DIGITS = 16
 # Columns that a panel's title needs.
 _FEWEST = 5
 _WIDTH, _HEIGHT, _GAP, _LABEL = 37.0, 19.0, 34.0, 250.0
-_PANELS = {"floor": "floor of double precision", "cured": "solved", "uncured": "without cures"}
+_PANELS = {"floor": "floor of double precision", "cured": "solved", "uncured": "without safeguards"}
 
 
 def digits(error: float | None) -> int | None:

@@ -37,8 +37,8 @@ def read_records(paths: Sequence[Path]) -> list[Record]:
             record = json.loads(path.read_text(encoding="utf-8"))
             records.append((record["order"], record["sweep"], record))
         except (OSError, ValueError, KeyError, TypeError) as error:
-            allowed = f"must be a record written by `sweep` ({type(error).__name__})"
-            raise InputError(path, "file", None, allowed) from None
+            problem = f"must be a record written by `sweep` ({type(error).__name__})"
+            raise InputError(path, "file", None, problem) from None
     return [record for _, _, record in sorted(records, key=lambda item: item[:2])]
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from solver.case.material import Material
 from solver.case.model import Case
 from solver.mesh import transform
-from solver.studies.stability.sweeps import HYDROSTATIC
+from solver.studies.stability.description import HYDROSTATIC
 
 LOWER, UPPER = "bottom", "top"
 # Steps of `transform:` that leave the corners of the blocks where they are.

@@ -178,7 +178,7 @@ class _SolverChoice(Section, frozen=True):
     problem: Name
     pair: Pair
     treatment: Name
-    solvers: Annotated[tuple[Literal["pardiso", "cholmod", "rslab", "superlu"], ...], ONCE]
+    solvers: Annotated[tuple[Literal["pardiso", "cholmod", "superlu"], ...], ONCE]
 
 
 class _QuickStudy(Section, frozen=True):

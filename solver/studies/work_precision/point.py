@@ -36,8 +36,8 @@ def measure_point(study: Study, point: StudyPoint, output: Path, reference: Path
     """
     started, cores = now(), cores_for(study.threads)
     if len(cores) < study.threads:
-        allowed = f"more than the {len(cores)} cores that may be used here"
-        raise InputError(study.path, "threads", study.threads, allowed)
+        problem = f"more than the {len(cores)} cores that may be used here"
+        raise InputError(study.path, "threads", study.threads, problem)
     about = {
         "point": point.name,
         "problem": point.problem.name,

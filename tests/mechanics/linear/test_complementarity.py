@@ -1,10 +1,12 @@
 """Linear complementarity problems, solved by hand, by enumeration, and of random stiffness."""
 
+import doctest
 from itertools import product
 
 import numpy as np
 import pytest
 
+from solver.mechanics.linear import complementarity
 from solver.mechanics.linear.complementarity import complementary
 from solver.system.errors import SolveError
 
@@ -66,3 +68,7 @@ def test_a_motion_that_nothing_resists_ends_where_it_is_stopped():
 def test_a_stiffness_with_a_negative_motion_is_refused():
     with pytest.raises(SolveError, match="not positive semidefinite"):
         complementary(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([-1.0, -1.0]))
+
+
+def test_the_example_of_its_docstring():
+    assert doctest.testmod(complementarity).failed == 0

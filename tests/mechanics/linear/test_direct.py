@@ -248,6 +248,6 @@ def test_what_a_chosen_solver_cannot_do_is_no_other_s_work(monkeypatch):
         pytest.raises(SolveError, match="CHOLMOD factors positive definite matrices only"),
     ):
         factorise_indefinite(saddle(4))
-    monkeypatch.setitem(BACKENDS, "rslab", replace(BACKENDS["rslab"], available=lambda: False))
-    with force_solver("rslab"), pytest.raises(SolveError, match="rslab is not installed"):
+    monkeypatch.setitem(BACKENDS, "cholmod", replace(BACKENDS["cholmod"], available=lambda: False))
+    with force_solver("cholmod"), pytest.raises(SolveError, match="CHOLMOD is not installed"):
         factorise(laplacian(3))

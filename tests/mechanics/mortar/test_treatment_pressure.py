@@ -39,7 +39,9 @@ def test_between_nodes_the_pressure_is_linear(tmp_path):
     solution = plane(tmp_path)
     zone = nodal(solution, lambda x: 2 + 3 * x[:, 0])
     at = surface_points(solution.mesh.points, zone.faces)
-    assert computed_pressure(zone) == pytest.approx(2 + 3 * at.place[:, 0], rel=1e-14)
+    assert computed_pressure(solution.mesh.points, zone) == pytest.approx(
+        2 + 3 * at.place[:, 0], rel=1e-14
+    )
 
 
 def test_a_pressure_that_alternates_from_node_to_node_shows(tmp_path):

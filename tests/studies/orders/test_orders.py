@@ -33,6 +33,7 @@ reference_code: {name: code_aster, version: "14"}
 ladders:
   - {case: tria3.yaml, reference_code: {displacement_l2: 1.998}}
   - {case: hexa20.yaml, hexahedra: hexahedra, levels: [1, 2]}
+  - {case: tria3.yaml, recovery: smooth}
 """
 
 
@@ -48,12 +49,13 @@ def file(tmp_path):
 
 def test_ladders_as_their_file_gives_them(file):
     family = read_ladders(file)
-    first, second = family.ladders
+    first, second, third = family.ladders
     assert (family.name, family.title, family.description) == ("family", "A family", "")
     assert (first.case, first.levels) == (file.parent / "tria3.yaml", (1, 2, 4))
     assert first.observed == {"displacement_l2": 1.998}
     assert (second.levels, second.hexahedra) == ((1, 2), "hexahedra")
     assert [first.folder(False), second.folder(True)] == ["tria3", "hexa20-swapped-hexahedra"]
+    assert (third.recovery, third.folder(True)) == ("smooth", "tria3-swapped-smooth")
 
 
 @pytest.mark.parametrize(
@@ -65,6 +67,7 @@ def test_ladders_as_their_file_gives_them(file):
         ("- {case: tria3.yaml,", "- {", r"ladders\[0\].case: this key is needed"),
         ("tria3.yaml", "tria5.yaml", r"ladders\[0\].case = 'tria5.yaml': no such file"),
         ("hexahedra: hexahedra", "hexahedra: cubes", "must be pyramids or hexahedra"),
+        ("recovery: smooth", "recovery: rough", "recovery = 'rough': must be"),
         ("levels: [1, 2]}", "finest: {peek: 1}}", "did you mean peak"),
         ("levels: [1, 2]}", "finest: {peak: 0}}", r"finest.peak = 0: must be a positive number"),
         ("[0.5, null]", "[0.5]", r"must be \[guaranteed, best\]"),
@@ -83,7 +86,7 @@ MANUFACTURED = Path(__file__).parents[3] / "cases" / "manufactured"
 
 def solved(case):
     """Size of the macro-elements, and errors, of a case."""
-    solution = simulate(case, mesh_of(case), log=lambda line: None)
+    solution = simulate(case, mesh_of(case))
     return {"size": element_size(solution.macro_elements, 2)} | errors(solution)
 
 

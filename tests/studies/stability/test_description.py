@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from solver.studies.stability.sweeps import read_sweep
+from solver.studies.stability.description import read_sweep
 from solver.system.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -11,6 +11,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ import meshio
 import numpy as np
 from scipy import sparse
 
-from solver.case.model import Case
 from solver.mechanics.linear.condensation import CondensedSystem
 from solver.mesh import generate, transform
 from solver.simulation.accuracy import Accuracy
@@ -26,9 +26,9 @@ from solver.simulation.options import Options, Safeguards
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import solve_problem
+from solver.studies.stability.description import Sweep, SweepSeries, Value
 from solver.studies.stability.floor import floor, stress_error
 from solver.studies.stability.states import State, exact_state
-from solver.studies.stability.sweeps import Sweep, SweepSeries, Value
 from solver.system.clock import Clock
 from solver.system.errors import InputError, SolveError
 from solver.system.files import write_text
@@ -41,17 +41,10 @@ SMALL = 1500
 Log = Callable[[str], Any]
 
 
-class _Meshes:
-    """Meshes of recipes as generated, each made once."""
-
-    def __init__(self) -> None:
-        self._made: dict[str, meshio.Mesh] = {}
-
-    def raw(self, case: Case) -> meshio.Mesh:
-        key = json.dumps(case.mesh, sort_keys=True, default=str)
-        if key not in self._made:
-            self._made[key] = generate(case.mesh, str(case.path))
-        return self._made[key]
+@lru_cache(maxsize=8)
+def _generated(recipe: str, where: str) -> meshio.Mesh:
+    """The mesh of a recipe (as JSON), made once."""
+    return generate(json.loads(recipe), where)
 
 
 @dataclass(frozen=True)
@@ -64,8 +57,8 @@ class _Point:
 
 def run_sweep(sweep: Sweep, output: Path, log: Log) -> dict[str, Any]:
     """Solve all points of a sweep in this process and write the record, whole or not at all."""
-    started, meshes = time.process_time(), _Meshes()
-    points = [_record(point, meshes) for point in _points(sweep)]
+    started = time.process_time()
+    points = [_record(point) for point in _points(sweep)]
     record = {
         "sweep": sweep.name,
         "title": sweep.title,
@@ -87,9 +80,9 @@ def _points(sweep: Sweep) -> Iterator[_Point]:
             yield _Point(sweep, series, value, label)
 
 
-def _record(point: _Point, meshes: _Meshes) -> dict[str, Any]:
+def _record(point: _Point) -> dict[str, Any]:
     """One point: identity, floor, measures with all safeguards and with none, whether it holds."""
-    cured = _attempt(point, meshes, Safeguards())
+    cured = _attempt(point, Safeguards())
     beyond = point.value in point.sweep.beyond
     return {
         "series": point.series.name,
@@ -98,7 +91,7 @@ def _record(point: _Point, meshes: _Meshes) -> dict[str, Any]:
         "beyond": beyond,
         "holds": _within(cured) or (beyond and _known_to_itself(cured)),
         **cured,
-        "uncured": _attempt(point, meshes, Safeguards.none()),
+        "uncured": _attempt(point, Safeguards.none()),
     }
 
 
@@ -115,19 +108,19 @@ def _known_to_itself(measured: dict[str, Any]) -> bool:
     return max(measured["pressure"], measured["stress"]) <= measured["attainable"]
 
 
-def _attempt(point: _Point, meshes: _Meshes, safeguards: Safeguards) -> dict[str, Any]:
+def _attempt(point: _Point, safeguards: Safeguards) -> dict[str, Any]:
     """What came of the point: measures, or the reason why there are none."""
     try:
-        return _measured(point, meshes, safeguards)
+        return _measured(point, safeguards)
     except InputError as error:
         return {"word": REFUSED, "reason": f"{error.key}: {error.problem}"}
     except SolveError as error:
         return {"word": FAILED, "reason": str(error)}
 
 
-def _measured(point: _Point, meshes: _Meshes, safeguards: Safeguards) -> dict[str, Any]:
+def _measured(point: _Point, safeguards: Safeguards) -> dict[str, Any]:
     case = point.sweep.case(point.series.mesh, point.value).as_solved(point.series.swapped)
-    raw = meshes.raw(case)
+    raw = _generated(json.dumps(case.mesh), str(case.path))
     mesh = transform(raw, case.transform, str(case.path)) if case.transform else raw
     state = exact_state(case, point.sweep.state, raw)
     clock = Clock()

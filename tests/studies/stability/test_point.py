@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from solver.simulation.options import Safeguards
-from solver.studies.stability import points
-from solver.studies.stability.points import run_sweep
-from solver.studies.stability.sweeps import read_sweep
+from solver.studies.stability import point as measuring
+from solver.studies.stability.description import read_sweep
+from solver.studies.stability.point import run_sweep
 
 SWEEPS = Path(__file__).resolve().parents[3] / "cases" / "stability" / "sweeps"
 
@@ -36,7 +36,7 @@ def test_a_point_has_all_measures(tmp_path):
 
 
 def test_a_large_system_is_known_to_be_definite_by_its_factor(tmp_path, monkeypatch):
-    monkeypatch.setattr(points, "SMALL", 10)
+    monkeypatch.setattr(measuring, "SMALL", 10)
     first, *_ = run("stiffness", tmp_path, values=(1.0,), labels=("one",))
     assert first["condition"] is None
     assert first["inertia_by"] == "factor"
@@ -60,11 +60,11 @@ def test_a_point_holds_by_its_floor_or_beyond_by_its_own_estimate():
     measured = {"word": "passed", "pressure": 3e-9, "stress": 1e-12, "attainable": 1e-8}
     low = {**measured, "floor_pressure": 1e-10, "floor_stress": 0.0}
     high = {**measured, "floor_pressure": 2e-10, "floor_stress": 0.0}
-    assert not points._within(low)
-    assert points._within(high)
-    assert points._known_to_itself(low)
-    assert not points._known_to_itself({**low, "attainable": 1e-9})
-    assert points._known_to_itself({"word": "failed"})
+    assert not measuring._within(low)
+    assert measuring._within(high)
+    assert measuring._known_to_itself(low)
+    assert not measuring._known_to_itself({**low, "attainable": 1e-9})
+    assert measuring._known_to_itself({"word": "failed"})
 
 
 @pytest.mark.parametrize("name", ["zone", "slivers", "warp"])
@@ -72,11 +72,10 @@ def test_quick_points_hold(name, tmp_path):
     assert all(point["holds"] for point in run(name, tmp_path))
 
 
-def test_the_map_without_cures_is_of_a_plain_implementation(tmp_path):
+def test_the_map_without_safeguards_is_of_a_plain_implementation(tmp_path):
     """What the two columns differ by: a tiny pressure is lost in gaps that are none."""
     sweep = read_sweep(SWEEPS / "tiny-pressure.yaml")
-    made = points._Meshes()
-    point = points._Point(sweep, sweep.series[0], 1e-12, "tiny")
-    assert points._measured(point, made, Safeguards())["pressure"] < 1e-12
-    without = points._measured(point, made, Safeguards(gap_threshold=False))
+    point = measuring._Point(sweep, sweep.series[0], 1e-12, "tiny")
+    assert measuring._measured(point, Safeguards())["pressure"] < 1e-12
+    without = measuring._measured(point, Safeguards(gap_threshold=False))
     assert without["pressure"] > 1e-3

@@ -1,0 +1,398 @@
+"""The keys of a case file, as types; the lines of a docstring say what each key is."""
+
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, field
+
+from solver.case.typed import FieldError, Number, Positive, Section, Text, Version
+
+FORM = "{file: MESH} alone, or {recipe: NAME, …}"
+
+Name = Annotated[
+    str,
+    Meta(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$(?!\n)",
+        description="a name of letters, digits, `_`, `-` and `.`, 64 at most, starting with a "
+        "letter or digit (in quotes if it is a number)",
+    ),
+]
+_GROUP = "the name of a group of the mesh (in quotes if it is a number)"
+Group = Annotated[str, Meta(min_length=1, max_length=200, description=_GROUP)]
+_UNIT = "the name of a unit, 20 letters, digits, `/`, `*`, `^`, `²` and the like at most"
+Unit = Annotated[str, Meta(pattern=r"^[\w/*^·²³µ%()-]{1,20}$(?!\n)", description=_UNIT)]
+Whole = Annotated[int, Meta(ge=0, lt=2**31, description="a whole number, not negative, below 2^31")]
+_VECTOR = "a list of two (plane) or three numbers"
+Vector = Annotated[tuple[Number, ...], Meta(min_length=2, max_length=3, description=_VECTOR)]
+_SCALAR = "a number or an expression (numbers from -1e30 to 1e30)"
+Scalar = Annotated[Number | Text, Meta(description=_SCALAR)]
+_SCALARS = "a list of two (plane) or three numbers or expressions, or `solution`"
+_Scalars = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
+Scalars = Annotated[_Scalars | Literal["solution"], Meta(description=_SCALARS)]
+Angle = Annotated[Number, Meta(description="an angle in degrees")]
+Poisson = Annotated[
+    float, Meta(gt=-1, lt=0.5, description="a number greater than -1 and less than 0.5")
+]
+CheckName = Literal[
+    "all", "multiplier", "nodal_stress", "surface_stress_slave", "surface_stress_master",
+    "element_pressure", "element_gap", "element_status", "coverage", "covered_pressure",
+    "displacement", "stress_components", "integration_stress", "balance", "counts", "observation",
+    "observation_gap",
+    "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2", "pressure_max",
+    "pressure_means", "pressure_oscillation", "half_width", "peak",
+]  # fmt: skip
+
+
+class Rotation(Section, frozen=True):
+    """A turn about an axis through the origin.
+
+    axis: the axis, in 3D
+    angle: the angle
+    """
+
+    axis: Annotated[tuple[Number, Number, Number], Meta(description="a list of three numbers")]
+    angle: Angle
+
+
+class Perturbation(Section, frozen=True):
+    """Random moves of inner nodes.
+
+    amplitude: by at most this share of the shortest edge at a node
+    seed: of the random numbers
+    group: the nodes of this group alone
+    """
+
+    amplitude: Positive
+    seed: Whole = 0
+    group: Group | None = None
+
+
+class Shift(Section, frozen=True):
+    """A group moved.
+
+    group: which
+    by: by how much
+    """
+
+    group: Group
+    by: Vector
+
+
+class Turn(Section, frozen=True):
+    """A group turned.
+
+    group: which
+    angle: by how much
+    """
+
+    group: Group
+    angle: Angle
+
+
+class Pick(Section, frozen=True):
+    """A group made of the cells of another that are in a box."""
+
+    source: Group = field(name="from")
+    low: Vector
+    high: Vector
+    name: Group
+    rest: Group | None = None
+
+
+class Renumbering(Section, frozen=True):
+    """A new order of nodes and cells.
+
+    seed: of the random numbers
+    """
+
+    seed: Whole
+
+
+_ROTATE = "an angle in degrees (plane), or {axis: [x, y, z], angle: degrees}"
+_STRETCH = "a list of two (plane) or three positive numbers"
+_PERTURB = "a positive share of the edges, or {amplitude, seed, group}"
+_RENUMBER = "a seed (a whole number, not negative), or {seed}"
+_PICK = "{from, low, high, name, rest}, or a list of them"
+_Picks = Annotated[tuple[Pick, ...], Meta(min_length=1)]
+
+
+class Transform(Section, frozen=True):
+    """What is done to the mesh, in the order of the keys.
+
+    scale: multiply all coordinates
+    rotate: turn the mesh about the origin
+    translate: move the mesh
+    stretch: multiply each coordinate by a factor of its own
+    perturb: move inner nodes at random
+    shift: move the nodes of a group
+    turn: turn the nodes of a group about the last axis
+    pick: make a group of the cells of another that are in a box
+    renumber: number nodes and cells in another order, at random
+    """
+
+    scale: Positive | None = None
+    rotate: Annotated[Number | Rotation, Meta(description=_ROTATE)] | None = None
+    translate: Vector | None = None
+    stretch: (
+        Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=3, description=_STRETCH)]
+        | None
+    ) = None
+    perturb: Annotated[Positive | Perturbation, Meta(description=_PERTURB)] | None = None
+    shift: Shift | None = None
+    turn: Turn | None = None
+    pick: Annotated[Pick | _Picks, Meta(description=_PICK)] | None = None
+    renumber: Annotated[Whole | Renumbering, Meta(description=_RENUMBER)] | None = None
+
+
+class Units(Section, frozen=True):
+    """The units of the numbers.
+
+    length: such as mm
+    stress: such as MPa
+    """
+
+    length: Unit | None = None
+    stress: Unit | None = None
+
+    def __post_init__(self) -> None:
+        if not (self.length or self.stress):
+            raise FieldError((), "must be {length, stress}")
+
+
+class MaterialKeys(Section, frozen=True):
+    """An elastic material.
+
+    young: Young's modulus
+    poisson: Poisson's ratio
+    form: the unknowns: displacement, or also pressure for nearly incompressible material;
+      automatic: mixed above 0.499
+    """
+
+    young: Positive
+    poisson: Poisson
+    form: Literal["automatic", "displacement", "mixed"] = "automatic"
+
+    def __post_init__(self) -> None:
+        if self.form == "mixed" and self.poisson <= 0:
+            raise FieldError(("poisson",), "must be greater than 0 in the mixed form")
+
+
+_Axis = Literal["x", "y", "z", "normal"]
+_Fixed = Annotated[tuple[_Axis, ...], Meta(min_length=1)]
+_Imposed = Annotated[dict[_Axis, Scalar], Meta(min_length=1)]
+_FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
+
+
+class SupportKeys(Section, frozen=True):
+    """Imposed displacements.
+
+    group: on the nodes of this group
+    fix: which components are fixed, or have a value; `normal`: along the normal of the group's
+      faces, a plane of any direction
+    """
+
+    group: Group
+    fix: Annotated[
+        _Fixed | _Imposed, Meta(description=_FIX, extra_json_schema={"uniqueItems": True})
+    ]
+
+
+class LoadKeys(Section, frozen=True):
+    """A load.
+
+    group: on the faces of this group, or, a body force, on its cells
+    pressure: force per area against the faces, positive inwards
+    traction: force per area, as a vector
+    body_force: force per volume, as a vector
+    """
+
+    group: Group
+    pressure: Scalar | None = None
+    traction: Scalars | None = None
+    body_force: Scalars | None = None
+
+    def __post_init__(self) -> None:
+        given = (self.pressure, self.traction, self.body_force)
+        if sum(value is not None for value in given) != 1:
+            problem = "must be {group, and exactly one of pressure, traction, body_force}"
+            raise FieldError((), problem)
+
+
+class BodyKeys(Section, frozen=True):
+    """A body.
+
+    rigid: the body is fixed where it is and does not deform: no load or displacement may be given
+      to it, and a rigid side is always master
+    """
+
+    rigid: bool = False
+
+
+class ZoneKeys(Section, frozen=True):
+    """A contact zone.
+
+    name: the zone's name in the results
+    slave: the faces that carry the multipliers: the finer ones, or those of the softer body
+    master: the faces opposite to them
+    hexahedra: into what slave hexahedra are cut
+    treatment: how the interface is treated
+    points: points each way on a slave face, for the treatment quadrature alone
+    normal: along what gaps are measured: normals of the faces, or their means at the nodes
+    recovery: how a pressure of higher order is recovered from the constants
+    interference: overlap at the start of bodies modelled apart: taken off the gap
+    clearance: the gap at the start, in place of the one between the faces as meshed
+    """
+
+    slave: Group
+    master: Group
+    name: Name = "contact"
+    hexahedra: Literal["pyramids", "hexahedra"] = "pyramids"
+    treatment: Literal["lac", "uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual"] = (
+        "lac"
+    )
+    normal: Literal["element", "nodal"] = "element"
+    recovery: Literal["none", "linear", "quadratic", "smooth", "automatic"] = "none"
+    interference: Number = 0.0
+    points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
+    clearance: Scalar | None = None
+
+
+class ObservationKeys(Section, frozen=True):
+    """A macro-element to report at every step.
+
+    zone: in this zone
+    nearest: the one nearest to this point
+    """
+
+    zone: Name
+    nearest: Vector
+
+
+class CodeKeys(Section, frozen=True):
+    """Another code.
+
+    name: the code
+    version: its version
+    """
+
+    name: Text
+    version: Version
+
+
+_UNCERTAINTY = "a positive number: how far the reference may be off, relative"
+_SOLUTION = "the name of a documented solution, or {name: NAME, …} with its parameters"
+_STRESS = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions, or `solution`"
+_Stress = Annotated[dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar], Meta(min_length=1)]
+
+
+class ReferenceKeys(Section, frozen=True):
+    """What the result is compared with.
+
+    kind: where the right answer comes from
+    uncertainty: how far the reference itself may be off; needed with refined
+    code: which code it is from; needed with other_code
+    remark: more on where it comes from, for the report
+    solution: an exact solution of the project; then `solution` may be a value here, in loads and
+      in supports
+    contact_pressure: contact pressure on the slave faces, positive in compression
+    normal_stress: stress along the contact normal at all nodes, positive in tension
+    gap: gap on the slave faces, positive when open
+    displacement: displacement of all nodes
+    stress: components of the stress at all nodes
+    """
+
+    kind: Literal["analytical", "manufactured", "refined", "other_code"]
+    uncertainty: Annotated[float, Meta(gt=0, le=1e30, description=_UNCERTAINTY)] | None = None
+    code: CodeKeys | None = None
+    remark: str = ""
+    solution: Annotated[Text | dict[str, Any], Meta(description=_SOLUTION)] | None = None
+    contact_pressure: Scalar | None = None
+    normal_stress: Scalar | None = None
+    gap: Scalar | None = None
+    displacement: Scalars | None = None
+    stress: Annotated[_Stress | Literal["solution"], Meta(description=_STRESS)] | None = None
+
+    def __post_init__(self) -> None:
+        needed = {"refined": "uncertainty", "other_code": "code"}.get(self.kind)
+        if needed and getattr(self, needed) is None:
+            raise FieldError((needed,), "this key is needed")
+        if self.code and self.kind != "other_code":
+            raise FieldError(("code",), "must be left out: only the kind other_code has one")
+
+
+class CountKeys(Section, frozen=True):
+    """The size of a body.
+
+    cells: cells of the group
+    faces: its faces on contact surfaces
+    """
+
+    cells: Whole | None = None
+    faces: Whole | None = None
+
+
+_MATERIALS = "a mapping of cell groups, or `all`, to {young, poisson}"
+_SUPPORTS = "a list of {group, fix}, at least one"
+_STEPS = "a list of increasing positive load factors"
+_Tolerance = Annotated[float, Meta(gt=0, description="a positive number")]
+_TOLERANCE = (
+    "a positive number of at most 1, or a mapping of checks (`all`: the relative ones) to such "
+    "numbers"
+)
+
+
+class CaseFile(Section, frozen=True):
+    """A case file.
+
+    name: the case's name: of its folder of results, and in the report
+    title: one line for the report
+    description: anything worth knowing, for readers
+    mesh: the mesh: `file`, a mesh file (.med, .msh, .inp, .vtu, .vtkhdf), relative to the case
+      file; or `recipe`, a recipe that makes the mesh, and the keys of the recipe
+    transform: what is done to the mesh, in the order of the keys
+    plane: plane strain: for plane meshes, and only there
+    units: what the numbers are in: labels of fields and pictures, and nothing else
+    materials: the material of each group of cells, or of `all`
+    supports: where displacements are imposed
+    loads: what acts on the bodies
+    bodies: bodies of which more is to be said than their material
+    contact: the contact zones
+    directions: solved once, or again with slave and master exchanged
+    steps: load factors, solved one after the other
+    observe: macro-elements to report at every step
+    reference: what the result is compared with
+    tolerance: of the relative checks, or check by check
+    counts: how many cells and contact faces a body must have, as another code has them
+    """
+
+    name: Name
+    mesh: Annotated[dict[str, Any], Meta(description=FORM)]
+    materials: Annotated[dict[Group, MaterialKeys], Meta(min_length=1, description=_MATERIALS)]
+    supports: Annotated[tuple[SupportKeys, ...], Meta(min_length=1, description=_SUPPORTS)]
+    title: str = ""
+    description: str = ""
+    transform: Transform | None = None
+    plane: Literal["strain"] | None = None
+    units: Units | None = None
+    loads: tuple[LoadKeys, ...] = ()
+    bodies: dict[Group, BodyKeys] = field(default_factory=dict)
+    contact: tuple[ZoneKeys, ...] = ()
+    directions: Literal["first", "both"] = "first"
+    steps: Annotated[
+        tuple[Positive, ...], Meta(min_length=1, max_length=1000, description=_STEPS)
+    ] = (1.0,)
+    observe: tuple[ObservationKeys, ...] = ()
+    reference: ReferenceKeys | None = None
+    tolerance: (
+        Annotated[_Tolerance | dict[CheckName, _Tolerance], Meta(description=_TOLERANCE)] | None
+    ) = None
+    counts: dict[Group, CountKeys] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        keys = self.mesh.keys() & {"file", "recipe"}
+        if len(keys) != 1 or ("file" in keys and len(self.mesh) > 1):
+            raise FieldError(("mesh",), f"must be {FORM}")
+        for key in keys:
+            if not isinstance(self.mesh[key], str) or not self.mesh[key]:
+                problem = "the path of a mesh file" if key == "file" else "the name of a recipe"
+                raise FieldError(("mesh", key), f"must be {problem}")
