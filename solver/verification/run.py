@@ -91,7 +91,7 @@ def mesh_of(case: Case, memory_check: bool = True) -> meshio.Mesh:
     else:
         if memory_check:
             size = of_mesh(case.mesh, case.path.parent)
-            check_memory(int(_SURELY * size.points), size.dim, case.path, lambda _: None)
+            check_memory(int(_SURELY * size.points), size.dim, case.path)
         mesh = generate(case.mesh, str(case.path))
     return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
 
