@@ -11,12 +11,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from solver.case import job_name
-from solver.case.model import Case
-from solver.case.reader import load_case
-from solver.commands.options import add_command
-from solver.mesh.size import Size, of_mesh
-from solver.system.errors import InputError
+from ..case import job_name
+from ..case.model import Case
+from ..case.reader import load_case
+from ..mesh.size import Size, of_mesh
+from ..system.errors import InputError
+from .options import add_command
 
 # Files of these names describe a folder of cases.
 DESCRIPTIONS = ("family.yaml", "orders.yaml")
@@ -131,7 +131,7 @@ def _mesh_files(case: Case) -> list[str] | None:
     path = Path(case.mesh["path"])
     if path.suffix.lower() != ".inp":
         return [str(path)]
-    from solver.mesh.files.abaqus import files_of
+    from ..mesh.files.abaqus import files_of
 
     return [str(file) for file in files_of(path)]
 

@@ -6,15 +6,14 @@ from urllib.parse import quote
 import numpy as np
 from markupsafe import Markup
 
-from solver.report import formats, stages
-from solver.report.axes import EPSILON, Scale, draw_axes, draw_floor, draw_level, round_off
-from solver.report.families import CodeError
-from solver.report.rows import Row
-from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
+from . import formats, stages
+from .axes import EPSILON, Scale, draw_axes, draw_floor, draw_level, round_off
+from .families import CodeError
+from .rows import Row
+from .svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
 
 WIDTH, HEIGHT = 940, 470
-# One mark for each kind of reference: they are not compared with one another.
-KINDS = ("analytical", "manufactured", "refined", "other_code")
+# One colour for each kind of reference: they are not compared with one another.
 COLORS = {"analytical": BLUE, "manufactured": GREEN, "refined": PURPLE, "other_code": ORANGE}
 
 

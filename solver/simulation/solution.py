@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from solver.case import job_name
+from ..case import job_name
 
 if TYPE_CHECKING:
     import meshio
 
-    from solver.case.model import Case
+    from ..case.model import Case
+    from ..mechanics.mortar.edge import Edges
 
 
 class Line(NamedTuple):
@@ -81,11 +82,39 @@ class RecoveredPressure:
 
     def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
         """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
-        from solver.mechanics.mortar.recovery import FORMS, Local
+        from ..mechanics.mortar.recovery import FORMS, Local
 
         local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
         psi = local.shapes(macro, places, FORMS[self.form])
         return mean[macro][:, None] + np.einsum("sqk,sk->sq", psi, self.coefficients[macro])
+
+
+@dataclass
+class Resultants:
+    """What contact comes to in a zone.
+
+    `area` (3,): that of contact, and bounds below and above; `force` (dim,) on the slave and its
+    `moment` (3,) about the origin of the coordinates; `edges`: where contact ends in 2D. In 3D the
+    edge is known to one macro-element only: the area is that of the closed ones, its bounds those
+    without their rim and with the open ones around it.
+    """
+
+    area: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+    edges: Edges | None = None
+
+    def __str__(self) -> str:
+        area, low, high = (f"{value:.5g}" for value in self.area)
+        force = ", ".join(f"{value:.6g}" for value in self.force)
+        text = f"contact area {area} ({low} to {high}), force ({force}) on the slave"
+        if self.edges is None or not len(self.edges.better):
+            return text
+        places = (
+            f"({', '.join(f'{x:.5g}' for x in place)})" + ("" if better else " to one face only")
+            for place, better in zip(self.edges.position, self.edges.better, strict=True)
+        )
+        return f"{text}, edge at {' and '.join(places)}"
 
 
 @dataclass
@@ -101,7 +130,8 @@ class ZoneResult:
     `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
     these do not determine it (see `solver.simulation.balance`). `pressure_error` (m,) estimates the
     L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
-    where multipliers belong to nodes. `recovered` is p* where the case asks for one.
+    where multipliers belong to nodes. `recovered` is p* where the case asks for one. `resultants`:
+    area, force, moment and edges of contact; None in files of earlier versions.
     """
 
     name: str
@@ -122,6 +152,7 @@ class ZoneResult:
     pressure_of_forces: np.ndarray | None = None
     pressure_error: np.ndarray | None = None
     recovered: RecoveredPressure | None = None
+    resultants: Resultants | None = None
 
     @property
     def relative_pressure_error(self) -> float | None:

@@ -4,13 +4,13 @@ import os
 import resource
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
 
-from solver.system.clock import now, processor_time
-from solver.system.memory import peak_mb
+from .clock import now, processor_time
+from .memory import peak_mb
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """The variables that tell the libraries how many threads to use."""
@@ -73,7 +73,6 @@ def run_apart(
     cores: Sequence[int],
     limit: float,
     memory: float = float("inf"),
-    environment: Mapping[str, str] | None = None,
     folder: Path | None = None,
 ) -> Ended:
     """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
@@ -93,7 +92,7 @@ def run_apart(
         process = subprocess.Popen(
             command,
             cwd=folder,
-            env={**os.environ, **threads, **(environment or {})},
+            env={**os.environ, **threads},
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=complaint,

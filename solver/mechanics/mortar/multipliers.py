@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.mortar.facets import Facets
-from solver.mechanics.mortar.segments import Segments
-from solver.mechanics.mortar.surface_points import Samples
+from .facets import Facets
+from .segments import Segments
+from .surface_points import Samples
 
 Intersections = Sequence[Segments]
 """Between all pairs of blocks of a slave and a master surface."""
@@ -78,6 +78,23 @@ class InterfaceData:
 
 
 Space = Callable[[InterfaceData], Multipliers]
+
+
+def of_nodes(nodes: Sequence[np.ndarray], shapes: Sequence[np.ndarray]) -> Multipliers:
+    """One multiplier for each of the `nodes` (n, k) of faces, with functions `shapes`, by block.
+
+    >>> space = of_nodes([np.array([[7, 3]])], [np.eye(2)])
+    >>> space.nodes.tolist(), space.number[0].tolist()
+    ([3, 7], [[1, 0]])
+    """
+    known = np.unique(np.concatenate([block.ravel() for block in nodes]))
+    return Multipliers(
+        count=len(known),
+        number=[np.searchsorted(known, block) for block in nodes],
+        coefficients=[shape[None] for shape in shapes],
+        shapes=list(shapes),
+        nodes=known,
+    )
 
 
 def constants(data: InterfaceData) -> Multipliers:

@@ -26,13 +26,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from msgspec import Meta, field
 
-from solver.case.expressions import Expression
-from solver.case.model import Case
-from solver.case.reader import parse_case
-from solver.case.typed import ONCE, FieldError, Section, Text, read_as
-from solver.case.yaml import read_mapping
+from ...case.expressions import Expression
+from ...case.model import Case
+from ...case.reader import parse_case
+from ...case.typed import ONCE, FieldError, Section, Text, read_as
+from ...case.yaml import read_mapping
 
-COMPRESSION, HYDROSTATIC = "compression", "hydrostatic"
+HYDROSTATIC = "hydrostatic"
 Value = Annotated[
     float | Annotated[tuple[float, ...], Meta(min_length=1, max_length=3)],
     Meta(description="a number, or a list of up to three"),
