@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from solver.report import stages
-from solver.report.html import MEANING, NORMS, TEMPLATES, render
-from solver.report.pictures import picture
-from solver.report.rows import Row, counted
-from solver.report.sections import FamilySection
-from solver.report.tables import outcome
+from . import stages
+from .html import MEANING, NORMS, TEMPLATES, render
+from .pictures import picture
+from .rows import Row, counted
+from .sections import FamilySection
+from .tables import outcome
 
 # What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
 LEFT_OUT = {

@@ -6,10 +6,10 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem.elasticity import Sizes, internal_force, sizes, stiffness
-from solver.simulation.constraints import ContactConstraints
-from solver.simulation.displacement import Displacement
-from solver.simulation.scene import Scene
+from ..mechanics.fem.elasticity import Sizes, internal_force, sizes, stiffness
+from .constraints import ContactConstraints
+from .displacement import Displacement
+from .scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)

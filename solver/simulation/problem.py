@@ -7,27 +7,27 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import nnls
 
-from solver.mechanics.fem.bodies import (
+from ..mechanics.fem.bodies import (
     nodes_of_unknowns,
     rigid_motions,
     unsupported,
     whole_motions,
 )
-from solver.mechanics.fem.elasticity import internal_force, stiffness
-from solver.mechanics.linear.condensation import ConstrainedSystem, solve
-from solver.mechanics.linear.multigrid import Unknowns
-from solver.mechanics.linear.systems import Systems, parts_of
-from solver.mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
-from solver.simulation.accuracy import Accuracy, Roughness, estimate, judged, roughness
-from solver.simulation.constraints import (
+from ..mechanics.fem.elasticity import internal_force, stiffness
+from ..mechanics.linear.condensation import ConstrainedSystem, solve
+from ..mechanics.linear.multigrid import Unknowns
+from ..mechanics.linear.systems import Systems, parts_of
+from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
+from ..system.errors import SolveError
+from .accuracy import Accuracy, Roughness, estimate, judged, roughness
+from .constraints import (
     contact_constraints,
     free_motion,
     refuse_unsolvable,
 )
-from solver.simulation.displacement import Displacement
-from solver.simulation.iterate import ContactIterate
-from solver.simulation.scene import Scene
-from solver.system.errors import SolveError
+from .displacement import Displacement
+from .iterate import ContactIterate
+from .scene import Scene
 
 # An estimated error of the pressure from which residuals are summed in extended precision.
 _EXTEND = 3e-11

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.mechanics.mortar.recovery import Reconstruction, Recovery
-from solver.simulation.problem import ContactProblem, Equilibrium
-from solver.simulation.scene import ZoneScene
+from ..mechanics.mortar.recovery import Reconstruction, Recovery
+from .problem import ContactProblem, Equilibrium
+from .scene import ZoneScene
 
 _LOG = logging.getLogger(__name__)
 # The eigenvalues of a sweep lie between −0.4 and 0: this makes them ±0.2 and smaller.

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from solver.mechanics.mortar.edge import Edges, contact_edges
-from solver.mechanics.mortar.recovery import vertex_neighbours
-from solver.simulation.problem import Equilibrium
-from solver.simulation.recovery import RecoveredZone
-from solver.simulation.scene import Scene, ZoneScene
-from solver.simulation.solution import Resultants
+from ..mechanics.mortar.edge import Edges, contact_edges
+from ..mechanics.mortar.recovery import vertex_neighbours
+from .problem import Equilibrium
+from .recovery import RecoveredZone
+from .scene import Scene, ZoneScene
+from .solution import Resultants
 
 
 def resultants(

@@ -16,8 +16,8 @@ import numpy as np
 if TYPE_CHECKING:
     import meshio
 
-    from solver.case.model import Case
-    from solver.mechanics.mortar.edge import Edges
+    from ..case.model import Case
+    from ..mechanics.mortar.edge import Edges
 
 
 def job_name(
@@ -87,7 +87,7 @@ class RecoveredPressure:
 
     def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
         """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
-        from solver.mechanics.mortar.recovery import FORMS, Local
+        from ..mechanics.mortar.recovery import FORMS, Local
 
         local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
         psi = local.shapes(macro, places, FORMS[self.form])

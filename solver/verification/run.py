@@ -8,25 +8,25 @@ from pathlib import Path
 
 import meshio
 
-from solver.case.model import Case
-from solver.case.reader import check_mesh_file, load_case
-from solver.mesh import generate, read_mesh, transform
-from solver.mesh.files.vtkhdf import check_name
-from solver.mesh.size import check_memory
-from solver.simulation.options import LEAN, Options
-from solver.simulation.simulate import simulate
-from solver.simulation.solution import Solution
-from solver.system.clock import Clock, processor_time
-from solver.system.errors import InputError, MachineError, SolveError, of_machine
-from solver.system.files import last_line
-from solver.system.progress import OUTCOME
-from solver.system.provenance import gather
-from solver.verification.checks import run_checks
-from solver.verification.judge import judge, without_result
-from solver.verification.norms import errors
-from solver.verification.regression import accepted_values
-from solver.verification.results import read_result, write_result
-from solver.verification.verdict import (
+from ..case.model import Case
+from ..case.reader import check_mesh_file, load_case
+from ..mesh import generate, read_mesh, transform
+from ..mesh.files.vtkhdf import check_name
+from ..mesh.size import check_memory
+from ..simulation.options import LEAN, Options
+from ..simulation.simulate import simulate
+from ..simulation.solution import Solution
+from ..system.clock import Clock, processor_time
+from ..system.errors import InputError, MachineError, SolveError, of_machine
+from ..system.files import last_line
+from ..system.progress import OUTCOME
+from ..system.provenance import gather
+from .checks import run_checks
+from .judge import judge, without_result
+from .norms import errors
+from .regression import accepted_values
+from .results import read_result, write_result
+from .verdict import (
     CRASHED,
     FAILED,
     REFUSED,
