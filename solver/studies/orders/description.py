@@ -24,9 +24,9 @@ from typing import Annotated
 
 from msgspec import Meta, field, structs
 
+from ...case import job_name
 from ...case.typed import Number, Positive, Section, read_as
 from ...case.yaml import read_mapping
-from ...simulation.solution import job_name
 from ..keys import Counts, Cut, Degree, ErrorName, Recovered
 
 Slopes = dict[ErrorName, Number]
