@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta, field
 
-from solver.case.typed import FieldError, Number, Positive, Section, Text, Version
+from .typed import FieldError, Number, Positive, Section, Text, Version
 
 FORM = "{file: MESH} alone, or {recipe: NAME, …}"
 

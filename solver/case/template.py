@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from solver.case.reader import parse_case
-from solver.system.errors import InputError
-from solver.system.files import write_text
-from solver.system.package import PROGRAM
+from ..system.errors import InputError
+from ..system.files import write_text
+from ..system.package import PROGRAM
+from .reader import parse_case
 
 TEMPLATE = """\
 # A case file: change it to your problem, then

@@ -6,8 +6,8 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from solver.report import PAGE, formats
-from solver.report.families import page_name, paragraphs
+from . import PAGE, formats
+from .families import page_name, paragraphs
 
 # What each check looks at, in the order of the table of checks.
 MEANING = {
