@@ -7,6 +7,20 @@ from solver.case.expressions import Expression
 from solver.case.model import SWAPPED, Case, Scalar
 from solver.system.errors import InputError, hint
 
+# The errors of `solver.verification.norms`, and what a solution must have for each to be known.
+ERRORS: dict[str, str] = {
+    "displacement_l2": "displacement",
+    "displacement_h1": "gradient",
+    "stress_l2": "stress",
+    "stress_max": "stress",
+    "pressure_l2": "contact_pressure",
+    "pressure_max": "contact_pressure",
+    "pressure_means": "contact_pressure",
+    "pressure_oscillation": "contact_pressure",
+    "half_width": "half_width",
+    "peak": "peak",
+}
+
 
 def check_rules(case: Case) -> None:
     """Raise `InputError` for what neither the types of the keys nor the mesh decide."""
@@ -51,8 +65,6 @@ def _check_errors(case: Case) -> None:
     """An error against an exact solution can have a tolerance only where there is such a one."""
     if not case.tolerance:
         return
-    from solver.case.solutions import ERRORS
-
     for error in case.tolerance.keys() & ERRORS.keys():
         if case.solution is None:
             allowed = "needs an exact solution: reference.solution names none"
@@ -65,8 +77,6 @@ def _check_errors(case: Case) -> None:
 
 def _check_reference(case: Case) -> None:
     """Every value of the reference feeds a check; no tolerance admits any result at all."""
-    from solver.case.solutions import ERRORS
-
     for check, tolerance in case.tolerance.items():
         if tolerance > 1:
             allowed = "must be at most 1: then the error is as large as the reference"

@@ -18,7 +18,9 @@ def add_command(
 
 def add_threads(command: argparse.ArgumentParser) -> None:
     """Let a command take `--threads`."""
-    command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
+    command.add_argument(
+        "--threads", type=int, metavar="N", help="number of threads, unless the environment sets it"
+    )
 
 
 def limit_threads(number: int) -> None:

@@ -18,7 +18,7 @@ def add_commands(commands: Any) -> None:
     _add_orders(commands)
     study = commands.add_parser("study", help="error against run time: points and their page")
     _add_study(study.add_subparsers(title="commands", metavar="COMMAND", required=True))
-    scaling = commands.add_parser("scaling", help="growth with size: points and their page")
+    scaling = commands.add_parser("scaling", help="scaling: points and their page")
     _add_scaling(scaling.add_subparsers(title="commands", metavar="COMMAND", required=True))
     _add_benchmark(commands)
     _add_stability(commands)
@@ -67,7 +67,9 @@ def _add_study(commands: Any) -> None:
     purpose = "measure one point, in a process of its own"
     point = _sized(commands, "point", _study_point, purpose, file, RECORD)
     point.add_argument("point", metavar="POINT", help="PROBLEM/SLAVE-MASTER/TREATMENT/LEVEL")
-    point.add_argument("--reference", type=Path, metavar="RESULT.vtkhdf", help="taken for exact")
+    point.add_argument(
+        "--reference", type=Path, metavar="RESULT.vtkhdf", help="used as the exact solution"
+    )
     purpose = "solve a problem on its refined mesh"
     reference = _sized(commands, "reference", _reference, purpose, file, "RESULT.vtkhdf")
     reference.add_argument("problem", metavar="PROBLEM")
@@ -131,9 +133,9 @@ def _scaling_page(options: argparse.Namespace) -> int:
 
 
 def _add_benchmark(commands: Any) -> None:
-    command = add_command(commands, "benchmark", _benchmark, "measure ratios side by side")
+    command = add_command(commands, "benchmark", _benchmark, "measure time ratios side by side")
     command.add_argument("benchmark", type=Path, metavar="BENCHMARK.yaml")
-    command.add_argument("--quick", action="store_true", help="on tiny meshes, for a first look")
+    command.add_argument("--quick", action="store_true", help="tiny meshes, for a first look")
     _output(command, RECORD)
 
 
@@ -152,17 +154,19 @@ def _benchmark(options: argparse.Namespace) -> int:
 
 
 def _add_stability(commands: Any) -> None:
-    purpose = "push one quantity of a case through its values"
+    purpose = "run a case over the values of one quantity"
     command = add_command(commands, "sweep", _sweep, purpose)
     command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
-    _quick(command, "some of the values only")
+    _quick(command, "only some of the values")
 
     purpose = "write the page of numerical stability"
     command = add_command(commands, "stability", _stability, purpose)
     command.add_argument("records", type=Path, nargs="+", metavar=RECORD)
     _output(command, FOLDER)
-    command.add_argument("--quick", action="store_true", help="say that values are left out")
-    command.add_argument("--infsup", type=Path, metavar=RECORD, help="show its record too")
+    command.add_argument(
+        "--quick", action="store_true", help="state on the page that values are left out"
+    )
+    command.add_argument("--infsup", type=Path, metavar=RECORD, help="also show this record")
 
 
 def _sweep(options: argparse.Namespace) -> int:

@@ -12,6 +12,21 @@ from solver.system.files import write_text
 PAGE = "compare.html"
 CHANGES = ("solve", "quantity", "before", "now", "change")
 TIMES = ("before", "now", "ratio")
+# By what became of a verdict: in the line of the outcome, and over the list of solves.
+SAID = {
+    "worse": "got worse",
+    "better": "got better",
+    "still": "did not pass before either",
+    "new": "new",
+    "vanished": "vanished",
+}
+HEADINGS = {
+    "worse": "Worse than before",
+    "still": "Not passed, as before",
+    "better": "Better than before",
+    "new": "New, and passed",
+    "vanished": "No longer there",
+}
 # Rows of a table in Markdown; the page has them all.
 _MOST = 40
 
@@ -32,14 +47,9 @@ def compare(
 
 def verdict(found: Comparison) -> str:
     """The comparison in one line."""
-    parts = {
-        "got worse": found.worse,
-        "got better": found.better,
-        "did not pass before either": found.still,
-        "new": found.new,
-        "vanished": found.vanished,
-    }
-    words = ", ".join(f"{len(pairs)} {word}" for word, pairs in parts.items() if pairs)
+    words = ", ".join(
+        f"{len(pairs)} {said}" for key, said in SAID.items() if (pairs := found.groups[key])
+    )
     solves = len({change.solve for change in found.changes})
     numbers = f"numbers changed in {solves} of them" if solves else "no number changed"
     return f"{len(found.pairs)} solves: {words or 'no verdict changed'}; {numbers}."
@@ -47,14 +57,7 @@ def verdict(found: Comparison) -> str:
 
 def sections(found: Comparison) -> dict[str, list[Pair]]:
     """The solves with a verdict to report, by heading, new failures first."""
-    named = {
-        "Worse than before": found.worse,
-        "Not passed, as before": found.still,
-        "Better than before": found.better,
-        "New, and passed": found.new,
-        "No longer there": found.vanished,
-    }
-    return {heading: pairs for heading, pairs in named.items() if pairs}
+    return {title: pairs for key, title in HEADINGS.items() if (pairs := found.groups[key])}
 
 
 def to_markdown(found: Comparison) -> str:

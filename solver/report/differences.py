@@ -6,6 +6,7 @@ round-off does is no change. Times are shown and never judged.
 
 import json
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -113,6 +114,15 @@ class Pair:
         return WORDS.index(before) - WORDS.index(self.this.word)
 
     @property
+    def change(self) -> str:
+        """What became of the verdict: worse, better, still (not passed), new, vanished, or ""."""
+        if self.this is None:
+            return "vanished"
+        if self.step:
+            return "worse" if self.step > 0 else "better"
+        return "still" if not self.this.sound else "new" if self.base is None else ""
+
+    @property
     def words(self) -> str:
         """The verdicts, before and now."""
         told = [row.word if row else "not there" for row in (self.base, self.this)]
@@ -132,30 +142,14 @@ class Comparison:
         names = sorted({*self.base.rows, *self.this.rows}, key=lambda n: (n[0], natural(n[1])))
         return [Pair(self.base.rows.get(name), self.this.rows.get(name)) for name in names]
 
-    @property
-    def worse(self) -> list[Pair]:
-        """Verdicts that got worse, worst first; new solves that did not pass are among them."""
-        return sorted((p for p in self.pairs if p.step > 0), key=lambda p: WORDS.index(p.row.word))
-
-    @property
-    def better(self) -> list[Pair]:
-        """Verdicts that got better."""
-        return [pair for pair in self.pairs if pair.step < 0]
-
-    @property
-    def still(self) -> list[Pair]:
-        """Solves that did not pass before, and do no better and no worse."""
-        return [p for p in self.pairs if p.this and p.step == 0 and not p.row.sound]
-
-    @property
-    def new(self) -> list[Pair]:
-        """Solves that were not there, and passed."""
-        return [pair for pair in self.pairs if pair.base is None and pair.step == 0]
-
-    @property
-    def vanished(self) -> list[Pair]:
-        """Solves that are no longer there."""
-        return [pair for pair in self.pairs if pair.this is None]
+    @cached_property
+    def groups(self) -> dict[str, list[Pair]]:
+        """The solves by what became of their verdict (`Pair.change`), worst verdicts first."""
+        found: dict[str, list[Pair]] = defaultdict(list)
+        for pair in self.pairs:
+            found[pair.change].append(pair)
+        found["worse"].sort(key=lambda pair: WORDS.index(pair.row.word))
+        return found
 
     @cached_property
     def changes(self) -> list[Change]:

@@ -13,8 +13,7 @@ from solver.report.rows import Row
 from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
 
 WIDTH, HEIGHT = 940, 470
-# One mark for each kind of reference: they are not compared with one another.
-KINDS = ("analytical", "manufactured", "refined", "other_code")
+# One colour for each kind of reference: they are not compared with one another.
 COLORS = {"analytical": BLUE, "manufactured": GREEN, "refined": PURPLE, "other_code": ORANGE}
 
 

@@ -42,8 +42,6 @@ _TAKEN = (
     "benchmark",
 )
 
-_Place = Annotated[str, Meta(min_length=1, description="an expression in x, y, z, r")]
-
 
 class Figure(Section, frozen=True):
     """A solve whose pressure is drawn along the interface, over `along` where it is given."""

@@ -13,8 +13,6 @@ into a pressure by what it acts on; it is relative to the largest pressure:
     stress       as forces, for the stress in the bodies
     slender      the errors of forces seen on the small faces of slender cells, as a stress there
     sums         a stress is a sum over the nodes of a cell, of gradients that are such sums
-    segments     the share of a covered macro-element by which its segments miss its area, on
-                 warped faces without closure
 
 The largest one counts.
 """
@@ -45,8 +43,6 @@ NOTED_STRAIN, SMALL_STRAIN = 1e-2, 1e-1
 # the second share of the displacements they are the difference of, or below so many roundings of
 # the coordinates, are so too; and pressures below so many times their estimated error.
 _NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
-# A macro-element counts as covered where its segments miss less than this share of its area.
-_COVERED = 1e-6
 
 _REASONS = {
     "forces": "the terms that add up to its forces are far larger than they",
@@ -55,7 +51,6 @@ _REASONS = {
     "stress": "the strains are lost in the rounding of the displacements",
     "slender": "on the small faces of slender cells the rounding of forces is a large stress",
     "sums": "its cells have too many nodes",
-    "segments": "the segments of its faces miss a part of their area",
 }
 
 
@@ -215,7 +210,6 @@ def estimate(
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
     mean_stress = scene.mean.cancellation(iterate.mean_stress)[1]
-    missed = np.abs(constraints.covered / constraints.area - 1)[closed]
     causes = {
         "forces": pressure_of_forces(moving, noise),
         "gap": pressure_of_gaps(moving, _rounding_of_gaps(iterate)[closed], diagonal),
@@ -223,7 +217,6 @@ def estimate(
         "stress": max(unit * iterate.sizes.highest, EPSILON * mean_stress),
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
-        "segments": float(missed[missed < _COVERED].max(initial=0.0)) * scale,
     }
     return Accuracy({name: error / scale for name, error in causes.items()})
 

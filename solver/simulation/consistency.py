@@ -6,6 +6,7 @@ solve and in a file that is read back.
 """
 
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def _all(solution: Solution) -> Iterator[str]:
         yield "the contact zones are not those of the case"
     yield from _steps(solution)
     for zone in solution.zones:
-        for fault in _zone(zone, n, dim):
+        for fault in chain(_zone(zone, n, dim), _resultants(zone, dim)):
             yield f"zone {zone.name}: {fault}"
     for zone in solution.zones:
         yield from _status(zone, solution)
@@ -81,12 +82,11 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
         yield from _numbers(f"macro-elements of {kind}", owner, (len(owner),), m)
     for kind, faces in zone.master_faces:
         yield from _numbers(f"master faces {kind}", faces, (len(faces), None), n)
-    if zone.pressure_error is not None:
-        yield from _values("pressure_error", zone.pressure_error, (m,))
     if zone.recovered:
         yield from _recovered(zone.recovered, n, m, dim)
-    if zone.pressure_of_forces is not None:
-        yield from _values("pressure of forces", zone.pressure_of_forces, (m,))
+    for name in ("pressure_error", "pressure_of_forces"):
+        if (values := getattr(zone, name)) is not None:
+            yield from _values(name.replace("_", " "), values, (m,))
     if zone.nodal:
         yield from _nodal(zone.nodal, n)
 
@@ -100,6 +100,20 @@ def _recovered(field: RecoveredPressure, n: int, m: int, dim: int) -> Iterator[s
     shapes |= {"spread": (m, dim - 1, dim - 1), "at_nodes": (k,)}
     for name, shape in shapes.items():
         yield from _values(f"{name} of the recovered pressure", getattr(field, name), shape)
+
+
+def _resultants(zone: ZoneResult, dim: int) -> Iterator[str]:
+    if (found := zone.resultants) is None:
+        return
+    for name, shape in {"area": (3,), "force": (dim,), "moment": (3,)}.items():
+        yield from _values(f"{name} of contact", getattr(found, name), shape)
+    if edges := found.edges:
+        e = len(edges.macro)
+        yield from _numbers("macro-elements of edges", edges.macro, (e,), len(zone.area))
+        yield from _flags(edges.better, e)
+        for name in ("position", "lower", "upper"):
+            yield from _values(f"{name} of edges", getattr(edges, name), (e, dim))
+        yield from _values("lengths of edges", edges.lengths, (e, 3))
 
 
 def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:

@@ -306,15 +306,12 @@ def _operator(
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
     masters = _master_facets(points, master_faces)
-    corners = np.concatenate([f.centre for f in [*slaves, *masters]])
-    search = float(np.linalg.norm(np.ptp(corners, axis=0)))
-    search += max(f.radius.max() for f in [*slaves, *masters])
     if not options.shortcuts.quadrature:
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
     asked = _recovery(zone, faces.slave_faces, count) if scheme.space is constants else None
-    operator = gap_operator(slaves, masters, count, len(points), search, scheme, asked)
+    operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
     return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
 
 

@@ -20,6 +20,7 @@ from solver.simulation.options import LEAN, Options
 from solver.simulation.plan import decided, estimated, noted, strained
 from solver.simulation.problem import ContactProblem, Equilibrium
 from solver.simulation.recovery import Recovered, RecoveredZone, recovered
+from solver.simulation.resultants import resultants
 from solver.simulation.scene import Scene, ZoneScene, build_scene
 from solver.simulation.solution import (
     Line,
@@ -78,6 +79,8 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     plan += noted(problem, states)
     with clock.stage("recovery"):
         solution = _recover(problem, states, recovered, plan)
+    for zone in solution.zones:
+        _LOG.log(OUTCOME, "zone %s: %s", zone.name, zone.resultants)
     solution.plan += [*estimated(solution), *strained(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
@@ -185,6 +188,7 @@ def _zone_result(
     )
     master = [(b.type.name, b.nodes) for b in zone.master_faces]
     master_nodes, master_normal = _nodal_normals(scene, master)
+    closed = _closed(zone, state)
     return ZoneResult(
         name=zone.zone.name,
         faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
@@ -194,7 +198,7 @@ def _zone_result(
         area=surface.area,
         multiplier=zone.by_macro_element(state.pressure),
         gap=zone.by_macro_element(state.gap),
-        closed=_closed(zone, state),
+        closed=closed,
         coverage=surface.covered / surface.area,
         stress_slave=normal_stress(stress[slave_nodes], slave_normal),
         stress_master=normal_stress(stress[master_nodes], master_normal),
@@ -204,6 +208,7 @@ def _zone_result(
         pressure_of_forces=pressure_of_forces,
         pressure_error=None if field is None else field.error,
         recovered=_recovered_pressure(scene, zone, state, field),
+        resultants=resultants(scene, zone, state, closed, field),
     )
 
 

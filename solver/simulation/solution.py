@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import meshio
 
     from solver.case.model import Case
+    from solver.mechanics.mortar.edge import Edges
 
 
 def job_name(
@@ -94,6 +95,34 @@ class RecoveredPressure:
 
 
 @dataclass
+class Resultants:
+    """What contact comes to in a zone.
+
+    `area` (3,): that of contact, and bounds below and above; `force` (dim,) on the slave and its
+    `moment` (3,) about the origin of the coordinates; `edges`: where contact ends in 2D. In 3D the
+    edge is known to one macro-element only: the area is that of the closed ones, its bounds those
+    without their rim and with the open ones around it.
+    """
+
+    area: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+    edges: Edges | None = None
+
+    def __str__(self) -> str:
+        area, low, high = (f"{value:.5g}" for value in self.area)
+        force = ", ".join(f"{value:.6g}" for value in self.force)
+        text = f"contact area {area} ({low} to {high}), force ({force}) on the slave"
+        if self.edges is None or not len(self.edges.better):
+            return text
+        places = (
+            f"({', '.join(f'{x:.5g}' for x in place)})" + ("" if better else " to one face only")
+            for place, better in zip(self.edges.position, self.edges.better, strict=True)
+        )
+        return f"{text}, edge at {' and '.join(places)}"
+
+
+@dataclass
 class ZoneResult:
     """The contact state of one zone, by macro-element, and the stress on both surfaces.
 
@@ -106,7 +135,8 @@ class ZoneResult:
     `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
     these do not determine it (see `solver.simulation.balance`). `pressure_error` (m,) estimates the
     L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
-    where multipliers belong to nodes. `recovered` is p* where the case asks for one.
+    where multipliers belong to nodes. `recovered` is p* where the case asks for one. `resultants`:
+    area, force, moment and edges of contact; None in files of earlier versions.
     """
 
     name: str
@@ -127,6 +157,7 @@ class ZoneResult:
     pressure_of_forces: np.ndarray | None = None
     pressure_error: np.ndarray | None = None
     recovered: RecoveredPressure | None = None
+    resultants: Resultants | None = None
 
     @property
     def relative_pressure_error(self) -> float | None:

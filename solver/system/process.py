@@ -4,7 +4,7 @@ import os
 import resource
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
@@ -73,7 +73,6 @@ def run_apart(
     cores: Sequence[int],
     limit: float,
     memory: float = float("inf"),
-    environment: Mapping[str, str] | None = None,
     folder: Path | None = None,
 ) -> Ended:
     """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
@@ -93,7 +92,7 @@ def run_apart(
         process = subprocess.Popen(
             command,
             cwd=folder,
-            env={**os.environ, **threads, **(environment or {})},
+            env={**os.environ, **threads},
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=complaint,

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.case.model import Exact
-from solver.case.solutions import ERRORS
+from solver.case.rules import ERRORS
 from solver.simulation.exact import ExactValues
 from solver.simulation.solution import Solution, ZoneResult
 from solver.verification import samples

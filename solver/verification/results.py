@@ -10,7 +10,8 @@ that the checks need, so that it can be judged without solving:
     /mean_stress   by cell type, that of cells in mixed form at their nodes
     /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces; in `nodal` those
                    of nodes where the treatment has its multipliers there; in `recovered` the
-                   coefficients of a recovered pressure and its values at nodes
+                   coefficients of a recovered pressure and its values at nodes; in `resultants`
+                   area, force and moment of contact, in `edges` where it ends in 2D
     /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
     /provenance    versions, revision, hashes, machine
 
@@ -39,17 +40,15 @@ from solver.simulation.consistency import inconsistency
 from solver.simulation.solution import (
     BodyInfo,
     Line,
-    NodalContact,
-    RecoveredPressure,
     Solution,
     StepResult,
-    ZoneResult,
 )
 from solver.system.errors import InputError
 from solver.system.files import replacing, seal, seal_of
 from solver.system.hdf5 import column, new_file, read_file, read_table, write_table
 from solver.verification.units import label_fields
 from solver.verification.verdict import CheckResult
+from solver.verification.zones import read_zone, write_zone
 
 GRID = "VTKHDF"
 _SCALARS = (
@@ -64,23 +63,6 @@ _SCALARS = (
     "cpu_seconds",
     "peak_memory_mb",
 )
-_BY_MACRO_ELEMENT = {  # data set: attribute of ZoneResult
-    "centre": "centre",
-    "normal": "normal",
-    "area": "area",
-    "multiplier": "multiplier",
-    "gap": "gap",
-    "status": "closed",
-    "coverage": "coverage",
-}
-_BY_NODE = ("stress_slave", "stress_master", "slave_nodes", "master_nodes")
-_AT_MULTIPLIER_NODES = {
-    "nodes": "nodes",
-    "multiplier": "multiplier",
-    "gap": "gap",
-    "status": "closed",
-}
-_RECOVERED = ("coefficients", "degree", "centre", "axes", "spread", "nodes", "at_nodes")
 _ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
@@ -125,7 +107,7 @@ def _write(
         mean_stress[kind] = values
     contact = file.create_group("contact")
     for number, zone in enumerate(solution.zones):
-        _write_zone(contact.create_group(zone.name), zone, number)
+        write_zone(contact.create_group(zone.name), zone, number)
     _write_bodies(file.create_group("bodies"), solution.bodies)
     _write_steps(file, solution.steps)
     write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
@@ -184,7 +166,7 @@ def _read_solution(file: h5py.File) -> Solution:
         body=point_data["body"],
         bodies=_read_bodies(file["bodies"]),
         zones=[
-            _read_zone(file["contact"][name], name, _sub_faces(grid, cell_data, number))
+            read_zone(file["contact"][name], name, _sub_faces(grid, cell_data, number))
             for number, name in enumerate(names)
         ],
         nodal_normal_stress=point_data["normal_stress"],
@@ -299,60 +281,6 @@ def _read_case(group: h5py.Group) -> Case:
     return case.as_solved(
         bool(told["swapped"]), told["hexahedra"] or None, told["recovery"] or None
     )
-
-
-def _write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
-    group.attrs["number"] = number
-    for name, attribute in _BY_MACRO_ELEMENT.items():
-        group[name] = getattr(zone, attribute)
-    for name in _BY_NODE:
-        group[name] = getattr(zone, name)
-    faces = group.create_group("master_faces")
-    # Faces of one type may be in several blocks, one for each type of cell behind them.
-    for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
-        faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
-    if zone.pressure_error is not None:
-        group["pressure_error"] = zone.pressure_error
-    if zone.recovered:
-        recovered = group.create_group("recovered")
-        recovered.attrs["form"] = zone.recovered.form
-        for name in _RECOVERED:
-            recovered[name] = getattr(zone.recovered, name)
-    if zone.pressure_of_forces is not None:
-        group["pressure_of_forces"] = zone.pressure_of_forces
-    if zone.nodal:
-        nodal = group.create_group("nodal")
-        for name, attribute in _AT_MULTIPLIER_NODES.items():
-            nodal[name] = getattr(zone.nodal, attribute)
-
-
-def _read_zone(
-    group: h5py.Group, name: str, faces: list[tuple[str, np.ndarray, np.ndarray]]
-) -> ZoneResult:
-    return ZoneResult(
-        name=name,
-        faces=faces,
-        master_faces=[(kind, data[()]) for kind, data in group["master_faces"].items()],
-        **{attribute: group[key][()] for key, attribute in _BY_MACRO_ELEMENT.items()},
-        **{key: group[key][()] for key in _BY_NODE},
-        nodal=_read_nodal(group["nodal"]) if "nodal" in group else None,
-        pressure_of_forces=_optional(group, "pressure_of_forces"),
-        pressure_error=_optional(group, "pressure_error"),
-        recovered=_read_recovered(group["recovered"]) if "recovered" in group else None,
-    )
-
-
-def _optional(group: h5py.Group, name: str) -> np.ndarray | None:
-    return group[name][()] if name in group else None
-
-
-def _read_recovered(group: h5py.Group) -> RecoveredPressure:
-    fields = {name: group[name][()] for name in _RECOVERED}
-    return RecoveredPressure(form=group.attrs["form"], **fields)
-
-
-def _read_nodal(group: h5py.Group) -> NodalContact:
-    return NodalContact(**{a: group[name][()] for name, a in _AT_MULTIPLIER_NODES.items()})
 
 
 def _write_bodies(group: h5py.Group, bodies: Sequence[BodyInfo]) -> None:

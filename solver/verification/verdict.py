@@ -2,7 +2,7 @@
 
 `verdict.json` holds it as a JSON object with the same keys. It is bound to what it judges: `digest`
 is the hash of all other keys, `result_sha256` that of the result file, and family and job are those
-of its folder. A file that was damaged, edited or moved is found out by `flaw`.
+of its folder. `read_verdict` finds a file damaged or edited, `unbound` one that was moved.
 """
 
 from __future__ import annotations
@@ -231,23 +231,11 @@ def read_verdict(path: str | Path) -> Verdict:
     return verdict
 
 
-def flaw(path: str | Path, case: str | Path | None = None) -> str:
-    """Why a verdict file cannot be relied on, in one line; empty where it can.
+def unbound(verdict: Verdict, path: Path) -> str:
+    """What of folder (in `results`) and result is not the verdict's own; empty where both are.
 
-    It must be as it was written, in the folder of its own family and job (where that is in
-    `results`), and its result must be the one it names. `case` is the case file that it must be
-    of, in its present state. Reads the whole result.
+    Reads the whole result.
     """
-    path = Path(path)
-    try:
-        verdict = read_verdict(path)
-    except InputError as error:
-        return error.told
-    return unbound(verdict, path, case)
-
-
-def unbound(verdict: Verdict, path: Path, case: str | Path | None = None) -> str:
-    """What of folder, result and case is not the verdict's own; empty where all is."""
     *_, root, family, job = ("", "", *path.absolute().parts[:-1])
     if root == "results" and (family, job) != (verdict.family, verdict.job):
         return f"the verdict is that of {verdict.family}/{verdict.job}"
@@ -257,9 +245,6 @@ def unbound(verdict: Verdict, path: Path, case: str | Path | None = None) -> str
             return f"the result {verdict.result} is missing or damaged"
         if seal != verdict.result_sha256:
             return f"the result {verdict.result} is that of another solve"
-    known = verdict.provenance.get("case_sha256")
-    if case is not None and known and known != hashlib.sha256(Path(case).read_bytes()).hexdigest():
-        return "the case file has changed"
     return ""
 
 

@@ -37,16 +37,15 @@ def split_slave(mesh, apart=0.0):
     return mesh
 
 
+def moved(by):
+    """The upper block's top moved up instead of loaded."""
+    base = "- {group: base, fix: [y]}"
+    imposed = f"{base}\n  - {{group: press, fix: {{y: {by}}}}}"
+    return replaced([(base, imposed), ("loads:\n  - {group: press, pressure: 25.0}\n", "")])
+
+
 def test_both_starts_give_the_same_answer_where_the_bodies_are_held():
-    case = replaced(
-        [
-            (
-                "- {group: base, fix: [y]}",
-                "- {group: base, fix: [y]}\n  - {group: press, fix: {y: -0.01}}",
-            ),
-            ("loads:\n  - {group: press, pressure: 25.0}\n", ""),
-        ]
-    )
+    case = moved(-0.01)
     scene = build_scene(case, block_mesh("TRIA3", "QUAD4", (4, 3)))
     problem = ContactProblem(scene)
     closed = problem.solve(1.0)
@@ -60,16 +59,7 @@ def test_both_starts_give_the_same_answer_where_the_bodies_are_held():
 
 
 def test_pulled_apart_the_surfaces_open_and_carry_nothing():
-    case = replaced(
-        [
-            (
-                "- {group: base, fix: [y]}",
-                "- {group: base, fix: [y]}\n  - {group: press, fix: {y: 0.01}}",
-            ),
-            ("loads:\n  - {group: press, pressure: 25.0}\n", ""),
-        ]
-    )
-    solution = simulate(case, block_mesh("QUAD4", "QUAD8", (4, 3)))
+    solution = simulate(moved(0.01), block_mesh("QUAD4", "QUAD8", (4, 3)))
     zone = solution.zones[0]
     assert not zone.closed.any()
     assert (zone.multiplier == 0).all()

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.case.solutions import ERRORS
+from solver.case.rules import ERRORS
 from solver.verification.checks import CHECKS, Accepted, block_size, run_checks
 from tests.handmade import PLANE, plane
 

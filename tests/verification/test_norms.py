@@ -178,10 +178,20 @@ def test_half_width_and_peak_of_a_half_ellipse(handmade):
     a = exact.half_width
     wider = replace(exact, force=1.0201)  # half-width and peak are 1.01 times as large
     found = errors(on_line(handmade, exact, 400, -2 * a, 2 * a, wider.contact_pressure))
-    assert found["half_width"] == pytest.approx(0.01, rel=1e-6)
+    assert found["half_width"] == pytest.approx(0.01, abs=2e-4)  # pressures at centres, not means
     assert found["peak"] == pytest.approx(0.01, rel=1e-6)
     few = errors(on_line(handmade, exact, 2, -2 * a, 2 * a))
     assert "peak" not in few
+
+
+def test_half_width_and_peak_are_measured_without_the_exact_ones():
+    """The same pressures, whatever half-width is expected; a triangle's from its second moment."""
+    one = HertzCylinder(force=1.0, radius=1.0, lower=UNIT, upper=UNIT)
+    x = np.c_[(np.arange(200) + 0.5) / 200, np.zeros(200)]
+    pressure = 1 - x[:, 0]
+    found = [e.measured(x, pressure, x, pressure) for e in (one, replace(one, force=9.0))]
+    assert found[0] == found[1]
+    assert found[0][0] == pytest.approx(2 * np.sqrt(1 / 6), rel=1e-4)
 
 
 def test_constants_show_order_one_and_exact_means_none(handmade):

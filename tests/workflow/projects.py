@@ -68,8 +68,9 @@ def summary(project):
     return {verdict["job"]: verdict for verdict in content}
 
 
-# What differs from one run of the same solve to the next.
+# What differs from one run of the same solve to the next, and the hashes of files with such.
 TIMES = {"seconds", "cpu_seconds", "stage_cpu_seconds", "peak_memory_mb", "time_utc"}
+TIMES |= {"digest", "result_sha256"}
 
 
 def without_times(content):

@@ -98,7 +98,7 @@ def test_jobs_ask_for_memory_and_time_by_size_and_again_for_more(tmp_path):
         f"minutes({name('large')}, 2)",
         f"minutes({name('large')}, 1, 2)",
     )
-    assert 20 < first < second == 2 * first < refined
+    assert 10 < first < second == 2 * first < refined
 
 
 def test_the_profile_keeps_what_every_run_needs():

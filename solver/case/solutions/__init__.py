@@ -16,7 +16,6 @@ from typing import Any
 
 from solver.case.material import Material
 from solver.case.solutions.base import (
-    ERRORS,
     ElasticSolution,
     ExactSolution,
     ParameterError,
@@ -32,7 +31,6 @@ from solver.case.solutions.waves import Waves2d, Waves3d
 from solver.system.errors import InputError, hint
 
 __all__ = [
-    "ERRORS",
     "SOLUTIONS",
     "ElasticSolution",
     "ExactSolution",

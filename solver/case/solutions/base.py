@@ -16,20 +16,6 @@ from solver.case.material import Material
 
 Part = np.ndarray | int | None
 
-# The errors of `solver.verification.norms`, and what a solution must have for each to be known.
-ERRORS: dict[str, str] = {
-    "displacement_l2": "displacement",
-    "displacement_h1": "gradient",
-    "stress_l2": "stress",
-    "stress_max": "stress",
-    "pressure_l2": "contact_pressure",
-    "pressure_max": "contact_pressure",
-    "pressure_means": "contact_pressure",
-    "pressure_oscillation": "contact_pressure",
-    "half_width": "half_width",
-    "peak": "peak",
-}
-
 
 class ParameterError(ValueError):
     """A parameter has a value that is not allowed."""

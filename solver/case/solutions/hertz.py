@@ -66,15 +66,24 @@ class Hertz(ExactSolution):
         """Within 0.8 a."""
         return self._distance(x) <= _REGULAR * self.half_width
 
-    def fitted(self, x: np.ndarray, pressure: np.ndarray) -> tuple[float, float]:
-        """Half-width and peak of the half ellipse nearest to pressures (n,) found at points x.
+    def measured(
+        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
+    ) -> tuple[float, float] | None:
+        """Half-width and peak of the half ellipse of a computed pressure, from this alone.
 
-        p² = p₀² − (p₀/a)² ρ² is a straight line in ρ²; least squares over the regular points.
+        The mean of ρ² over the forces (n,) at points x (n, dim) is a²/4 in 2D, 2 a²/5 in 3D. Within
+        0.8 of that a, p² = p₀² − (p₀/a)² ρ² is a straight line in ρ²: p₀ by least squares over the
+        means (m,) of macro-elements at their centres. None where fewer than three are there.
         """
-        inside = self.regular(x)
-        square = self._distance(x[inside]) ** 2
-        slope, top = np.polyfit(square, pressure[inside] ** 2, 1)
-        return float(np.sqrt(-top / slope)) if top > 0 > slope else 0.0, float(np.sqrt(max(top, 0)))
+        whole = force.sum()
+        square = force @ self._distance(x) ** 2 / whole if whole > 0 else 0.0
+        half_width = float(np.sqrt((4.0 if self.dim == 2 else 2.5) * square))
+        distance = self._distance(centre)
+        inside = distance <= _REGULAR * half_width
+        if np.count_nonzero(inside) < 3:
+            return None
+        top = np.polyfit(distance[inside] ** 2, mean[inside] ** 2, 1)[1]
+        return half_width, float(np.sqrt(max(top, 0.0)))
 
     def level(self, x: np.ndarray) -> np.ndarray:
         """Height above the point of contact."""

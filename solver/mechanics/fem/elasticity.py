@@ -78,6 +78,17 @@ def _chunks(block: Block, dim: int) -> Iterator[slice]:
         yield slice(start, start + step)
 
 
+def _in_the_middle(
+    points: np.ndarray, block: Block
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    """Parts of a block with gradients (n, 1, n_nodes, dim) in the middle of cells, sizes (n,)."""
+    reference, weights = block.rule
+    middle = (weights @ reference / weights.sum())[None]
+    for part in _chunks(block, points.shape[1]):
+        gradient, determinant = physical_gradients(points, block.cells[part], block.type, middle)
+        yield part, gradient, determinant[:, 0] * weights.sum()
+
+
 def element_matrices(points: np.ndarray, block: Block, part: slice = _ALL) -> np.ndarray:
     """Stiffness matrices (n, dim · n_nodes, dim · n_nodes) of a part of a block's cells."""
     dim, nodes = points.shape[1], block.type.n_nodes
@@ -169,18 +180,15 @@ def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> 
     largest = np.zeros(len(points))
     displacement = displacement.reshape(-1, *points.shape).sum(axis=0)
     for block in blocks:
-        reference, weights = block.rule
-        middle = (weights @ reference / weights.sum())[None]
-        for part in _chunks(block, points.shape[1]):
+        for part, gradient, volume in _in_the_middle(points, block):
             cells = block.cells[part]
-            gradient, determinant = physical_gradients(points, cells, block.type, middle)
             slope = np.linalg.norm(gradient[:, 0], axis=2)
             nodal = displacement[cells]
             apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
             stiff = block.lame[part] + 2 * block.shear[part]
             terms = stiff * np.einsum("ca,ca->c", slope, apart)
             extent = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
-            nodal_force = (determinant[:, 0] * weights.sum() * terms)[:, None] * slope
+            nodal_force = (volume * terms)[:, None] * slope
             np.add.at(force, cells.ravel(), nodal_force.ravel())
             highest = max(highest, float(terms.max(initial=0.0)))
             on_small_faces = terms * extent * slope.max(axis=1)
@@ -200,11 +208,8 @@ def largest_strain(
     """
     strain = rotation = 0.0
     for block in blocks:
-        reference, weights = block.rule
-        middle = (weights @ reference / weights.sum())[None]
-        for part in _chunks(block, points.shape[1]):
+        for part, gradient, _ in _in_the_middle(points, block):
             cells = block.cells[part]
-            gradient, _ = physical_gradients(points, cells, block.type, middle)
             nodal = displacement[cells] - displacement[cells[:, :1]]
             slope = np.einsum("cai,caj->cij", nodal, gradient[:, 0])
             turned = np.swapaxes(slope, 1, 2)
@@ -222,11 +227,8 @@ def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
     """The sizes of the gradients of the shape functions (n, n_nodes) in the middle of each cell."""
     found = []
     for block in blocks:
-        reference, weights = block.rule
-        middle = (weights @ reference / weights.sum())[None]
         slope = np.empty(block.cells.shape)
-        for part in _chunks(block, points.shape[1]):
-            gradient, _ = physical_gradients(points, block.cells[part], block.type, middle)
+        for part, gradient, _ in _in_the_middle(points, block):
             slope[part] = np.linalg.norm(gradient[:, 0], axis=2)
         found.append(slope)
     return found

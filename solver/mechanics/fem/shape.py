@@ -1,4 +1,8 @@
-"""Shape functions by cell type, in the node order of the catalogue, over scikit-fem's elements."""
+"""Shape functions by cell type, in the node order of the catalogue.
+
+Those of edges and faces are products of a matrix and monomials, since contact evaluates them at
+many points; those of solid cells are scikit-fem's.
+"""
 
 from functools import cache
 
@@ -11,7 +15,7 @@ _STRAIGHT = 1e-9
 
 
 class ShapeFunctions:
-    """The shape functions of one cell type.
+    """The shape functions of one solid cell type.
 
     scikit-fem numbers the degrees of freedom of an element in its own way; they are matched here
     with the catalogue's nodes by their place in the reference cell.
@@ -53,10 +57,50 @@ class ShapeFunctions:
         )
 
 
+class _Polynomials(ShapeFunctions):
+    """The shape functions of an edge or a face: monomials, around the middle of squares."""
+
+    def __init__(self, name: str):
+        self.type = kind = BY_NAME[name]
+        self._origin = 0.0 if kind.n_vertices == 3 else 0.5
+        powers = np.indices((kind.order + 1,) * kind.dim).reshape(kind.dim, -1).T
+        if kind.n_vertices == 3:
+            powers = powers[powers.sum(axis=1) <= kind.order]
+        self._powers = powers[: kind.n_nodes]
+        self._values = np.linalg.inv(self._monomials(kind.nodes).T).round(2)
+        # The derivative of a monomial is its power times another one.
+        lower = self._powers - np.eye(kind.dim, dtype=int)[:, None]
+        to_lower = (self._powers == lower[:, :, None]).all(axis=3) * self._powers.T[..., None]
+        slopes = np.einsum("kml,ma->lak", to_lower, self._values)
+        self._gradients = slopes.reshape(kind.n_nodes, -1)
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        shape = (*np.shape(points)[:-1], self.type.n_nodes)
+        return (self._monomials(points).T @ self._values).reshape(shape)
+
+    def gradients(self, points: np.ndarray) -> np.ndarray:
+        return self.both(points)[1]
+
+    def both(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        monomials, shape = self._monomials(points).T, (*np.shape(points)[:-1], self.type.n_nodes)
+        slopes = monomials @ self._gradients
+        return (monomials @ self._values).reshape(shape), slopes.reshape(*shape, self.type.dim)
+
+    def _monomials(self, points: np.ndarray) -> np.ndarray:
+        """Monomials (n_nodes, n) at points (..., dim), of which there are n."""
+        x = np.reshape(points, (-1, self.type.dim)).T - self._origin
+        ladder = [np.ones_like(x), x, x * x]
+        found = np.stack([ladder[power][0] for power in self._powers[:, 0]])
+        if self.type.dim == 2:
+            for k, power in enumerate(self._powers[:, 1]):
+                found[k] *= ladder[power][1]
+        return found
+
+
 @cache
 def shape_functions(name: str) -> ShapeFunctions:
     """The shape functions of the cell type `name` (the field's name: `HEXA20`)."""
-    return ShapeFunctions(name)
+    return _Polynomials(name) if BY_NAME[name].dim < 3 else ShapeFunctions(name)
 
 
 def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
@@ -81,13 +125,6 @@ def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
 
         return ElementWedgeS2() if name == "PENTA15" else ElementPyramid(name)
     makers = {
-        "SEG2": element.ElementLineP1,
-        "SEG3": element.ElementLineP2,
-        "TRIA3": element.ElementTriP1,
-        "TRIA6": element.ElementTriP2,
-        "QUAD4": element.ElementQuad1,
-        "QUAD8": element.ElementQuadS2,
-        "QUAD9": element.ElementQuad2,
         "TETRA4": element.ElementTetP1,
         "TETRA10": element.ElementTetP2,
         "HEXA8": element.ElementHex1,

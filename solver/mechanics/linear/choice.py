@@ -98,13 +98,16 @@ class LinearSolver:
         raise SolveError(self.doubt)
 
 
-def prepare(matrix: Symmetric, unknowns: Unknowns, gave_up: str = "") -> LinearSolver:
+def prepare(matrix: Symmetric, unknowns: Unknowns | None = None, gave_up: str = "") -> LinearSolver:
     """Prepare to solve with a symmetric positive definite `matrix` (n, n).
 
+    Without `unknowns`, which multigrid asks for, the matrix is factored.
     `gave_up`: why multigrid failed on a similar matrix; it is then not tried again. Raises
     SolveError where the matrix is not positive definite beyond round-off; see `LinearSolver.doubt`.
     A singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
     """
+    if unknowns is None:
+        return LinearSolver(matrix, 3, None, "what multigrid asks for is not known")
     dim, size = unknowns.dim, matrix.shape[0]
     against = gave_up or _against_multigrid(size, unknowns)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)

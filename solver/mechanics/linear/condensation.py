@@ -192,13 +192,13 @@ def condense(
     matrix: sparse.csr_matrix,
     constraints: sparse.csr_matrix,
     own: np.ndarray,
-    unknowns: Unknowns,
+    unknowns: Unknowns | None = None,
     gave_up: str = "",
 ) -> CondensedSystem:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
     `own` (n,) marks the unknowns that may be eliminated, `unknowns` describes all, `gave_up` says
-    why multigrid is not tried again (see `prepare`).
+    why multigrid is not tried again; neither is needed (see `prepare`).
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
@@ -219,7 +219,7 @@ def condense(
         pulled = (coupling[:, kept_columns].T @ follow).tocsr()
         added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
         condensed = CondensedMatrix(matrix, kept_columns, added.tocsr())
-    factor = prepare(condensed, unknowns.of(kept_columns), gave_up)
+    factor = prepare(condensed, unknowns and unknowns.of(kept_columns), gave_up)
     return CondensedSystem(expansion, pivot, coefficient, factor, coupling)
 
 

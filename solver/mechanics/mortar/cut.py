@@ -65,32 +65,35 @@ def cut(
     points: np.ndarray,
     cells: dict[str, np.ndarray],
     faces: list[FaceBlock],
-    macro: list[np.ndarray],
-    into_hexahedra: list[bool],
+    macro: list[np.ndarray] | None = None,
+    into_hexahedra: list[bool] | None = None,
     uncut: list[bool] | None = None,
 ) -> CutMesh:
     """Cut the cells behind slave faces.
 
-    `faces` are the slave faces of all zones, `macro` their macro-element numbers, `into_hexahedra`
-    the choice for hexahedra, all by block; blocks marked `uncut` are left as they are.
+    By block: `faces` are the slave faces of all zones, `macro` their macro-element numbers, by
+    default those within their group; hexahedra behind blocks marked `into_hexahedra` are cut into
+    hexahedra, and cells behind blocks marked `uncut` are left as they are.
 
     A triangle on its slave edge from (0, 0) to (2, 0) is cut in two, at a new node 3:
 
     >>> corner = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 1.0]])
     >>> zero = np.array([0])
     >>> face = FaceBlock(BY_NAME["SEG2"], np.array([[0, 1]]), zero, BY_NAME["TRIA3"], zero, zero)
-    >>> mesh = cut(corner, {"TRIA3": np.array([[0, 1, 2]])}, [face], [zero], [False])
+    >>> mesh = cut(corner, {"TRIA3": np.array([[0, 1, 2]])}, [face])
     >>> mesh.points[3:].tolist(), len(mesh.cells["TRIA3"]), mesh.sub_faces[0].nodes.tolist()
     ([[1.0, 0.0]], 2, [[0, 3], [3, 1]])
     """
-    left = uncut or [False] * len(faces)
+    macro = [block.number for block in faces] if macro is None else macro
+    no = [False] * len(faces)
     chosen = [
-        needs_cut(block.type.name) and not leave for block, leave in zip(faces, left, strict=True)
+        needs_cut(block.type.name) and not leave
+        for block, leave in zip(faces, uncut or no, strict=True)
     ]
     slaves = _slave_faces_by_cell(
         list(compress(faces, chosen)),
         list(compress(macro, chosen)),
-        list(compress(into_hexahedra, chosen)),
+        list(compress(into_hexahedra or no, chosen)),
     )
     whole = [
         SubFaces(block.type, block.nodes, number)

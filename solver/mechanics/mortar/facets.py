@@ -158,14 +158,15 @@ def project_along(
     target: np.ndarray,
     direction: np.ndarray,
     outline: bool = False,
+    affine: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where lines through points meet faces: reference points (f, q, dim − 1), distances (f, q).
 
     One face `corner` (f, n_nodes, dim) for each row of `target` (f, q, dim) and unit `direction`
-    (f, q, dim); the meeting point is target + distance · direction. Newton from the affine face
-    through the vertices, which is exact at once for affine faces. Raises SolveError where it does
-    not converge; points of an `outline` around the face then keep their place on the affine face
-    (they lie outside the face, and all that matters is that neighbours agree on them).
+    (f, q or 1, dim); the meeting point is target + distance · direction. Newton from the affine
+    face through the vertices, whose tangents serve where all faces are `affine`. Raises SolveError
+    where it does not converge; points of an `outline` around the face then keep their place on the
+    affine face (they lie outside the face, and all that matters is that neighbours agree on them).
 
     Up from (3/4, 0) to the edge from (0, 1/2) to (1, 1/2):
 
@@ -176,13 +177,22 @@ def project_along(
     >>> place.tolist(), distance.tolist()
     ([[[0.75]]], [[0.5]])
     """
-    start, distance = _on_affine_face(kind, corner, target, direction)
-    place, distance, size = _newton(kind, corner, target, direction, start, distance)
+    start, distance, inverse = _on_affine_face(kind, corner, target, direction)
+    if affine:
+        values = shape_functions(kind.name).values(start)
+        error = _error(values, corner, target, direction, distance)
+        step = np.einsum("fqij,fqj->fqi", inverse, error)
+        place, distance = start - step[..., :-1], distance - step[..., -1]
+        size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
+    else:
+        direction = np.broadcast_to(direction, target.shape)
+        place, distance, size = _newton(kind, corner, target, direction, start, distance)
     lost = ~(size <= _ACCEPTED)
     if outline:
         return np.where(lost[..., None], start, place), distance
     if lost.any():
         face, q = np.nonzero(lost)
+        direction = np.broadcast_to(direction, target.shape)
         rest = corner[face], target[face, q][:, None], direction[face, q][:, None]
         again, height, size = _from_the_middle(kind, *rest)
         place[lost], distance[lost] = again[:, 0], height[:, 0]
@@ -201,10 +211,9 @@ def _newton(
     distance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, distances, and the sizes (f, q) of the last steps; done faces are left alone."""
-    step = _newton_step(kind, corner, target, direction, place, distance)
-    place, distance = place - step[..., :-1], distance - step[..., -1]
-    size = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
-    for _ in range(_NEWTON_STEPS - 1):
+    size = np.full(distance.shape, np.inf)
+    place, distance = np.array(place), np.array(distance)
+    for _ in range(_NEWTON_STEPS):
         rows = np.flatnonzero(~(size <= _CONVERGED).all(axis=1))
         if not len(rows):
             break
@@ -233,15 +242,15 @@ def _from_the_middle(
 
 def _on_affine_face(
     kind: CellType, corner: np.ndarray, target: np.ndarray, direction: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The same for the affine faces through the first vertices."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same for the affine faces through the first vertices, and their inverse tangents."""
     n = kind.n_vertices
     sides = corner[:, [1, n - 1]] if kind.dim == 2 else corner[:, [1]]
     sides = np.swapaxes(sides - corner[:, :1], 1, 2)[:, None]
-    sides = np.broadcast_to(sides, (*target.shape[:2], *sides.shape[2:]))
+    sides = np.broadcast_to(sides, (*direction.shape[:2], *sides.shape[2:]))
     _, inverse = invert(np.concatenate([sides, -direction[..., None]], axis=-1))
     found = np.einsum("fqij,fqj->fqi", inverse, target - corner[:, :1])
-    return found[..., :-1], found[..., -1]
+    return found[..., :-1], found[..., -1], inverse
 
 
 def _newton_step(
@@ -254,10 +263,21 @@ def _newton_step(
 ) -> np.ndarray:
     """Step (f, q, dim) of place and distance, at most one face length at a time."""
     values, slopes = shape_functions(kind.name).both(place)
-    error = np.einsum("fqa,fad->fqd", values, corner) - target - distance[..., None] * direction
+    error = _error(values, corner, target, direction, distance)
     tangent = np.einsum("fad,fqat->fqdt", corner, slopes, optimize=True)
     _, inverse = invert(np.concatenate([tangent, -direction[..., None]], axis=-1))
     step = np.einsum("fqij,fqj->fqi", inverse, error)
     # Far outside a bent face the full step may overshoot.
     length = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
     return step / np.maximum(length, 1.0)[..., None]
+
+
+def _error(
+    values: np.ndarray,
+    corner: np.ndarray,
+    target: np.ndarray,
+    direction: np.ndarray,
+    distance: np.ndarray,
+) -> np.ndarray:
+    """How far (f, q, dim) the places with these shape functions are from those on the lines."""
+    return np.einsum("fqa,fad->fqd", values, corner) - target - distance[..., None] * direction

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.mechanics.fem import shape_functions
-from solver.mechanics.mortar.multipliers import InterfaceData, Multipliers
+from solver.mechanics.mortar.multipliers import InterfaceData, Multipliers, of_nodes
 
 # Of a face covered by less than this share, dual functions are those of the whole face: those of
 # so small a part would be lost in round-off.
@@ -28,16 +28,8 @@ def linear(data: InterfaceData) -> Multipliers:
     ([0, 1], [[1, 0]], [[1.0, 0.0], [0.0, 1.0]])
     """
     vertices = [block.nodes[:, : block.type.n_vertices] for block in data.slaves]
-    nodes = np.unique(np.concatenate([v.ravel() for v in vertices]))
-    number = [np.searchsorted(nodes, v) for v in vertices]
     hats = [shape_functions(b.type.skeleton).values(b.type.nodes) for b in data.slaves]
-    return Multipliers(
-        count=len(nodes),
-        number=number,
-        coefficients=[hat[None] for hat in hats],
-        shapes=hats,
-        nodes=nodes,
-    )
+    return of_nodes(vertices, hats)
 
 
 def dual(data: InterfaceData) -> Multipliers:

@@ -113,17 +113,17 @@ def gap_operator(
     masters: list[Facets],
     n_macro: int,
     n_nodes: int,
-    search: float,
+    search: float | None = None,
     scheme: Scheme = LAC,
     asked: Asked | None = None,
 ) -> GapOperator:
     """Gap operator of slave sub-faces (numbered by macro-element) over master faces.
 
-    `search` is the largest distance (a length) at which surfaces are looked for. They are first
-    looked for nearby, and farther away only for sub-faces that found no partner there. What is out
-    of reach of contact does not count as covered. Faces that meet along directions other than
-    their own normals have no closure. `asked`: how the pressure is recovered, for the multipliers
-    of macro-elements alone.
+    `search` is the largest distance (a length) at which surfaces are looked for, by default the
+    extent of both. They are first looked for nearby, and farther away only for sub-faces that found
+    no partner there. What is out of reach of contact does not count as covered. Faces that meet
+    along directions other than their own normals have no closure. `asked`: how the pressure is
+    recovered, for the multipliers of macro-elements alone.
 
     A slave edge of length 2 under two master edges, open by 1/2:
 
@@ -138,7 +138,8 @@ def gap_operator(
     if any(block.directions is not None for block in slaves):
         scheme = replace(scheme, closure=False)
     samples = scheme.sample(slaves)
-    found = _in_reach(_search(slaves, samples, masters, search, scheme.meet), slaves, n_macro)
+    reach = _extent([*slaves, *masters]) if search is None else search
+    found = _in_reach(_search(slaves, samples, masters, reach, scheme.meet), slaves, n_macro)
     data = InterfaceData(slaves=slaves, samples=samples, found=found, n_macro=n_macro)
     space = scheme.space(data)
     parts = [integrals(space, segments) for segments in found]
@@ -163,6 +164,13 @@ def gap_operator(
         plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
         recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
     )
+
+
+def _extent(faces: list[Facets]) -> float:
+    """The extent of surfaces, and that of their largest face."""
+    centres = np.concatenate([block.centre for block in faces])
+    largest = max(block.radius.max() for block in faces)
+    return float(np.linalg.norm(np.ptp(centres, axis=0)) + largest)
 
 
 def _search(

@@ -89,10 +89,14 @@ def _around(kind: CellType, reverse: bool) -> tuple[np.ndarray, np.ndarray | Non
 
 @dataclass(frozen=True, kw_only=True)
 class Pairs:
-    """Pairs of slave faces `i` (p,) of one block and master faces `j` (p,) of all blocks."""
+    """Pairs of slave faces `i` (p,) of one block and master faces `j` (p,) of all blocks.
+
+    `own`, `outline`: the outlines of the slave and of the master faces.
+    """
 
     slave: Facets
     index: int
+    own: Outlines
     masters: Sequence[Facets]
     outline: Outlines
     i: np.ndarray
@@ -140,7 +144,15 @@ def face_pairs(
     slave, master = slaves[index], outlines(masters, reverse=True)
     i, j = facing_pairs(slave, master, reach, among)
     near = _above_each_other(slave, master, i, j)
-    return Pairs(slave=slave, index=index, masters=masters, outline=master, i=i[near], j=j[near])
+    return Pairs(
+        slave=slave,
+        index=index,
+        own=outlines([slave]),
+        masters=masters,
+        outline=master,
+        i=i[near],
+        j=j[near],
+    )
 
 
 def facing_pairs(
@@ -237,7 +249,7 @@ def hidden_pairs(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
     none = np.empty(0, dtype=int)
     if len(pairs.i) < 2 or _in_one_plane(pairs.outline):
         return none, none
-    own, _ = pairs.seen(outlines([pairs.slave]), pairs.i)
+    own, _ = pairs.seen(pairs.own, pairs.i)
     corner, bulge = pairs.seen(pairs.outline, pairs.j)
     control = np.concatenate([corner, corner + bulge, np.roll(corner, -1, axis=1) + bulge], axis=1)
     low = np.maximum(control.min(axis=1), own.min(axis=1))

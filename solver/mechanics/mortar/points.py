@@ -20,7 +20,7 @@ from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.faces import nodal_normals
 from solver.mechanics.fem.gauss import gauss_rule
 from solver.mechanics.mortar.facets import Facets, project_along
-from solver.mechanics.mortar.multipliers import InterfaceData, Multipliers
+from solver.mechanics.mortar.multipliers import InterfaceData, Multipliers, of_nodes
 from solver.mechanics.mortar.pairing import facing_pairs
 from solver.mechanics.mortar.segments import Segments, Side
 from solver.mechanics.mortar.surface_points import Samples, face_samples, sampled
@@ -73,16 +73,8 @@ def one_each(data: InterfaceData) -> Multipliers:
     >>> one_each(InterfaceData(slaves=[master], samples=[], found=[], n_macro=2)).number[0].tolist()
     [[0, 1], [1, 2]]
     """
-    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in data.slaves]))
-    number = [np.searchsorted(nodes, block.nodes) for block in data.slaves]
     shapes = [np.eye(block.type.n_nodes) for block in data.slaves]
-    return Multipliers(
-        count=len(nodes),
-        number=number,
-        coefficients=[shape[None] for shape in shapes],
-        shapes=shapes,
-        nodes=nodes,
-    )
+    return of_nodes([block.nodes for block in data.slaves], shapes)
 
 
 def meet_at_points(

@@ -15,6 +15,7 @@ import numpy as np
 
 from solver.mechanics.fem import simplex_rule
 from solver.mechanics.fem.gauss import gauss_rule
+from solver.mechanics.mortar.clipping import triangles
 
 # Edges whose middle is off the chord by less than this share of it are straight.
 _BENT = 1e-13
@@ -52,6 +53,11 @@ class Regions:
         following = np.arange(1, self.start.shape[1] + 1)
         following = np.where(following < self.count[:, None], following, 0)
         return np.take_along_axis(self.start, following[..., None], axis=1)
+
+    @property
+    def middle(self) -> np.ndarray:
+        """The middles of the arcs (n, v, 2)."""
+        return (self.start + self.end) / 2 + self.bulge
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,7 +174,7 @@ def clip_to_face(regions: Regions, corner: np.ndarray, bulge: np.ndarray) -> Par
     ...               bulge=np.zeros((1, 4, 2)), count=np.array([4]))
     >>> left = np.array([[[0, 0], [0.5, 0], [0.5, 1], [0, 1]]])
     >>> (which, part), = clip_to_face(low, left, np.zeros((1, 4, 2)))
-    >>> [float(weight.sum()) for _, _, weight in quadrature(part, 1)]
+    >>> [round(float(weight.sum()), 15) for _, _, weight in quadrature(part, 1)]
     [0.25]
     """
     inner, caps = _boundary(corner, bulge)
@@ -254,7 +260,7 @@ def _boundary(
 
 
 def quadrature(regions: Regions, degree: int) -> list[Pieces]:
-    """Points on the fans of the regions' arcs, for polynomials of a degree.
+    """Points on fans of triangles that make up the regions, for polynomials of a degree.
 
     Region numbers (s,), points (s, q, 2) and weights (s, q); of triangles, where the rule is exact,
     and of those with a bent side, where it is exact for degree 2 and has no fewer points.
@@ -265,9 +271,24 @@ def quadrature(regions: Regions, degree: int) -> list[Pieces]:
     >>> round(sum(float(weight.sum()) for _, _, weight in quadrature(cap, 1)), 15)
     0.666666666666667
     """
+    bent = (regions.bulge.any(axis=2) & regions.used).any(axis=1)
+    which = np.flatnonzero(~bent)
+    polygon, corner, area = triangles(regions.start[which], regions.count[which])
+    reference, weights = simplex_rule(2, degree)
+    barycentric = np.column_stack([1 - reference.sum(axis=1), reference])
+    points = np.einsum("qk,skt->sqt", barycentric, corner)
+    pieces = [(which[polygon], points, 2 * area[:, None] * weights)]
+    which = np.flatnonzero(bent)
+    if len(which):
+        fans = _fans(regions.of(which), degree)
+        pieces += [(which[arc], points, weights) for arc, points, weights in fans]
+    return pieces
+
+
+def _fans(regions: Regions, degree: int) -> list[Pieces]:
+    """The same of regions with bent arcs, around the centroid: away from edges bent inward."""
     total = np.where(regions.used[..., None], regions.start, 0.0).sum(axis=1)
     middle = total / np.maximum(regions.count, 1)[:, None]
-    # Around the centroid, which lies away from edges bent inward.
     area, moment = np.zeros(len(middle)), np.zeros_like(middle)
     for which, points, weights in _fan(regions, middle, 1):
         area += np.bincount(which, weights.sum(axis=1), minlength=len(middle))

@@ -2,8 +2,9 @@
 
 Both faces are seen along the normal at the slave's centre. Where their edges look straight,
 polygons are clipped; where they look bent they are parabolas, and so are the edges of the segments:
-areas in that plane are exact to round-off either way. In 2D, bent slave faces are cut in their
-reference face. Of two master faces behind each other the nearer one counts. Every quadrature point
+areas in that plane are exact to round-off either way. The pieces of slave faces that are not flat
+are integrated in their reference face, where shape functions are polynomials; in 2D bent faces are
+cut there. Of two master faces behind each other the nearer one counts. Every quadrature point
 knows its place on both faces, found along the slave's normal at that point (the face's own, or one
 interpolated between the mean normals at its nodes), so that both sides of an integral share one
 normal and one surface measure.
@@ -18,17 +19,17 @@ from typing import Self
 import numpy as np
 
 from solver.mechanics.fem import mortar_degree, shape_functions, simplex_rule
-from solver.mechanics.mortar.clipping import clip, overlap, triangles
+from solver.mechanics.mortar.clipping import clip, overlap
 from solver.mechanics.mortar.facets import Facets, project_along
 from solver.mechanics.mortar.pairing import (
     Outlines,
     Pairs,
     face_pairs,
     hidden_pairs,
-    outlines,
     seen_along,
 )
 from solver.mechanics.mortar.regions import (
+    Parts,
     Pieces,
     Regions,
     clip_to_face,
@@ -153,26 +154,16 @@ Behind = tuple[np.ndarray, np.ndarray]
 
 def _segments(pairs: Pairs, behind: Behind, reach: float, more: int) -> Iterator[Segments]:
     degree = _degree(pairs) + more
-    if pairs.slave.centre.shape[1] == 2:
-        straight = pairs.slave.straight[pairs.i]
-        for chosen in (np.flatnonzero(straight), np.flatnonzero(~straight)):
-            if len(chosen):
-                some = pairs.of(chosen)
-                pieces = _intervals(some, _among(behind, chosen, len(straight)), degree)
-                yield from _with_master(some, pieces, reach)
-        return
-    window, bend = pairs.seen(outlines([pairs.slave]), pairs.i)
-    subject, bulge = pairs.seen(pairs.outline, pairs.j)
-    special = ~(_looks_straight(window, bend) & _looks_straight(subject, bulge))
-    special[behind[0]] = True
-    chosen = np.flatnonzero(~special)
-    pieces = _polygons(window[chosen], subject[chosen], degree)
-    yield from _with_master(pairs.of(chosen), pieces, reach)
-    chosen = np.flatnonzero(special)
-    if len(chosen):
-        some = pairs.of(chosen)
-        for pieces in _bent(some, _among(behind, chosen, len(special)), degree):
-            yield from _with_master(some, pieces, reach)
+    slave = pairs.slave
+    plane, cut = (
+        (slave.straight, _intervals) if slave.centre.shape[1] == 2 else (slave.flat, _areas)
+    )
+    plane = plane[pairs.i]
+    for chosen, curved in ((np.flatnonzero(plane), False), (np.flatnonzero(~plane), True)):
+        if len(chosen):
+            some = pairs.of(chosen)
+            for pieces in cut(some, _among(behind, chosen, len(plane)), degree, curved):
+                yield from _with_master(some, pieces, reach, curved)
 
 
 def _among(behind: Behind, chosen: np.ndarray, count: int) -> Behind:
@@ -198,19 +189,37 @@ def _degree(pairs: Pairs) -> int:
     return degree if plain else degree + _BENT_DEGREES
 
 
-def _polygons(window: np.ndarray, subject: np.ndarray, degree: int) -> Pieces:
-    """Triangles of what straight slave and master faces (p, v, 2) have in common."""
-    reference, weights = simplex_rule(2, degree)
-    which, corner, area = triangles(*clip(subject, np.full(len(subject), subject.shape[1]), window))
-    barycentric = np.column_stack([1 - reference.sum(axis=1), reference])
-    return which, np.einsum("qk,skt->sqt", barycentric, corner), 2 * area[:, None] * weights
+def _areas(pairs: Pairs, behind: Behind, degree: int, curved: bool) -> list[Pieces]:
+    """Pieces of what faces have in common: in the slave's plane, or where `curved` in reference."""
+    window, bend = pairs.seen(pairs.own, pairs.i)
+    subject, bulge = pairs.seen(pairs.outline, pairs.j)
+    special = ~(_looks_straight(window, bend) & _looks_straight(subject, bulge))
+    special[behind[0]] = True
+    which = np.flatnonzero(~special)
+    corner, count = clip(subject[which], np.full(len(which), subject.shape[1]), window[which])
+    parts = [(which, Regions(start=corner, bulge=np.zeros_like(corner), count=count))]
+    if special.any():
+        which = np.flatnonzero(special)
+        slave = Regions(
+            start=window[which], bulge=bend[which], count=np.full(len(which), window.shape[1])
+        )
+        faces = subject[which], bulge[which]
+        cut = _bent(pairs.of(which), slave, faces, _among(behind, which, len(special)))
+        parts += [(which[k], regions) for k, regions in cut]
+    if curved:
+        parts = [(which, _in_reference(pairs.of(which), regions)) for which, regions in parts]
+    return [
+        (which[number], points, weight)
+        for which, regions in parts
+        for number, points, weight in quadrature(regions, degree)
+    ]
 
 
-def _bent(pairs: Pairs, behind: Behind, degree: int) -> list[Pieces]:
-    """Fans of what faces have in common where edges are bent, or where others hide some of it."""
-    corner, bulge = pairs.seen(outlines([pairs.slave]), pairs.i)
-    slave = Regions(start=corner, bulge=bulge, count=np.full(len(corner), corner.shape[1]))
-    parts = clip_to_face(slave, *pairs.seen(pairs.outline, pairs.j))
+def _bent(
+    pairs: Pairs, slave: Regions, master: tuple[np.ndarray, np.ndarray], behind: Behind
+) -> Parts:
+    """What faces have in common where edges are bent, or where others hide some of it."""
+    parts = clip_to_face(slave, *master)
     for face, rows in _layers(behind, len(pairs.i)):
         cut = []
         for which, regions in parts:
@@ -220,9 +229,27 @@ def _bent(pairs: Pairs, behind: Behind, degree: int) -> list[Pieces]:
             outline = pairs.of(chosen).seen(pairs.outline, face[rows[chosen]])
             cut += [(chosen[k], part) for k, part in without_face(regions.of(deep), *outline)]
         parts = cut
-    which = np.concatenate([which for which, _ in parts])
-    pieces = quadrature(joined([regions for _, regions in parts]), degree)
-    return [(which[number], points, weight) for number, points, weight in pieces]
+    return [(np.concatenate([which for which, _ in parts]), joined([part for _, part in parts]))]
+
+
+def _in_reference(pairs: Pairs, regions: Regions) -> Regions:
+    """The same regions in the reference faces of the slaves, where their functions are polynomials.
+
+    Arcs become parabolas through the places of their ends and middles: edges of the slave its
+    reference edges, and edges that two masters share one curve.
+    """
+    start = np.where(regions.used[..., None], regions.start, regions.start[:, :1])
+    middle = np.where(regions.used[..., None], regions.middle, start)
+    slave, i, v = pairs.slave, pairs.i, start.shape[1]
+    points = np.einsum("sat,std->sad", np.hstack([start, middle]), slave.tangents[i])
+    direction = slave.normal[i][:, None]
+    place, _ = project_along(slave.type, pairs.corner, points, direction)
+    mapped = Regions(start=place[:, :v], bulge=np.zeros_like(start), count=regions.count)
+    chord = mapped.end - mapped.start
+    bulge = place[:, v:] - mapped.start - chord / 2
+    sideways = np.abs(chord[..., 0] * bulge[..., 1] - chord[..., 1] * bulge[..., 0])
+    bent = regions.used & (sideways > _STRAIGHT * np.linalg.norm(chord, axis=2))
+    return replace(mapped, bulge=np.where(bent[..., None], bulge, 0.0))
 
 
 def _layers(behind: Behind, count: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -235,28 +262,28 @@ def _layers(behind: Behind, count: int) -> Iterator[tuple[np.ndarray, np.ndarray
         yield nearer, rows
 
 
-def _intervals(pairs: Pairs, behind: Behind, degree: int) -> Pieces:
+def _intervals(pairs: Pairs, behind: Behind, degree: int, curved: bool) -> list[Pieces]:
     """Intervals of what edges have in common: on straight slaves along them, else in reference."""
     reference, weights = simplex_rule(1, degree)
-    window = _ends(pairs, outlines([pairs.slave]), pairs.i)
-    ends, _ = overlap(window, _ends(pairs, pairs.outline, pairs.j))
+    window = _ends(pairs, pairs.own, pairs.i, curved)
+    ends, _ = overlap(window, _ends(pairs, pairs.outline, pairs.j, curved))
     which = np.arange(len(pairs.i))
     for face, rows in _layers(behind, len(pairs.i)):
         deep = np.flatnonzero(rows[which] >= 0)
-        hiding = _ends(pairs.of(which[deep]), pairs.outline, face[rows[which[deep]]])
+        hiding = _ends(pairs.of(which[deep]), pairs.outline, face[rows[which[deep]]], curved)
         beyond = np.stack([np.maximum(ends[deep, 0], hiding[:, 1]), ends[deep, 1]], axis=1)
         ends[deep, 1] = np.minimum(ends[deep, 1], hiding[:, 0])
         ends, which = np.concatenate([ends, beyond]), np.concatenate([which, which[deep]])
     length = ends[:, 1] - ends[:, 0]
     real = length > 0
     points = ends[real, :1] + length[real, None] * reference[:, 0]
-    return which[real], points[..., None], length[real, None] * weights
+    return [(which[real], points[..., None], length[real, None] * weights)]
 
 
-def _ends(pairs: Pairs, outline: Outlines, j: np.ndarray) -> np.ndarray:
+def _ends(pairs: Pairs, outline: Outlines, j: np.ndarray, curved: bool) -> np.ndarray:
     """The ends (p, 2) of edges `j`, ascending, in the coordinate that the slave is cut in."""
     ends, _ = pairs.seen(outline, j)
-    if not pairs.slave.straight[pairs.i].all():
+    if curved:
         corner = pairs.corner
         own = seen_along(corner, pairs.slave.tangents[pairs.i])
         low, high = own.min(axis=1), own.max(axis=1)
@@ -264,7 +291,7 @@ def _ends(pairs: Pairs, outline: Outlines, j: np.ndarray) -> np.ndarray:
         # Far from a bent face, points have no place in its reference face, or a wrong one.
         ends = np.clip(ends, (low - margin)[:, None], (high + margin)[:, None])
         points = np.einsum("sat,std->sad", ends, pairs.slave.tangents[pairs.i])
-        direction = np.broadcast_to(pairs.slave.normal[pairs.i][:, None], points.shape)
+        direction = pairs.slave.normal[pairs.i][:, None]
         ends, _ = project_along(pairs.slave.type, corner, points, direction, outline=True)
     return np.sort(ends[..., 0], axis=1)
 
@@ -272,29 +299,27 @@ def _ends(pairs: Pairs, outline: Outlines, j: np.ndarray) -> np.ndarray:
 # Points on both faces
 
 
-def _with_master(pairs: Pairs, pieces: Pieces, reach: float) -> Iterator[Segments]:
+def _with_master(pairs: Pairs, pieces: Pieces, reach: float, curved: bool) -> Iterator[Segments]:
     """The segments of pieces; those with points beyond the reach are left out."""
     which, points, weight = pieces
     pairs = pairs.of(which)
     slave, i = pairs.slave, pairs.i
     kind, corner = slave.type, pairs.corner
-    normal = np.broadcast_to(slave.normal[i][:, None], (*points.shape[:2], slave.normal.shape[1]))
-    if points.shape[2] == 1 and not slave.straight[i].all():
+    if curved:
         place = points
-        points = np.einsum("sqa,sad->sqd", shape_functions(kind.name).values(place), corner)
-        vectors = _area_vectors(corner, shape_functions(kind.name).gradients(place))
+        values, slopes = shape_functions(kind.name).both(place)
+        points = np.einsum("sqa,sad->sqd", values, corner)
+        vectors = _area_vectors(corner, slopes)
         stretch = np.linalg.norm(vectors, axis=-1)
         normal, weight = vectors / stretch[..., None], weight * stretch
     else:
+        normal = slave.normal[i][:, None]
         points = np.einsum("sqt,std->sqd", points, slave.tangents[i])
-        place, height = project_along(kind, corner, points, normal)
+        place, height = project_along(
+            kind, corner, points, normal, affine=bool(slave.affine[i].all())
+        )
         points = points + height[..., None] * normal
-        if not slave.flat[i].all():
-            vectors = _area_vectors(corner, shape_functions(kind.name).gradients(place))
-            stretch = np.linalg.norm(vectors, axis=-1)
-            weight = weight * stretch / np.einsum("sqd,sqd->sq", vectors, normal)
-            normal = vectors / stretch[..., None]
-    values = shape_functions(kind.name).values(place)
+        values = shape_functions(kind.name).values(place)
     if slave.directions is not None:
         between = np.einsum("sqa,sad->sqd", values, slave.directions[i])
         normal = between / np.linalg.norm(between, axis=-1, keepdims=True)
@@ -302,7 +327,8 @@ def _with_master(pairs: Pairs, pieces: Pieces, reach: float) -> Iterator[Segment
         mine = np.flatnonzero(pairs.outline.block[pairs.j] == index)
         face = pairs.outline.face[pairs.j[mine]]
         corner = master.corner[face] - slave.centre[i[mine]][:, None]
-        partner, gap = project_along(master.type, corner, points[mine], normal[mine])
+        affine = bool(master.affine[face].all())
+        partner, gap = project_along(master.type, corner, points[mine], normal[mine], affine=affine)
         near = np.abs(gap).max(axis=1, initial=0.0) <= reach
         mine = mine[near]
         if len(mine):
@@ -311,7 +337,7 @@ def _with_master(pairs: Pairs, pieces: Pieces, reach: float) -> Iterator[Segment
                 slave=Side(faces=slave, index=pairs.index, face=i[mine], values=values[mine]),
                 master=Side(faces=master, index=index, face=face[near], values=on_master),
                 weight=weight[mine],
-                normal=normal[mine],
+                normal=np.broadcast_to(normal[mine], points[mine].shape),
                 gap=gap[near],
             )
 

@@ -29,7 +29,7 @@ import numpy as np
 from solver.mesh.catalogue import BY_NAME, CellType
 from solver.mesh.keys import Keys
 from solver.mesh.recipes.gmsh_session import current_model, session
-from solver.mesh.recipes.hybrid import cube, side_name
+from solver.mesh.recipes.sides import side_name
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
 _ALGORITHMS = {"frontal": 6, "delaunay": 5, "meshadapt": 1}
@@ -60,6 +60,8 @@ def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys, refine: int)
     if name == "bottom":
         origin[-1] = -size[-1]
     if cell.name.startswith(("PENTA", "PYRA")):
+        from solver.mesh.recipes.hybrid import cube
+
         return cube(name, cell, origin, size, keys, refine)
     return _Block(name, cell, origin, size, keys, refine).mesh()
 

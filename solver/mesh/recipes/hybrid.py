@@ -21,6 +21,7 @@ import numpy as np
 from solver.mesh.catalogue import BY_NAME, CellType
 from solver.mesh.keys import Keys
 from solver.mesh.recipes.gmsh_session import current_model, number_of, session
+from solver.mesh.recipes.sides import side_name
 
 _CUBE = BY_NAME["HEXA8"]
 _STANDING = [(0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)]
@@ -84,25 +85,6 @@ def _sides(name: str, cell: CellType, nodes: np.ndarray, pieces: np.ndarray) -> 
             if group:
                 sides[group].append((face.type, corners))
     return sides
-
-
-def side_name(block: str, corners: np.ndarray) -> str:
-    """Group of the side of the unit square or cube on which the corners (n, dim) lie.
-
-    `block` is `bottom` (interface at height 1) or `top` (interface at height 0). Empty where the
-    corners lie on no side.
-    """
-    dim = corners.shape[1]
-    for axis in range(dim):
-        height = corners[0, axis]
-        if height not in (0, 1) or np.ptp(corners[:, axis]) > 0:
-            continue
-        if axis < dim - 1:
-            return f"{'sym' if height == 0 else 'far'}{'xy'[axis]}"
-        if (height == 0) == (block == "top"):
-            return f"{block}_contact"
-        return "base" if block == "bottom" else "press"
-    return ""
 
 
 def _fill(entity: int, dim: int, group: str, cells: _Cells) -> None:

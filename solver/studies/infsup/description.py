@@ -79,7 +79,7 @@ class InfSupLadder:
         """How the cells are cut, in a word."""
         if not self.cut:
             return "uncut"
-        return self.hexahedra or ("yes" if self.needs_cut else "needs none")
+        return self.hexahedra or ("yes" if self.needs_cut else "not needed")
 
     @property
     def verdict(self) -> str:

@@ -1,1 +1,1 @@
-"""Growth with size: one problem on ever finer meshes, what each solve costs, fitted exponents."""
+"""Scaling: the cost of one problem on ever finer meshes, with fitted exponents."""

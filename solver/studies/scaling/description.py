@@ -1,6 +1,6 @@
 """The scaling family as data: `scaling.yaml`, and the case that each of its points is.
 
-    title: Growth with size
+    title: Scaling
     threads: 2                    # that every point may use, fewer where there are not as many
     limit: 600                    # seconds that a solve may take
     fit: [1.0e+5, 1.0e+6]         # exponents are fitted to the sizes from here to there

@@ -32,7 +32,7 @@ from solver.case.reader import parse_case
 from solver.case.typed import ONCE, FieldError, Section, Text, read_as
 from solver.case.yaml import read_mapping
 
-COMPRESSION, HYDROSTATIC = "compression", "hydrostatic"
+HYDROSTATIC = "hydrostatic"
 Value = Annotated[
     float | Annotated[tuple[float, ...], Meta(min_length=1, max_length=3)],
     Meta(description="a number, or a list of up to three"),

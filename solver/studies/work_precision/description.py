@@ -7,7 +7,7 @@
     treatments:                   # of the interface: what is set in the contact of a case
       - {name: lac, title: LAC, zone: {treatment: lac}}
       - name: lac-hexahedra       # only for these cell types on the slave side
-        title: LAC into hexahedra
+        title: LAC cut into hexahedra
         zone: {treatment: lac, hexahedra: hexahedra}
         slaves: [HEXA8, HEXA20]
     problems:

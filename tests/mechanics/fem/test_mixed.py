@@ -184,6 +184,7 @@ def nested(cells, poisson, form, n):
         + "loads: [{group: base, pressure: 25.0}]\n"
         + "contact: [{slave: bottom_contact, master: top_contact}]\n"
         + f"reference: {{kind: analytical, solution: {{name: {name}, radii: [20, 30, 40]}}}}\n"
+        + "tolerance: {displacement_l2: 1.0}\n"
     )
     sections = {
         side: {"cells": cells, "divisions": [2 * k] * (dim - 1) + [k]}
@@ -256,6 +257,7 @@ def test_the_result_file_keeps_it(tmp_path):
     mesh = block_mesh("QUAD4", "TRIA6")
     text = block_case(2).source.replace("0.3}", "0.4999999}")
     text += "reference: {kind: analytical, solution: {name: uniform_compression, base: -1.0}}\n"
+    text += "tolerance: {stress_l2: 1.0e-8}\n"
     solution = simulate(parse_case(text, Path("patch.yaml")), mesh)
     before = norms(solution)
     assert before["stress_l2"] < 1e-8

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from solver.mechanics.fem import shape_functions
-from solver.mechanics.mortar.facets import facets
+from solver.mechanics.fem.gauss import gauss_rule
+from solver.mechanics.mortar.facets import facets, surface_vectors
 from solver.mechanics.mortar.operator import LAC, gap_operator
 from solver.mechanics.mortar.regions import Regions, clip_to_face, quadrature, without_face
+from solver.mechanics.mortar.segments import intersect
 from solver.mesh.catalogue import BY_NAME
 
 RAW = replace(LAC, closure=False)
@@ -85,6 +87,32 @@ def test_bent_master_faces_share_a_bent_slave_face(kind, amount):
     field[:, 2] = points @ [0.7, -0.4, 0.0]
     assert operator.matrix @ field.ravel() == pytest.approx(0.0, abs=1e-15)
     assert operator.segments > 4
+
+
+@pytest.mark.parametrize("kind", ["QUAD4", "TRIA6", "QUAD8", "QUAD9"])
+def test_segments_of_a_warped_face_sum_to_it(kind):
+    """∫ N n dS of a face that is not flat, whose integrand is a polynomial in its reference face.
+
+    The edges of its four masters cross it; it lies within their outline.
+    """
+    rng = np.random.default_rng(2)
+    places = BY_NAME[kind].nodes + 0.05 * rng.uniform(-1, 1, BY_NAME[kind].nodes.shape)
+    rim = np.array([[-2, -2], [3, -2], [3, 3], [-2, 3], [0.4, -2], [3, 0.6], [0.5, 3], [-2, 0.3]])
+    corner = np.vstack([rim, [0.45, 0.4]])
+    quads = [(0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)]
+    masters = [("QUAD4", corner[list(quad)]) for quad in quads]
+    points, _, upper = facing((kind, places), masters, 0.25)
+    n = len(places)
+    points[:n, 2] = 0.1 * rng.uniform(-1, 1, n)
+    lower = facets(points, BY_NAME[kind], np.arange(n)[None], np.array([0]))
+    found = intersect([lower], 0, upper, 9.0)
+    assert {segments.master.index for segments in found} == {0, 1, 2, 3}
+    summed = sum(np.einsum("sq,sqd,sqa->ad", s.weight, s.normal, s.slave.values) for s in found)
+    reference, weights = gauss_rule(BY_NAME[kind].skeleton, 8)
+    values, slopes = shape_functions(kind).both(reference)
+    vectors = surface_vectors(lower, slopes)[0]
+    exact = np.einsum("q,qa,qd->ad", weights, values, vectors)
+    assert summed == pytest.approx(exact, abs=1e-13)
 
 
 def test_half_of_a_bent_face_by_hand():

@@ -1,0 +1,48 @@
+"""What contact comes to in a zone: where it ends, its area, its force and moment."""
+
+import numpy as np
+
+from solver.mechanics.mortar.edge import Edges, contact_edges
+from solver.mechanics.mortar.recovery import vertex_neighbours
+from solver.simulation.problem import Equilibrium
+from solver.simulation.recovery import RecoveredZone
+from solver.simulation.scene import Scene, ZoneScene
+from solver.simulation.solution import Resultants
+
+
+def resultants(
+    scene: Scene,
+    zone: ZoneScene,
+    state: Equilibrium,
+    closed: np.ndarray,
+    field: RecoveredZone | None,
+) -> Resultants:
+    """Area and edges of the `closed` macro-elements (m,), and the forces on the slave."""
+    edges, area = _extent(scene, zone, zone.by_macro_element(state.pressure), closed)
+    forces = zone.operator.matrix.T @ state.pressure[zone.numbers]
+    if field is not None and field.recovery.form.sweeps:
+        forces = forces + field.recovery.loads.T @ field.coefficients
+    nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
+    force = forces.reshape(scene.points.shape)[nodes]
+    places = np.pad(scene.points[nodes] + scene.origin, ((0, 0), (0, 3 - force.shape[1])))
+    moment = np.cross(places, np.pad(force, ((0, 0), (0, 3 - force.shape[1])))).sum(axis=0)
+    return Resultants(area=area, force=force.sum(axis=0), moment=moment, edges=edges)
+
+
+def _extent(
+    scene: Scene, zone: ZoneScene, mean: np.ndarray, closed: np.ndarray
+) -> tuple[Edges | None, np.ndarray]:
+    """The edges of contact in 2D, and the area of contact with its bounds (3,)."""
+    surface = zone.operator.surface
+    faces = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in zone.slave_faces]
+    if scene.points.shape[1] == 2:
+        ends = np.empty((len(closed), 2), dtype=int)
+        for number, nodes in faces:
+            ends[number] = nodes
+        # Where multipliers belong to nodes, means of macro-elements are no resultants of theirs.
+        whole = surface.covered / surface.area * (zone.operator.nodes is None)
+        edges = contact_edges(scene.points + scene.origin, ends, surface.area, whole, mean, closed)
+        return edges, surface.covered[closed].sum() + edges.lengths.sum(axis=0)
+    near = vertex_neighbours(faces, len(closed)).astype(int)
+    inside, around = closed & (near @ ~closed == 0), closed | (near @ closed > 0)
+    return None, np.array([surface.covered[chosen].sum() for chosen in (closed, inside, around)])
