@@ -17,14 +17,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from solver.commands import studies
-from solver.commands.options import add_command, add_threads, limit_threads
-from solver.system.errors import InputError, SolveError, of_machine
-from solver.system.package import PROGRAM, PROJECT, project_version
+from ..system.errors import InputError, SolveError, of_machine
+from ..system.package import PROGRAM, PROJECT, project_version
+from . import jobs, studies
+from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
-    from solver.verification.run import Job
-    from solver.verification.verdict import CheckResult
+    from ..verification.run import Job
+    from ..verification.verdict import CheckResult
 
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
@@ -102,6 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
     command.add_argument("--log", type=Path, help="its last line is the reason")
     command.add_argument("--status", type=int, metavar="N", help="its exit status")
+    command.add_argument("--refusal", help="it was not started, for this reason: refused")
 
     command = add_command(commands, "check", _check, "run the checks of stored results again")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
@@ -133,6 +134,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
     studies.add_commands(commands)
+    jobs.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "check whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -179,16 +181,16 @@ def _add_job(command: argparse.ArgumentParser) -> None:
 
 
 def _mesh(options: argparse.Namespace) -> int:
-    from solver.case.reader import load_case
-    from solver.mesh import write_mesh
-    from solver.verification.run import mesh_of
+    from ..case.reader import load_case
+    from ..mesh import write_mesh
+    from ..verification.run import mesh_of
 
     write_mesh(mesh_of(load_case(options.case)), options.output)
     return PASSED
 
 
 def _job(options: argparse.Namespace) -> "Job":
-    from solver.verification.run import Job
+    from ..verification.run import Job
 
     given = vars(options)
     told = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
@@ -196,8 +198,8 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from solver.system.progress import saying, telling
-    from solver.verification.run import solve
+    from ..system.progress import saying, telling
+    from ..verification.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
@@ -212,15 +214,18 @@ def _silent(line: str) -> None:
 
 
 def _crashed(options: argparse.Namespace) -> int:
-    from solver.verification.run import record_crash
+    from ..verification.run import record_crash, record_refusal
 
+    if options.refusal:
+        print(record_refusal(options.case, options.verdict, options.refusal).summary)
+        return PASSED
     print(record_crash(_job(options), options.verdict, options.log, options.status).summary)
     return PASSED
 
 
 def _check(options: argparse.Namespace) -> int:
-    from solver.verification.run import check
-    from solver.verification.verdict import to_json
+    from ..verification.run import check
+    from ..verification.verdict import to_json
 
     verdicts = [check(result) for result in options.results]
     if options.json:
@@ -254,14 +259,14 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
 
 
 def _gallery(options: argparse.Namespace) -> int:
-    from solver.report.gallery import write_gallery
+    from ..report.gallery import write_gallery
 
     write_gallery(_verdicts(options), options.output, options.plain, partial(print, flush=True))
     return PASSED
 
 
 def _report(options: argparse.Namespace) -> int:
-    from solver.report import write_report
+    from ..report import write_report
 
     verdicts = _verdicts(options)
     families = options.families
@@ -271,7 +276,7 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from solver.report.compare import compare
+    from ..report.compare import compare
 
     return FAILED if compare(options.base, options.this, options.output).groups["worse"] else PASSED
 
@@ -290,19 +295,19 @@ def _validate(options: argparse.Namespace) -> int:
 
 
 def _validate_one(path: Path, with_mesh: bool) -> None:
-    from solver.case.reader import check_mesh_file, load_case
+    from ..case.reader import check_mesh_file, load_case
 
     case = load_case(path)
     check_mesh_file(case)
     if with_mesh:
-        from solver.simulation.groups import check_groups
-        from solver.verification.run import mesh_of
+        from ..simulation.groups import check_groups
+        from ..verification.run import mesh_of
 
         check_groups(case, mesh_of(case))
 
 
 def _new(options: argparse.Namespace) -> int:
-    from solver.case.template import write_template
+    from ..case.template import write_template
 
     name = options.name or (options.output.stem if options.output else "new-case")
     path = options.output or Path(f"{name}.yaml")
@@ -312,9 +317,9 @@ def _new(options: argparse.Namespace) -> int:
 
 
 def _accept(options: argparse.Namespace) -> int:
-    from solver.verification.checks import run_checks
-    from solver.verification.regression import accept, accepted_values, regression_file
-    from solver.verification.results import read_result
+    from ..verification.checks import run_checks
+    from ..verification.regression import accept, accepted_values, regression_file
+    from ..verification.results import read_result
 
     for path in options.results:
         solution = read_result(path).solution
@@ -333,7 +338,7 @@ def _accept(options: argparse.Namespace) -> int:
 def _serve(options: argparse.Namespace) -> int:
     import socket
 
-    from solver.commands.server import serve
+    from .server import serve
 
     with socket.socket(fileno=options.socket) as listener:
         serve(listener)

@@ -25,7 +25,7 @@ def add_threads(command: argparse.ArgumentParser) -> None:
 
 def limit_threads(number: int) -> None:
     """Tell the libraries, which read it when they are loaded; the environment comes first."""
-    from solver.system.process import THREADS
+    from ..system.process import THREADS
 
     for variable in THREADS:
         os.environ.setdefault(variable, str(number))

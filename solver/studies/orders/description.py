@@ -24,10 +24,10 @@ from typing import Annotated
 
 from msgspec import Meta, field, structs
 
-from solver.case.typed import Number, Positive, Section, read_as
-from solver.case.yaml import read_mapping
-from solver.simulation.solution import job_name
-from solver.studies.keys import Counts, Cut, Degree, ErrorName, Recovered
+from ...case import job_name
+from ...case.typed import Number, Positive, Section, read_as
+from ...case.yaml import read_mapping
+from ..keys import Counts, Cut, Degree, ErrorName, Recovered
 
 Slopes = dict[ErrorName, Number]
 _Orders = Annotated[

@@ -7,19 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME, CellType
-from solver.report.html import NORMS
-from solver.report.rows import Row, read_rows
-from solver.studies.fits import Fit, fit_order, is_rounding
-from solver.studies.orders.description import Ladder, LadderFamily
-from solver.studies.orders.theory import (
-    DEGREES,
-    RECOVERED,
-    THEORY,
-    UNKNOWN,
-    Order,
-    element_size,
-)
+from ...mesh.catalogue import BY_NAME, CellType
+from ...report.html import NORMS
+from ...report.rows import Row, read_rows
+from ..fits import Fit, fit_order, is_rounding
+from .description import Ladder, LadderFamily
+from .theory import DEGREES, RECOVERED, THEORY, UNKNOWN, Order, element_size
 
 VERDICT = "verdict.json"
 # The errors of ladders in the order in which they are shown.
