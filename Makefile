@@ -22,7 +22,11 @@ export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
 ALONE := .venv/bin/python -I -m
 OURS := .venv/bin/python -Es -m
 INSTALL := $(PYTHON) -Es workflow/install --mkl "$(MKL)"
-SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
+# A folder is taken from where make was called, also with `make -C`; quotes keep names that look like
+# numbers, and spaces.
+FROM = $(if $(filter-out $(CURDIR),$(PWD)),$(if $(filter /% ~%,$(CASES)),,$(PWD)/))
+SETTINGS = $(strip $(CONFIG) $(if $(CASES),"cases=$(FROM)$(CASES)"))
+CHOICE = $(if $(FAMILY),"family='$(FAMILY)'") $(if $(CASE),"case='$(CASE)'")
 SILENCE = $(if $(QUIET),--quiet rules progress reason host)
 SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
@@ -36,36 +40,37 @@ SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
 
+all-cases: override CONFIG += $(CHOICE)
 all-cases: environment ## mesh, solve and check what is not up to date, then report
 	@$(SNAKEMAKE) all_cases
 
-family: override CONFIG += family=$(FAMILY)
-family: environment ## the same for one family: make family FAMILY=ssnp170
+family: override CONFIG += $(CHOICE)
+family: environment ## the batch of one family: make family FAMILY=ssnp170
 	@test -n "$(FAMILY)" || { echo "make family: name a folder of cases/, FAMILY=…"; exit 2; }
 	@$(SNAKEMAKE) all_cases
 
-case: override CONFIG += case=$(CASE)
+case: override CONFIG += $(CHOICE)
 case: override ARGS += --forcerun solve
 case: environment ## solve one case again, then report: make case CASE=ssnp170-e-swapped
 	@test -n "$(CASE)" || { echo "make case: name a case as the report does, CASE=…"; exit 2; }
 	@$(SNAKEMAKE) all_cases
 
-report: environment ## write the report again from the results there are
+report: environment ## write the report again from existing results
 	@$(SNAKEMAKE) report
 
 summary: ## print the last report's table, as Markdown
 	@cat results/report/summary.md 2>/dev/null \
 	  || { echo "make summary: there is no report yet; make all-cases writes it" >&2; exit 2; }
 
-compare: environment ## what is new since another batch: make compare BASE=folder [THIS=folder]
+compare: environment ## compare with another batch: make compare BASE=folder [THIS=folder]
 	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
 	@$(OURS) solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
 
-gallery: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
+gallery: override CONFIG += $(CHOICE)
 gallery: gallery-environment ## draw each result with PyVista, off-screen: all or FAMILY=…
 	@$(SNAKEMAKE) gallery
 
-orders: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
+orders: override CONFIG += $(CHOICE)
 orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…
 	@$(SNAKEMAKE) orders
 
@@ -74,15 +79,15 @@ study: environment ## error against run time, all treatments; a part in minutes:
 	@$(SNAKEMAKE) study
 
 stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
-stability: environment ## push one quantity after another until it breaks: LEVEL=quick for a few
+stability: environment ## numerical stability: vary quantities until the answer breaks; some values: LEVEL=quick
 	@$(SNAKEMAKE) stability
 
 scaling: override CONFIG += $(if $(LEVEL),scaling=$(LEVEL))
-scaling: environment ## growth with size, to a million unknowns; the small in a minute: LEVEL=quick
+scaling: environment ## cost up to a million unknowns; small sizes in a minute: LEVEL=quick
 	@$(SNAKEMAKE) scaling
 
 BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
-benchmark: environment ## ratios side by side: linear solvers, cut, cures, batch, CalculiX
+benchmark: environment ## time ratios: linear solvers, cut, safeguards, batch, CalculiX
 	@$(OURS) solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
 	  $(if $(filter quick,$(LEVEL)),--quick)
 
@@ -93,22 +98,22 @@ infsup: environment ## the inf-sup test of every cell type, and the half-loaded 
 test: test-environment ## run the tests
 	@$(ALONE) pytest -n auto $(ARGS)
 
-faults: test-environment ## read damaged files, 1,000 of them or COUNT=…: none may get through
+faults: test-environment ## read 1,000 (or COUNT=…) damaged files: none may pass unnoticed
 	@$(OURS) tests.faults $(or $(COUNT),1000)
 
-mutants: test-environment ## plant faults in the core, one at a time: which check notices each
+mutants: test-environment ## plant faults in the core, one at a time, and see which check catches each
 	@$(OURS) tests.faults.mutants
 
-kills: test-environment ## kill runs at 100 random moments, and see that the next one recovers
+kills: test-environment ## kill runs at 100 random moments and check that the next run recovers
 	@$(OURS) tests.workflow.kills $(ARGS)
 
-cluster-test: test-environment ## six solves through a SLURM of one machine, against a local run
+cluster-test: test-environment ## compare six solves through a SLURM of one machine with a local run
 	@missing=$$($(OURS) tests.workflow.slurm --missing); \
 	if test -n "$$missing"; then echo "make cluster-test: skipped: $$missing"; \
 	else $(INSTALL) slurm && $(OURS) tests.workflow.slurm; fi
 
 RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
-accept: environment ## take results as the accepted values, showing the difference: all or CASE=…
+accept: environment ## store results as the accepted values and show the difference: all or CASE=…
 	@test -n "$(RESULTS)" || { echo "make accept: there is no such result; solve first"; exit 2; }
 	@$(OURS) solver accept $(RESULTS)
 
@@ -157,7 +162,7 @@ bill: bill-environment ## write the bill of materials: every installed package a
 LOCK := $(ALONE) uv pip compile --quiet --universal --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --no-annotate --custom-compile-command 'make lock'
 
-lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrade
+lock: ## lock the packages of pyproject.toml again: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --group pyproject.toml:batch \
 	  --output-file requirements.txt
@@ -165,7 +170,7 @@ lock: ## lock the packages named in pyproject.toml anew: make lock ARGS=--upgrad
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 
-schemas: environment ## write the JSON Schemas of the typed files anew, for editors
+schemas: environment ## write the JSON Schemas of the typed files, for editors
 	@.venv/bin/python -m solver.commands.schemas
 
 clean: ## remove results and caches

@@ -7,8 +7,8 @@ installed (see `solver.api`).
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from solver.api import Solved, solve_case
-    from solver.system.errors import InputError, SolveError
+    from .api import Solved, solve_case
+    from .system.errors import InputError, SolveError
 
 __all__ = ["InputError", "SolveError", "Solved", "solve_case"]
 
@@ -23,7 +23,7 @@ _HOME = {
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first asked for: `import solver` alone loads nothing."""
     if name == "__version__":
-        from solver.system.package import project_version
+        from .system.package import project_version
 
         return project_version()
     if name not in _HOME:

@@ -22,21 +22,21 @@ from typing import Any, TypeAlias
 import meshio
 import numpy as np
 
-from solver.case.expressions import Expression
-from solver.case.model import Case
-from solver.case.reader import load_case, parse_case
-from solver.mesh import read_mesh
-from solver.mesh.size import check_memory
-from solver.mesh.tidy import tidy
-from solver.simulation.options import Options
-from solver.simulation.solution import Solution, ZoneResult
-from solver.system.errors import InputError, key_path
-from solver.system.progress import saying
-from solver.system.provenance import gather
-from solver.verification.judge import judge
-from solver.verification.results import write_result
-from solver.verification.run import mesh_of, solve_checked
-from solver.verification.verdict import CheckResult, Verdict
+from .case.expressions import Expression
+from .case.model import Case
+from .case.reader import load_case, parse_case
+from .mesh import read_mesh
+from .mesh.size import check_memory
+from .mesh.tidy import tidy
+from .simulation.options import Options
+from .simulation.solution import Solution, ZoneResult
+from .system.errors import InputError, key_path
+from .system.progress import saying
+from .system.provenance import gather
+from .verification.judge import judge
+from .verification.results import write_result
+from .verification.run import mesh_of, solve_checked
+from .verification.verdict import CheckResult, Verdict
 
 CaseLike: TypeAlias = Case | Mapping[str, Any] | str | os.PathLike[str]
 MeshLike: TypeAlias = meshio.Mesh | str | os.PathLike[str]
@@ -173,7 +173,7 @@ class Solved:
 
     def picture(self) -> str:
         """The report's picture, as SVG: both meshes and the contact pressure."""
-        from solver.report.pictures import draw
+        from .report.pictures import draw
 
         return str(draw(self.solution, self.solution.job))
 
@@ -183,7 +183,7 @@ class Solved:
         Over the distance along the interface, or over an expression in x, y, z, r such as "r"; of
         the first zone, or the one named.
         """
-        from solver.report.pictures import draw_pressure
+        from .report.pictures import draw_pressure
 
         over = Expression(along, where="profile", key="along") if along else None
         return str(draw_pressure(self.solution, self.solution.job, over, zone))

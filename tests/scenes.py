@@ -29,6 +29,17 @@ def block_case(dim: int, extra: str = "", zone: str = "", size: float = 1.0) -> 
     return parse_case(text, Path("patch.yaml"))
 
 
+def changed_case(dim: int, *changes: tuple[str, str], normal: bool = False, **options) -> Case:
+    """`block_case` with parts of its text replaced; `normal`: its supports hold along normals."""
+    text = block_case(dim, **options).source
+    if normal:
+        changes += tuple((f"fix: [{axis}]", "fix: [normal]") for axis in "xyz"[:dim])
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return parse_case(text, Path("patch.yaml"))
+
+
 def block_mesh(bottom: str, top: str, counts: tuple[int, int] = (3, 2), size: float = 1.0):
     """Two blocks of edge `size`, of so many divisions each way."""
     dim = BY_NAME[bottom].dim
@@ -62,6 +73,15 @@ def moved(mesh: meshio.Mesh, amount: float, seed: int = 0) -> meshio.Mesh:
     for level in (-size, 0.0, size):
         move[np.abs(points - level) < 1e-9 * size] = 0.0
     return with_points(mesh, points + move)
+
+
+def turn(dim: int, angle: float) -> np.ndarray:
+    """A rotation (dim, dim); in 3D about an axis that lies in no plane of the coordinates."""
+    if dim == 2:
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    axis = np.array([1.0, 2.0, 3.0]) / np.sqrt(14)
+    cross = np.cross(np.eye(3), axis)
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 def straightened(mesh: meshio.Mesh) -> meshio.Mesh:

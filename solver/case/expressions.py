@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from solver.system.errors import InputError
+from ..system.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np

@@ -5,11 +5,11 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.case.expressions import Expression
-from solver.case.material import Material
+from .expressions import Expression
+from .material import Material
 
 if TYPE_CHECKING:
-    from solver.case.solutions.base import ExactSolution
+    from .solutions.base import ExactSolution
 
 
 class Exact(Enum):

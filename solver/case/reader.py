@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
-from solver.case.expressions import Expression
-from solver.case.file import CaseFile
-from solver.case.material import Material
-from solver.case.model import EXACT, LOAD_KINDS, Case, Load, Observation, Support, Zone
-from solver.case.rules import check_rules
-from solver.case.typed import read_as
-from solver.case.yaml import parse_mapping, read_text
-from solver.system.errors import InputError, key_path
-from solver.system.files import is_file
+from ..system.errors import InputError, key_path
+from ..system.files import is_file
+from .expressions import Expression
+from .file import CaseFile
+from .material import Material
+from .model import EXACT, LOAD_KINDS, Case, Load, Observation, Support, Zone
+from .rules import check_rules
+from .typed import read_as
+from .yaml import parse_mapping, read_text
 
 if TYPE_CHECKING:
-    from solver.case.solutions import ExactSolution
+    from .solutions import ExactSolution
 
 # The quantity of an exact solution that `solution` means under a key; in supports, displacement.
 _QUANTITY = {
@@ -131,7 +131,7 @@ class _Reader:
         given = self.file.reference.solution if self.file.reference else None
         if given is None:
             return None
-        from solver.case.solutions import Known, build
+        from .solutions import Known, build
 
         known = Known(
             where=self.path,

@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from solver.case.expressions import Expression
-from solver.case.model import SWAPPED, Case, Scalar
-from solver.system.errors import InputError, hint
+from ..system.errors import InputError, hint
+from .expressions import Expression
+from .model import SWAPPED, Case, Scalar
 
 # The errors of `solver.verification.norms`, and what a solution must have for each to be known.
 ERRORS: dict[str, str] = {

@@ -21,8 +21,8 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import msgspec
 from msgspec import Meta, Struct
 
-from solver.system.errors import InputError, hint, key_path
-from solver.system.files import is_file
+from ..system.errors import InputError, hint, key_path
+from ..system.files import is_file
 
 Text = Annotated[str, Meta(min_length=1, description="text")]
 Version = Annotated[str, Meta(min_length=1, description="text (in quotes if it is a number)")]

@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from solver.system.errors import InputError, key_path
+from ..system.errors import InputError, key_path
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 20

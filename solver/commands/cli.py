@@ -17,14 +17,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from solver.commands import studies
-from solver.commands.options import add_command, add_threads, limit_threads
-from solver.system.errors import InputError, SolveError, of_machine
-from solver.system.package import PROGRAM, PROJECT, project_version
+from ..system.errors import InputError, SolveError, of_machine
+from ..system.package import PROGRAM, PROJECT, project_version
+from . import jobs, studies
+from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
-    from solver.verification.run import Job
-    from solver.verification.verdict import CheckResult
+    from ..verification.run import Job
+    from ..verification.verdict import CheckResult
 
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
@@ -77,31 +77,32 @@ def _parser() -> argparse.ArgumentParser:
     parser.set_defaults(threads=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
-    command = add_command(
-        commands, "mesh", _mesh, "write the mesh of a case, its transform applied"
-    )
+    command = add_command(commands, "mesh", _mesh, "write the mesh of a case, after its transform")
     command.add_argument("case", type=Path, metavar="CASE.yaml")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="MESH")
 
     command = add_command(commands, "solve", _solve, "solve a case, check it and write the result")
     _add_job(command)
     command.add_argument("-o", "--output", type=Path, required=True, metavar="RESULT.vtkhdf")
-    command.add_argument("--verdict", type=Path, metavar="VERDICT.json", help="written in any case")
+    command.add_argument(
+        "--verdict", type=Path, metavar="VERDICT.json", help="written for every outcome"
+    )
     command.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    command.add_argument("--verbose", action="store_true", help="tell each stage, with the time")
+    command.add_argument("--verbose", action="store_true", help="print each stage, with the time")
     add_threads(command)
     command.add_argument(
-        "--everything", action="store_true", help="do what the scene does not need as well"
+        "--everything", action="store_true", help="also do the work that the case does not need"
     )
     command.add_argument(
-        "--no-memory-check", action="store_true", help="start even where memory cannot suffice"
+        "--no-memory-check", action="store_true", help="start even if memory cannot suffice"
     )
 
     command = add_command(commands, "crashed", _crashed, "write the verdict of a solve that died")
     _add_job(command)
     command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
-    command.add_argument("--log", type=Path, help="its last line tells the reason")
+    command.add_argument("--log", type=Path, help="its last line is the reason")
     command.add_argument("--status", type=int, metavar="N", help="its exit status")
+    command.add_argument("--refusal", help="it was not started, for this reason: refused")
 
     command = add_command(commands, "check", _check, "run the checks of stored results again")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
@@ -110,43 +111,46 @@ def _parser() -> argparse.ArgumentParser:
     command = add_command(commands, "report", _report, "write the report of many verdicts")
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
+    command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
     command.add_argument(
         "--families",
         type=Path,
         nargs="*",
         metavar="FAMILY.yaml",
-        help="what families are about; default: those in cases/",
+        help="descriptions of families; default: those in cases/",
     )
 
-    command = add_command(commands, "gallery", _gallery, "draw results with PyVista, on a page")
+    command = add_command(
+        commands, "gallery", _gallery, "draw results with PyVista and write a page"
+    )
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    command.add_argument("--results", type=Path, metavar="DIR", help="take all verdicts in there")
+    command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
     command.add_argument("--plain", action="store_true", help="without PyVista and OpenGL")
 
-    command = add_command(commands, "compare", _compare, "say what is new since another batch")
+    command = add_command(commands, "compare", _compare, "compare with another batch")
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
     studies.add_commands(commands)
+    jobs.add_commands(commands)
 
-    command = add_command(commands, "validate", _validate, "say whether case files are valid")
+    command = add_command(commands, "validate", _validate, "check whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
-    command.add_argument("--mesh", action="store_true", help="mesh them too and check the groups")
+    command.add_argument("--mesh", action="store_true", help="also mesh them and check the groups")
 
     command = add_command(commands, "new", _new, "write a commented case file to start from")
     command.add_argument("name", nargs="?", metavar="NAME", help="default: as FILE")
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: NAME.yaml")
 
-    command = add_command(commands, "accept", _accept, "take results as the accepted values")
+    command = add_command(commands, "accept", _accept, "store results as the accepted values")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
 
     command = add_command(
-        commands, "serve", _serve, "stay warm and fork for each command of a batch"
+        commands, "serve", _serve, "keep a warm process and fork it for each command of a batch"
     )
-    command.add_argument("socket", type=int, metavar="FD", help="an open socket that listens")
+    command.add_argument("socket", type=int, metavar="FD", help="an open, listening socket")
     return parser
 
 
@@ -161,13 +165,15 @@ class _Version(argparse.Action):
 def _add_job(command: argparse.ArgumentParser) -> None:
     """What singles out one solve: case, mesh, direction, variant."""
     command.add_argument("case", type=Path, metavar="CASE.yaml")
-    command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, taken as it is")
+    command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, used unchanged")
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
-    command.add_argument("--hexahedra", choices=("pyramids", "hexahedra"), help="how they are cut")
+    command.add_argument(
+        "--hexahedra", choices=("pyramids", "hexahedra"), help="how to cut slave hexahedra"
+    )
     command.add_argument(
         "--recovery",
         choices=("none", "linear", "quadratic", "smooth", "automatic"),
-        help="how constant pressures are recovered from, in place of what the case says",
+        help="how to recover a pressure of higher order, instead of the case's own setting",
     )
     command.add_argument(
         "--refine", type=int, default=1, metavar="N", help="multiply the recipe's divisions"
@@ -175,16 +181,16 @@ def _add_job(command: argparse.ArgumentParser) -> None:
 
 
 def _mesh(options: argparse.Namespace) -> int:
-    from solver.case.reader import load_case
-    from solver.mesh import write_mesh
-    from solver.verification.run import mesh_of
+    from ..case.reader import load_case
+    from ..mesh import write_mesh
+    from ..verification.run import mesh_of
 
     write_mesh(mesh_of(load_case(options.case)), options.output)
     return PASSED
 
 
 def _job(options: argparse.Namespace) -> "Job":
-    from solver.verification.run import Job
+    from ..verification.run import Job
 
     given = vars(options)
     told = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
@@ -192,8 +198,8 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from solver.system.progress import saying, telling
-    from solver.verification.run import solve
+    from ..system.progress import saying, telling
+    from ..verification.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
@@ -208,15 +214,18 @@ def _silent(line: str) -> None:
 
 
 def _crashed(options: argparse.Namespace) -> int:
-    from solver.verification.run import record_crash
+    from ..verification.run import record_crash, record_refusal
 
+    if options.refusal:
+        print(record_refusal(options.case, options.verdict, options.refusal).summary)
+        return PASSED
     print(record_crash(_job(options), options.verdict, options.log, options.status).summary)
     return PASSED
 
 
 def _check(options: argparse.Namespace) -> int:
-    from solver.verification.run import check
-    from solver.verification.verdict import to_json
+    from ..verification.run import check
+    from ..verification.verdict import to_json
 
     verdicts = [check(result) for result in options.results]
     if options.json:
@@ -250,14 +259,14 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
 
 
 def _gallery(options: argparse.Namespace) -> int:
-    from solver.report.gallery import write_gallery
+    from ..report.gallery import write_gallery
 
     write_gallery(_verdicts(options), options.output, options.plain, partial(print, flush=True))
     return PASSED
 
 
 def _report(options: argparse.Namespace) -> int:
-    from solver.report import write_report
+    from ..report import write_report
 
     verdicts = _verdicts(options)
     families = options.families
@@ -267,7 +276,7 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from solver.report.compare import compare
+    from ..report.compare import compare
 
     return FAILED if compare(options.base, options.this, options.output).groups["worse"] else PASSED
 
@@ -286,19 +295,19 @@ def _validate(options: argparse.Namespace) -> int:
 
 
 def _validate_one(path: Path, with_mesh: bool) -> None:
-    from solver.case.reader import check_mesh_file, load_case
+    from ..case.reader import check_mesh_file, load_case
 
     case = load_case(path)
     check_mesh_file(case)
     if with_mesh:
-        from solver.simulation.groups import check_groups
-        from solver.verification.run import mesh_of
+        from ..simulation.groups import check_groups
+        from ..verification.run import mesh_of
 
         check_groups(case, mesh_of(case))
 
 
 def _new(options: argparse.Namespace) -> int:
-    from solver.case.template import write_template
+    from ..case.template import write_template
 
     name = options.name or (options.output.stem if options.output else "new-case")
     path = options.output or Path(f"{name}.yaml")
@@ -308,9 +317,9 @@ def _new(options: argparse.Namespace) -> int:
 
 
 def _accept(options: argparse.Namespace) -> int:
-    from solver.verification.checks import run_checks
-    from solver.verification.regression import accept, accepted_values, regression_file
-    from solver.verification.results import read_result
+    from ..verification.checks import run_checks
+    from ..verification.regression import accept, accepted_values, regression_file
+    from ..verification.results import read_result
 
     for path in options.results:
         solution = read_result(path).solution
@@ -329,7 +338,7 @@ def _accept(options: argparse.Namespace) -> int:
 def _serve(options: argparse.Namespace) -> int:
     import socket
 
-    from solver.commands.server import serve
+    from .server import serve
 
     with socket.socket(fileno=options.socket) as listener:
         serve(listener)

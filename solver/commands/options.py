@@ -18,12 +18,14 @@ def add_command(
 
 def add_threads(command: argparse.ArgumentParser) -> None:
     """Let a command take `--threads`."""
-    command.add_argument("--threads", type=int, metavar="N", help="where the environment sets none")
+    command.add_argument(
+        "--threads", type=int, metavar="N", help="number of threads, unless the environment sets it"
+    )
 
 
 def limit_threads(number: int) -> None:
     """Tell the libraries, which read it when they are loaded; the environment comes first."""
-    from solver.system.process import THREADS
+    from ..system.process import THREADS
 
     for variable in THREADS:
         os.environ.setdefault(variable, str(number))

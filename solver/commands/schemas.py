@@ -7,8 +7,8 @@ import json
 from importlib import import_module
 from pathlib import Path
 
-from solver.case.typed import json_schema
-from solver.system.files import write_text
+from ..case.typed import json_schema
+from ..system.files import write_text
 
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {

@@ -20,8 +20,8 @@ from contextlib import suppress
 from functools import partial
 from typing import NoReturn
 
-from solver.commands.warm import GREETING, LIMIT, THREADS, outcome
-from solver.system.package import PACKAGE
+from ..system.package import PACKAGE
+from .warm import GREETING, LIMIT, THREADS, outcome
 
 # What the solver imports only where it is needed; what is missing here, the command will say.
 _LATE = ("gmsh", "jsonschema.validators", "skfem.element", "cvxopt")

@@ -6,9 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from solver.commands.options import add_command, add_threads
-from solver.studies import FULL, QUICK, SIZES
-from solver.system.errors import InputError
+from ..studies import FULL, QUICK, SIZES
+from ..system.errors import InputError
+from .options import add_command, add_threads
 
 RECORD, FOLDER = "RECORD.json", "DIR"
 
@@ -18,7 +18,7 @@ def add_commands(commands: Any) -> None:
     _add_orders(commands)
     study = commands.add_parser("study", help="error against run time: points and their page")
     _add_study(study.add_subparsers(title="commands", metavar="COMMAND", required=True))
-    scaling = commands.add_parser("scaling", help="growth with size: points and their page")
+    scaling = commands.add_parser("scaling", help="scaling: points and their page")
     _add_scaling(scaling.add_subparsers(title="commands", metavar="COMMAND", required=True))
     _add_benchmark(commands)
     _add_stability(commands)
@@ -55,8 +55,8 @@ def _add_orders(commands: Any) -> None:
 
 
 def _orders(options: argparse.Namespace) -> int:
-    from solver.studies.orders.description import read_ladders
-    from solver.studies.orders.page import write_orders
+    from ..studies.orders.description import read_ladders
+    from ..studies.orders.page import write_orders
 
     write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
     return 0
@@ -67,7 +67,9 @@ def _add_study(commands: Any) -> None:
     purpose = "measure one point, in a process of its own"
     point = _sized(commands, "point", _study_point, purpose, file, RECORD)
     point.add_argument("point", metavar="POINT", help="PROBLEM/SLAVE-MASTER/TREATMENT/LEVEL")
-    point.add_argument("--reference", type=Path, metavar="RESULT.vtkhdf", help="taken for exact")
+    point.add_argument(
+        "--reference", type=Path, metavar="RESULT.vtkhdf", help="used as the exact solution"
+    )
     purpose = "solve a problem on its refined mesh"
     reference = _sized(commands, "reference", _reference, purpose, file, "RESULT.vtkhdf")
     reference.add_argument("problem", metavar="PROBLEM")
@@ -76,8 +78,8 @@ def _add_study(commands: Any) -> None:
 
 
 def _study_point(options: argparse.Namespace) -> int:
-    from solver.studies.work_precision.description import read_study
-    from solver.studies.work_precision.point import measure_point
+    from ..studies.work_precision.description import read_study
+    from ..studies.work_precision.point import measure_point
 
     study = read_study(options.study, options.size)
     point = study.point(options.point)
@@ -89,16 +91,16 @@ def _study_point(options: argparse.Namespace) -> int:
 
 
 def _reference(options: argparse.Namespace) -> int:
-    from solver.studies.work_precision.description import read_study
-    from solver.studies.work_precision.reference import write_reference
+    from ..studies.work_precision.description import read_study
+    from ..studies.work_precision.reference import write_reference
 
     write_reference(read_study(options.study, options.size), options.problem, options.output)
     return 0
 
 
 def _study_page(options: argparse.Namespace) -> int:
-    from solver.studies.work_precision.description import read_study
-    from solver.studies.work_precision.page import write_study
+    from ..studies.work_precision.description import read_study
+    from ..studies.work_precision.page import write_study
 
     write_study(read_study(options.study, options.size), options.results, options.output)
     return 0
@@ -114,8 +116,8 @@ def _add_scaling(commands: Any) -> None:
 
 
 def _scaling_point(options: argparse.Namespace) -> int:
-    from solver.studies.scaling.description import read_scaling
-    from solver.studies.scaling.point import measure_point
+    from ..studies.scaling.description import read_scaling
+    from ..studies.scaling.point import measure_point
 
     scaling = read_scaling(options.study, options.size)
     print(measure_point(scaling, scaling.point(options.point), options.output))
@@ -123,26 +125,26 @@ def _scaling_point(options: argparse.Namespace) -> int:
 
 
 def _scaling_page(options: argparse.Namespace) -> int:
-    from solver.studies.scaling.description import read_scaling
-    from solver.studies.scaling.page import write_scaling
+    from ..studies.scaling.description import read_scaling
+    from ..studies.scaling.page import write_scaling
 
     write_scaling(read_scaling(options.study, options.size), options.results, options.output)
     return 0
 
 
 def _add_benchmark(commands: Any) -> None:
-    command = add_command(commands, "benchmark", _benchmark, "measure ratios side by side")
+    command = add_command(commands, "benchmark", _benchmark, "measure time ratios side by side")
     command.add_argument("benchmark", type=Path, metavar="BENCHMARK.yaml")
-    command.add_argument("--quick", action="store_true", help="on tiny meshes, for a first look")
+    command.add_argument("--quick", action="store_true", help="tiny meshes, for a first look")
     _output(command, RECORD)
 
 
 def _benchmark(options: argparse.Namespace) -> int:
-    from solver.studies.benchmark.description import read_benchmark
-    from solver.studies.benchmark.page import as_text
-    from solver.studies.benchmark.run import run_benchmark
-    from solver.system.files import write_text
-    from solver.verification.verdict import to_json
+    from ..studies.benchmark.description import read_benchmark
+    from ..studies.benchmark.page import as_text
+    from ..studies.benchmark.run import run_benchmark
+    from ..system.files import write_text
+    from ..verification.verdict import to_json
 
     benchmark = read_benchmark(options.benchmark, QUICK if options.quick else FULL)
     record = run_benchmark(benchmark, partial(print, file=sys.stderr, flush=True))
@@ -152,30 +154,32 @@ def _benchmark(options: argparse.Namespace) -> int:
 
 
 def _add_stability(commands: Any) -> None:
-    purpose = "push one quantity of a case through its values"
+    purpose = "run a case over the values of one quantity"
     command = add_command(commands, "sweep", _sweep, purpose)
     command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
-    _quick(command, "some of the values only")
+    _quick(command, "only some of the values")
 
     purpose = "write the page of numerical stability"
     command = add_command(commands, "stability", _stability, purpose)
     command.add_argument("records", type=Path, nargs="+", metavar=RECORD)
     _output(command, FOLDER)
-    command.add_argument("--quick", action="store_true", help="say that values are left out")
-    command.add_argument("--infsup", type=Path, metavar=RECORD, help="show its record too")
+    command.add_argument(
+        "--quick", action="store_true", help="state on the page that values are left out"
+    )
+    command.add_argument("--infsup", type=Path, metavar=RECORD, help="also show this record")
 
 
 def _sweep(options: argparse.Namespace) -> int:
-    from solver.studies.stability.description import read_sweep
-    from solver.studies.stability.point import run_sweep
+    from ..studies.stability.description import read_sweep
+    from ..studies.stability.point import run_sweep
 
     record = run_sweep(read_sweep(options.sweep, options.quick), options.output, print)
     return 0 if all(point["holds"] for point in record["points"]) else 1
 
 
 def _stability(options: argparse.Namespace) -> int:
-    from solver.studies.infsup.records import read_record
-    from solver.studies.stability.page import read_records, write_stability
+    from ..studies.infsup.records import read_record
+    from ..studies.stability.page import read_records, write_stability
 
     theory = read_record(options.infsup) if options.infsup else None
     records = read_records(options.records)
@@ -196,15 +200,15 @@ def _add_infsup(commands: Any) -> None:
 
 
 def _infsup(options: argparse.Namespace) -> int:
-    from solver.studies.infsup.point import measure
+    from ..studies.infsup.point import measure
 
     measure(options.ladders, options.output, options.quick, partial(print, flush=True))
     return 0
 
 
 def _infsup_page(options: argparse.Namespace) -> int:
-    from solver.studies.infsup.page import write_page
-    from solver.studies.infsup.records import read_record
+    from ..studies.infsup.page import write_page
+    from ..studies.infsup.records import read_record
 
     write_page(read_record(options.record), options.output)
     return 0

@@ -15,8 +15,8 @@ from typing import Any
 import meshio
 from meshio._mesh import topological_dimension
 
-from solver.mesh.catalogue import BY_NAME
-from solver.system.files import replacing
+from ..system.files import replacing
+from .catalogue import BY_NAME
 
 # meshio knows the nodes of PENTA15 and PYRA13, but its table of dimensions has no line for them.
 for _kind in BY_NAME.values():
@@ -27,28 +27,28 @@ __all__ = ["generate", "read_mesh", "transform", "write_mesh"]
 
 def generate(recipe: Mapping[str, Any], where: str) -> meshio.Mesh:
     """The mesh of a case file's `mesh:` mapping with the key `recipe`; see `recipes`."""
-    from solver.mesh import recipes
+    from . import recipes
 
     return recipes.generate(recipe, where)
 
 
 def transform(mesh: meshio.Mesh, spec: Mapping[str, Any], where: str = "transform") -> meshio.Mesh:
     """The mesh changed as a case file's `transform:` mapping says; see `transforms`."""
-    from solver.mesh.changes import transforms
+    from .changes import transforms
 
     return transforms.transform(mesh, spec, where)
 
 
 def read_mesh(path: str | os.PathLike[str]) -> meshio.Mesh:
     """The mesh in a file, by its extension; see `formats`. Raises InputError naming the file."""
-    from solver.mesh.files import formats
+    from .files import formats
 
     return formats.read(Path(path))
 
 
 def write_mesh(mesh: meshio.Mesh, path: str | os.PathLike[str]) -> None:
     """Write the mesh as VTKHDF, whole or not at all; the same mesh gives the same bytes."""
-    from solver.mesh.files import vtkhdf
+    from .files import vtkhdf
 
     path = Path(path)
     vtkhdf.check_name(path)

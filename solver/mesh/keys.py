@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from solver.system.errors import InputError
+from ..system.errors import InputError
 
 LARGEST = 1e150
 """The largest magnitude of a coordinate or length: the square of twice it is finite."""

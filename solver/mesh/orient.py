@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solver.mesh.catalogue import CellType
+from .catalogue import CellType
 
 # Below this share of the product of the edges that span it, a corner counts as flat.
 _FLAT = 1e-12

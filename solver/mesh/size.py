@@ -17,10 +17,10 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-from solver.mesh.catalogue import BY_NAME
-from solver.system.errors import MachineError
-from solver.system.memory import available
-from solver.system.progress import OUTCOME
+from ..system.errors import MachineError
+from ..system.memory import available
+from ..system.progress import OUTCOME
+from .catalogue import BY_NAME
 
 _LOG = logging.getLogger(__name__)
 

@@ -20,12 +20,12 @@ def write_report(
     `family.yaml`, each in the folder of its family. Logs one line for each solve that did not pass,
     the outcome, and the processor time by family.
     """
-    from solver.report import tables
-    from solver.report.junit import to_junit
-    from solver.report.page import family_page, main_page
-    from solver.report.rows import read_rows
-    from solver.report.sections import sections
-    from solver.system.files import write_text
+    from ..system.files import write_text
+    from . import tables
+    from .junit import to_junit
+    from .page import family_page, main_page
+    from .rows import read_rows
+    from .sections import sections
 
     folder.mkdir(parents=True, exist_ok=True)
     files = {file.resolve().parent.name: file for file in families}

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.report.svg import INK, MUTED, RULE, Drawing, Style
+from .svg import INK, MUTED, RULE, Drawing, Style
 
 EPSILON = float(np.finfo(float).eps)
 # The colour of the round-off floor.

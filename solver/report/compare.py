@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver.report.differences import Comparison, Pair, read_batch
-from solver.report.html import TEMPLATES, render
-from solver.report.tables import md
-from solver.system.files import write_text
+from ..system.files import write_text
+from .differences import Comparison, Pair, read_batch
+from .html import TEMPLATES, render
+from .tables import md
 
 PAGE = "compare.html"
 CHANGES = ("solve", "quantity", "before", "now", "change")

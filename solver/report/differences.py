@@ -13,12 +13,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from solver.report import formats, stages
-from solver.report.rows import Row, natural
-from solver.report.tables import outcome
-from solver.system.errors import InputError
-from solver.verification.checks import ROUND_OFF
-from solver.verification.verdict import WORDS, CheckResult, Verdict, typed
+from ..system.errors import InputError
+from ..verification.checks import ROUND_OFF
+from ..verification.verdict import WORDS, CheckResult, Verdict, typed
+from . import formats, stages
+from .rows import Row, natural
+from .tables import outcome
 
 SUMMARY = "summary.json"
 # A solve whose time changed is worth a line from this ratio on, and from these seconds.

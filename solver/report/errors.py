@@ -6,11 +6,11 @@ from urllib.parse import quote
 import numpy as np
 from markupsafe import Markup
 
-from solver.report import formats, stages
-from solver.report.axes import EPSILON, Scale, draw_axes, draw_floor, draw_level, round_off
-from solver.report.families import CodeError
-from solver.report.rows import Row
-from solver.report.svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
+from . import formats, stages
+from .axes import EPSILON, Scale, draw_axes, draw_floor, draw_level, round_off
+from .families import CodeError
+from .rows import Row
+from .svg import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, Drawing
 
 WIDTH, HEIGHT = 940, 470
 # One colour for each kind of reference: they are not compared with one another.

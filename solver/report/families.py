@@ -23,10 +23,10 @@ from typing import Annotated
 
 from msgspec import Meta, structs
 
-from solver.case.expressions import Expression
-from solver.case.typed import Positive, Section, Text, Version, read_as
-from solver.case.yaml import read_mapping
-from solver.system.errors import InputError
+from ..case.expressions import Expression
+from ..case.typed import Positive, Section, Text, Version, read_as
+from ..case.yaml import read_mapping
+from ..system.errors import InputError
 
 FILE_NAME = "family.yaml"
 # Pages of the report that are no family's: a family of that name has its page under another.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup, escape
 
-from solver.verification.verdict import Body
+from ..verification.verdict import Body
 
 NOTHING = "–"
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 import meshio
 import numpy as np
 
-from solver.mechanics.fem.faces import corner_sets
-from solver.mesh.catalogue import cell_type
+from ..mechanics.fem.faces import corner_sets
+from ..mesh.catalogue import cell_type
 
 
 def outlines(points: np.ndarray, kind: str, connectivity: np.ndarray) -> np.ndarray:

@@ -10,8 +10,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
-from solver.report import formats
-from solver.report.rows import Row, counted, families
+from . import formats
+from .rows import Row, counted, families
 
 _FAILURES, _ERRORS = ("failed", "unreliable"), ("crashed", "refused")
 # The parts of the provenance that identify a run.

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solver.report.svg import BLUE, MUTED, ORANGE, PAPER, mixed
-from solver.simulation.solution import BodyInfo, Solution, ZoneResult
+from ..simulation.solution import BodyInfo, Solution, ZoneResult
+from .svg import BLUE, MUTED, ORANGE, PAPER, mixed
 
 Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
 Placement = Callable[[np.ndarray], np.ndarray]  # coordinates (…, dim) to pixels (…, 2)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from solver.report.svg import BLUE, GREEN, ORANGE, PAPER, PURPLE, Drawing
+from .svg import BLUE, GREEN, ORANGE, PAPER, PURPLE, Drawing
 
 _CORNERS = {
     "square": [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)],

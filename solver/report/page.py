@@ -3,12 +3,15 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from solver.report import stages
-from solver.report.html import MEANING, NORMS, TEMPLATES, render
-from solver.report.pictures import picture
-from solver.report.rows import Row, counted
-from solver.report.sections import FamilySection
-from solver.report.tables import outcome
+from . import stages
+from .html import MEANING, NORMS, TEMPLATES, render
+from .pictures import picture
+from .rows import Row, counted
+from .sections import FamilySection
+from .tables import outcome
+
+# Pages beside the report that other commands write.
+_PAGES = ("orders", "study", "stability", "gallery")
 
 # What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
 LEFT_OUT = {
@@ -25,10 +28,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     return render(
         TEMPLATES / "summary.html.jinja",
         rows=rows,
-        orders=(folder / "orders.html").is_file(),
-        study=(folder / "study.html").is_file(),
-        stability=(folder / "stability.html").is_file(),
-        gallery=(folder / "gallery.html").is_file(),
+        pages={name for name in _PAGES if (folder / f"{name}.html").is_file()},
         bad=[row for row in rows if not row.sound],
         outcome=outcome(rows),
         counts=counted(rows),

@@ -6,15 +6,15 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from solver.case.expressions import Expression
-from solver.report.plane import draw_plane
-from solver.report.profile import draw_profile
-from solver.report.rows import Row
-from solver.report.space import draw_space
-from solver.simulation.solution import Solution
-from solver.system.errors import InputError
-from solver.system.files import write_text
-from solver.verification.results import read_result
+from ..case.expressions import Expression
+from ..simulation.solution import Solution
+from ..system.errors import InputError
+from ..system.files import write_text
+from ..verification.results import read_result
+from .plane import draw_plane
+from .profile import draw_profile
+from .rows import Row
+from .space import draw_space
 
 MOST_CELLS = 100_000
 

@@ -3,13 +3,13 @@
 import numpy as np
 from markupsafe import Markup
 
-from solver.report.axes import Scale, draw_axes
-from solver.report.geometry import plane_cells
-from solver.report.layout import Frame, apart, edge_color, extents, fit, tangent, tint
-from solver.report.profile import expected
-from solver.report.svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
-from solver.simulation.solution import Solution, ZoneResult
-from solver.verification.units import with_unit
+from ..simulation.solution import Solution, ZoneResult
+from ..verification.units import with_unit
+from .axes import Scale, draw_axes
+from .geometry import plane_cells
+from .layout import Frame, apart, edge_color, extents, fit, tangent, tint
+from .profile import expected
+from .svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
 
 WIDTH, HEIGHT = 760, 330
 

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from solver.case.expressions import Expression, evaluate
-from solver.mechanics.fem.faces import surface_points
-from solver.report.axes import Scale, draw_axes
-from solver.report.layout import extents, plan_axes, tangent
-from solver.report.svg import BLUE, INK, PAPER, Drawing, mixed
-from solver.simulation.exact import ExactValues
-from solver.simulation.solution import NodalContact, Solution, ZoneResult
-from solver.verification.samples import expected_pressure
-from solver.verification.units import with_unit
+from ..case.expressions import Expression, evaluate
+from ..mechanics.fem.faces import surface_points
+from ..simulation.exact import ExactValues
+from ..simulation.solution import NodalContact, Solution, ZoneResult
+from ..verification.samples import expected_pressure
+from ..verification.units import with_unit
+from .axes import Scale, draw_axes
+from .layout import extents, plan_axes, tangent
+from .svg import BLUE, INK, PAPER, Drawing, mixed
 
 WIDTH, HEIGHT = 470, 372
 # Where less than this share of the interface is pressed, only that and what is next to it is drawn.

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from solver.mesh.catalogue import BY_NAME
-from solver.system.errors import InputError
-from solver.verification.verdict import CRASHED, WORDS, Body, Verdict, read_verdict, unbound
+from ..mesh.catalogue import BY_NAME
+from ..system.errors import InputError
+from ..verification.verdict import CRASHED, WORDS, Body, Verdict, read_verdict, unbound
 
 
 @dataclass(frozen=True)

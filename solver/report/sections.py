@@ -7,14 +7,14 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from solver.report import formats
-from solver.report.errors import COLORS, draw_errors, drawn, floor
-from solver.report.families import Family, Figure, page_name, read_family
-from solver.report.html import KINDS, NORMS
-from solver.report.pictures import profile
-from solver.report.rows import Row, families
-from solver.report.svg import INK
-from solver.report.tables import outcome
+from . import formats
+from .errors import COLORS, draw_errors, drawn, floor
+from .families import Family, Figure, page_name, read_family
+from .html import KINDS, NORMS
+from .pictures import profile
+from .rows import Row, families
+from .svg import INK
+from .tables import outcome
 
 # Profiles on a page where the family does not say which.
 _MOST_PROFILES = 4

@@ -3,9 +3,11 @@
 import numpy as np
 from markupsafe import Markup
 
-from solver.mesh.catalogue import cell_type
-from solver.report.geometry import boundary_faces, macro_edges, normals, outlines
-from solver.report.layout import (
+from ..mesh.catalogue import cell_type
+from ..simulation.solution import Solution, ZoneResult
+from ..verification.units import with_unit
+from .geometry import boundary_faces, macro_edges, normals, outlines
+from .layout import (
     Frame,
     Placement,
     apart,
@@ -15,9 +17,7 @@ from solver.report.layout import (
     plan_axes,
     tint,
 )
-from solver.report.svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
-from solver.simulation.solution import Solution, ZoneResult
-from solver.verification.units import with_unit
+from .svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
 
 WIDTH, HEIGHT = 760, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)

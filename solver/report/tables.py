@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from solver.report import formats
-from solver.report.rows import Row, counted, families
-from solver.verification.verdict import to_json as strict_json
+from ..verification.verdict import to_json as strict_json
+from . import formats
+from .rows import Row, counted, families
 
 _HEAD = (
     "case",

@@ -23,14 +23,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from solver.case.model import Case
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.elasticity import Block, steepness
-from solver.mechanics.fem.faces import FaceBlock, area_vectors
-from solver.mechanics.mortar.facets import FLAT
-from solver.mechanics.mortar.status import Trial
-from solver.simulation.iterate import ContactIterate
-from solver.simulation.scene import Scene
+from ..case.model import Case
+from ..mechanics.fem import shape_functions
+from ..mechanics.fem.elasticity import Block, steepness
+from ..mechanics.fem.faces import FaceBlock, area_vectors
+from ..mechanics.mortar.facets import FLAT
+from ..mechanics.mortar.status import Trial
+from .iterate import ContactIterate
+from .scene import Scene
 
 EPSILON = float(np.finfo(float).eps)
 EPSILON_EXTENDED = float(np.finfo(np.longdouble).eps)

@@ -7,28 +7,28 @@ from functools import cached_property
 import meshio
 import numpy as np
 
-from solver.case.expressions import evaluate
-from solver.case.material import Material
-from solver.case.model import Case, Exact, Load, Scalar
-from solver.case.solutions import ExactSolution
-from solver.mechanics.fem import has_straight_edges
-from solver.mechanics.fem.bodies import body_numbers
-from solver.mechanics.fem.elasticity import Block, lame_parameters
-from solver.mechanics.fem.faces import (
+from ..case.expressions import evaluate
+from ..case.material import Material
+from ..case.model import Case, Exact, Load, Scalar
+from ..case.solutions import ExactSolution
+from ..mechanics.fem import has_straight_edges
+from ..mechanics.fem.bodies import body_numbers
+from ..mechanics.fem.elasticity import Block, lame_parameters
+from ..mechanics.fem.faces import (
     FaceBlock,
     FaceError,
     boundary_faces,
     nodal_normals,
     volume_cells,
 )
-from solver.mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
-from solver.mechanics.fem.mixed import MeanStress, in_mixed_form, split
-from solver.mechanics.fem.supports import SAME, Fixed, FreeMotion, SupportClashError, free_motion
-from solver.mechanics.mortar.cut import CutMesh, SubFaces
-from solver.mesh.catalogue import BY_MESHIO, BY_NAME
-from solver.simulation.exact import node_parts
-from solver.simulation.groups import ALL
-from solver.system.errors import InputError
+from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
+from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
+from ..mechanics.fem.supports import SAME, Fixed, FreeMotion, SupportClashError, free_motion
+from ..mechanics.mortar.cut import CutMesh, SubFaces
+from ..mesh.catalogue import BY_MESHIO, BY_NAME
+from ..system.errors import InputError
+from .exact import node_parts
+from .groups import ALL
 
 
 @dataclass(frozen=True)

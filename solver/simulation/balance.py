@@ -4,9 +4,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from solver.mechanics.fem.faces import face_integrals
-from solver.simulation.problem import Equilibrium
-from solver.simulation.scene import Scene, ZoneScene
+from ..mechanics.fem.faces import face_integrals
+from .problem import Equilibrium
+from .scene import Scene, ZoneScene
 
 # A macro-element of which the segments miss less than this share is covered in full.
 _COVERED = 1e-6

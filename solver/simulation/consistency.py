@@ -10,8 +10,8 @@ from itertools import chain
 
 import numpy as np
 
-from solver.mechanics.mortar.recovery import FORMS
-from solver.simulation.solution import NodalContact, RecoveredPressure, Solution, ZoneResult
+from ..mechanics.mortar.recovery import FORMS
+from .solution import NodalContact, RecoveredPressure, Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
 # roundings of coordinates and displacements, a pressure by its estimated error and by what so many

@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem.bodies import unheld_motion
-from solver.mechanics.linear.condensation import choose_pivots
-from solver.simulation.naming import body_names
-from solver.simulation.scene import Scene
-from solver.system.errors import InputError
+from ..mechanics.fem.bodies import unheld_motion
+from ..mechanics.linear.condensation import choose_pivots
+from ..system.errors import InputError
+from .naming import body_names
+from .scene import Scene
 
 # A macro-element covered by less than this share of its area is out of contact.
 MIN_COVERAGE = 0.01

@@ -7,13 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.case.solutions import ExactSolution
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.faces import FACE_POINTS, nodal_normals, surface_points
-from solver.mechanics.fem.gauss import gauss_rule
-from solver.mechanics.fem.stress import normal_stress
-from solver.mesh.catalogue import cell_type
-from solver.simulation.solution import Solution, ZoneResult
+from ..case.solutions import ExactSolution
+from ..mechanics.fem import shape_functions
+from ..mechanics.fem.faces import FACE_POINTS, nodal_normals, surface_points
+from ..mechanics.fem.gauss import gauss_rule
+from ..mechanics.fem.stress import normal_stress
+from ..mesh.catalogue import cell_type
+from .solution import Solution, ZoneResult
 
 
 def node_parts(exact: ExactSolution, points: np.ndarray, body: np.ndarray) -> np.ndarray:

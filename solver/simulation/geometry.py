@@ -7,9 +7,9 @@ bodies and at the contact between them.
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solver.simulation.naming import body_names
-from solver.simulation.scene import Scene, ZoneScene
-from solver.system.errors import InputError
+from ..system.errors import InputError
+from .naming import body_names
+from .scene import Scene, ZoneScene
 
 # Nodes nearer than this share of the model's length are at one place.
 _ONE_PLACE = 1e-10

@@ -8,10 +8,10 @@ from collections.abc import Iterable
 import meshio
 import numpy as np
 
-from solver.case.model import Case, Exact, Load, Zone
-from solver.case.rules import check_dimension
-from solver.mesh.catalogue import BY_MESHIO
-from solver.system.errors import InputError, hint
+from ..case.model import Case, Exact, Load, Zone
+from ..case.rules import check_dimension
+from ..mesh.catalogue import BY_MESHIO
+from ..system.errors import InputError, hint
 
 ALL = "all"
 _EMPTY = "is empty, or none of its members touches a volume cell"

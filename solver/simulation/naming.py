@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from solver.simulation.scene import Scene
-from solver.simulation.solution import BodyInfo
+from .scene import Scene
+from .solution import BodyInfo
 
 
 def body_names(scene: Scene) -> list[str]:

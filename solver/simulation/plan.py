@@ -8,15 +8,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from solver.mechanics.fem.mixed import AUTOMATIC_ABOVE
-from solver.mechanics.mortar.cut import needs_cut
-from solver.simulation.accuracy import NOTED_STRAIN
-from solver.simulation.constraints import MIN_COVERAGE
-from solver.simulation.naming import body_names
-from solver.simulation.options import Options
-from solver.simulation.problem import ContactProblem, Equilibrium
-from solver.simulation.scene import Scene, ZoneScene
-from solver.simulation.solution import Line, Solution
+from ..mechanics.fem.mixed import AUTOMATIC_ABOVE
+from ..mechanics.mortar.cut import needs_cut
+from .accuracy import NOTED_STRAIN
+from .constraints import MIN_COVERAGE
+from .naming import body_names
+from .options import Options
+from .problem import ContactProblem, Equilibrium
+from .scene import Scene, ZoneScene
+from .solution import Line, Solution
 
 # An estimated error below this is rounding.
 _ROUNDING = 1e-10

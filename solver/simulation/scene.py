@@ -8,25 +8,25 @@ from typing import TypeAlias
 import meshio
 import numpy as np
 
-from solver.case.model import Case, Zone
-from solver.mechanics.fem.bodies import body_numbers
-from solver.mechanics.fem.elasticity import Block
-from solver.mechanics.fem.faces import FaceBlock, surface_points, volume_cells
-from solver.mechanics.fem.mixed import MeanStress
-from solver.mechanics.fem.supports import FreeMotion
-from solver.mechanics.mortar.cut import CutMesh, SubFaces, cut
-from solver.mechanics.mortar.facets import Facets, facets, with_nodal_normals
-from solver.mechanics.mortar.held import merge_fixed_multipliers
-from solver.mechanics.mortar.multipliers import constants
-from solver.mechanics.mortar.operator import GapOperator, gap_operator
-from solver.mechanics.mortar.recovery import FORMS, Asked, automatic, vertex_neighbours
-from solver.mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
-from solver.mesh.catalogue import BY_NAME
-from solver.simulation.attributes import Attributes, CutZone, faces_of
-from solver.simulation.groups import check_groups, named_parts
-from solver.simulation.options import LEAN, Options
-from solver.system.clock import Clock
-from solver.system.errors import InputError
+from ..case.model import Case, Zone
+from ..mechanics.fem.bodies import body_numbers
+from ..mechanics.fem.elasticity import Block
+from ..mechanics.fem.faces import FaceBlock, surface_points, volume_cells
+from ..mechanics.fem.mixed import MeanStress
+from ..mechanics.fem.supports import FreeMotion
+from ..mechanics.mortar.cut import CutMesh, SubFaces, cut
+from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
+from ..mechanics.mortar.held import merge_fixed_multipliers
+from ..mechanics.mortar.multipliers import constants
+from ..mechanics.mortar.operator import GapOperator, gap_operator
+from ..mechanics.mortar.recovery import FORMS, Asked, automatic, vertex_neighbours
+from ..mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
+from ..mesh.catalogue import BY_NAME
+from ..system.clock import Clock
+from ..system.errors import InputError
+from .attributes import Attributes, CutZone, faces_of
+from .groups import check_groups, named_parts
+from .options import LEAN, Options
 
 # Slave and master faces of each zone.
 Surfaces: TypeAlias = list[tuple[list[FaceBlock], list[FaceBlock]]]

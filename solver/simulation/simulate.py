@@ -7,22 +7,26 @@ from dataclasses import replace
 import meshio
 import numpy as np
 
-from solver.case.model import Case
-from solver.mechanics.fem.elasticity import largest_strain, nodal_stress
-from solver.mechanics.fem.faces import nodal_normals
-from solver.mechanics.fem.stress import normal_stress
-from solver.mesh.catalogue import BY_NAME
-from solver.simulation.balance import imbalances, pressures_of_forces
-from solver.simulation.consistency import inconsistency
-from solver.simulation.geometry import check_geometry
-from solver.simulation.naming import body_infos
-from solver.simulation.options import LEAN, Options
-from solver.simulation.plan import decided, estimated, noted, strained
-from solver.simulation.problem import ContactProblem, Equilibrium
-from solver.simulation.recovery import Recovered, RecoveredZone, recovered
-from solver.simulation.resultants import resultants
-from solver.simulation.scene import Scene, ZoneScene, build_scene
-from solver.simulation.solution import (
+from ..case.model import Case
+from ..mechanics.fem.elasticity import largest_strain, nodal_stress
+from ..mechanics.fem.faces import nodal_normals
+from ..mechanics.fem.stress import normal_stress
+from ..mesh.catalogue import BY_NAME
+from ..system.clock import Clock, processor_time
+from ..system.errors import SolveError
+from ..system.memory import peak_mb
+from ..system.progress import OUTCOME
+from .balance import imbalances, pressures_of_forces
+from .consistency import inconsistency
+from .geometry import check_geometry
+from .naming import body_infos
+from .options import LEAN, Options
+from .plan import decided, estimated, noted, strained
+from .problem import ContactProblem, Equilibrium
+from .recovery import Recovered, RecoveredZone, recovered
+from .resultants import resultants
+from .scene import Scene, ZoneScene, build_scene
+from .solution import (
     Line,
     NodalContact,
     RecoveredPressure,
@@ -30,11 +34,7 @@ from solver.simulation.solution import (
     StepResult,
     ZoneResult,
 )
-from solver.simulation.unloaded import without_unloaded
-from solver.system.clock import Clock, processor_time
-from solver.system.errors import SolveError
-from solver.system.memory import peak_mb
-from solver.system.progress import OUTCOME
+from .unloaded import without_unloaded
 
 _LOG = logging.getLogger(__name__)
 # Half, but for round-off.

@@ -13,18 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..case import job_name
+
 if TYPE_CHECKING:
     import meshio
 
-    from solver.case.model import Case
-    from solver.mechanics.mortar.edge import Edges
-
-
-def job_name(
-    name: str, swapped: bool, hexahedra: str | None = None, recovery: str | None = None
-) -> str:
-    """The name of one solve of a case: direction and variant, where they are not the case's own."""
-    return "-".join(filter(None, [name, "swapped" * swapped, hexahedra, recovery]))
+    from ..case.model import Case
+    from ..mechanics.mortar.edge import Edges
 
 
 class Line(NamedTuple):
@@ -87,7 +82,7 @@ class RecoveredPressure:
 
     def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
         """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
-        from solver.mechanics.mortar.recovery import FORMS, Local
+        from ..mechanics.mortar.recovery import FORMS, Local
 
         local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
         psi = local.shapes(macro, places, FORMS[self.form])

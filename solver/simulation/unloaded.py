@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem.bodies import (
+from ..mechanics.fem.bodies import (
     joined_bodies,
     nodes_of_unknowns,
     rigid_motions,
     unheld_motion,
 )
-from solver.mechanics.fem.supports import FreeMotion
-from solver.simulation.scene import Rest, Scene
+from ..mechanics.fem.supports import FreeMotion
+from .scene import Rest, Scene
 
 
 def without_unloaded(scene: Scene) -> Scene:

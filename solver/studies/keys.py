@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from msgspec import Meta
 
-from solver.case.typed import ONCE
+from ..case.typed import ONCE
 
 Cut = Literal["pyramids", "hexahedra"]
 Recovered = Literal["none", "linear", "quadratic", "smooth", "automatic"]

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from markupsafe import Markup
 
-from solver.report.axes import Scale, draw_axes
-from solver.report.marks import draw_marks
-from solver.report.svg import MUTED, Drawing, Style
+from ..report.axes import Scale, draw_axes
+from ..report.marks import draw_marks
+from ..report.svg import MUTED, Drawing, Style
 
 SIZE, SMALL = (420, 330), (320, 270)
 Range = tuple[float, float]

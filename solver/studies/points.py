@@ -20,10 +20,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from solver.studies import FULL
-from solver.system.clock import now
-from solver.system.errors import InputError, SolveError, hint
-from solver.system.process import run_apart
+from ..system.clock import now
+from ..system.errors import InputError, SolveError, hint
+from ..system.process import run_apart
+from . import FULL
 
 SOLVED, REFUSED, FAILED, CRASHED, MISSING = "solved", "refused", "failed", "crashed", "missing"
 # A machine that was busier than this when a point began may have disturbed it.
@@ -126,7 +126,7 @@ def measure_apart(
 
 def _work(task: Mapping[str, Any]) -> None:
     """Do it in this process, and write what was found or why there is nothing."""
-    from solver.verification.verdict import to_json
+    from ..verification.verdict import to_json
 
     try:
         found = getattr(import_module(task["module"]), task["work"])(task["job"])

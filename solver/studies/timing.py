@@ -5,7 +5,7 @@ import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from solver.system.clock import Clock
+from ..system.clock import Clock
 
 TOTAL = "total"
 # By stage and `total`: wall and processor time of every repetition, seconds.

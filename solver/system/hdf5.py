@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 from h5py import h5d, h5g, h5l, h5o
 
-from solver.system.errors import InputError
+from .errors import InputError
 
 # Memory is asked for in pieces of this size (bytes).
 _PIECE = 1 << 20

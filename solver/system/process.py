@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
 
-from solver.system.clock import now, processor_time
-from solver.system.memory import peak_mb
+from .clock import now, processor_time
+from .memory import peak_mb
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """The variables that tell the libraries how many threads to use."""

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from logging.handlers import MemoryHandler
 from threading import Timer, get_ident
 
-from solver.system.package import PACKAGE
+from .package import PACKAGE
 
 OUTCOME = 25
 """The level of what a solve says of its course, between information and warnings."""

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from solver.system.package import PROJECT, in_project, project_version
+from .package import PROJECT, in_project, project_version
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "gmsh")
 _THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.case.model import Exact
-from solver.case.rules import ERRORS
-from solver.simulation.exact import ExactValues
-from solver.simulation.solution import Solution, ZoneResult
-from solver.verification import samples
-from solver.verification.verdict import CheckResult, Regression
+from ..case.model import Exact
+from ..case.rules import ERRORS
+from ..simulation.exact import ExactValues
+from ..simulation.solution import Solution, ZoneResult
+from . import samples
+from .verdict import CheckResult, Regression
 
 RELATIVE = 1e-3
 GAP = 2e-5

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.simulation.accuracy import Accuracy, beyond_small_strain
-from solver.simulation.solution import job_name
-from solver.verification.verdict import (
+from ..case import job_name
+from ..simulation.accuracy import Accuracy, beyond_small_strain
+from .verdict import (
     FAILED,
     PASSED,
     SOLVED,
@@ -25,8 +25,8 @@ from solver.verification.verdict import (
 )
 
 if TYPE_CHECKING:
-    from solver.case.model import Case
-    from solver.simulation.solution import Solution
+    from ..case.model import Case
+    from ..simulation.solution import Solution
 
 NOT_VERIFIED = "not verified: the case gives no reference"
 # What `Case.as_solved` is told.

@@ -31,17 +31,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from solver.case.solutions import ElasticSolution, ExactSolution
-from solver.case.solutions.base import lame_of
-from solver.case.solutions.hertz import Hertz
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.elasticity import physical_gradients
-from solver.mechanics.fem.faces import surface_points
-from solver.mechanics.fem.gauss import gauss_rule
-from solver.mesh.catalogue import cell_type
-from solver.simulation.exact import ExactValues, computed_pressure, deformable
-from solver.simulation.solution import Solution
-from solver.verification.oscillation import oscillation
+from ..case.solutions import ElasticSolution, ExactSolution
+from ..case.solutions.base import lame_of
+from ..case.solutions.hertz import Hertz
+from ..mechanics.fem import shape_functions
+from ..mechanics.fem.elasticity import physical_gradients
+from ..mechanics.fem.faces import surface_points
+from ..mechanics.fem.gauss import gauss_rule
+from ..mesh.catalogue import cell_type
+from ..simulation.exact import ExactValues, computed_pressure, deformable
+from ..simulation.solution import Solution
+from .oscillation import oscillation
 
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.
 _CHUNK = 1 << 17

@@ -7,9 +7,9 @@ what is linear on a regular grid. Places at the rim of the surface have none.
 
 import numpy as np
 
-from solver.case.solutions import ExactSolution
-from solver.mesh.catalogue import cell_type
-from solver.simulation.solution import NodalContact, ZoneResult
+from ..case.solutions import ExactSolution
+from ..mesh.catalogue import cell_type
+from ..simulation.solution import NodalContact, ZoneResult
 
 # Pairs of neighbours (k, 2), each once, and which places (m,) are at the rim.
 Neighbours = tuple[np.ndarray, np.ndarray]

@@ -13,11 +13,11 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from solver.simulation.solution import Solution
-from solver.system.errors import InputError
-from solver.system.files import write_text
-from solver.verification.checks import Accepted
-from solver.verification.verdict import CheckResult
+from ..simulation.solution import Solution
+from ..system.errors import InputError
+from ..system.files import write_text
+from .checks import Accepted
+from .verdict import CheckResult
 
 _KEYS = {"minimum", "maximum"}
 

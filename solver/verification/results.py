@@ -32,23 +32,23 @@ import h5py
 import meshio
 import numpy as np
 
-from solver.case.model import Case
-from solver.case.reader import parse_case
-from solver.mesh.catalogue import cell_type
-from solver.mesh.files.vtkhdf import check_name, read_grid, write_grid
-from solver.simulation.consistency import inconsistency
-from solver.simulation.solution import (
+from ..case.model import Case
+from ..case.reader import parse_case
+from ..mesh.catalogue import cell_type
+from ..mesh.files.vtkhdf import check_name, read_grid, write_grid
+from ..simulation.consistency import inconsistency
+from ..simulation.solution import (
     BodyInfo,
     Line,
     Solution,
     StepResult,
 )
-from solver.system.errors import InputError
-from solver.system.files import replacing, seal, seal_of
-from solver.system.hdf5 import column, new_file, read_file, read_table, write_table
-from solver.verification.units import label_fields
-from solver.verification.verdict import CheckResult
-from solver.verification.zones import read_zone, write_zone
+from ..system.errors import InputError
+from ..system.files import replacing, seal, seal_of
+from ..system.hdf5 import column, new_file, read_file, read_table, write_table
+from .units import label_fields
+from .verdict import CheckResult
+from .zones import read_zone, write_zone
 
 GRID = "VTKHDF"
 _SCALARS = (

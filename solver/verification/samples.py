@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from solver.case.expressions import evaluate
-from solver.mechanics.fem import shape_functions, volume_rule
-from solver.mechanics.fem.elasticity import lame_parameters, physical_gradients
-from solver.mechanics.fem.stress import COMPONENTS
-from solver.mesh.catalogue import cell_type
-from solver.simulation.exact import ExactValues, deformable
-from solver.simulation.groups import ALL
-from solver.simulation.solution import Solution, ZoneResult
-from solver.system.errors import InputError, hint
+from ..case.expressions import evaluate
+from ..mechanics.fem import shape_functions, volume_rule
+from ..mechanics.fem.elasticity import lame_parameters, physical_gradients
+from ..mechanics.fem.stress import COMPONENTS
+from ..mesh.catalogue import cell_type
+from ..simulation.exact import ExactValues, deformable
+from ..simulation.groups import ALL
+from ..simulation.solution import Solution, ZoneResult
+from ..system.errors import InputError, hint
 
 Reference = Any
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.

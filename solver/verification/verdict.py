@@ -18,8 +18,8 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from solver.system.errors import InputError
-from solver.system.files import seal_of, write_text
+from ..system.errors import InputError
+from ..system.files import seal_of, write_text
 
 PASSED, SOLVED, FAILED, UNRELIABLE = "passed", "solved", "failed", "unreliable"
 REFUSED, CRASHED = "refused", "crashed"

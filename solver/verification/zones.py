@@ -6,8 +6,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from solver.mechanics.mortar.edge import Edges
-from solver.simulation.solution import (
+from ..mechanics.mortar.edge import Edges
+from ..simulation.solution import (
     NodalContact,
     RecoveredPressure,
     Resultants,

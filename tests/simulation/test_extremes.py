@@ -1,14 +1,11 @@
 """Extremes that a plain implementation loses digits on: each holds, or is known to its floor."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from solver.case.reader import parse_case
 from solver.simulation.options import LEAN
 from solver.simulation.simulate import simulate
-from tests.scenes import block_case, block_mesh, with_points
+from tests.scenes import block_mesh, changed_case, turn, with_points
 
 MESHES = {2: ("TRIA6", "QUAD4", (6, 4)), 3: ("TETRA10", "HEXA8", (3, 2))}
 
@@ -24,20 +21,18 @@ def patch_solution(
     options=LEAN,
 ):
     """The patch test, supports by plane."""
-    text = block_case(dim).source
     materials = (
         f"{{bottom: {{young: {lower!r}, poisson: {poisson!r}}}, "
         f"top: {{young: {upper!r}, poisson: {poisson!r}}}}}"
     )
-    text = text.replace("{all: {young: 2000.0, poisson: 0.3}}", materials)
-    text = text.replace("pressure: 25.0", f"pressure: {pressure!r}")
-    for axis in "xyz":
-        text = text.replace(f"fix: [{axis}]", "fix: [normal]")
-    bottom, top, counts = MESHES[dim]
-    mesh = block_mesh(bottom, top, counts)
+    changes = (
+        ("{all: {young: 2000.0, poisson: 0.3}}", materials),
+        ("pressure: 25.0", f"pressure: {pressure!r}"),
+    )
+    mesh = block_mesh(*MESHES[dim])
     if move:
         mesh = with_points(mesh, move(mesh.points))
-    case = parse_case(text, Path("patch.yaml")).as_solved(swapped)
+    case = changed_case(dim, *changes, normal=True).as_solved(swapped)
     return simulate(case, mesh, options)
 
 
@@ -49,14 +44,6 @@ def patch_errors(dim, pressure=25.0, **scene):
         np.abs(zone.multiplier / pressure - 1).max(),
         np.abs(solution.nodal_normal_stress / pressure + 1).max(),
     )
-
-
-def turn(dim, angle):
-    if dim == 2:
-        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    axis = np.array([1.0, 2.0, 3.0]) / np.sqrt(14)
-    cross = np.cross(np.eye(3), axis)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 @pytest.mark.parametrize("swapped", [False, True])

@@ -1,16 +1,13 @@
 """Each cure against lost digits holds what it is there for, and without it the digits are gone."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from solver.case.reader import parse_case
 from solver.simulation.options import Options, Safeguards
 from solver.simulation.simulate import simulate
 from solver.verification.judge import judge
-from tests.scenes import block_case, block_mesh, errors, moved, with_points
-from tests.simulation.test_extremes import MESHES, patch_errors, patch_solution, turn
+from tests.scenes import block_case, block_mesh, changed_case, errors, moved, turn, with_points
+from tests.simulation.test_extremes import MESHES, patch_errors, patch_solution
 
 LONG = np.finfo(np.longdouble).eps < np.finfo(float).eps
 needs_extended = pytest.mark.skipif(not LONG, reason="extended precision is double precision here")
@@ -68,17 +65,12 @@ def test_without_closure_faces_that_are_no_parallelograms_break_the_patch_test()
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_without_local_coordinates_moments_are_lost_far_from_the_origin(dim):
-    text = block_case(dim).source
-    for axis in "xyz":
-        text = text.replace(f"fix: [{axis}]", "fix: [normal]")
+    case = changed_case(dim, normal=True)
     mesh = block_mesh(*MESHES[dim])
     # One sum of few terms may be exact by luck, three hardly.
     far = [with_points(mesh, mesh.points + 1e8 / part) for part in (3, 7, 11)]
     held, lost = (
-        max(
-            max(simulate(parse_case(text, Path("far.yaml")), m, options=options).balance.values())
-            for m in far
-        )
+        max(max(simulate(case, m, options=options).balance.values()) for m in far)
         for options in (Options(), without("local_coordinates"))
     )
     assert held < 1e-13

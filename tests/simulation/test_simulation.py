@@ -1,28 +1,17 @@
 """Contact beyond one patch: zones, starts, corners, and what must be refused by name."""
 
 import re
-from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 
-from solver.case.reader import parse_case
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME, cell_type
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError, SolveError
-from tests.scenes import block_case, block_mesh, errors, with_points
-
-
-def replaced(case_text_pairs, dim=2, **options):
-    """The patch case with parts of its text replaced."""
-    text = block_case(dim, **options).source
-    for old, new in case_text_pairs:
-        assert old in text
-        text = text.replace(old, new)
-    return parse_case(text, Path("patch.yaml"))
+from tests.scenes import block_case, block_mesh, changed_case, errors, turn, with_points
 
 
 def split_slave(mesh, apart=0.0):
@@ -37,11 +26,13 @@ def split_slave(mesh, apart=0.0):
     return mesh
 
 
-def moved(by):
+def moved(by, **options):
     """The upper block's top moved up instead of loaded."""
     base = "- {group: base, fix: [y]}"
     imposed = f"{base}\n  - {{group: press, fix: {{y: {by}}}}}"
-    return replaced([(base, imposed), ("loads:\n  - {group: press, pressure: 25.0}\n", "")])
+    return changed_case(
+        2, (base, imposed), ("loads:\n  - {group: press, pressure: 25.0}\n", ""), **options
+    )
 
 
 def test_both_starts_give_the_same_answer_where_the_bodies_are_held():
@@ -69,16 +60,7 @@ def test_pulled_apart_the_surfaces_open_and_carry_nothing():
 
 @pytest.mark.parametrize("overlap", [", interference: 0.01", ", clearance: -0.01"])
 def test_interference_presses_as_an_imposed_overlap_would(overlap):
-    case = replaced(
-        [
-            (
-                "- {group: base, fix: [y]}",
-                "- {group: base, fix: [y]}\n  - {group: press, fix: [y]}",
-            ),
-            ("loads:\n  - {group: press, pressure: 25.0}\n", ""),
-        ],
-        zone=overlap,
-    )
+    case = moved(0.0, zone=overlap)
     solution = simulate(case, block_mesh("TRIA6", "QUAD4", (4, 3)))
     pressure = solution.zones[0].multiplier
     assert pressure == pytest.approx(np.full(4, 0.005 * 2000 / (1 - 0.3**2)), rel=1e-12)
@@ -88,7 +70,7 @@ def test_a_clearance_stands_for_the_gap_as_meshed():
     """The mean of 0.01 x over each macro-element is its value at the centre."""
     mesh = block_mesh("QUAD4", "TRIA3", (4, 3))
     mesh.points[:, 0] += 7.0
-    case = replaced([], zone=", clearance: '0.01 * x', interference: 0.02")
+    case = block_case(2, zone=", clearance: '0.01 * x', interference: 0.02")
     zone = build_scene(case, mesh).zones[0]
     centre = 7.0 + (np.arange(4) + 0.5) / 4
     mean = zone.operator.initial / zone.operator.covered
@@ -100,7 +82,7 @@ def test_several_zones_carry_the_patch_together():
     both = "contact:\n  - {name: a, slave: left, master: top_contact}\n"
     both += "  - {name: b, slave: right, master: top_contact}\n"
     one = "contact:\n  - {name: interface, slave: bottom_contact, master: top_contact}\n"
-    shared = replaced([(one, both)], dim=3)
+    shared = changed_case(3, (one, both))
     with pytest.raises(InputError, match=r"contact\[1\].slave = 'right': 5 of its nodes are slave"):
         simulate(shared, mesh)
     # with two columns of faces left out between them, the zones share no node
@@ -180,7 +162,7 @@ def with_side(mesh, cells):
 )
 def test_refusals_name_what_is_wrong(change, message):
     with pytest.raises(InputError) as refusal:
-        simulate(replaced(change), block_mesh("QUAD4", "QUAD4", (4, 3)))
+        simulate(changed_case(2, *change), block_mesh("QUAD4", "QUAD4", (4, 3)))
     assert re.search(message, str(refusal.value)), str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert str(refusal.value).startswith("patch.yaml: ")
@@ -205,22 +187,15 @@ def test_a_face_inside_a_body_is_refused():
 
 
 def test_a_body_that_only_tension_could_hold_is_a_failed_solve():
-    case = replaced([("pressure: 25.0", "pressure: -25.0")])
+    case = changed_case(2, ("pressure: 25.0", "pressure: -25.0"))
     with pytest.raises(SolveError, match="nothing keeps top from a free motion"):
         simulate(case, block_mesh("QUAD4", "QUAD4", (4, 3)))
 
 
 def test_a_symmetry_plane_of_any_direction_holds_as_an_axis_does():
     mesh = block_mesh("HEXA8", "TETRA10")
-    axis = np.array([1.0, 2.0, 2.0]) / 3
-    angle = 0.7
-    cross = np.cross(np.eye(3), axis)
-    turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    case = replaced(
-        [(f"fix: [{a}]", "fix: [normal]") for a in "xyz"],
-        dim=3,
-    )
-    solution = simulate(case, with_points(mesh, mesh.points @ turn.T))
+    case = changed_case(3, normal=True)
+    solution = simulate(case, with_points(mesh, mesh.points @ turn(3, 0.7).T))
     assert solution.zones[0].multiplier == pytest.approx(np.full(9, 25.0), rel=1e-12)
     assert solution.nodal_normal_stress == pytest.approx(
         np.full(len(solution.stress), -25.0), rel=1e-11

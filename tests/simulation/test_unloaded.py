@@ -35,6 +35,7 @@ contact:
   - {name: near, slave: bottom_contact, master: top_contact}
   - {name: far, slave: bottom_contact_far, master: top_contact_far}
 """
+ALONE = "\n".join(line for line in SCENE.split("\n") if "far" not in line)
 
 
 def side_by_side(*meshes):
@@ -167,8 +168,7 @@ def test_a_case_without_any_load_is_solved_as_it_is(mesh):
 @pytest.mark.parametrize("cells", ["QUAD4", "TRIA6"])
 def test_a_rigid_body_has_no_stiffness_and_bears_its_load(cells):
     mesh = side_by_side(block_mesh("QUAD8", cells, (1, 3)))
-    text = "\n".join(line for line in SCENE.split("\n") if "far" not in line)
-    text = text.replace("materials: {all:", "bodies: {bottom: {rigid: true}}\nmaterials: {top:")
+    text = ALONE.replace("materials: {all:", "bodies: {bottom: {rigid: true}}\nmaterials: {top:")
     text = text.replace(
         "slave: bottom_contact, master: top_contact", "slave: top_contact, master: bottom_contact"
     )
@@ -190,8 +190,7 @@ def test_a_rigid_body_has_no_stiffness_and_bears_its_load(cells):
     ],
 )
 def test_a_displacement_given_to_a_rigid_body_is_refused(support, said):
-    text = "\n".join(line for line in SCENE.split("\n") if "far" not in line)
-    text = text.replace("materials:", "bodies: {bottom: {rigid: true}}\nmaterials:")
+    text = ALONE.replace("materials:", "bodies: {bottom: {rigid: true}}\nmaterials:")
     text = text.replace("slave: bottom_contact, master: top", "slave: top_contact, master: bottom")
     text = text.replace("loads:", f"  - {support}\nloads:").replace(
         "  - {group: base, fix: [y]}\n", ""
@@ -245,8 +244,7 @@ def test_a_group_keeps_its_factor_while_another_changes_its_status(mesh, monkeyp
 
 def test_groups_and_faces_that_the_case_does_not_name_are_left_behind():
     mesh = block_mesh("QUAD4", "TRIA3", (4, 3))
-    text = "\n".join(line for line in SCENE.split("\n") if "far" not in line)
-    case = parse_case(text, Path("beside.yaml"))
+    case = parse_case(ALONE, Path("beside.yaml"))
     found = simulate(case, mesh)
     lines = [line.what for line in found.plan if "left behind: " in line.what]
     named = {"base", "symx", "press", "bottom_contact", "top_contact"}

@@ -14,21 +14,21 @@ from dataclasses import MISSING, dataclass, fields
 from math import inf
 from typing import Any
 
-from solver.case.material import Material
-from solver.case.solutions.base import (
+from ...system.errors import InputError, hint
+from ..material import Material
+from .base import (
     ElasticSolution,
     ExactSolution,
     ParameterError,
     Part,
 )
-from solver.case.solutions.hertz import HertzApproach, HertzCylinder, HertzSphere
-from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
-from solver.case.solutions.nested import NestedCylinders, NestedSpheres
-from solver.case.solutions.oval import OvalCylinders
-from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
-from solver.case.solutions.uniform import Hydrostatic, UniformCompression
-from solver.case.solutions.waves import Waves2d, Waves3d
-from solver.system.errors import InputError, hint
+from .hertz import HertzApproach, HertzCylinder, HertzSphere
+from .manufactured import Parabola2d, Paraboloid3d
+from .nested import NestedCylinders, NestedSpheres
+from .oval import OvalCylinders
+from .polynomial import PolynomialPressure2d, PolynomialPressure3d
+from .uniform import Hydrostatic, UniformCompression
+from .waves import Waves2d, Waves3d
 
 __all__ = [
     "SOLUTIONS",

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from solver.case.material import Material
+from ..material import Material
 
 Part = np.ndarray | int | None
 

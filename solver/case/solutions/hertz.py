@@ -11,8 +11,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.material import Material
-from solver.case.solutions.base import ExactSolution, parameter
+from ..material import Material
+from .base import ExactSolution, parameter
 
 # The pressure has a vertical tangent at the end of the contact.
 _REGULAR = 0.8

@@ -19,8 +19,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.material import Material
-from solver.case.solutions.base import ElasticSolution, Part, parameter
+from ..material import Material
+from .base import ElasticSolution, Part, parameter
 
 _MIDDLE = 0.5
 

@@ -20,8 +20,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.solutions.base import Part, lame_of, parameter
-from solver.case.solutions.nested import NestedCylinders
+from .base import Part, lame_of, parameter
+from .nested import NestedCylinders
 
 
 @dataclass(frozen=True, kw_only=True)

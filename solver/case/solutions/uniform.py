@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.material import Material
-from solver.case.solutions.base import ElasticSolution, Part, parameter
+from ..material import Material
+from .base import ElasticSolution, Part, parameter
 
 _DIMENSION = "must be 2 (plane strain) or 3"
 

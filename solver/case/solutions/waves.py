@@ -22,8 +22,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.case.material import Material
-from solver.case.solutions.base import ElasticSolution, Part, lame_of, parameter
+from ..material import Material
+from .base import ElasticSolution, Part, lame_of, parameter
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem import shape_functions, volume_rule
-from solver.mechanics.fem.assembly import CellSum, degrees_of_freedom
-from solver.mechanics.fem.small_matrices import invert
-from solver.mesh.catalogue import CellType
-from solver.system.errors import SolveError
+from ...mesh.catalogue import CellType
+from ...system.errors import SolveError
+from . import shape_functions, volume_rule
+from .assembly import CellSum, degrees_of_freedom
+from .small_matrices import invert
 
 # Bytes of gradients handled at once: small enough to stay in the processor's cache.
 _CHUNK_BYTES = 1 << 20

@@ -8,7 +8,7 @@ import numpy as np
 from skfem.element.element_h1 import ElementH1
 from skfem.refdom import RefHex, RefWedge
 
-from solver.mesh.catalogue import BY_NAME
+from ...mesh.catalogue import BY_NAME
 
 
 class _NodeElement(ElementH1):

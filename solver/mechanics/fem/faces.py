@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import meshio
 import numpy as np
 
-from solver.mechanics.fem import face_rule, shape_functions
-from solver.mechanics.fem.gauss import gauss_rule
-from solver.mesh.catalogue import BY_MESHIO, CellType, cell_type
+from ...mesh.catalogue import BY_MESHIO, CellType, cell_type
+from . import face_rule, shape_functions
+from .gauss import gauss_rule
 
 # Points each way on a face: enough for pressures that end with a vertical tangent.
 FACE_POINTS = 8

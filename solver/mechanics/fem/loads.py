@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solver.mechanics.fem import face_rule, shape_functions, volume_rule
-from solver.mechanics.fem.faces import area_vectors
-from solver.mechanics.fem.small_matrices import invert
-from solver.mechanics.fem.stress import traction
-from solver.system.errors import SolveError
+from ...system.errors import SolveError
+from . import face_rule, shape_functions, volume_rule
+from .faces import area_vectors
+from .small_matrices import invert
+from .stress import traction
 
 # A value of position: points (n, dim) to values (n,) or (n, dim).
 Field = Callable[[np.ndarray], np.ndarray]

@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.assembly import degrees_of_freedom
-from solver.mechanics.fem.elasticity import Block, physical_gradients
+from . import shape_functions
+from .assembly import degrees_of_freedom
+from .elasticity import Block, physical_gradients
 
 AUTOMATIC_ABOVE = 0.499
 """Poisson's ratio above which the mixed form is taken where a case does not choose."""

@@ -13,7 +13,7 @@ from scipy.special import roots_jacobi
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefTet, RefTri
 
-from solver.mesh.catalogue import BY_NAME
+from ...mesh.catalogue import BY_NAME
 
 Rule = tuple[np.ndarray, np.ndarray]
 

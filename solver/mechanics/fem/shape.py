@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME, CellType
+from ...mesh.catalogue import BY_NAME, CellType
 
 # Mid-edge nodes off the middle by less than this share of the edge make no bent edge.
 _STRAIGHT = 1e-9
@@ -121,7 +121,7 @@ def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
     from skfem import element
 
     if name in ("PENTA15", "PYRA5", "PYRA13"):
-        from solver.mechanics.fem.extra_elements import ElementPyramid, ElementWedgeS2
+        from .extra_elements import ElementPyramid, ElementWedgeS2
 
         return ElementWedgeS2() if name == "PENTA15" else ElementPyramid(name)
     makers = {

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags
 
-from solver.mechanics.linear import pardiso
+from . import pardiso
 
 Solve = Callable[[np.ndarray], np.ndarray]
 

@@ -5,12 +5,12 @@ import logging
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from solver.mechanics.linear.backends import BACKENDS
-from solver.mechanics.linear.condensed_matrix import Symmetric
-from solver.mechanics.linear.direct import Factor, factorise, wanted
-from solver.mechanics.linear.krylov import EPSILON
-from solver.mechanics.linear.multigrid import Multigrid, Unknowns
-from solver.system.errors import SolveError
+from ...system.errors import SolveError
+from .backends import BACKENDS
+from .condensed_matrix import Symmetric
+from .direct import Factor, factorise, wanted
+from .krylov import EPSILON
+from .multigrid import Multigrid, Unknowns
 
 _LOG = logging.getLogger(__name__)
 

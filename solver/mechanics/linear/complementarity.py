@@ -10,7 +10,7 @@ Problems, §23.3 (there for W = AᵀA).
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from solver.system.errors import SolveError
+from ...system.errors import SolveError
 
 # Added to the scaled diagonal of one: motions that nothing resists stay finite. The next ones serve
 # where W as given is not semidefinite.

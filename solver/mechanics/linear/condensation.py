@@ -12,12 +12,12 @@ from typing import Protocol, Self, TypeVar
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.linear.choice import LinearSolver, prepare
-from solver.mechanics.linear.condensed_matrix import CondensedMatrix, Symmetric
-from solver.mechanics.linear.direct import Factor, factorise_indefinite
-from solver.mechanics.linear.krylov import EPSILON, ROUGH
-from solver.mechanics.linear.multigrid import Unknowns
-from solver.system.errors import SolveError
+from ...system.errors import SolveError
+from .choice import LinearSolver, prepare
+from .condensed_matrix import CondensedMatrix, Symmetric
+from .direct import Factor, factorise_indefinite
+from .krylov import EPSILON, ROUGH
+from .multigrid import Unknowns
 
 _LOG = logging.getLogger(__name__)
 

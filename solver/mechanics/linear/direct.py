@@ -19,9 +19,9 @@ from typing import Self
 import numpy as np
 from scipy.sparse import csr_matrix, sparray, spmatrix
 
-from solver.mechanics.linear.backends import BACKENDS, Backend, BreakdownError, Solve
-from solver.mechanics.linear.krylov import EPSILON, conjugate_gradients, in_single
-from solver.system.errors import SolveError
+from ...system.errors import SolveError
+from .backends import BACKENDS, Backend, BreakdownError, Solve
+from .krylov import EPSILON, conjugate_gradients, in_single
 
 LIGHT = 150_000
 """Stored entries up to which CHOLMOD takes least processor time in 3D (in 2D it always does)."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solver.system.errors import SolveError
+from ...system.errors import SolveError
 
 _LOG = logging.getLogger(__name__)
 _TOLD = 10  # iterations from one line of the log to the next

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import bsr_matrix, csr_matrix
 
-from solver.mechanics.linear.condensed_matrix import Symmetric
-from solver.mechanics.linear.krylov import EPSILON, conjugate_gradients, in_single
-from solver.system.errors import SolveError
+from ...system.errors import SolveError
+from .condensed_matrix import Symmetric
+from .krylov import EPSILON, conjugate_gradients, in_single
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""

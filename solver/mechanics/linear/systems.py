@@ -10,18 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem.bodies import joined_bodies
-from solver.mechanics.linear.choice import LinearSolver, against_condensation
-from solver.mechanics.linear.condensation import (
+from ...system.errors import SolveError
+from ..fem.bodies import joined_bodies
+from .choice import LinearSolver, against_condensation
+from .condensation import (
     CondensedSystem,
     ConstrainedSystem,
     condense,
     saddle_point,
 )
-from solver.mechanics.linear.direct import Factor
-from solver.mechanics.linear.krylov import EPSILON
-from solver.mechanics.linear.multigrid import Unknowns
-from solver.system.errors import SolveError
+from .direct import Factor
+from .krylov import EPSILON
+from .multigrid import Unknowns
 
 _NOTHING_OWN = "constraints without an unknown of their own leave a saddle point"
 

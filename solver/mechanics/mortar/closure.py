@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.mechanics.fem import face_rule, shape_functions
-from solver.mechanics.mortar.facets import Facets, surface_vectors
-from solver.mechanics.mortar.multipliers import Multipliers
-from solver.mechanics.mortar.segments import Segments
+from ..fem import face_rule, shape_functions
+from .facets import Facets, surface_vectors
+from .multipliers import Multipliers
+from .segments import Segments
 
 # A face counts as fully covered when the segments miss less than this share of its area.
 _FULL = 1e-11

@@ -15,9 +15,9 @@ from itertools import compress
 
 import numpy as np
 
-from solver.mechanics.fem import has_straight_edges, shape_functions
-from solver.mechanics.fem.faces import FaceBlock
-from solver.mesh.catalogue import BY_NAME, CellType, cell_type
+from ...mesh.catalogue import BY_NAME, CellType, cell_type
+from ..fem import has_straight_edges, shape_functions
+from ..fem.faces import FaceBlock
 
 # Faces without a node strictly inside, and TRIA6 and QUAD8, whose inner nodes are on the rim.
 CUT_FACES = ("SEG2", "TRIA3", "TRIA6", "QUAD4", "QUAD8")

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.faces import area_vectors, nodal_normals
-from solver.mechanics.fem.small_matrices import invert
-from solver.mesh.catalogue import CellType
-from solver.system.errors import SolveError
+from ...mesh.catalogue import CellType
+from ...system.errors import SolveError
+from ..fem import shape_functions
+from ..fem.faces import area_vectors, nodal_normals
+from ..fem.small_matrices import invert
 
 # Below these shares of a face's size, its bending and the skew of its map are round-off.
 FLAT = 1e-9

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.mortar.operator import GapOperator
+from .operator import GapOperator
 
 # A node is held along its normal where less than this share of a motion that way is free.
 _HELD = 1e-12

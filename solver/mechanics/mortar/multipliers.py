@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.mortar.facets import Facets
-from solver.mechanics.mortar.segments import Segments
-from solver.mechanics.mortar.surface_points import Samples
+from .facets import Facets
+from .segments import Segments
+from .surface_points import Samples
 
 Intersections = Sequence[Segments]
 """Between all pairs of blocks of a slave and a master surface."""

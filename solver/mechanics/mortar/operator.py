@@ -11,18 +11,18 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem import mortar_degree
-from solver.mechanics.mortar.closure import MASTER, SLAVE, Integrals, close_faces, integrals
-from solver.mechanics.mortar.facets import Facets
-from solver.mechanics.mortar.multipliers import (
+from ..fem import mortar_degree
+from .closure import MASTER, SLAVE, Integrals, close_faces, integrals
+from .facets import Facets
+from .multipliers import (
     InterfaceData,
     Multipliers,
     Space,
     constants,
 )
-from solver.mechanics.mortar.recovery import Asked, Recovery, recovery
-from solver.mechanics.mortar.segments import Segments, intersect
-from solver.mechanics.mortar.surface_points import Samples, Surface, face_samples
+from .recovery import Asked, Recovery, recovery
+from .segments import Segments, intersect
+from .surface_points import Samples, Surface, face_samples
 
 # Slave-side entries of dual multipliers below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13

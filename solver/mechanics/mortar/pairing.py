@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solver.mechanics.mortar.clipping import clip, triangles
-from solver.mechanics.mortar.facets import Facets
-from solver.mesh.catalogue import CellType
+from ...mesh.catalogue import CellType
+from .clipping import clip, triangles
+from .facets import Facets
 
 # Master faces overlap, one behind the other, by more than this share of the slave face's radius.
 _OVERLAP = 1e-9

@@ -16,15 +16,15 @@ from typing import Self
 
 import numpy as np
 
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.faces import nodal_normals
-from solver.mechanics.fem.gauss import gauss_rule
-from solver.mechanics.mortar.facets import Facets, project_along
-from solver.mechanics.mortar.multipliers import InterfaceData, Multipliers, of_nodes
-from solver.mechanics.mortar.pairing import facing_pairs
-from solver.mechanics.mortar.segments import Segments, Side
-from solver.mechanics.mortar.surface_points import Samples, face_samples, sampled
-from solver.mesh.catalogue import CellType
+from ...mesh.catalogue import CellType
+from ..fem import shape_functions
+from ..fem.faces import nodal_normals
+from ..fem.gauss import gauss_rule
+from .facets import Facets, project_along
+from .multipliers import InterfaceData, Multipliers, of_nodes
+from .pairing import facing_pairs
+from .segments import Segments, Side
+from .surface_points import Samples, face_samples, sampled
 
 Among = Sequence[np.ndarray] | None
 # A point this far outside a face, in parts of its reference face, is on its edge.

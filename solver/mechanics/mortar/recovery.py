@@ -24,9 +24,9 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.mortar.facets import tangents_of
-from solver.mechanics.mortar.segments import Segments
-from solver.mechanics.mortar.surface_points import Surface
+from .facets import tangents_of
+from .segments import Segments
+from .surface_points import Surface
 
 # A macro-element covered by less than this share of its area is no neighbour: its mean is of
 # little use to others.

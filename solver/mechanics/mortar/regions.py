@@ -13,9 +13,9 @@ from typing import Self
 
 import numpy as np
 
-from solver.mechanics.fem import simplex_rule
-from solver.mechanics.fem.gauss import gauss_rule
-from solver.mechanics.mortar.clipping import triangles
+from ..fem import simplex_rule
+from ..fem.gauss import gauss_rule
+from .clipping import triangles
 
 # Edges whose middle is off the chord by less than this share of it are straight.
 _BENT = 1e-13

@@ -18,17 +18,17 @@ from typing import Self
 
 import numpy as np
 
-from solver.mechanics.fem import mortar_degree, shape_functions, simplex_rule
-from solver.mechanics.mortar.clipping import clip, overlap
-from solver.mechanics.mortar.facets import Facets, project_along
-from solver.mechanics.mortar.pairing import (
+from ..fem import mortar_degree, shape_functions, simplex_rule
+from .clipping import clip, overlap
+from .facets import Facets, project_along
+from .pairing import (
     Outlines,
     Pairs,
     face_pairs,
     hidden_pairs,
     seen_along,
 )
-from solver.mechanics.mortar.regions import (
+from .regions import (
     Parts,
     Pieces,
     Regions,

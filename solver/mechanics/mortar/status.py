@@ -18,8 +18,8 @@ from itertools import count
 
 import numpy as np
 
-from solver.mechanics.linear.complementarity import complementary
-from solver.system.errors import SolveError
+from ...system.errors import SolveError
+from ..linear.complementarity import complementary
 
 _LOG = logging.getLogger(__name__)
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.mechanics.fem import face_rule, shape_functions
-from solver.mechanics.fem.quadrature import Rule
-from solver.mechanics.mortar.facets import Facets, surface_vectors
+from ..fem import face_rule, shape_functions
+from ..fem.quadrature import Rule
+from .facets import Facets, surface_vectors
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-from solver.mechanics.mortar.nodal import dual, linear
-from solver.mechanics.mortar.operator import LAC, Scheme, meet_in_segments
-from solver.mechanics.mortar.points import at_nodes, gauss, meet_at_points, one_each
+from .nodal import dual, linear
+from .operator import LAC, Scheme, meet_in_segments
+from .points import at_nodes, gauss, meet_at_points, one_each
 
 DEFAULT_POINTS = 4
 # Slave nodes at the end of a bent surface may look past the master's by this part of a face.

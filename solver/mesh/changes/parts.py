@@ -3,8 +3,8 @@
 import meshio
 import numpy as np
 
-from solver.mesh.changes.perturb import stepped
-from solver.mesh.keys import Keys
+from ..keys import Keys
+from .perturb import stepped
 
 
 def cells_of(mesh: meshio.Mesh, keys: Keys, key: str) -> list[np.ndarray]:

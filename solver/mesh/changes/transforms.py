@@ -20,10 +20,10 @@ from typing import Any
 import meshio
 import numpy as np
 
-from solver.mesh.changes import parts
-from solver.mesh.changes.perturb import perturbed
-from solver.mesh.keys import LARGEST, Keys
-from solver.system.errors import InputError
+from ...system.errors import InputError
+from ..keys import LARGEST, Keys
+from . import parts
+from .perturb import perturbed
 
 
 def transform(mesh: meshio.Mesh, spec: Mapping[str, Any], where: str) -> meshio.Mesh:

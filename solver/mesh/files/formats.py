@@ -14,9 +14,9 @@ from pathlib import Path
 
 import meshio
 
-from solver.mesh.files.apart import read_apart, read_here
-from solver.mesh.tidy import tidy
-from solver.system.errors import InputError
+from ...system.errors import InputError
+from ..tidy import tidy
+from .apart import read_apart, read_here
 
 # Modules with a function `read(path)` that gives the mesh as it stands in the file.
 _READERS = {

@@ -9,9 +9,9 @@ import h5py
 import meshio
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME
-from solver.system.errors import InputError
-from solver.system.hdf5 import read_file
+from ...system.errors import InputError
+from ...system.hdf5 import read_file
+from ..catalogue import BY_NAME
 
 _TYPES = {
     "SE2": "SEG2", "SE3": "SEG3", "TR3": "TRIA3", "TR6": "TRIA6",

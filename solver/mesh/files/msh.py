@@ -5,9 +5,9 @@ from pathlib import Path
 import gmsh
 import meshio
 
-from solver.mesh.catalogue import BY_NAME
-from solver.mesh.recipes.gmsh_session import current_model, foreign_types, session
-from solver.system.errors import InputError
+from ...system.errors import InputError
+from ..catalogue import BY_NAME
+from ..recipes.gmsh_session import current_model, foreign_types, session
 
 
 def read(path: Path) -> meshio.Mesh:

@@ -6,8 +6,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME
-from solver.system.errors import InputError
+from ...system.errors import InputError
+from ..catalogue import BY_NAME
 
 _COMPRESSORS = ("vtkZLibDataCompressor", "vtkLZMADataCompressor")
 

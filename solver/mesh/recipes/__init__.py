@@ -9,9 +9,9 @@ from typing import Any
 
 import meshio
 
-from solver.mesh.keys import Keys
-from solver.mesh.tidy import tidy
-from solver.system.errors import InputError
+from ...system.errors import InputError
+from ..keys import Keys
+from ..tidy import tidy
 
 _RECIPES = {
     "blocks": ".blocks:blocks",

@@ -26,10 +26,10 @@ import gmsh
 import meshio
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME, CellType
-from solver.mesh.keys import Keys
-from solver.mesh.recipes.gmsh_session import current_model, session
-from solver.mesh.recipes.sides import side_name
+from ..catalogue import BY_NAME, CellType
+from ..keys import Keys
+from .gmsh_session import current_model, session
+from .sides import side_name
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
 _ALGORITHMS = {"frontal": 6, "delaunay": 5, "meshadapt": 1}
@@ -60,7 +60,7 @@ def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys, refine: int)
     if name == "bottom":
         origin[-1] = -size[-1]
     if cell.name.startswith(("PENTA", "PYRA")):
-        from solver.mesh.recipes.hybrid import cube
+        from .hybrid import cube
 
         return cube(name, cell, origin, size, keys, refine)
     return _Block(name, cell, origin, size, keys, refine).mesh()

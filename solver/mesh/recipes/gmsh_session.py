@@ -9,7 +9,7 @@ import gmsh
 import meshio
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME
+from ..catalogue import BY_NAME
 
 # gmsh's own number of each cell type.
 _NUMBERS = {

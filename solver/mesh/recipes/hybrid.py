@@ -18,10 +18,10 @@ import gmsh
 import meshio
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME, CellType
-from solver.mesh.keys import Keys
-from solver.mesh.recipes.gmsh_session import current_model, number_of, session
-from solver.mesh.recipes.sides import side_name
+from ..catalogue import BY_NAME, CellType
+from ..keys import Keys
+from .gmsh_session import current_model, number_of, session
+from .sides import side_name
 
 _CUBE = BY_NAME["HEXA8"]
 _STANDING = [(0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)]

@@ -36,9 +36,9 @@ import meshio
 import numpy as np
 from scipy.optimize import brentq
 
-from solver.mesh.catalogue import cell_type
-from solver.mesh.keys import Keys
-from solver.mesh.recipes.blocks import stacked
+from ..catalogue import cell_type
+from ..keys import Keys
+from .blocks import stacked
 
 # Nodes as near as this share of the side to the place where it is divided lie on it.
 _ON = 1e-9

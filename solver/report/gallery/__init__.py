@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from solver.report.rows import Row
+from ..rows import Row
 
 PAGE, FOLDER = "gallery.html", "gallery"
 
@@ -32,10 +32,10 @@ def write_gallery(
     By PyVista, unless `plain` or it cannot draw here; the page says which, and why. A picture that
     is newer than its result and the drawing stays.
     """
-    from solver.report.gallery.probe import set_up
-    from solver.report.html import TEMPLATES, render
-    from solver.report.rows import families, read_rows
-    from solver.system.files import write_text
+    from ...system.files import write_text
+    from ..html import TEMPLATES, render
+    from ..rows import families, read_rows
+    from .probe import set_up
 
     reason = "asked for" if plain else set_up()
     log(f"Drawing {'without OpenGL: ' + reason if reason else 'by PyVista'}.")
@@ -61,18 +61,18 @@ def _drawing(plain: bool) -> tuple[Draw, str]:
     """What draws a result into a file, and the ending of these files."""
     if plain:
         return _draw_plain, "-plain.svg"
-    from solver.report.gallery.drawing import draw
+    from .drawing import draw
 
     return draw, ".png"
 
 
 def _draw_plain(result: Path, target: Path) -> None:
     """The report's own drawing with the bodies deformed, as SVG."""
-    from solver.report.layout import magnification
-    from solver.report.plane import draw_plane
-    from solver.report.space import draw_space
-    from solver.system.files import write_text
-    from solver.verification.results import read_result
+    from ...system.files import write_text
+    from ...verification.results import read_result
+    from ..layout import magnification
+    from ..plane import draw_plane
+    from ..space import draw_space
 
     solution = read_result(result).solution
     factor = magnification(solution.displacement, solution.length)
@@ -82,7 +82,7 @@ def _draw_plain(result: Path, target: Path) -> None:
 
 
 def _picture(row: Row, folder: Path, draw: Draw, ending: str) -> Picture:
-    from solver.report.pictures import is_current
+    from ..pictures import is_current
 
     if row.result_file is None:
         return Picture(row, "", f"no picture: {row.why or 'no result'}")

@@ -9,11 +9,11 @@ import pyvista
 from matplotlib.colors import LinearSegmentedColormap
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from solver.report.gallery.shapes import Shape
-from solver.report.space import PRESSURE
-from solver.report.svg import BLUE, INK, MUTED, ORANGE, PAPER, mixed
-from solver.system.files import replacing
-from solver.verification.units import with_unit
+from ...system.files import replacing
+from ...verification.units import with_unit
+from ..space import PRESSURE
+from ..svg import BLUE, INK, MUTED, ORANGE, PAPER, mixed
+from .shapes import Shape
 
 WIDTH, HEIGHT = 1560, 600
 # From little to much, light to dark, as far from the blues of pressure as can be.

@@ -8,10 +8,10 @@ from typing import Any
 import meshio
 import numpy as np
 
-from solver.mesh.catalogue import BY_NAME, cell_type
-from solver.report.geometry import boundary_faces, macro_edges, normals, outlines
-from solver.report.layout import magnification
-from solver.report.space import AZIMUTH, ELEVATION
+from ...mesh.catalogue import BY_NAME, cell_type
+from ..geometry import boundary_faces, macro_edges, normals, outlines
+from ..layout import magnification
+from ..space import AZIMUTH, ELEVATION
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
 # The highest bar, as a share of the size of what is pressed.

@@ -16,12 +16,12 @@ from tempfile import TemporaryDirectory
 import meshio
 import numpy as np
 
-from solver.case.model import Case, Zone
-from solver.mechanics.fem.faces import boundary_faces, volume_cells
-from solver.mesh.catalogue import BY_MESHIO, BY_NAME, CellType
-from solver.mesh.files.abaqus import FACES
-from solver.system.errors import SolveError
-from solver.system.process import Ended, cores_for, run_apart
+from ...case.model import Case, Zone
+from ...mechanics.fem.faces import boundary_faces, volume_cells
+from ...mesh.catalogue import BY_MESHIO, BY_NAME, CellType
+from ...mesh.files.abaqus import FACES
+from ...system.errors import SolveError
+from ...system.process import Ended, cores_for, run_apart
 
 PROGRAM = "ccx"
 # Cells whose nodes have the same order here and there.

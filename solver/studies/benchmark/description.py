@@ -29,12 +29,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from solver.case.typed import Section, Text, read_as
-from solver.case.yaml import read_mapping
-from solver.studies import QUICK
-from solver.studies.keys import Count, Seconds, Unknowns
-from solver.studies.scaling.description import ScalingPoint, read_scaling
-from solver.system.errors import InputError, hint
+from ...case.typed import Section, Text, read_as
+from ...case.yaml import read_mapping
+from ...system.errors import InputError, hint
+from .. import QUICK
+from ..keys import Count, Seconds, Unknowns
+from ..scaling.description import ScalingPoint, read_scaling
 
 
 class Way(Section, frozen=True):

@@ -3,7 +3,7 @@
 import statistics
 from collections.abc import Iterator, Sequence
 
-from solver.studies.points import SOLVED, Record
+from ..points import SOLVED, Record
 
 # A title and rows; a row has a name and numbers, or a reason in place of these.
 TextTable = tuple[str, list[list[str]]]

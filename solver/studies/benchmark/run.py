@@ -7,14 +7,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from solver.studies.benchmark import calculix, ways
-from solver.studies.benchmark.description import Benchmark, WarmBatch, Way, WayComparison
-from solver.studies.points import FAILED, MISSING, SOLVED, ended, measure_apart, surroundings
-from solver.studies.scaling.description import ScalingPoint
-from solver.system.clock import now
-from solver.system.errors import SolveError
-from solver.system.package import COMMAND
-from solver.system.process import cores_for, run_apart
+from ...system.clock import now
+from ...system.errors import SolveError
+from ...system.package import COMMAND
+from ...system.process import cores_for, run_apart
+from ..points import FAILED, MISSING, SOLVED, ended, measure_apart, surroundings
+from ..scaling.description import ScalingPoint
+from . import calculix, ways
+from .description import Benchmark, WarmBatch, Way, WayComparison
 
 Record = dict[str, Any]
 Log = Callable[[str], Any]
@@ -65,7 +65,7 @@ def run_benchmark(benchmark: Benchmark, log: Log) -> Record:
 
     Raises SolveError where a mesh cannot be made.
     """
-    from solver.system.provenance import gather
+    from ...system.provenance import gather
 
     started = now()
     with bench(benchmark) as place:
@@ -123,7 +123,7 @@ def _solve(place: Bench, comparison: WayComparison, way: Way, case: Path, mesh: 
 
 def _other(place: Bench, point: ScalingPoint, mesh: Path) -> Record:
     """The same problem on the same mesh by CalculiX, where it is installed."""
-    from solver.mesh import read_mesh
+    from ...mesh import read_mesh
 
     if not calculix.version():
         return ended(MISSING, f"{calculix.PROGRAM} is not installed")

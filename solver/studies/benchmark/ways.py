@@ -5,19 +5,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from solver.system.clock import Clock, now, processor_time
-from solver.system.process import used_since
+from ...system.clock import Clock, now, processor_time
+from ...system.process import used_since
 
 
 def solve(job: Mapping[str, Any]) -> dict[str, Any]:
     """One mesh solved in one way: the process up to the first solve's end, and warm repetitions."""
-    from solver.case.reader import load_case
-    from solver.mechanics.linear.direct import force_solver
-    from solver.mesh import read_mesh
-    from solver.simulation.options import Options, Safeguards, Shortcuts
-    from solver.simulation.simulate import simulate
-    from solver.studies.timing import repeated
-    from solver.verification.norms import errors
+    from ...case.reader import load_case
+    from ...mechanics.linear.direct import force_solver
+    from ...mesh import read_mesh
+    from ...simulation.options import Options, Safeguards, Shortcuts
+    from ...simulation.simulate import simulate
+    from ...verification.norms import errors
+    from ..timing import repeated
 
     case = load_case(Path(job["case"]))
     zones = tuple(replace(zone, treatment=job["treatment"]) for zone in case.zones)
@@ -50,8 +50,8 @@ def solve(job: Mapping[str, Any]) -> dict[str, Any]:
 
 def batch(job: Mapping[str, Any]) -> dict[str, Any]:
     """Cases from mesh file to verdict one after the other, twice: the second time all is warm."""
-    from solver.verification.run import Job
-    from solver.verification.run import solve as solve_job
+    from ...verification.run import Job
+    from ...verification.run import solve as solve_job
 
     folder, passes = Path(job["folder"]), []
     for _ in range(2):
@@ -65,6 +65,6 @@ def batch(job: Mapping[str, Any]) -> dict[str, Any]:
 
 def _without_mkl() -> None:
     """As where MKL is not installed."""
-    from solver.mechanics.linear.backends import BACKENDS
+    from ...mechanics.linear.backends import BACKENDS
 
     BACKENDS["pardiso"] = replace(BACKENDS["pardiso"], available=lambda: False)

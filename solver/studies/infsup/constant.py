@@ -10,11 +10,11 @@ Comput. Struct. 79 (2001) 1473–1486.
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.assembly import CellSum
-from solver.mechanics.fem.elasticity import Block, physical_gradients, stiffness
-from solver.mechanics.linear.direct import factorise
-from solver.simulation.scene import Scene
+from ...mechanics.fem import shape_functions
+from ...mechanics.fem.assembly import CellSum
+from ...mechanics.fem.elasticity import Block, physical_gradients, stiffness
+from ...mechanics.linear.direct import factorise
+from ...simulation.scene import Scene
 
 
 def inf_sup_constant(scene: Scene) -> float:

@@ -24,11 +24,11 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from solver.case.typed import Section, read_as
-from solver.case.yaml import read_mapping
-from solver.mesh.catalogue import BY_NAME
-from solver.studies.fits import fit_power
-from solver.studies.keys import Cell
+from ...case.typed import Section, read_as
+from ...case.yaml import read_mapping
+from ...mesh.catalogue import BY_NAME
+from ..fits import fit_power
+from ..keys import Cell
 
 LEVEL = 0.4
 """β_h falls with the size of the faces to this power at most."""
@@ -79,7 +79,7 @@ class InfSupLadder:
         """How the cells are cut, in a word."""
         if not self.cut:
             return "uncut"
-        return self.hexahedra or ("yes" if self.needs_cut else "needs none")
+        return self.hexahedra or ("yes" if self.needs_cut else "not needed")
 
     @property
     def verdict(self) -> str:

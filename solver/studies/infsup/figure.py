@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from solver.mesh.catalogue import BY_NAME
-from solver.report.axes import Scale, draw_axes
-from solver.report.marks import look_of
-from solver.report.svg import INK, MUTED, ORANGE, Drawing
-from solver.studies.infsup.description import InfSupLadder
-from solver.studies.infsup.half_loaded import CELLS, PressureProfile
-from solver.studies.plots import PlotLine, draw_lines
+from ...mesh.catalogue import BY_NAME
+from ...report.axes import Scale, draw_axes
+from ...report.marks import look_of
+from ...report.svg import INK, MUTED, ORANGE, Drawing
+from ..plots import PlotLine, draw_lines
+from .description import InfSupLadder
+from .half_loaded import CELLS, PressureProfile
 
 WIDTH = 400
 # β_h below is drawn at the foot of the plot.

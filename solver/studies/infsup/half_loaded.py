@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.case.reader import parse_case
-from solver.mesh import generate
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import build_scene
+from ...case.reader import parse_case
+from ...mesh import generate
+from ...simulation.problem import ContactProblem
+from ...simulation.scene import build_scene
 
 PRESSURE, FACES, COARSER = 25.0, 64, 4
 CELLS = {"TRIA3": True, "QUAD4": True, "TRIA6": False, "QUAD8": False, "QUAD9": False}

@@ -9,13 +9,13 @@ from typing import Any
 
 from markupsafe import Markup
 
-from solver.report.html import render
-from solver.report.tables import as_csv
-from solver.studies.infsup.description import LEVEL, InfSupLadder
-from solver.studies.infsup.figure import draw_constants, draw_key, draw_profiles
-from solver.studies.infsup.half_loaded import COARSER
-from solver.studies.infsup.records import OSCILLATION, InfSupRecord, failures
-from solver.system.files import write_text
+from ...report.html import render
+from ...report.tables import as_csv
+from ...system.files import write_text
+from .description import LEVEL, InfSupLadder
+from .figure import draw_constants, draw_key, draw_profiles
+from .half_loaded import COARSER
+from .records import OSCILLATION, InfSupRecord, failures
 
 PAGE, TABLE, FAILURES = "infsup.html", "infsup.csv", "infsup-failures.txt"
 

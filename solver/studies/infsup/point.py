@@ -8,15 +8,15 @@ from typing import Any
 
 import meshio
 
-from solver.case.reader import parse_case
-from solver.mesh import generate
-from solver.mesh.catalogue import BY_NAME
-from solver.simulation.scene import build_scene
-from solver.studies.infsup.constant import inf_sup_constant
-from solver.studies.infsup.description import InfSupLadder, read_ladders
-from solver.studies.infsup.half_loaded import FACES, profiles
-from solver.studies.infsup.records import write_record
-from solver.system.errors import InputError, SolveError
+from ...case.reader import parse_case
+from ...mesh import generate
+from ...mesh.catalogue import BY_NAME
+from ...simulation.scene import build_scene
+from ...system.errors import InputError, SolveError
+from .constant import inf_sup_constant
+from .description import InfSupLadder, read_ladders
+from .half_loaded import FACES, profiles
+from .records import write_record
 
 
 def measure(description: Path, output: Path, quick: bool, log: Callable[[str], Any]) -> None:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from solver.studies.infsup.description import InfSupLadder
-from solver.studies.infsup.half_loaded import PressureProfile
-from solver.system.files import write_text
+from ...system.files import write_text
+from .description import InfSupLadder
+from .half_loaded import PressureProfile
 
 OSCILLATION = 0.15
 """Second difference, over the pressure, that the cut has to stay below; an edge of contact has one

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from solver.report.axes import EPSILON
-from solver.report.marks import LOOKS, look_of
-from solver.report.svg import INK
-from solver.studies.orders.records import ERRORS, Curve
-from solver.studies.plots import PlotLine, draw_lines
+from ...report.axes import EPSILON
+from ...report.marks import LOOKS, look_of
+from ...report.svg import INK
+from ..plots import PlotLine, draw_lines
+from .records import ERRORS, Curve
 
 # QUAD9 and HEXA27 have a look of their own here, beside QUAD8 and HEXA20.
 _LOOKS = {"QUAD9": (INK, "cross"), "HEXA27": (INK, "cross"), **LOOKS}

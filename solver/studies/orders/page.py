@@ -4,14 +4,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver.report.families import FILE_NAME, read_family
-from solver.report.html import render
-from solver.report.tables import as_csv
-from solver.studies.fits import LAST
-from solver.studies.orders.description import LadderFamily
-from solver.studies.orders.figure import draw_key, draw_panel
-from solver.studies.orders.records import ERRORS, Curve, groups, read_curves, shown_errors
-from solver.system.files import write_text
+from ...report.families import FILE_NAME, read_family
+from ...report.html import render
+from ...report.tables import as_csv
+from ...system.files import write_text
+from ..fits import LAST
+from .description import LadderFamily
+from .figure import draw_key, draw_panel
+from .records import ERRORS, Curve, groups, read_curves, shown_errors
 
 PAGE, SLOPES, POINTS, FAILURES = (
     "orders.html",
@@ -115,6 +115,7 @@ def _point_rows(curves: Sequence[Curve]) -> list[dict[str, Any]]:
             "unknowns": row.verdict.dofs,
             "macro_elements": row.verdict.macro_elements,
             "seconds": row.total,
+            "pressure_error_estimate": row.verdict.pressure_error_estimate,
             **{error: row.norms.get(error) for error in ERRORS},
         }
         for curve in curves

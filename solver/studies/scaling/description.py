@@ -33,9 +33,9 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta, field, structs
 
-from solver.case.model import Case
-from solver.case.reader import parse_case
-from solver.case.typed import (
+from ...case.model import Case
+from ...case.reader import parse_case
+from ...case.typed import (
     ONCE,
     Positive,
     Section,
@@ -44,12 +44,12 @@ from solver.case.typed import (
     refuse_twins,
     refuse_unknown,
 )
-from solver.case.yaml import read_mapping
-from solver.mesh.catalogue import BY_NAME
-from solver.mesh.size import Size, of_bodies, of_body
-from solver.studies import FULL, QUICK
-from solver.studies.keys import Count, Name, Seconds, Unknowns
-from solver.studies.points import PointStudy
+from ...case.yaml import read_mapping
+from ...mesh.catalogue import BY_NAME
+from ...mesh.size import Size, of_bodies, of_body
+from .. import FULL, QUICK
+from ..keys import Count, Name, Seconds, Unknowns
+from ..points import PointStudy
 
 GROWTH = "growth of "
 _START = 5.0  # seconds: three interpreters, libraries loaded, small mesh

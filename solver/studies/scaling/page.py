@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from solver.report import formats, stages
-from solver.report.html import render
-from solver.report.marks import MARKS
-from solver.report.svg import BLUE, GREEN, INK, ORANGE, PURPLE, RED
-from solver.report.tables import as_csv
-from solver.studies.plots import SMALL, PlotLine, draw_bar, draw_lines
-from solver.studies.points import disturbed, facts, outcome, page_name
-from solver.studies.scaling.description import Scaling
-from solver.studies.scaling.records import (
+from ...report import formats, stages
+from ...report.html import render
+from ...report.marks import MARKS
+from ...report.svg import BLUE, GREEN, INK, ORANGE, PURPLE, RED
+from ...report.tables import as_csv
+from ...system.files import write_text
+from ..plots import SMALL, PlotLine, draw_bar, draw_lines
+from ..points import disturbed, facts, outcome, page_name
+from .description import Scaling
+from .records import (
     BY_FACES,
     OTHER,
     WHOLE,
@@ -25,7 +26,6 @@ from solver.studies.scaling.records import (
     reached,
     read_series,
 )
-from solver.system.files import write_text
 
 # Colour and mark by the number of a line: either shows which it is.
 _COLORS = (BLUE, ORANGE, GREEN, PURPLE, INK, RED)

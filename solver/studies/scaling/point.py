@@ -20,14 +20,14 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from solver.studies.points import CRASHED, FAILED, REFUSED, SOLVED, Record, ended, surroundings
-from solver.studies.scaling.description import Scaling, ScalingPoint
-from solver.system.clock import now
-from solver.system.files import write_text
-from solver.system.memory import available
-from solver.system.package import COMMAND
-from solver.system.process import cores_for, run_apart
-from solver.verification.verdict import read_verdict
+from ...system.clock import now
+from ...system.files import write_text
+from ...system.memory import available
+from ...system.package import COMMAND
+from ...system.process import cores_for, run_apart
+from ...verification.verdict import read_verdict
+from ..points import CRASHED, FAILED, REFUSED, SOLVED, Record, ended, surroundings
+from .description import Scaling, ScalingPoint
 
 # The share of the machine's free memory that a point may take: the rest is for other programs.
 _SHARE = 0.9

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from solver.studies.fits import Fit, fit_power
-from solver.studies.points import MeasuredPoint, read_record
-from solver.studies.scaling.description import GROWTH, Goal, Scaling, ScalingPoint, SizeSeries
+from ..fits import Fit, fit_power
+from ..points import MeasuredPoint, read_record
+from .description import GROWTH, Goal, Scaling, ScalingPoint, SizeSeries
 
 WHOLE, OTHER = "whole", "start-up"
 BY_FACES = ("cut", "pairing")

@@ -26,11 +26,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from msgspec import Meta, field
 
-from solver.case.expressions import Expression
-from solver.case.model import Case
-from solver.case.reader import parse_case
-from solver.case.typed import ONCE, FieldError, Section, Text, read_as
-from solver.case.yaml import read_mapping
+from ...case.expressions import Expression
+from ...case.model import Case
+from ...case.reader import parse_case
+from ...case.typed import ONCE, FieldError, Section, Text, read_as
+from ...case.yaml import read_mapping
 
 HYDROSTATIC = "hydrostatic"
 Value = Annotated[

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from solver.report import formats
-from solver.report.svg import INK, MUTED, RULE, Drawing
-from solver.studies.points import Record
+from ...report import formats
+from ...report.svg import INK, MUTED, RULE, Drawing
+from ..points import Record
 
 # Dark is good, also in greyscale (viridis; van der Walt and Smith).
 _COLORS = (

@@ -18,12 +18,12 @@ from collections.abc import Iterator
 import meshio
 import numpy as np
 
-from solver.case.model import Case
-from solver.mechanics.fem.elasticity import internal_force, nodal_stress
-from solver.mesh import transform
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import Scene, carried_over
-from solver.studies.stability.states import UPPER, State
+from ...case.model import Case
+from ...mechanics.fem.elasticity import internal_force, nodal_stress
+from ...mesh import transform
+from ...simulation.problem import ContactProblem
+from ...simulation.scene import Scene, carried_over
+from .states import UPPER, State
 
 _RANDOM_ROUNDINGS = 3
 

@@ -5,15 +5,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver.report import formats
-from solver.report.html import render
-from solver.report.tables import as_csv
-from solver.studies.infsup.page import sections
-from solver.studies.infsup.records import InfSupRecord, failures
-from solver.studies.points import Record
-from solver.studies.stability.figure import anchor, draw_key, draw_map
-from solver.system.errors import InputError
-from solver.system.files import write_text
+from ...report import formats
+from ...report.html import render
+from ...report.tables import as_csv
+from ...system.errors import InputError
+from ...system.files import write_text
+from ..infsup.page import sections
+from ..infsup.records import InfSupRecord, failures
+from ..points import Record
+from .figure import anchor, draw_key, draw_map
 
 PAGE, TABLE, FAILURES = ".html", ".csv", "-failures.txt"
 MEASURES = {

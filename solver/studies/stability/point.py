@@ -19,20 +19,20 @@ import meshio
 import numpy as np
 from scipy import sparse
 
-from solver.mechanics.linear.condensation import CondensedSystem
-from solver.mesh import generate, transform
-from solver.simulation.accuracy import Accuracy
-from solver.simulation.options import Options, Safeguards
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import build_scene
-from solver.simulation.simulate import solve_problem
-from solver.studies.stability.description import Sweep, SweepSeries, Value
-from solver.studies.stability.floor import floor, stress_error
-from solver.studies.stability.states import State, exact_state
-from solver.system.clock import Clock
-from solver.system.errors import InputError, SolveError
-from solver.system.files import write_text
-from solver.verification.verdict import FAILED, PASSED, REFUSED, UNRELIABLE, to_json
+from ...mechanics.linear.condensation import CondensedSystem
+from ...mesh import generate, transform
+from ...simulation.accuracy import Accuracy
+from ...simulation.options import Options, Safeguards
+from ...simulation.problem import ContactProblem
+from ...simulation.scene import build_scene
+from ...simulation.simulate import solve_problem
+from ...system.clock import Clock
+from ...system.errors import InputError, SolveError
+from ...system.files import write_text
+from ...verification.verdict import FAILED, PASSED, REFUSED, UNRELIABLE, to_json
+from .description import Sweep, SweepSeries, Value
+from .floor import floor, stress_error
+from .states import State, exact_state
 
 GOAL, FLOORS = 1e-10, 20.0
 """What a point has to reach: the first, or so many times its floor."""

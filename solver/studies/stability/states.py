@@ -14,10 +14,10 @@ from typing import Any
 import meshio
 import numpy as np
 
-from solver.case.material import Material
-from solver.case.model import Case
-from solver.mesh import transform
-from solver.studies.stability.description import HYDROSTATIC
+from ...case.material import Material
+from ...case.model import Case
+from ...mesh import transform
+from .description import HYDROSTATIC
 
 LOWER, UPPER = "bottom", "top"
 # Steps of `transform:` that leave the corners of the blocks where they are.

@@ -36,9 +36,9 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta, structs
 
-from solver.case.model import Case
-from solver.case.reader import parse_case
-from solver.case.typed import (
+from ...case.model import Case
+from ...case.reader import parse_case
+from ...case.typed import (
     ONCE,
     FieldError,
     Positive,
@@ -48,13 +48,13 @@ from solver.case.typed import (
     refuse_twins,
     refuse_unknown,
 )
-from solver.case.yaml import read_mapping
-from solver.mesh.catalogue import BY_NAME
-from solver.mesh.size import Size, of_bodies, of_body
-from solver.studies import FULL
-from solver.studies.keys import Cell, Count, Counts, ErrorName, Name, Seconds
-from solver.studies.points import PointStudy
-from solver.system.errors import InputError
+from ...case.yaml import read_mapping
+from ...mesh.catalogue import BY_NAME
+from ...mesh.size import Size, of_bodies, of_body
+from ...system.errors import InputError
+from .. import FULL
+from ..keys import Cell, Count, Counts, ErrorName, Name, Seconds
+from ..points import PointStudy
 
 AUTO = "auto"
 _START = 1.5  # seconds: libraries loaded, mesh made, record written

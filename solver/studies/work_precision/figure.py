@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from markupsafe import Markup
 
-from solver.report.axes import (
+from ...report.axes import (
     EPSILON,
     FLOOR,
     Scale,
@@ -16,11 +16,11 @@ from solver.report.axes import (
     draw_level,
     round_off,
 )
-from solver.report.html import NORMS
-from solver.report.marks import MARKS
-from solver.report.svg import INK, MUTED, RED, Drawing
-from solver.studies.plots import PlotLine
-from solver.studies.work_precision.records import LevelLine, Panel, TimedSolve, shown
+from ...report.html import NORMS
+from ...report.marks import MARKS
+from ...report.svg import INK, MUTED, RED, Drawing
+from ..plots import PlotLine
+from .records import LevelLine, Panel, TimedSolve, shown
 
 PLOT, HEIGHT, LEFT, RIGHT, APART = 268, 340, 58, 112, 14
 # A row of the legend, about the width of a letter in it, the height of a label.

@@ -4,14 +4,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver.report import stages
-from solver.report.html import NORMS, render
-from solver.report.tables import as_csv
-from solver.studies.points import REFUSED, SOLVED, disturbed, facts, outcome, page_name
-from solver.studies.timing import TOTAL, spread
-from solver.studies.work_precision.description import AUTO, Problem, Study
-from solver.studies.work_precision.figure import LIMIT, Looks, draw_figure, draw_note
-from solver.studies.work_precision.records import (
+from ...report import stages
+from ...report.html import NORMS, render
+from ...report.tables import as_csv
+from ...system.files import write_text
+from ..points import REFUSED, SOLVED, disturbed, facts, outcome, page_name
+from ..timing import TOTAL, spread
+from .description import AUTO, Problem, Study
+from .figure import LIMIT, Looks, draw_figure, draw_note
+from .records import (
     ERRORS,
     TARGETS,
     TIE,
@@ -23,7 +24,6 @@ from solver.studies.work_precision.records import (
     panels,
     read_points,
 )
-from solver.system.files import write_text
 
 # The errors that the table at the top shows.
 _OVERVIEW = ("pressure_l2", "pressure_means", "displacement_l2", "stress_l2")

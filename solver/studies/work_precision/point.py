@@ -15,13 +15,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from solver.studies.points import SOLVED, Record, measure_apart, surroundings
-from solver.studies.timing import TOTAL, repeated, spread
-from solver.studies.work_precision.description import Study, StudyPoint, read_study
-from solver.system.clock import SOLVING, Clock, now
-from solver.system.errors import InputError
-from solver.system.files import replacing
-from solver.system.process import cores_for, used_since
+from ...system.clock import SOLVING, Clock, now
+from ...system.errors import InputError
+from ...system.files import replacing
+from ...system.process import cores_for, used_since
+from ..points import SOLVED, Record, measure_apart, surroundings
+from ..timing import TOTAL, repeated, spread
+from .description import Study, StudyPoint, read_study
 
 _UNKNOWN: dict[str, Any] = dict.fromkeys(
     ("dim", "dofs", "macro_elements", "iterations", "factor")
@@ -72,12 +72,12 @@ def measure(job: Mapping[str, Any]) -> dict[str, Any]:
 
     Raises InputError and SolveError.
     """
-    from solver.mechanics.linear.direct import force_solver
-    from solver.simulation.simulate import simulate
-    from solver.studies.work_precision.reference import read_reference
-    from solver.system.provenance import gather
-    from solver.verification.norms import errors
-    from solver.verification.run import mesh_of
+    from ...mechanics.linear.direct import force_solver
+    from ...simulation.simulate import simulate
+    from ...system.provenance import gather
+    from ...verification.norms import errors
+    from ...verification.run import mesh_of
+    from .reference import read_reference
 
     study = read_study(Path(job["study"]), job["size"])
     point = study.point(job["point"])

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from solver.mechanics.linear.backends import BACKENDS
-from solver.report.axes import EPSILON
-from solver.studies.fits import ROUND_OFF, Fit, fit_order
-from solver.studies.points import MeasuredPoint, read_record
-from solver.studies.timing import TOTAL, Spread, medians, spread
-from solver.studies.work_precision.description import (
+from ...mechanics.linear.backends import BACKENDS
+from ...report.axes import EPSILON
+from ..fits import ROUND_OFF, Fit, fit_order
+from ..points import MeasuredPoint, read_record
+from ..timing import TOTAL, Spread, medians, spread
+from .description import (
     AUTO,
     Problem,
     Study,

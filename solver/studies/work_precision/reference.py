@@ -13,14 +13,14 @@ from typing import ClassVar
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from solver.case.material import Material
-from solver.case.solutions import ElasticSolution, Part
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.small_matrices import invert
-from solver.mesh.catalogue import cell_type
-from solver.simulation.solution import Solution
-from solver.studies.work_precision.description import Study
-from solver.system.errors import InputError
+from ...case.material import Material
+from ...case.solutions import ElasticSolution, Part
+from ...mechanics.fem import shape_functions
+from ...mechanics.fem.small_matrices import invert
+from ...mesh.catalogue import cell_type
+from ...simulation.solution import Solution
+from ...system.errors import InputError
+from .description import Study
 
 
 class _Grid:
@@ -121,7 +121,7 @@ class RefinedSolution(ElasticSolution):
 
 def read_reference(path: Path) -> RefinedSolution:
     """The reference that a result file is; InputError for a file that is none."""
-    from solver.verification.results import read_result
+    from ...verification.results import read_result
 
     return RefinedSolution(read_result(path).solution)
 
@@ -131,10 +131,10 @@ def write_reference(study: Study, problem: str, output: Path) -> None:
 
     Raises InputError for a problem that has none, SolveError where it cannot be solved.
     """
-    from solver.simulation.simulate import simulate
-    from solver.system.provenance import gather
-    from solver.verification.results import write_result
-    from solver.verification.run import mesh_of
+    from ...simulation.simulate import simulate
+    from ...system.provenance import gather
+    from ...verification.results import write_result
+    from ...verification.run import mesh_of
 
     point = next((p for p in study.points if p.problem.name == problem), None)
     if point is None or point.problem.reference is None:

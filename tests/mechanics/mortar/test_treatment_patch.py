@@ -1,14 +1,20 @@
 """The treatments on the patch test: who passes, who fails, and what is refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from solver.case.reader import parse_case
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError, SolveError
-from tests.scenes import POISSON, PRESSURE, YOUNG, block_case, block_mesh, errors, moved
+from tests.scenes import (
+    POISSON,
+    PRESSURE,
+    YOUNG,
+    block_case,
+    block_mesh,
+    changed_case,
+    errors,
+    moved,
+)
 
 PLANE = ["TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9"]
 SOLID = ["TETRA4", "TETRA10", "HEXA8", "HEXA20", "HEXA27", "PENTA15", "PYRA5"]
@@ -95,11 +101,8 @@ def held_at_a_side(treatment, mesh):
     dim, up = mesh.points.shape[1], "xyz"[mesh.points.shape[1] - 1]
     modulus = YOUNG / (1 - POISSON**2) if dim == 2 else YOUNG
     sinking = f'"{-PRESSURE / modulus} * ({up} + 1)"'
-    text = block_case(dim, zone=f", treatment: {treatment}").source
-    held = f"{{group: symx, fix: {{x: 0, {up}: {sinking}}}}}"
-    assert "{group: symx, fix: [x]}" in text
-    text = text.replace("{group: symx, fix: [x]}", held)
-    return simulate(parse_case(text, Path("held.yaml")), mesh)
+    held = ("{group: symx, fix: [x]}", f"{{group: symx, fix: {{x: 0, {up}: {sinking}}}}}")
+    return simulate(changed_case(dim, held, zone=f", treatment: {treatment}"), mesh)
 
 
 @pytest.mark.parametrize("treatment", ["lac", "nodal", "nodal_dual"])

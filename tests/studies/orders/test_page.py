@@ -217,7 +217,7 @@ def test_slopes_below_theory_are_told_with_the_reason_where_it_is_known(family, 
     assert below == [("tria3", "displacement_l2")]
     write_orders([family], results, tmp_path, lambda line: None)
     text = (tmp_path / orders.PAGE).read_text()
-    assert "1 slopes (▽) are below theory, by more than their spread explains." in text
+    assert "1 slopes (▽) are below theory by more than their spread." in text
     assert "The reason is not known." in text
     path = tmp_path / "cases" / "powers" / "orders.yaml"
     path.write_text(LADDERS + "shortfalls: Few <levels>.\n")

@@ -1,29 +1,25 @@
 """The exact answer of a sweep's point, and what rounding alone makes of it."""
 
-from pathlib import Path
-
 import meshio
 import numpy as np
 import pytest
 
-from solver.case.reader import parse_case
 from solver.mechanics.fem.elasticity import nodal_stress
 from solver.mesh import transform
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.studies.stability.floor import floor, misplaced, upper_nodes
 from solver.studies.stability.states import exact_state
-from tests.scenes import block_case, block_mesh
+from tests.scenes import block_mesh, changed_case
 
 MESHES = {2: ("TRIA3", "QUAD4"), 3: ("TETRA4", "HEXA8")}
 
 
 def solved(dim, spec="", poisson=0.3, cells=None):
     """Case, mesh before and after its transform, and the problem, solved."""
-    text = block_case(dim).source.replace("poisson: 0.3", f"poisson: {poisson!r}")
-    for axis in "xyz":
-        text = text.replace(f"fix: [{axis}]", "fix: [normal]")
-    case = parse_case(text + (f"transform: {spec}\n" if spec else ""), Path("point.yaml"))
+    moved = f"transform: {spec}\n" if spec else ""
+    change = ("poisson: 0.3", f"poisson: {poisson!r}")
+    case = changed_case(dim, change, normal=True, extra=moved)
     raw = block_mesh(*(cells or MESHES[dim]))
     mesh = transform(raw, case.transform) if case.transform else raw
     problem = ContactProblem(build_scene(case, mesh))
@@ -94,8 +90,7 @@ def test_the_floor_of_the_mixed_form_does_not_grow_with_poissons_ratio():
 
 
 def solved_with_form(poisson):
-    text = block_case(2).source.replace("poisson: 0.3", f"poisson: {poisson}")
-    case = parse_case(text, Path("point.yaml"))
+    case = changed_case(2, ("poisson: 0.3", f"poisson: {poisson}"))
     raw = block_mesh(*MESHES[2])
     problem = ContactProblem(build_scene(case, raw))
     return case, raw, raw, problem, problem.solve(1.0)

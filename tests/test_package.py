@@ -1,0 +1,112 @@
+"""The package as it is installed: the command and the import `mortarcheck`, in a fresh folder."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = ROOT / "solver"
+SCRIPT = """\
+import sys
+from mortarcheck import InputError, __version__, solve_case
+solved = solve_case("block.yaml")
+assert abs(solved.pressure - 25.0).max() < 1e-9, solved.pressure
+try:
+    solve_case({"name": "empty"})
+except InputError as error:
+    print(error)
+import importlib, pkgutil, mortarcheck
+for module in pkgutil.walk_packages(mortarcheck.__path__, "mortarcheck."):
+    if module.name.rpartition(".")[2] not in ("__main__", "drawing", "shapes"):  # need PyVista
+        importlib.import_module(module.name)
+assert not [name for name in sys.modules if name.partition(".")[0] == "solver"]
+print(__version__)
+"""
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """A folder in which the project's wheel is installed, built without network."""
+    if find_spec("setuptools") is None or find_spec("pip") is None:
+        pytest.skip("setuptools and pip, which `make` installs, are not there")
+    folder = tmp_path_factory.mktemp("installed")
+    copied = folder / "sources"
+    shutil.copytree(SOURCES, copied / "solver", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("LICENSE", "README.md", "pyproject.toml", "setup.py"):
+        shutil.copy(ROOT / name, copied)
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
+    alone = ["--no-deps", "--no-index"]
+    build = [*pip, "wheel", *alone, "--no-build-isolation", "-w", folder, copied]
+    subprocess.run(build, check=True)
+    (wheel,) = folder.glob("*.whl")
+    subprocess.run([*pip, "install", *alone, "-t", folder / "packages", wheel], check=True)
+    return folder
+
+
+@pytest.fixture
+def fresh(installed, tmp_path):
+    """Run Python with the installed package in a fresh folder."""
+    environment = {**os.environ, "PYTHONPATH": str(installed / "packages")}
+
+    def run(*command):
+        return subprocess.run(
+            [sys.executable, *map(str, command)],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
+
+    return run
+
+
+def test_the_wheel_holds_every_file_of_the_package(installed):
+    (wheel,) = installed.glob("*.whl")
+    held = {name for name in ZipFile(wheel).namelist() if name.startswith("mortarcheck/")}
+    files = (f for f in SOURCES.rglob("*") if f.is_file() and "__pycache__" not in f.parts)
+    assert held == {f"mortarcheck/{f.relative_to(SOURCES).as_posix()}" for f in files}
+
+
+def test_the_command_solves_checks_and_reports(installed, fresh, tmp_path):
+    command = installed / "packages" / "bin" / "mortarcheck"
+    assert fresh(command, "--version").stdout == "mortarcheck 0.1.0\n"
+    made = fresh(command, "new", "block").stdout
+    assert made.endswith("next: mortarcheck solve block.yaml -o block.vtkhdf\n")
+    solved = fresh(command, "solve", "block.yaml", "-o", "r.vtkhdf", "--verdict", "verdict.json")
+    assert solved.returncode == 0, solved.stderr
+    verdict = json.loads((tmp_path / "verdict.json").read_text())
+    assert verdict["verdict"] == "passed"
+    assert verdict["provenance"]["command"].startswith("mortarcheck solve block.yaml")
+    assert verdict["provenance"]["mortarcheck"] == "0.1.0"
+    assert fresh(command, "check", "r.vtkhdf").returncode == 0
+    reported = fresh(command, "report", "verdict.json", "-o", "report")
+    assert reported.returncode == 0, reported.stderr
+    assert "block" in (tmp_path / "report" / "summary.html").read_text()
+    validated = fresh("-m", "mortarcheck", "validate", "block.yaml")
+    assert validated.stdout == "block.yaml: valid\n"
+
+
+def test_the_import_solves_and_every_module_is_found(fresh):
+    fresh("-m", "mortarcheck", "new", "block")
+    done = fresh("-c", SCRIPT)
+    assert done.returncode == 0, done.stderr
+    refusal, version = done.stdout.splitlines()
+    assert refusal.startswith("case: ")
+    assert version == "0.1.0"
+
+
+def test_the_citation_has_the_same_version():
+    assert "\nversion: 0.1.0\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_the_project_folder_runs_in_place():
+    command = [sys.executable, "-m", "solver", "--version"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout == "mortarcheck 0.1.0\n"
