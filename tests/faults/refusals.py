@@ -21,10 +21,10 @@ _RAISED = {
 HEAD = """\
 # Refusals
 
-This page lists every message that refuses input or gives up a solve, by module. `…` stands for the
-parts that vary. A message is one line. It starts with the file and usually the key and its value. The
-exit status is 2 for input and 3 for a solve. If a key of a case file is invalid, the message describes
-the allowed values by the type of the key (`solver/case/file.py`).
+This page lists every message that refuses input or gives up a solve, by module. `…` stands for
+the parts that vary. A message is one line. It starts with the file and usually the key and its
+value. The exit status is 2 for input and 3 for a solve. If a key of a case file is invalid, the
+message describes the allowed values by the type of the key (`solver/case/file.py`).
 
 `python -m tests.faults.refusals` generates the table from the sources; a test compares both.
 
