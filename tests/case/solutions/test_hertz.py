@@ -64,14 +64,6 @@ def test_outside_there_is_no_pressure_and_the_end_is_not_regular():
     assert CYLINDER.regular(x).tolist() == [True, True, False, False]
 
 
-def test_the_half_ellipse_is_found_again_in_its_values():
-    x = np.c_[np.linspace(-7, 7, 41), np.zeros(41)]
-    a, peak = CYLINDER.fitted(x, 1.02 * CYLINDER.contact_pressure(x))
-    assert a == pytest.approx(CYLINDER.half_width, rel=1e-12)
-    assert peak == pytest.approx(1.02 * CYLINDER.peak, rel=1e-12)
-    assert CYLINDER.fitted(x, np.abs(x[:, 0]))[0] == 0  # no ellipse at all
-
-
 def test_the_interior_is_not_offered():
     with pytest.raises(NotImplementedError, match="no displacement; it offers contact_pressure"):
         CYLINDER.displacement(np.zeros((1, 2)))
