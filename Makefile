@@ -22,7 +22,11 @@ export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
 ALONE := .venv/bin/python -I -m
 OURS := .venv/bin/python -Es -m
 INSTALL := $(PYTHON) -Es workflow/install --mkl "$(MKL)"
-SETTINGS = $(strip $(CONFIG) $(if $(CASES),cases=$(CASES)))
+# A folder is taken from where make was called, also with `make -C`; quotes keep names that look like
+# numbers, and spaces.
+FROM = $(if $(filter-out $(CURDIR),$(PWD)),$(if $(filter /% ~%,$(CASES)),,$(PWD)/))
+SETTINGS = $(strip $(CONFIG) $(if $(CASES),"cases=$(FROM)$(CASES)"))
+CHOICE = $(if $(FAMILY),"family='$(FAMILY)'") $(if $(CASE),"case='$(CASE)'")
 SILENCE = $(if $(QUIET),--quiet rules progress reason host)
 SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
@@ -36,15 +40,16 @@ SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
 
+all-cases: override CONFIG += $(CHOICE)
 all-cases: environment ## mesh, solve and check what is not up to date, then report
 	@$(SNAKEMAKE) all_cases
 
-family: override CONFIG += family=$(FAMILY)
+family: override CONFIG += $(CHOICE)
 family: environment ## the batch of one family: make family FAMILY=ssnp170
 	@test -n "$(FAMILY)" || { echo "make family: name a folder of cases/, FAMILY=…"; exit 2; }
 	@$(SNAKEMAKE) all_cases
 
-case: override CONFIG += case=$(CASE)
+case: override CONFIG += $(CHOICE)
 case: override ARGS += --forcerun solve
 case: environment ## solve one case again, then report: make case CASE=ssnp170-e-swapped
 	@test -n "$(CASE)" || { echo "make case: name a case as the report does, CASE=…"; exit 2; }
@@ -61,11 +66,11 @@ compare: environment ## compare with another batch: make compare BASE=folder [TH
 	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
 	@$(OURS) solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
 
-gallery: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
+gallery: override CONFIG += $(CHOICE)
 gallery: gallery-environment ## draw each result with PyVista, off-screen: all or FAMILY=…
 	@$(SNAKEMAKE) gallery
 
-orders: override CONFIG += $(if $(FAMILY),family=$(FAMILY))
+orders: override CONFIG += $(CHOICE)
 orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…
 	@$(SNAKEMAKE) orders
 

@@ -1,4 +1,4 @@
-"""Targets of the batch: `all_cases` (default), `report`, `gallery`, `orders`, `study`, `stability`, `scaling`, or a verdict by its path."""
+"""Targets of the batch: `all_cases` (default), `report`, `gallery`, `orders`, `study`, `stability`, `scaling`, or the folder of a solve by its path."""
 
 from snakemake.utils import min_version
 
@@ -12,7 +12,16 @@ include: "workflow/rules/cluster.smk"
 
 rule all_cases:
     input:
-        "results/report/passed",
+        passed="results/report/passed",
+        # Missed where they are gone: Snakemake misses only what a target names.
+        solves=lambda w: [results_of(job) for job in RUN.values()],
+        again=lambda w: sorted({f for job in RUN.values() for f in again_for(job)}),
+
+
+# Never there when a run begins, so that what it is an input of runs again.
+rule again:
+    output:
+        temp(touch(AGAIN)),
 
 
 include: "workflow/rules/mesh.smk"
@@ -29,6 +38,7 @@ include: "workflow/rules/scaling.smk"
 # Pages and gates run where Snakemake does, wherever it sends the other jobs.
 localrules:
     all_cases,
+    again,
     report,
     gate,
     orders_page,

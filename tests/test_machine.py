@@ -9,12 +9,14 @@ from types import SimpleNamespace
 
 import pytest
 
+from solver.case.reader import load_case
 from solver.commands.cli import main
 from solver.mesh.size import Size, check_memory
 from solver.system.errors import MachineError
 from solver.system.files import replacing
 from solver.system.memory import available, peak_mb
 from solver.system.progress import saying
+from solver.verification.run import mesh_of
 from tests.machine import obeying_permissions, small_disk
 from tests.workflow.projects import CASE, ROOT, without_times
 
@@ -99,6 +101,12 @@ def test_left_over_temporaries_of_dead_processes_go(tmp_path):
     assert {file.name for file in tmp_path.iterdir()} == {"a.json", alive.name}
 
 
+def test_a_mesh_that_no_solve_could_use_is_not_made(case):
+    case.write_text(case.read_text().replace("divisions: [2, 2]", "divisions: [90000, 90000]"))
+    with pytest.raises(MachineError, match=r"memory = '1\d{10} unknowns': needs at least"):
+        mesh_of(load_case(case))
+
+
 def test_peak_memory_is_told_in_megabytes():
     assert peak_mb(SimpleNamespace(ru_maxrss=1_000_000)) == 1024
 
@@ -144,6 +152,7 @@ def test_the_memory_there_is_heeds_the_limit_of_the_process():
 LIMITED = """
 import resource, sys
 from pathlib import Path
+from solver.case.reader import load_case
 from solver.commands.cli import main
 
 main(["solve", sys.argv[1], "-o", sys.argv[1] + ".vtkhdf", "--quiet"])

@@ -31,7 +31,15 @@ TALKING = (
     *("study", "study_point", "scaling", "scaling_point"),
 )
 # What Snakemake says that is of no use to whoever sees the jobs.
-_CHATTER = ("Select jobs", "Execute ", "Using shell", "Assuming unrestricted", "Touching output")
+_CHATTER = (
+    *("Select jobs", "Execute ", "Using shell", "Assuming unrestricted", "Touching output"),
+    *("Removing temporary output", "Complete log", "Elapsed time", "Exiting because a job"),
+    "WorkflowError:\nAt least one job did not complete",
+)
+# Rules that are to fail where a check does, and what their commands end with: the outcome, which
+# they print, is all there is to say.
+_GATES = ("gate", "orders", "stability", "infsup")
+_GATE_MARK = "# gate"
 _BAD = ("failed", "unreliable", "refused", "crashed")
 _EVENTS = ("job_info", "job_started", "job_finished", "progress", "run_info", "resources_info")
 _ON_TERMINAL, _IN_FILE = 1.0, 60.0
@@ -197,8 +205,11 @@ class Progress(logging.Filter):
 
 def hides(record: logging.LogRecord) -> bool:
     """Whether a record is of no use beside the progress."""
-    event = str(getattr(record, "event", None) or "")
-    return event in _EVENTS or record.getMessage().startswith(_CHATTER)
+    event, message = str(getattr(record, "event", None) or ""), record.getMessage()
+    if event == "job_error":
+        return getattr(record, "rule_name", None) in _GATES
+    failed_gate = message.startswith("RuleException:") and _GATE_MARK in message
+    return event in _EVENTS or failed_gate or message.startswith(_CHATTER)
 
 
 def duration(seconds: float) -> str:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import studies
+from . import jobs, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
@@ -102,6 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
     command.add_argument("--log", type=Path, help="its last line is the reason")
     command.add_argument("--status", type=int, metavar="N", help="its exit status")
+    command.add_argument("--refusal", help="it was not started, for this reason: refused")
 
     command = add_command(commands, "check", _check, "run the checks of stored results again")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
@@ -133,6 +134,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
     studies.add_commands(commands)
+    jobs.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "check whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -212,8 +214,11 @@ def _silent(line: str) -> None:
 
 
 def _crashed(options: argparse.Namespace) -> int:
-    from ..verification.run import record_crash
+    from ..verification.run import record_crash, record_refusal
 
+    if options.refusal:
+        print(record_refusal(options.case, options.verdict, options.refusal).summary)
+        return PASSED
     print(record_crash(_job(options), options.verdict, options.log, options.status).summary)
     return PASSED
 

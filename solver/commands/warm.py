@@ -4,8 +4,8 @@
 
 Python with all packages takes 0.7 s to start, a small case 0.1 s to solve. This client needs none
 of them; `solver.commands.server`, at the socket that the environment names, forks for each command.
-Exit status, output and files are those of the command. What it took goes to the file BENCHMARK, in
-Snakemake's columns.
+Exit status, output and files are those of the command. What it took goes to the file BENCHMARK:
+wall and processor time (s), largest resident memory (MB).
 """
 
 import json
@@ -15,7 +15,6 @@ import socket
 import sys
 import time
 from contextlib import suppress
-from datetime import timedelta
 
 # The package's folder; this file runs as a script, which knows no package.
 PACKAGE = os.path.abspath(__file__).rsplit("/", 3)[1]  # noqa: PTH100 -- pathlib is long to import
@@ -26,7 +25,6 @@ THREADS = "OMP_NUM_THREADS"
 GREETING = b"ready"
 # Seconds to wait for the server's greeting, which comes once all its packages are loaded.
 PATIENCE = 30.0
-_COLUMNS = "s h:m:s max_rss max_vms max_uss max_pss io_in io_out mean_load cpu_time"
 
 
 def main(benchmark: str, command: list[str]) -> int:
@@ -79,17 +77,9 @@ def _warm(place: str, command: list[str]) -> dict | None:
 
 
 def _write_benchmark(path: str, seconds: float, ended: dict) -> None:
-    known = {
-        "s": f"{seconds:.4f}",
-        "h:m:s": str(timedelta(seconds=int(seconds))),
-        "max_rss": f"{ended['max_rss'] / 1024:.2f}",
-        "mean_load": f"{100 * ended['cpu_time'] / seconds:.2f}",
-        "cpu_time": f"{ended['cpu_time']:.2f}",
-    }
-    columns = _COLUMNS.split()
+    took = f"{seconds:.4f}\t{ended['cpu_time']:.2f}\t{ended['max_rss'] * 1024 / 1e6:.2f}"
     with open(path, "w", encoding="utf-8") as file:  # noqa: PTH123 -- pathlib is long to import
-        print(*columns, sep="\t", file=file)
-        print(*(known.get(column, "NA") for column in columns), sep="\t", file=file)
+        print("seconds\tcpu_seconds\tpeak_memory_mb", took, sep="\n", file=file)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,9 @@ from .rows import Row, counted
 from .sections import FamilySection
 from .tables import outcome
 
+# Pages beside the report that other commands write.
+_PAGES = ("orders", "study", "stability", "gallery")
+
 # What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
 LEFT_OUT = {
     "quadrature": "more Gauss points, closure of integrals",
@@ -28,10 +31,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         title="Verification of contact solves",
         sortable=True,
         rows=rows,
-        orders=(folder / "orders.html").is_file(),
-        study=(folder / "study.html").is_file(),
-        stability=(folder / "stability.html").is_file(),
-        gallery=(folder / "gallery.html").is_file(),
+        pages={name for name in _PAGES if (folder / f"{name}.html").is_file()},
         bad=bad,
         good=bool(rows) and not bad,
         outcome=outcome(rows),

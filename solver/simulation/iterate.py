@@ -88,4 +88,18 @@ class ContactIterate:
         """The iterate with the free unknowns changed by `change` (n_free,)."""
         move = self.scene.free.basis @ change
         stress = self.mean_stress + self.scene.mean.change(move, self.defect)
-        return replace(self, displacement=self.displacement.moved(move), mean_stress=stress)
+        moved = replace(self, displacement=self.displacement.moved(move), mean_stress=stress)
+        return moved._knowing(self, "sizes")
+
+    def under(self, force: np.ndarray) -> "ContactIterate":
+        """The same displacement under another force (n, dim), a correction of this one.
+
+        What does not depend on the force is not computed anew, and the sizes of stresses stay those
+        that they were, also after the iterates that follow: they scale round-off alone.
+        """
+        return replace(self, force=force)._knowing(self, "defect", "internal", "sizes")
+
+    def _knowing(self, other: "ContactIterate", *names: str) -> "ContactIterate":
+        known = vars(other)
+        vars(self).update({name: known[name] for name in names if name in known})
+        return self

@@ -14,7 +14,7 @@ from ..mechanics.fem.bodies import (
     whole_motions,
 )
 from ..mechanics.fem.elasticity import internal_force, stiffness
-from ..mechanics.linear.condensation import ConstrainedSystem, solve
+from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ..mechanics.linear.multigrid import Unknowns
 from ..mechanics.linear.systems import Systems, parts_of
 from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
@@ -33,6 +33,8 @@ from .scene import Scene
 _EXTEND = 3e-11
 # How exactly the change of a sweep of recovery is solved for; its own error is far larger.
 _CHANGE = 1e-4
+# The residual of a corrected state may be so many times what is otherwise taken for round-off.
+_CORRECTED = 4.0
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
@@ -162,9 +164,9 @@ class ContactProblem:
 
         Only the change is solved for, on the factor that the state was solved with.
         """
-        start = replace(state.iterate, force=state.force + correction)
+        start = state.iterate.under(state.force + correction)
         scale = max(state.force_scale, np.abs(correction).max())
-        return self._refined(start, scale, state.status, correction)
+        return self._refined(start, scale, state.status, correction, _CORRECTED * ROUND_OFF)
 
     def pressure_change(self, closed: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The change of pressure (k,) by forces (n_dofs,), with the `closed` (k,) kept closed.
@@ -213,14 +215,19 @@ class ContactProblem:
         return self._refined(start, scale, StatusResult(closed, 1, []), correction)
 
     def _refined(
-        self, start: ContactIterate, scale: float, status: StatusResult, correction: np.ndarray
+        self,
+        start: ContactIterate,
+        scale: float,
+        status: StatusResult,
+        correction: np.ndarray,
+        round_off: float = ROUND_OFF,
     ) -> Equilibrium:
         """Solved from an iterate; in extended precision where that gains digits."""
         system, cures = self._constrained(start.closed), self.scene.options.safeguards
-        found = self._once(system, start, scale, status, correction)
+        found = self._once(system, start, scale, status, correction, round_off)
         if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
             extended = replace(found.iterate, extended=True)
-            found = self._once(system, extended, scale, status, correction)
+            found = self._once(system, extended, scale, status, correction, round_off)
         return found
 
     def _once(
@@ -230,11 +237,12 @@ class ContactProblem:
         scale: float,
         status: StatusResult,
         correction: np.ndarray,
+        round_off: float,
     ) -> Equilibrium:
         refine = self.scene.options.safeguards.refinement
         # In a stretched model a force of the size of round-off may be a large one elsewhere.
-        options = {"round_off": 0.0} if start.extended else {}
-        iterate, multiplier, residual = solve(system, start, scale, refine, **options)
+        round_off = 0.0 if start.extended else round_off
+        iterate, multiplier, residual = solve(system, start, scale, refine, round_off)
         pressure = np.zeros(len(start.closed))
         pressure[start.closed] = multiplier
         return Equilibrium(

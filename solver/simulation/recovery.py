@@ -45,12 +45,16 @@ class _Zone:
 
 @dataclass(frozen=True, kw_only=True)
 class RecoveredZone:
-    """A zone's reconstruction: `coefficients` (m · k,), `degree` (m,), by the form of a `name`."""
+    """A zone's reconstruction: `coefficients` (m · k,), `degree` (m,), by the form of a `name`.
+
+    `force` (n_dofs,): what its loads add to the contact forces of the means.
+    """
 
     name: str
     recovery: Recovery
     coefficients: np.ndarray
     degree: np.ndarray
+    force: np.ndarray
 
     @property
     def error(self) -> np.ndarray:
@@ -75,7 +79,7 @@ def recovered(
     found = state
     for _ in range(_ROUNDS):
         zones = [_zone(zone, found.status.closed) for zone in given]
-        found, applied = _corrected(problem, found, zones)
+        found, read, forces = _corrected(problem, found, zones)
         wrong = found.trial.offence(found.status.closed) > 1
         if not (wrong & problem.constraints.eligible).any():
             return found, {
@@ -84,8 +88,9 @@ def recovered(
                     recovery=fit.recovery,
                     coefficients=c,
                     degree=fit.reconstruction.degree,
+                    force=force,
                 )
-                for zone, fit, c in zip(given, zones, applied, strict=True)
+                for zone, fit, c, force in zip(given, zones, read, forces, strict=True)
             }
         found = problem.solve(factor, found.status.closed, correction=found.correction)
     _LOG.info("recovery: the contact status does not settle; the pressure stays constant by face")
@@ -103,19 +108,20 @@ def _zone(zone: ZoneScene, closed: np.ndarray) -> _Zone:
 
 def _corrected(
     problem: ContactProblem, state: Equilibrium, zones: list[_Zone]
-) -> tuple[Equilibrium, list[np.ndarray]]:
-    """The state with the loads of its reconstruction, and the coefficients (m · k,) by zone."""
+) -> tuple[Equilibrium, list[np.ndarray], list[np.ndarray]]:
+    """The state with the loads of its reconstruction; coefficients and loads (n_dofs,) by zone."""
     sweeps = max(zone.recovery.form.sweeps for zone in zones)
     pressure, applied = state.pressure.copy(), [np.zeros(0)] * len(zones)
     force = state.correction.ravel().copy()
-    last = state.pressure
+    last, loads = state.pressure, [np.zeros_like(force)] * len(zones)
     for sweep in range(sweeps):
         applied = [zone.coefficients(pressure) for zone in zones]
-        following = sum(z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True))
+        loads = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
+        following = sum(loads, np.zeros_like(force))
         if sweep == sweeps - 1:
             state = problem.corrected(state, following.reshape(state.correction.shape))
             break
         last = last + problem.pressure_change(state.status.closed, following - force)
         pressure, force = pressure + _RELAXATION * (last - pressure), following
     read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
-    return state, read
+    return state, read, loads

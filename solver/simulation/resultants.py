@@ -20,8 +20,8 @@ def resultants(
     """Area and edges of the `closed` macro-elements (m,), and the forces on the slave."""
     edges, area = _extent(scene, zone, zone.by_macro_element(state.pressure), closed)
     forces = zone.operator.matrix.T @ state.pressure[zone.numbers]
-    if field is not None and field.recovery.form.sweeps:
-        forces = forces + field.recovery.loads.T @ field.coefficients
+    if field is not None:
+        forces = forces + field.force
     nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
     force = forces.reshape(scene.points.shape)[nodes]
     places = np.pad(scene.points[nodes] + scene.origin, ((0, 0), (0, 3 - force.shape[1])))

@@ -13,18 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..case import job_name
+
 if TYPE_CHECKING:
     import meshio
 
     from ..case.model import Case
     from ..mechanics.mortar.edge import Edges
-
-
-def job_name(
-    name: str, swapped: bool, hexahedra: str | None = None, recovery: str | None = None
-) -> str:
-    """The name of one solve of a case: direction and variant, where they are not the case's own."""
-    return "-".join(filter(None, [name, "swapped" * swapped, hexahedra, recovery]))
 
 
 class Line(NamedTuple):

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..case import job_name
 from ..simulation.accuracy import Accuracy, beyond_small_strain
-from ..simulation.solution import job_name
 from .verdict import (
     FAILED,
     PASSED,

@@ -12,7 +12,7 @@ from ..case.model import Case
 from ..case.reader import check_mesh_file, load_case
 from ..mesh import generate, read_mesh, transform
 from ..mesh.files.vtkhdf import check_name
-from ..mesh.size import check_memory
+from ..mesh.size import check_memory, of_mesh
 from ..simulation.options import LEAN, Options
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
@@ -34,6 +34,9 @@ from .verdict import (
     Verdict,
     write_verdict,
 )
+
+# The part of the estimated nodes that a mesh has for certain.
+_SURELY = 0.8
 
 _LOG = logging.getLogger(__name__)
 
@@ -77,12 +80,18 @@ def refined(case: Case, factor: int) -> Case:
     return replace(case, mesh=mesh, counts={})
 
 
-def mesh_of(case: Case) -> meshio.Mesh:
-    """The case's mesh, read or generated, its transform applied."""
+def mesh_of(case: Case, memory_check: bool = True) -> meshio.Mesh:
+    """The case's mesh, read or generated, its transform applied.
+
+    `memory_check`: MachineError before it is generated, where no solve on it could fit in memory.
+    """
     if "path" in case.mesh:
         check_mesh_file(case)
         mesh = read_mesh(case.mesh["path"])
     else:
+        if memory_check:
+            size = of_mesh(case.mesh, case.path.parent)
+            check_memory(int(_SURELY * size.points), size.dim, case.path)
         mesh = generate(case.mesh, str(case.path))
     return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
 
@@ -157,6 +166,17 @@ def record_crash(
     return verdict
 
 
+def record_refusal(case: Path, verdict_file: Path, reason: str) -> Verdict:
+    """Write the verdict of a case that is refused before any solve, and return it.
+
+    Its job is called as the folder of the verdict.
+    """
+    known_as = case.with_name(f"{verdict_file.resolve().parent.name}.yaml")
+    verdict = without_result(REFUSED, reason, known_as)
+    write_verdict(verdict_file, verdict)
+    return verdict
+
+
 def _death(status: int) -> str:
     """What an exit status says of how a process ended; shells add 128 to a signal's number."""
     died = f"died with exit status {status}"
@@ -174,7 +194,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
     check_name(output)
     output.parent.mkdir(parents=True, exist_ok=True)
     with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
-        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case)
+        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path)
     # What was accepted is a result on the case's own mesh.

@@ -12,6 +12,7 @@ from solver.commands.cli import main
 from solver.mechanics.mortar import recovery as mortar
 from solver.mechanics.mortar.recovery import FORMS
 from solver.mesh import generate
+from solver.mesh.catalogue import BY_NAME
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -74,11 +75,14 @@ def error(bottom: str, top: str, n: int, recovery: str, swapped: bool = False) -
 @pytest.mark.parametrize("form", APPLIED)
 @pytest.mark.parametrize(
     ("bottom", "top"),
-    [("TRIA3", "QUAD8"), ("TRIA6", "QUAD4"), ("TETRA10", "HEXA8"), ("HEXA27", "TETRA4")],
+    [
+        *[("TRIA3", "QUAD8"), ("TRIA6", "QUAD4"), ("QUAD9", "TRIA3"), ("TETRA10", "HEXA8")],
+        *[("HEXA27", "TETRA4"), ("HEXA20", "PENTA6"), ("PENTA15", "PYRA5"), ("PYRA13", "TETRA4")],
+    ],
 )
 def test_a_uniform_pressure_stays_exact(bottom, top, form):
     """The patch test: nothing is added to the constants, on any neighbours."""
-    dim = 2 if bottom.startswith("TRIA") else 3
+    dim = BY_NAME[bottom].dim
     case = block_case(dim, zone=f", recovery: {form}")
     for swapped in (False, True):
         [zone] = simulate(case.as_solved(swapped), block_mesh(bottom, top)).zones

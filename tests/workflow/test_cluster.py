@@ -80,7 +80,7 @@ def test_jobs_ask_for_memory_and_time_by_size_and_again_for_more(tmp_path):
     case["mesh"] |= {"bottom": section, "top": section}
     tiny.with_name("large.yaml").write_text(yaml.safe_dump(case))
     tiny.with_name("broken.yaml").write_text("name: [broken\n")
-    name = '"cases/tiny/{}.yaml"'.format
+    name = 'BATCH["tiny", "{}"]'.format
     small, broken, large, twice, finer = asked(
         project,
         *(f"memory({name(each)}, 1)" for each in ("tiny-b", "broken", "large")),

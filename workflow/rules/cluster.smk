@@ -1,7 +1,5 @@
 """Jobs sent elsewhere: what they ask for, and what becomes of those that are ended from outside."""
 
-import subprocess
-
 from snakemake_interface_logger_plugins.common import LogEvent
 
 # In a job Snakemake runs in Snakemake, with its plugins' libraries: memory beside the solve's own.
@@ -10,24 +8,25 @@ AROUND_MB = 900
 START_MINUTES = 10
 # Contact takes several linear solves, and a node may be slower than where the model was measured.
 SLACK = 10
+# What asks for more (bytes, seconds) is for the solver to refuse, by its own estimate.
+MOST_MEMORY, MOST_SECONDS = 1e15, 1e9
 
 
-@cache
-def size_of(file, refine):
-    from solver.mesh.size import of_mesh
+def size_of(job, refine):
+    from solver.mesh.size import Size
 
-    return of_mesh(peek(Path(file)).get("mesh"), Path(file).parent, refine)
+    return Size(job.points * refine**job.dim, job.dim)
 
 
-def memory(file, attempt, refine=1):
+def memory(job, attempt, refine=1):
     """Megabytes that a job of this case asks for, more each time it has to be run again."""
-    size = size_of(file, refine)
-    return attempt * round(AROUND_MB + size.memory.most / 1e6)
+    most = size_of(job, refine).memory.most
+    return attempt * round(AROUND_MB + min(most, MOST_MEMORY) / 1e6)
 
 
-def minutes(file, attempt, refine=1):
+def minutes(job, attempt, refine=1):
     """Minutes that a job of this case asks for, more each time it has to be run again."""
-    seconds = size_of(file, refine).seconds
+    seconds = min(size_of(job, refine).seconds, MOST_SECONDS)
     return attempt * round(START_MINUTES + SLACK * seconds / 60)
 
 
@@ -68,39 +67,32 @@ def give_verdict(job, failure):
     from solver.verification.run import Job as Solve
     from solver.verification.run import record_crash
 
-    verdict = Path(verdict_of(job))
-    log = verdict.with_name("log")
-    log.parent.mkdir(parents=True, exist_ok=True)
-    with log.open("a", encoding="utf-8") as file:
+    folder = Path(results_of(job))
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "log").open("a", encoding="utf-8") as file:
         file.write(f"{reason_of(failure)}\n")
-    solve = Solve(
-        Path(job.file),
-        None if job.mesh else mesh_made_for(job),
-        job.swap,
-        job.hexahedra,
-    )
-    record_crash(solve, verdict, log)
+    solve = Solve(Path(job.file), swapped=job.swap, hexahedra=job.hexahedra)
+    record_crash(solve, folder / "verdict.json", folder / "log")
 
 
 def report_failures():
     """Give jobs that were ended from outside their verdict, and write the report that waits for it.
 
-    Snakemake's own rule cannot: what it needs was not made in this run. The next run takes these
-    verdicts away, does their jobs, and finds the list of failures too old to be true.
+    Snakemake's own rule cannot: what it needs was not made in this run. The next run does these
+    jobs again, and finds the list of failures too old to be true.
     """
     lost = 0
     for job in RUN.values():
-        made = (verdict_of(job), str(mesh_made_for(job)))
+        made = [results_of(job), *mesh_folder(job)]
         failure = next((FAILURES[file] for file in made if file in FAILURES), None)
         if failure and not Path(verdict_of(job)).exists():
             give_verdict(job, failure)
             lost += 1
     verdicts = [verdict_of(job) for job in RUN.values()]
     if lost and all(map(os.path.exists, verdicts)):
-        shown = [verdict for verdict in SHOWN if Path(verdict).is_file()]
-        command = [sys.executable, "-m", "solver", "report", *verdicts, *shown]
-        command += ["-o", "results/report", "--families", *FAMILY_FILES]
-        subprocess.run(command)
+        command = [sys.executable, "-Es", "-m", "solver", "report"]
+        command += [*verdicts, *verdicts_there(OTHERS)]
+        subprocess.run([*command, "-o", "results/report", "--families", *FAMILY_FILES])
         os.utime("results/report/failures.txt", (1, 1))
 
 

@@ -1,16 +1,19 @@
-"""What is run: the case files found, the jobs they stand for, and the sources jobs depend on."""
+"""What is run: the jobs that the solver lists, and what each of them is made from."""
 
 import hashlib
+import json
 import os
 import re
 import shlex
+import subprocess
 import sys
+import time
 from collections import namedtuple
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-import yaml
+import snakemake.dag
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
 
@@ -20,92 +23,34 @@ for package in ("solver", "workflow.progress"):
     import_module(package)
 sys.path.sort(key=lambda folder: Path(folder) == Path(workflow.basedir))
 
-validate(config, "../schemas/config.schema.yaml")
-
-VARIANTS = config["variants"] in (True, "true")
-# Jobs share their bytecode: to compile the sources anew in each costs a third of a small solve.
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-MEMORY_CHECK = " --no-memory-check" * (config["memory_check"] in (False, "false"))
-# Neither PYTHONPATH nor the user's own packages are for these processes.
-PYTHON = shlex.quote(sys.executable) + " -Es"
-# Before a file for what it takes and a command of the solver, which runs in a fork of the run's
-# warm process, where there is one.
-SOLVER = f"{PYTHON} -IS solver/commands/warm.py"
-
-# One solve. `mesh`: the user's mesh file, or None where a recipe generates it; `hexahedra`: how
-# hexahedra are cut, None for the case's own way.
-Job = namedtuple("Job", "family case name file mesh swap hexahedra")
+# One solve, as `python -m solver jobs` lists it. `folder`: that of its family's results.
+FIELDS = "family case name file mesh swap hexahedra points dim refusal folder"
+Job = namedtuple("Job", FIELDS)
+# Folders of results that are no family's.
+RESERVED = "report meshes orders study stability scaling benchmark docs".split()
 
 
-def sources(*patterns):
-    """Source files of the solver."""
-    return sorted(
-        str(f) for p in patterns for f in Path("solver").glob(p) if f.is_file()
-    )
+def refuse(line):
+    """End here with one line: nobody who named a wrong setting is helped by a traceback."""
+    print(line, file=sys.stderr)
+    sys.exit(2)
 
 
-@cache
-def content_of(file):
-    """The hash of a file's content; nothing where it cannot be read."""
+def read_config():
+    """Hold the configuration against its schema, which fills in what is not given."""
+    for key in ("family", "cases", "case"):  # Snakemake reads `case=12` as a number
+        if isinstance(config.get(key), (int, float)):
+            config[key] = str(config[key])
     try:
-        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
-    except OSError:
-        return ""
-
-
-def contents(*files):
-    """What a job is made from, as a parameter: it runs again on a change whatever the clock says.
-
-    Snakemake's parameters count for this only where they are made from nothing but wildcards.
-    """
-    return digest("".join(f"{file} {content_of(file)}\n" for file in files))
-
-
-def digest(text):
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def text_of(file):
-    return file.read_text() if file.is_file() else ""
-
-
-def stamped(name, files):
-    """The one file that stands for many as an input of jobs, in a list: their hashes.
-
-    Snakemake looks at each input of each job. Written only where a hash changes, so that by its
-    date alone all that depends on it is made again, also where Snakemake's records are lost.
-    """
-    told = "".join(f"{content_of(file)}  {file}\n" for file in files)
-    stamp = Path("results/.sources") / f"{name}.sha256"
-    if workflow.is_main_process and told != text_of(stamp):
-        try:
-            stamp.parent.mkdir(parents=True, exist_ok=True)
-            stamp.write_text(told)
-        except OSError:
-            pass  # said by check_writable
-    return [str(stamp)]
-
-
-def stamp_of(file):
-    """What tells one state of a file from another without reading it."""
-    if not file.is_file():
-        return ""
-    about = file.stat()
-    return f"{about.st_size} {about.st_mtime_ns} {os.access(file, os.R_OK)}"
-
-
-OF_REPORT = sources(
-    *("report/**/*.py", "report/templates/*", "studies/**/*.jinja"),
-    *(f"studies/**/{page}.py" for page in ("page", "figure", "records")),
-)
-OF_SOLVER = sorted({*sources("**/*.py", "case/schemas/*")} - {*OF_REPORT})
-OF_MESH = sources(
-    *("case/**/*.py", "case/schemas/*", "system/errors.py", "system/files.py"),
-    *("system/hdf5.py", "mesh/**/*.py"),
-)
-REPORT_SOURCES = stamped("report", OF_REPORT)
-SOLVER_SOURCES = stamped("solver", OF_SOLVER)
-MESH_SOURCES = stamped("mesh", OF_MESH)
+        validate(config, "../schemas/config.schema.yaml")
+    except WorkflowError as error:
+        told = re.search(r"^\w*Error: (.*)$", str(error), re.MULTILINE)
+        place = re.search(r"^On instance\['(\w+)'\]", str(error), re.MULTILINE)
+        refuse(
+            f"config: {place[1] + ': ' if place else ''}{told[1] if told else error}"
+        )
+    if workflow.cores is not None and workflow.cores < 1:
+        refuse(f"cores = {workflow.cores}: must be 1 or more, or `all`")
 
 
 def listed(value):
@@ -113,116 +58,239 @@ def listed(value):
     return value.split(",") if isinstance(value, str) and value else list(value)
 
 
-def case_files():
-    """All case files: ours, a folder a family, and those of the configured folders."""
-    # Folders of ours that are measured, not checked, hold no cases beside what they are told by.
-    measured = {Path("cases/study"), Path("cases/scaling")}
-    files = sorted(
-        f for f in Path("cases").glob("*/*.yaml") if f.parent not in measured
-    )
-    for folder in listed(config["cases"]):
-        found = sorted(Path(folder).expanduser().glob("*.yaml"))
-        if not found:
-            raise WorkflowError(
-                f"cases = {folder}: no case file (*.yaml) in this folder"
-            )
-        files += found
-    return [f for f in files if f.name not in ("family.yaml", "orders.yaml")]
+read_config()
+# Jobs share their bytecode: to compile the sources anew in each costs a third of a small solve.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+VARIANTS = config["variants"] in (True, "true")
+MEMORY_CHECK = "--no-memory-check" * (config["memory_check"] in (False, "false"))
+# Neither PYTHONPATH nor the user's own packages are for these processes.
+PYTHON = f"{shlex.quote(sys.executable)} -Es"
+# Before a file for what it takes and a command of the solver, which runs in a fork of the run's
+# warm process, where there is one.
+SOLVER = f"{PYTHON} -IS solver/commands/warm.py"
 
 
-def peek(file):
-    """The few keys needed here; a broken file still becomes one job, which the solver refuses."""
+def sources(*patterns):
+    """Source files of the solver."""
+    files = {f for p in patterns for f in Path("solver").glob(p) if f.is_file()}
+    return sorted(map(str, files))
+
+
+STUDY_PAGES = [f"studies/**/{page}.py" for page in ("page", "figure", "records")]
+OF_PAGES = ("report/**/*.*", "studies/**/*.jinja", *STUDY_PAGES)
+REPORT_SOURCES = [f for f in sources(*OF_PAGES) if not f.endswith(".pyc")]
+SOLVER_SOURCES = sorted({*sources("**/*.py", "case/schemas/*")} - {*REPORT_SOURCES})
+MESH_SOURCES = sources("case/**/*.py", "case/schemas/*", "mesh/**/*.py", "system/*.py")
+
+
+@cache
+def content_of(file):
+    """The hash of a file's content; nothing where it cannot be read, or would be waited for."""
+    if not os.path.isfile(file):
+        return ""
     try:
-        content = yaml.load(
-            file.read_text(), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-        )
-    except (OSError, yaml.YAMLError, UnicodeDecodeError):
-        content = None
-    return content if isinstance(content, dict) else {}
+        with open(file, "rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError:
+        return ""
 
 
-def jobs_of(file):
-    """The jobs of one case file: both directions where asked for, and the variants."""
-    content = peek(file)
-    family = file.resolve().parent.name
-    name = str(content.get("name"))
-    if "name" not in content or not re.fullmatch(r"[A-Za-z0-9][\w.+-]*", name):
-        name = re.sub(r"[^\w.+-]", "_", file.stem)
-    mesh = content.get("mesh")
-    mesh_file = (
-        file.parent / str(mesh["file"])
-        if isinstance(mesh, dict) and "file" in mesh
-        else None
-    )
-    cuts = [None]
-    if VARIANTS and (mesh_file or "HEXA" in str(mesh)):
-        own = re.search(
-            r"\bhexahedra: *(\w+)", str(content.get("contact")).replace("'", "")
-        )
-        cuts.append("pyramids" if own and own[1] == "hexahedra" else "hexahedra")
-    for cut in cuts:
-        for swap in [False, True] if content.get("directions") == "both" else [False]:
-            job = name + "-swapped" * swap + (f"-{cut}" if cut else "")
-            yield Job(family, name, job, str(file), mesh_file, swap, cut)
+@cache
+def contents(*files):
+    """What a job is made from, as a parameter: it runs again on a change whatever the clock says.
+
+    Snakemake's parameters count for this only where they are made from nothing but wildcards.
+    """
+    told = "".join(f"{file} {content_of(file)}\n" for file in files)
+    return hashlib.sha256(told.encode("utf-8", "surrogateescape")).hexdigest()
+
+
+SOLVER_CONTENT = contents(*SOLVER_SOURCES)
+REPORT_CONTENT = contents(*REPORT_SOURCES)
+MESH_CONTENT = contents(*MESH_SOURCES)
+
+
+def watched(*files):
+    """The user's files as inputs of a job; what they hold is among its parameters, and counts.
+
+    Their dates do not: a clock may be wrong. Left out are those that are missing or
+    unreadable, which the solver reports, those of the future, and those whose names Snakemake
+    takes for patterns.
+    """
+    found = [f for f in files if os.path.isfile(f) and not re.search(r"[{}\n]", f)]
+    found = [f for f in found if os.access(f, os.R_OK)]
+    return [ancient(f) for f in found if os.stat(f).st_mtime <= time.time()]
+
+
+def folder_of(family):
+    """The folder of a family's results: its name, but for what Snakemake takes for a pattern."""
+    plain = re.sub(r"[{}\x00-\x1f/]", "_", family)
+    return f"{plain}_" if plain in RESERVED else plain
 
 
 def find_jobs():
-    """Jobs by (family, name), as configured."""
-    jobs = {}
-    for job in (job for file in case_files() for job in jobs_of(file)):
-        other = jobs.setdefault((job.family, job.name), job)
-        if other is not job:
-            raise WorkflowError(
-                f"{job.file}: name = {job.case}: already taken by {other.file}; "
-                "each case of a family needs a name of its own"
-            )
+    """All jobs by folder and name: ours, a folder a family, and those of the configured folders."""
+    # Folders of ours that are measured, not checked, hold no cases beside what describes them.
+    measured = {Path("cases/study"), Path("cases/scaling")}
+    ours = sorted({f.parent for f in Path("cases").glob("*/*.yaml")} - measured)
+    folders = [*ours, *(Path(f).expanduser() for f in listed(config["cases"]))]
+    if not folders:
+        refuse("cases: no folder with case files (*.yaml) in it")
+    command = [sys.executable, "-Es", "-m", "solver", "jobs", *map(str, folders)]
+    done = subprocess.run(
+        command + ["--variants"] * VARIANTS, capture_output=True, text=True
+    )
+    if done.returncode:
+        refuse((done.stderr.strip() or "cases: they cannot be listed").splitlines()[-1])
+    jobs = [
+        Job(**of, folder=folder_of(of["family"]))
+        for of in json.loads(done.stdout.splitlines()[-1])
+    ]
+    return {(job.folder, job.name): job for job in jobs}
+
+
+def choose_jobs():
+    """The jobs of this run: of the configured families, or the one case."""
+    families = {job.family for job in BATCH.values()}
     chosen = listed(config["family"])
-    known = {job.family for job in jobs.values()}
-    if unknown := set(chosen) - known:
-        raise WorkflowError(
-            f"family = {', '.join(sorted(unknown))}: unknown; there are {', '.join(sorted(known))}"
+    if unknown := sorted(set(chosen) - families):
+        refuse(
+            f"family = {', '.join(unknown)}: unknown; there are {', '.join(sorted(families))}"
         )
-    return {key: job for key, job in jobs.items() if not chosen or job.family in chosen}
-
-
-def older(file, time):
-    """Whether a file is missing, or was written before that time."""
-    return not Path(file).is_file() or Path(file).stat().st_mtime < time
-
-
-def measured_points(read, file, size, folder):
-    """The points by name that a file describes; says how long those that are missing will take.
-
-    `read` the file at its `size`; `folder` has the records.
-    """
-    from solver.system.errors import InputError
-    from solver.studies.points import announcement
-
-    try:
-        content = read(Path(file), size)
-    except InputError as error:
-        raise WorkflowError(str(error)) from None
-    newest = max(Path(source).stat().st_mtime for source in [file, *SOLVER_SOURCES])
-    points = {point.name: point for point in content.points}
-    pending = [name for name in points if older(f"{folder}/{name}.json", newest)]
-    logger.info(announcement(content, Path(folder), pending))
-    return points
-
-
-def verdict_of(job):
-    return f"results/{job.family}/{job.name}/verdict.json"
+    jobs = {
+        key: job for key, job in BATCH.items() if not chosen or job.family in chosen
+    }
+    jobs = {key: job for key, job in jobs.items() if config["case"] in ("", job.name)}
+    if not jobs:
+        refuse(f"case = {config['case']}: unknown; a case is named as in its file")
+    return jobs
 
 
 BATCH = find_jobs()
-MESHES = {str(job.mesh) for job in BATCH.values() if job.mesh}
-RUN = {k: j for k, j in BATCH.items() if config["case"] in ("", j.name)}
-if not RUN:
-    raise WorkflowError(
-        f"case = {config['case']}: unknown; a case is named as in its file"
-    )
+RUN = choose_jobs()
+
+
+def results_of(job):
+    return f"results/{job.folder}/{job.name}"
+
+
+def verdict_of(job):
+    return f"{results_of(job)}/verdict.json"
+
+
+def verdicts_there(jobs):
+    """The verdicts of those jobs that have one."""
+    return [verdict for verdict in map(verdict_of, jobs) if os.path.isfile(verdict)]
+
+
+def is_kept(folder):
+    """Whether a solve's verdict can be kept: it is as it was written, its result is there, and it was
+    not the machine (memory, disk, a kill) that ended the solve."""
+    from solver.system.errors import InputError
+    from solver.verification.verdict import read_verdict
+
+    try:
+        verdict = read_verdict(Path(folder, "verdict.json"))
+    except InputError:
+        return False
+    there = verdict.result is None or Path(folder, verdict.result).is_file()
+    return there and not verdict.transient
+
+
+# Without Snakemake's records nobody knows what the results were made from.
+LOST = not any(Path(".snakemake/metadata").glob("*"))
+AGAIN = "results/.again"
+
+
+def again(folder, kept=is_kept):
+    """A further input of a job whose results are there, but cannot be kept: it is never there."""
+    return [AGAIN] if os.path.isdir(folder) and (LOST or not kept(folder)) else []
+
+
+# The wildcards stand for names that exist: no recursion is to be detected in a name that ends in
+# twenty zeros.
+snakemake.dag.PeriodicityDetector = lambda: type(
+    "Never", (), {"is_periodic": lambda *_: None}
+)()
 
 
 wildcard_constraints:
-    family="[^/]+",
+    family=f"(?!(?:{'|'.join(RESERVED)})/)[^/]+",
     case="[^/]+",
     job="[^/]+",
+
+
+def has_mesh(folder):
+    """Whether there is a mesh, or the case is to blame that there is none."""
+    return any(Path(folder, name).is_file() for name in ("mesh.vtkhdf", "refused"))
+
+
+def mesh_folder(job):
+    """Where the mesh of a recipe lies, in a list; a mesh of the user's is in none of ours."""
+    return [f"results/meshes/{job.folder}/{job.case}"] if job.mesh is None else []
+
+
+def mesh_file(job):
+    """The generated mesh, as a path that may be missing; none for a mesh of the user's."""
+    return "".join(f"{folder}/mesh.vtkhdf" for folder in mesh_folder(job))
+
+
+def files_of(job):
+    """The files that a solve is made from: case, mesh with what it includes, accepted values."""
+    accepted = Path(job.file).parent / "regression" / f"{job.name}.json"
+    return [job.file, *(job.mesh or ()), str(accepted)]
+
+
+def options_of(job):
+    """How the command line is told which job of a case this is."""
+    cut = f" --hexahedra {job.hexahedra}" if job.hexahedra else ""
+    return "--swap" * job.swap + cut
+
+
+def again_for(job):
+    """What `again` gives for a solve or its mesh."""
+    return again(results_of(job)) + [
+        f for mesh in mesh_folder(job) for f in again(mesh, has_mesh)
+    ]
+
+
+@cache
+def ladders():
+    """The jobs of all ladders by (family, folder), their levels, and options of a solve."""
+    from solver.commands.jobs import jobs_of
+    from solver.studies.orders.description import read_ladders
+    from solver.system.errors import InputError
+
+    found = {}
+    for file in LADDER_FILES:
+        try:
+            family = read_ladders(Path(file))
+        except InputError as error:
+            refuse(error)
+        for ladder in family.ladders:
+            for one in jobs_of(ladder.case):
+                name = ladder.folder(one.swap)
+                of = {**vars(one), "name": name, "hexahedra": ladder.hexahedra}
+                job = Job(**of, folder=folder_of(family.name))
+                options = f" --recovery {ladder.recovery}" if ladder.recovery else ""
+                found[job.folder, job.name] = job, ladder.levels, options
+    return found
+
+
+def level_of(w):
+    return ladders()[w.family, w.job][0]
+
+
+def options_of_level(w):
+    """How the command line is told which level of which ladder this is."""
+    job, _, options = ladders()[w.family, w.job]
+    return f"--refine {w.level} {options_of(job)}{options}"
+
+
+def level_folders():
+    """Where the results of all levels lie."""
+    return [
+        f"results/orders/{family}/{name}/{level}"
+        for (family, name), (_, levels, _) in ladders().items()
+        for level in levels
+    ]

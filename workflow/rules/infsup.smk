@@ -5,34 +5,35 @@ INFSUP_RECORD = f"results/stability/infsup-{config['stability']}.json"
 rule infsup_record:
     input:
         ladders="cases/stability/infsup/infsup.yaml",
-        sources=SOLVER_SOURCES,
     output:
-        INFSUP_RECORD,
+        record=INFSUP_RECORD,
+        benchmark=f"{INFSUP_RECORD}.benchmark",
     log:
-        INFSUP_RECORD + ".log",
+        f"{INFSUP_RECORD}.log",
     resources:
         mem_mb=lambda w, attempt: 2000 * attempt,
         runtime=lambda w, attempt: 60 * attempt,
     params:
-        benchmark=INFSUP_RECORD + ".benchmark",
+        content=SOLVER_CONTENT,
         quick=" --quick" * (config["stability"] == "quick"),
     message:
         "inf-sup test"
     shell:
-        "{SOLVER} {params.benchmark:q} infsup {input.ladders:q} -o {output:q}{params.quick}"
+        "{SOLVER} {output.benchmark:q} infsup {input.ladders:q} -o {output.record:q}{params.quick}"
         " > {log:q} 2>&1"
 
 
 rule infsup_page:
     input:
         record=INFSUP_RECORD,
-        sources=REPORT_SOURCES,
     output:
         "results/report/infsup.html",
         "results/report/infsup.csv",
         "results/report/infsup-failures.txt",
     log:
         "results/report/infsup.log",
+    params:
+        content=REPORT_CONTENT,
     message:
         "page of the inf-sup test"
     shell:
@@ -43,7 +44,9 @@ rule infsup_page:
 rule infsup:
     input:
         "results/report/infsup-failures.txt",
+    params:
+        log="results/report/infsup.log",
     message:
         "inf-sup constants level off?"
     shell:
-        "! test -s {input:q}"
+        "if test -s {input:q}; then tail -n 1 {params.log:q}; exit 1; fi # gate"

@@ -1,25 +1,24 @@
-RECIPES = {(job.family, job.case): job.file for job in BATCH.values() if not job.mesh}
+RECIPES = {(j.folder, j.case): j for j in BATCH.values() if j.mesh is None}
 
 
-# The mesh of a recipe, one for all directions and variants of a case. Where meshing fails the file
-# holds the reason instead, so that the solve refuses it and the batch goes on.
+# The mesh of a recipe, one for all directions and variants of a case. Where it cannot be made the
+# solve tries once more, and its verdict says why not.
 rule mesh:
     input:
-        case=lambda w: RECIPES[w.family, w.case],
-        sources=MESH_SOURCES,
+        case=lambda w: watched(RECIPES[w.family, w.case].file),
+        again=lambda w: again(f"results/meshes/{w.family}/{w.case}", has_mesh),
     output:
-        mesh="results/{family}/{case}/mesh.vtkhdf",
+        directory("results/meshes/{family}/{case}"),
     log:
-        "results/{family}/{case}/mesh.log",
+        "results/meshes/{family}/{case}/log",
     resources:
         mem_mb=lambda w, attempt: memory(RECIPES[w.family, w.case], attempt),
         runtime=lambda w, attempt: minutes(RECIPES[w.family, w.case], attempt),
     params:
-        benchmark="results/{family}/{case}/mesh.benchmark",
-        content=lambda w: contents(RECIPES[w.family, w.case], *MESH_SOURCES),
+        file=lambda w: RECIPES[w.family, w.case].file,
+        content=lambda w: contents(RECIPES[w.family, w.case].file) + MESH_CONTENT,
     message:
         "mesh {wildcards.case}"
     shell:
-        "{SOLVER} {params.benchmark:q} mesh {input.case:q} -o {output.mesh:q} > {log:q} 2>&1 || {{ died=$?;"
-        ' test -s {log:q} || echo "meshing died with exit status $died" > {log:q};'
-        " tail -n 1 {log:q} > {output.mesh:q}.reason; mv {output.mesh:q}.reason {output.mesh:q}; }}"
+        "{SOLVER} {output:q}/benchmark mesh {params.file:q} -o {output:q}/mesh.vtkhdf"
+        " > {log:q} 2>&1 || {{ test $? != 2 || touch {output:q}/refused; }}"

@@ -6,72 +6,36 @@ LADDER_FILES = sorted(
 )
 
 
-@cache
-def ladders():
-    """The jobs of all ladders by (family, folder), and their levels."""
-    from solver.studies.orders.description import read_ladders
-
-    found = {}
-    for file in LADDER_FILES:
-        family = read_ladders(Path(file))
-        for ladder in family.ladders:
-            for job in jobs_of(ladder.case):
-                if job.hexahedra is None:
-                    name = ladder.folder(job.swap)
-                    job = job._replace(name=name, hexahedra=ladder.hexahedra, mesh=None)
-                    found[family.name, name] = job, ladder
-    return found
-
-
-def level_file(w):
-    return ladders()[w.family, w.job][0].file
-
-
-def level_options(w):
-    """How the command line is told which level of which ladder this is."""
-    job, ladder = ladders()[w.family, w.job]
-    return (
-        f"--refine {w.level}"
-        + " --swap" * job.swap
-        + (f" --hexahedra {job.hexahedra}" if job.hexahedra else "")
-        + (f" --recovery {ladder.recovery}" if ladder.recovery else "")
-    )
-
-
 use rule solve as solve_level with:
     input:
-        case=level_file,
-        sources=SOLVER_SOURCES,
+        case=lambda w: watched(level_of(w).file),
+        again=lambda w: again(f"results/orders/{w.family}/{w.job}/{w.level}"),
     output:
-        verdict="results/orders/{family}/{job}/{level}/verdict.json",
+        directory("results/orders/{family}/{job}/{level}"),
     log:
         "results/orders/{family}/{job}/{level}/log",
     resources:
-        mem_mb=lambda w, attempt: memory(level_file(w), attempt, int(w.level)),
-        runtime=lambda w, attempt: minutes(level_file(w), attempt, int(w.level)),
+        mem_mb=lambda w, attempt: memory(level_of(w), attempt, int(w.level)),
+        runtime=lambda w, attempt: minutes(level_of(w), attempt, int(w.level)),
     params:
-        benchmark="results/orders/{family}/{job}/{level}/benchmark",
-        result="results/orders/{family}/{job}/{level}/result.vtkhdf",
-        content=lambda w: contents(level_file(w), *SOLVER_SOURCES),
-        options=level_options,
+        file=lambda w: level_of(w).file,
+        mesh="''",
+        content=lambda w: contents(level_of(w).file) + SOLVER_CONTENT,
+        options=options_of_level,
+        refusal="''",
     message:
         "solve {wildcards.job} refined {wildcards.level} times"
 
 
 rule orders_page:
     input:
-        verdicts=lambda w: [
-            f"results/orders/{family}/{name}/{level}/verdict.json"
-            for (family, name), (_, ladder) in ladders().items()
-            for level in ladder.levels
-        ],
-        ladders=LADDER_FILES,
+        levels=lambda w: level_folders(),
+        ladders=watched(*LADDER_FILES),
         families=[
             str(f)
             for f in (Path(file).with_name("family.yaml") for file in LADDER_FILES)
             if f.is_file()
         ],
-        sources=REPORT_SOURCES,
     output:
         "results/report/orders.html",
         "results/report/orders.csv",
@@ -79,6 +43,8 @@ rule orders_page:
         "results/report/orders-failures.txt",
     log:
         "results/report/orders.log",
+    params:
+        content=contents(*LADDER_FILES) + REPORT_CONTENT,
     message:
         "orders of convergence"
     shell:
@@ -89,8 +55,12 @@ rule orders_page:
 # The gate: fails when a level has no result or a slope is not reached; the page is there by then.
 rule orders:
     input:
-        "results/report/orders-failures.txt",
+        failures="results/report/orders-failures.txt",
+        levels=lambda w: level_folders(),
+        again=lambda w: sorted({f for folder in level_folders() for f in again(folder)}),
+    params:
+        log="results/report/orders.log",
     message:
         "all orders reached?"
     shell:
-        "! test -s {input:q}"
+        "if test -s {input.failures:q}; then tail -n 1 {params.log:q}; exit 1; fi # gate"

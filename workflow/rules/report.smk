@@ -1,5 +1,11 @@
-# Verdicts of the batch that are shown but not run: where one case is asked for, all others there.
-SHOWN = [verdict_of(job) for key, job in BATCH.items() if key not in RUN]
+# Solves that are shown but not run: where a family or a case is asked for, all others there.
+OTHERS = [job for key, job in BATCH.items() if key not in RUN]
+# Pages of other targets: the report links those that are there.
+PAGES = [
+    f"results/report/{name}.html"
+    for name in ("orders", "study", "stability", "gallery")
+]
+PAGES = [page for page in PAGES if os.path.isfile(page)]
 
 
 # What the families are about, of whichever folder their cases lie in.
@@ -16,9 +22,9 @@ FAMILY_FILES = sorted(
 # would hide from Snakemake that the batch is another one.
 rule report:
     input:
-        verdicts=[verdict_of(job) for job in RUN.values()],
-        families=FAMILY_FILES,
-        sources=REPORT_SOURCES,
+        solves=lambda w: [results_of(job) for job in RUN.values()],
+        families=watched(*FAMILY_FILES),
+        pages=watched(*PAGES),
     output:
         report(
             "results/report/summary.html",
@@ -27,30 +33,35 @@ rule report:
         ),
         multiext("results/report/summary", ".json", ".md", ".csv"),
         "results/report/junit.xml",
-        "results/report/failures.txt",
+        failures="results/report/failures.txt",
+        benchmark="results/report/benchmark",
     log:
         "results/report/log",
     params:
-        benchmark="results/report/benchmark",
-        content=lambda w: contents(*FAMILY_FILES, *REPORT_SOURCES),
-        shown=[verdict for verdict in SHOWN if Path(verdict).is_file()],
+        verdicts=lambda w: [verdict_of(job) for job in RUN.values()],
+        others=lambda w: verdicts_there(OTHERS),
+        families=FAMILY_FILES,
+        content=contents(*FAMILY_FILES, *PAGES) + REPORT_CONTENT,
     message:
         "report of all cases"
     shell:
-        "{SOLVER} {params.benchmark:q} report {input.verdicts:q} {params.shown:q} -o results/report"
-        " --families {input.families:q} 2>&1"
-        " | tee {log:q}"
+        "{SOLVER} {output.benchmark:q} report {params.verdicts:q} {params.others:q}"
+        " -o results/report --families {params.families:q} 2>&1 | tee {log:q}"
 
 
 # The gate: the exit status of the batch. The report is there by then, whatever it says.
 rule gate:
     input:
-        "results/report/failures.txt",
+        failures="results/report/failures.txt",
     output:
         touch("results/report/passed"),
+    log:
+        "results/report/gate.log",
     params:
-        line=f"^{config['case']}: " if config["case"] else "^",
+        log="results/report/log",
+        names=f"^({'|'.join(job.name for job in RUN.values())}): " if OTHERS else "^",
     message:
         "all cases passed?"
     shell:
-        "! grep --quiet {params.line:q} {input:q}"
+        "if grep --quiet --extended-regexp {params.names:q} {input.failures:q};"
+        " then grep Report: {params.log:q} | tee {log:q}; exit 1; fi # gate"

@@ -10,19 +10,21 @@ SCALING_PAGE = "scaling" if SCALE == "full" else f"scaling-{SCALE}"
 def scaling():
     from solver.studies.scaling.description import read_scaling
 
-    return measured_points(read_scaling, SCALING_FILE, SCALE, SCALED)
+    return measured_points("scaling_point", read_scaling, SCALING_FILE, SCALE, SCALED)
 
 
 # A point always ends with a record, whatever became of it.
 rule scaling_point:
     input:
         case=lambda w: str(scaling()[w.point].series.case),
-        sources=[SCALING_FILE, *SOLVER_SOURCES],
+        scaling=SCALING_FILE,
     output:
         f"{SCALED}/{{point}}.json",
     wildcard_constraints:
         point="[^/]+/[0-9]+",
     threads: lambda w: workflow.cores
+    params:
+        content=SOLVER_CONTENT,
     message:
         "measure {wildcards.point}"
     shell:
@@ -34,13 +36,14 @@ rule scaling:
     input:
         records=lambda w: [f"{SCALED}/{point}.json" for point in scaling()],
         scaling=SCALING_FILE,
-        sources=REPORT_SOURCES,
     output:
         f"results/report/{SCALING_PAGE}.html",
         f"results/report/{SCALING_PAGE}.csv",
         f"results/report/{SCALING_PAGE}-exponents.csv",
     log:
         f"results/report/{SCALING_PAGE}.log",
+    params:
+        content=REPORT_CONTENT,
     message:
         "growth with size"
     shell:

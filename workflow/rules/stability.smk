@@ -8,23 +8,23 @@ rule sweep:
     input:
         sweep="cases/stability/sweeps/{sweep}.yaml",
         cases=sorted(map(str, Path("cases/stability/base").glob("*.yaml"))),
-        sources=SOLVER_SOURCES,
     output:
-        "results/stability/{level}/{sweep}.json",
+        record="results/stability/{level}/{sweep}.json",
+        benchmark="results/stability/{level}/{sweep}.benchmark",
     log:
         "results/stability/{level}/{sweep}.log",
     resources:
         mem_mb=lambda w, attempt: 2000 * attempt,
         runtime=lambda w, attempt: 60 * attempt,
     params:
-        benchmark="results/stability/{level}/{sweep}.benchmark",
+        content=SOLVER_CONTENT,
         quick=QUICK,
     message:
         "sweep {wildcards.sweep}"
     shell:
         # Points that do not hold are for the gate to judge, once the page is there.
-        "{SOLVER} {params.benchmark:q} sweep {input.sweep:q} -o {output:q}{params.quick}"
-        " > {log:q} 2>&1 || test -s {output:q}"
+        "{SOLVER} {output.benchmark:q} sweep {input.sweep:q} -o {output.record:q}{params.quick}"
+        " > {log:q} 2>&1 || test -s {output.record:q}"
 
 
 rule stability_page:
@@ -35,15 +35,15 @@ rule stability_page:
             sweep=sorted(SWEEP_FILES),
         ),
         infsup=INFSUP_RECORD,
-        sources=REPORT_SOURCES,
     output:
-        STABILITY + ".html",
-        STABILITY + ".csv",
-        STABILITY + "-failures.txt",
+        f"{STABILITY}.html",
+        f"{STABILITY}.csv",
+        f"{STABILITY}-failures.txt",
     log:
-        STABILITY + ".log",
+        f"{STABILITY}.log",
     params:
         quick=QUICK,
+        content=REPORT_CONTENT,
     message:
         "numerical stability"
     shell:
@@ -54,8 +54,10 @@ rule stability_page:
 # The gate: fails when a point does not hold; the page is there by then.
 rule stability:
     input:
-        STABILITY + "-failures.txt",
+        f"{STABILITY}-failures.txt",
+    params:
+        log=f"{STABILITY}.log",
     message:
         "all points hold?"
     shell:
-        "! test -s {input:q}"
+        "if test -s {input:q}; then tail -n 1 {params.log:q}; exit 1; fi # gate"

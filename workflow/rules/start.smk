@@ -1,16 +1,13 @@
-"""Before a run: the folder is this run's alone, and what an earlier one was kept from is due again."""
+"""Before jobs run: the folder is this run's alone, its progress is told, its solver is warm."""
 
 import atexit
 import fcntl
 import logging
+import signal
 import socket
-import subprocess
 import tempfile
-import time
-from glob import glob
 from threading import Thread
 
-from snakemake.scheduling.job_scheduler import JobScheduler
 from snakemake.settings.enums import Quietness
 
 from workflow.progress import Progress, hides
@@ -21,17 +18,15 @@ def take_lock():
 
     Snakemake's own locks stay behind when a run is killed, so they are off.
     """
-    place = Path(".snakemake") / "run.lock"
-    place.parent.mkdir(exist_ok=True)
-    lock = place.open("a+")
+    lock = Path(".snakemake/run.lock").open("a+")
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         lock.seek(0)
-        raise WorkflowError(
+        refuse(
             f"{Path.cwd()}: another run is at work in this folder ({lock.read().strip()}); "
             "wait until it ends, or end it"
-        ) from None
+        )
     except OSError:
         return lock  # a file system without locks
     lock.truncate(0)
@@ -40,13 +35,45 @@ def take_lock():
     return lock
 
 
+# The lock, as long as this process lives.
+HELD = []
+
+
+def date_now():
+    """Date results of the future now, after the clock went back: Snakemake goes by their order."""
+    now = time.time()
+    for file in Path("results").rglob("*"):
+        if (
+            not file.is_symlink()
+            and file.stat().st_mtime > now
+            and os.access(file, os.W_OK)
+        ):
+            os.utime(file)
+
+
+def check_writable():
+    """Say in one line what Snakemake would meet in the midst of its work."""
+    parents = {
+        folder
+        for job in workflow.dag.needrun_jobs()
+        for f in job.output
+        for folder in Path(f).parents
+    }
+    for folder in sorted({Path(".snakemake"), *parents} - {Path()}):
+        if folder.exists() and not os.access(folder, os.W_OK | os.X_OK):
+            refuse(
+                f"{folder}: nothing can be written into this folder: "
+                "give yourself the permission, or work in a copy of the project"
+            )
+
+
 def survive_termination():
     """Let Snakemake end on SIGTERM: its handler takes a lock that the code it interrupts may hold.
 
     In a thread of its own the handler gets that lock as soon as it is free.
     """
-    ending = JobScheduler.exit_gracefully
-    JobScheduler.exit_gracefully = lambda *of: Thread(target=ending, args=of).start()
+    ending = workflow.scheduler.exit_gracefully
+    signal.signal(signal.SIGTERM, lambda *_: Thread(target=ending).start())
 
 
 def tell_progress():
@@ -55,6 +82,8 @@ def tell_progress():
     if settings.dryrun:  # which Snakemake tells well
         return
     shown = [each for each in handlers if each.name == "DefaultStreamHandler"]
+    for handler in [] if settings.verbose else shown:
+        handler.addFilter(lambda record: not hides(record))
     if {Quietness.PROGRESS, Quietness.ALL} & set(settings.quiet or ()):
         for handler in shown:
             handler.setLevel(logging.WARNING)
@@ -62,70 +91,39 @@ def tell_progress():
     progress = Progress(sys.stdout, sys.stderr)
     logger.addFilter(progress)
     atexit.register(progress.close)
-    for handler in [] if settings.verbose else shown:
-        handler.addFilter(lambda record: not hides(record))
 
 
-def check_writable():
-    """Say in one line what Snakemake would meet in the midst of its work."""
-    folders = [Path(verdict_of(job)).parent for job in RUN.values()]
-    for folder in (
-        Path(".snakemake"),
-        Path("results"),
-        Path("results/report"),
-        *folders,
-    ):
-        if folder.exists() and not os.access(folder, os.W_OK | os.X_OK):
-            raise WorkflowError(
-                f"{folder}: nothing can be written into this folder: "
-                "give yourself the permission, or work in a copy of the project"
-            )
+# What is measured point by point: by the rule of a point, what tells of those that are due.
+ANNOUNCED = {}
 
 
-def mesh_made_for(job):
-    return Path(f"results/{job.family}/{job.case}/mesh.vtkhdf")
+def measured_points(rule, read, file, size, folder):
+    """The points by name that a file describes at a `size`.
 
-
-def forget_transient():
-    """Remove what the machine was to blame for (memory, disk, a kill), so that it is done again.
-
-    A mesh that was not made goes with the verdicts that say so. With them goes what the gates
-    look at: Snakemake misses only files that something to be made is made from.
+    Those that a run will measure are announced before it begins, by their `rule`; their records
+    lie in `folder`.
     """
-    unmade = {mesh for mesh in map(mesh_made_for, RUN.values()) if is_reason(mesh)}
-    of_batch = {
-        Path(verdict_of(job))
-        for job in RUN.values()
-        if mesh_made_for(job) in unmade or is_transient(Path(verdict_of(job)))
-    }
-    levels = set(
-        filter(is_transient, map(Path, glob("results/orders/*/*/*/verdict.json")))
-    )
-    reports = Path("results/report")
-    gates = {reports / "passed", reports / "failures.txt"} if of_batch else set()
-    gates |= {reports / "orders-failures.txt"} if levels else set()
-    for file in unmade | of_batch | levels | gates:
-        file.unlink(missing_ok=True)
+    from solver.studies.points import announcement
+    from solver.system.errors import InputError
+
+    try:
+        content = read(Path(file), size)
+    except InputError as error:
+        refuse(error)
+    ANNOUNCED[rule] = lambda due: announcement(content, Path(folder), due)
+    return {point.name: point for point in content.points}
 
 
-def is_transient(verdict):
-    return verdict.is_file() and '"transient": true' in verdict.read_text("utf-8")
-
-
-def is_reason(mesh):
-    """Whether a mesh is none, but the line that says why."""
-    return mesh.is_file() and mesh.open("rb").read(8) != b"\x89HDF\r\n\x1a\n"
-
-
-def date_now():
-    """Date files of the future now, after the clock went back: Snakemake goes by their order."""
-    now = time.time()
-    stamps = {*SOLVER_SOURCES, *REPORT_SOURCES, *MESH_SOURCES}
-    files = {*glob("results/**", recursive=True)} | stamps | MESHES
-    files |= {job.file for job in BATCH.values()}
-    for file in filter(os.path.exists, files):
-        if os.stat(file).st_mtime > now and os.access(file, os.W_OK):
-            os.utime(file)
+def announce():
+    """Say how long the points that are to be measured will take."""
+    for rule, told in ANNOUNCED.items():
+        due = [
+            j.wildcards.point
+            for j in workflow.dag.needrun_jobs()
+            if j.rule.name == rule
+        ]
+        if due:
+            logger.info(told(due))
 
 
 def is_warm(job):
@@ -166,22 +164,23 @@ def end_warm(server):
         server.kill()
 
 
+# Not in a dry run, which changes nothing.
 onstart:
-    if workflow.is_main_process and workflow.local_exec:
-        # Each look for jobs to start sets a timer for another one, so that there are ever more.
-        workflow.scheduler.job_rate_limiter = None
-        # Elsewhere the system's own libraries start threads, and forks may hang.
-        if sys.platform == "linux" and any(
-            map(is_warm, workflow.dag.needrun_jobs())
-        ):
-            keep_warm()
+    if workflow.is_main_process:
+        check_writable()
+        HELD.append(take_lock())
+        date_now()
+        survive_termination()
+        announce()
+        if workflow.local_exec:
+            # Each look for jobs to start sets a timer for another one, so that there are ever more.
+            workflow.scheduler.job_rate_limiter = None
+            # Elsewhere the system's own libraries start threads, and forks may hang.
+            if sys.platform == "linux" and any(
+                map(is_warm, workflow.dag.needrun_jobs())
+            ):
+                keep_warm()
 
 
-# A dry run as well: else it would not tell what is due again.
 if workflow.is_main_process:
-    check_writable()
-    LOCK = take_lock()
-    survive_termination()
-    forget_transient()
-    date_now()
     tell_progress()

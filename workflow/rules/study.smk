@@ -4,14 +4,13 @@ STUDY_FILE = "cases/study/study.yaml"
 SIZE = config["study"]
 POINTS = f"results/study/{SIZE}"
 PAGE = "study" if SIZE == "full" else f"study-{SIZE}"
-MEASURING_SOURCES = [STUDY_FILE, *SOLVER_SOURCES]
 
 
 @cache
 def study():
     from solver.studies.work_precision.description import read_study
 
-    return measured_points(read_study, STUDY_FILE, SIZE, POINTS)
+    return measured_points("study_point", read_study, STUDY_FILE, SIZE, POINTS)
 
 
 def reference_of(w):
@@ -27,11 +26,13 @@ rule study_reference:
             for p in study().values()
             if p.problem.name == w.problem
         ),
-        sources=MEASURING_SOURCES,
+        study=STUDY_FILE,
     output:
         "results/study/references/{problem}.vtkhdf",
     log:
         "results/study/references/{problem}.log",
+    params:
+        content=SOLVER_CONTENT,
     message:
         "reference of {wildcards.problem}"
     shell:
@@ -44,13 +45,14 @@ rule study_point:
     input:
         case=lambda w: str(study()[w.point].problem.case),
         reference=reference_of,
-        sources=MEASURING_SOURCES,
+        study=STUDY_FILE,
     output:
         f"{POINTS}/{{point}}.json",
     wildcard_constraints:
         point=".+/.+/.+/[0-9]+",
     threads: lambda w: workflow.cores
     params:
+        content=SOLVER_CONTENT,
         reference=lambda w, input: [f"--reference {r}" for r in input.reference],
     message:
         "measure {wildcards.point}"
@@ -63,13 +65,14 @@ rule study:
     input:
         records=lambda w: [f"{POINTS}/{point}.json" for point in study()],
         study=STUDY_FILE,
-        sources=REPORT_SOURCES,
     output:
         f"results/report/{PAGE}.html",
         f"results/report/{PAGE}.csv",
         directory(f"results/report/{PAGE}"),
     log:
         f"results/report/{PAGE}.log",
+    params:
+        content=REPORT_CONTENT,
     message:
         "error against run time"
     shell:

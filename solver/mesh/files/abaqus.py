@@ -51,6 +51,23 @@ def read(path: Path) -> meshio.Mesh:
     return deck.mesh()
 
 
+def files_of(path: Path) -> list[Path]:
+    """The file and all that it includes, in their order; those that are missing as well."""
+    found, waiting = [], [path]
+    while waiting:
+        found.append(waiting.pop(0))
+        try:
+            text = found[-1].read_text(errors="replace")
+        except OSError:
+            continue
+        named = [found[-1].parent / name for name in _INCLUDED.findall(text)]
+        waiting += [file for file in named if file not in found and file not in waiting]
+    return found
+
+
+_INCLUDED = re.compile(
+    r'^[ \t]*\*include[ \t]*,[ \t]*input[ \t]*=[ \t]*"?(.*?)"?[ \t]*$', re.IGNORECASE | re.MULTILINE
+)
 _Options = dict[str, str]
 _Lines = list[list[str]]
 # A cell or face: its number (0 for a face of a surface), its nodes, the names of its groups.

@@ -1,0 +1,163 @@
+"""The jobs that the case files of folders stand for, as JSON: what a workflow has to run.
+
+One case file is a job for each direction, and where asked for one for each cut of hexahedra. A file
+that is refused is one job too: the solve says why. So no file keeps the others from being solved.
+"""
+
+import argparse
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from ..case import job_name
+from ..case.model import Case
+from ..case.reader import load_case
+from ..mesh.size import Size, of_mesh
+from ..system.errors import InputError
+from .options import add_command
+
+# Files of these names describe a folder of cases.
+DESCRIPTIONS = ("family.yaml", "orders.yaml")
+# What a name of a job may hold; the schema of case files allows no more.
+_ODD = re.compile(r"[^A-Za-z0-9_.-]")
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One job: the family, the case's name, its own name, its file, how it is solved.
+
+    `mesh` holds the files of the user's own mesh, the one named in the case first, then those it
+    includes; None where a recipe makes it, none at all where the case is refused. `points` and
+    `dim` estimate its size. `refusal` is the reason where no solve is to be started.
+    """
+
+    family: str
+    case: str
+    name: str
+    file: str
+    mesh: Sequence[str] | None = None
+    swap: bool = False
+    hexahedra: str | None = None
+    points: float = 0.0
+    dim: int = 3
+    refusal: str = ""
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What no two jobs share."""
+        return self.family, self.name
+
+
+def case_files(folder: Path) -> list[Path]:
+    """The case files of a folder, sorted; hidden files, such as an editor's locks, are none."""
+    found = (f for f in folder.glob("*.yaml") if not f.name.startswith("."))
+    return sorted(f for f in found if f.name not in DESCRIPTIONS)
+
+
+def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Listed]:
+    """The jobs of all case files in the folders, those of one file together.
+
+    `variants`: where there may be hexahedra, once more with the other cut. A file that
+    names its case as another file of the family does is refused, under a free name.
+    """
+    listed = [list(jobs_of(file, variants)) for folder in folders for file in case_files(folder)]
+    taken: dict[tuple[str, str], str] = {}
+    jobs: list[Listed] = []
+    # A file that is called as its case goes before one that took a copied name.
+    for found in sorted(listed, key=lambda found: found[0].case != Path(found[0].file).stem):
+        owner = next((taken[job.key] for job in found if job.key in taken), None)
+        mine = [_second(found[0], owner, taken)] if owner else found
+        jobs += mine
+        taken |= {job.key: job.file for job in mine}
+    return jobs
+
+
+def jobs_of(file: Path, variants: bool = False) -> Iterator[Listed]:
+    """The jobs of one case file."""
+    family, plain = file.resolve().parent.name or "cases", _ODD.sub("_", file.stem)[:64]
+    alone = Listed(_printable(family), plain, plain, str(file), mesh=())
+    try:
+        _printable(str(file), strict=True)
+        case = load_case(file)
+    except UnicodeError:
+        refusal = f"{_printable(str(file))}: file: its path must be UTF-8"
+        yield replace(alone, file=_printable(str(file)), refusal=refusal)
+        return
+    except Exception:  # noqa: BLE001 -- whatever it is, the solve meets it again and reports it
+        yield alone
+        return
+    mesh, size = _mesh_files(case), _size(case)
+    for cut in [None, _other_cut(case)] if variants and _may_hold_hexahedra(case) else [None]:
+        for swap in [False, True] if case.directions == "both" else [False]:
+            yield Listed(
+                family=alone.family,
+                case=case.name,
+                name=job_name(case.name, swap, cut),
+                file=str(file),
+                mesh=mesh,
+                swap=swap,
+                hexahedra=cut,
+                points=size.points,
+                dim=size.dim,
+            )
+
+
+def _second(job: Listed, owner: str, taken: dict[tuple[str, str], str]) -> Listed:
+    """The refused job of a file whose case has the name of another file's."""
+    stem = _ODD.sub("_", Path(job.file).stem)[:60]
+    names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
+    name = next(name for name in names if (job.family, name) not in taken)
+    refusal = (
+        f"{job.file}: name = {job.case!r}: already taken by {owner}; "
+        "each case of a family needs a name of its own"
+    )
+    return Listed(job.family, name, name, job.file, mesh=(), refusal=refusal)
+
+
+def _may_hold_hexahedra(case: Case) -> bool:
+    return "path" in case.mesh or "HEXA" in str(case.mesh)
+
+
+def _other_cut(case: Case) -> str:
+    own = {zone.hexahedra for zone in case.zones}
+    return "pyramids" if "hexahedra" in own else "hexahedra"
+
+
+def _mesh_files(case: Case) -> list[str] | None:
+    if "path" not in case.mesh:
+        return None
+    path = Path(case.mesh["path"])
+    if path.suffix.lower() != ".inp":
+        return [str(path)]
+    from ..mesh.files.abaqus import files_of
+
+    return [str(file) for file in files_of(path)]
+
+
+def _size(case: Case) -> Size:
+    path = case.mesh.get("path")
+    return of_mesh({"file": str(path)} if path else case.mesh, Path())
+
+
+def _printable(text: str, strict: bool = False) -> str:
+    """Text without the bytes that are no UTF-8; UnicodeError for them where `strict`."""
+    return text.encode("utf-8", "strict" if strict else "backslashreplace").decode("utf-8")
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add the command `jobs`."""
+    command = add_command(commands, "jobs", _jobs, "list the jobs of folders of cases, as JSON")
+    command.add_argument("folders", type=Path, nargs="+", metavar="DIR")
+    command.add_argument("--variants", action="store_true", help="with the other cut of hexahedra")
+
+
+def _jobs(options: argparse.Namespace) -> int:
+    for folder in options.folders:
+        if not folder.is_dir():
+            raise InputError(folder, "cases", None, "no such folder")
+        if not case_files(folder):
+            raise InputError(folder, "cases", None, "no case file (*.yaml) in this folder")
+    print(json.dumps([asdict(job) for job in list_jobs(options.folders, options.variants)]))
+    return 0

@@ -1,0 +1,105 @@
+"""Recovery where it gains little or nothing: it must do no harm there, and leave the status."""
+
+import pytest
+
+from solver.mechanics.linear import choice
+from solver.verification.norms import errors
+from tests.simulation.test_recovery import blocks, solved, waves
+from tests.simulation.test_resultants import hertz
+
+FORMS = ["linear", "quadratic", "smooth"]
+
+
+def pressed(n: int, m: int, form: str, bottom: str = "QUAD8", top: str = "TRIA6") -> dict:
+    """Two blocks under a load that varies smoothly, n faces on the slave and m on the master."""
+    content = blocks(bottom, top, 10, recovery=form)
+    content["mesh"]["bottom"]["divisions"] = [n, 4]
+    content["mesh"]["top"]["divisions"] = [m, 4]
+    content["supports"].append({"group": "base", "fix": ["y"]})
+    content["loads"] = [{"group": "press", "pressure": "25*(1 + 0.2*cos(pi*x/50))"}]
+    return content
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("faces", [1, 2, 3])
+def test_zones_of_few_faces(faces, form):
+    """One face has no neighbour and keeps its constant; two have a line, three a parabola."""
+    [zone] = solved(pressed(faces, 4, form)).zones
+    [plain] = solved(pressed(faces, 4, "none")).zones
+    assert zone.resultants.force == pytest.approx([0.0, -1250.0], abs=1e-9)
+    highest = min(faces - 1, 2 if form == "quadratic" else 1)
+    assert zone.recovered.degree.max() == highest
+    if faces == 1:
+        assert zone.recovered.at_nodes == pytest.approx(plain.multiplier[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_much_coarser_master(form):
+    """Four faces over forty: the error is that of the master, and recovery adds nothing to it."""
+
+    def found(form):
+        case = waves("QUAD8", "TRIA6", 40, form)
+        case["mesh"]["top"]["divisions"] = [4, 4]
+        return errors(solved(case))["pressure_l2"]
+
+    assert found(form) < 1.05 * found("none")
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("ratio", [1e-3, 1.0, 1e3])
+def test_any_ratio_of_stiffness(ratio, swapped):
+    found = {}
+    for form in ("none", "linear", "quadratic"):
+        case = waves("TRIA6", "QUAD8", 20, form)
+        case["materials"]["bottom"]["young"] = 1000.0 * ratio
+        case["reference"]["solution"]["mean_pressure"] = 25 * min(ratio, 1.0)
+        case["contact"][0]["clearance"] = "0.02*(1 - cos(pi*x/50))"
+        case["reference"]["solution"]["amplitude"] = 0.02
+        found[form] = errors(solved(case, swapped))["pressure_l2"]
+    assert found["linear"] < found["none"] / 10
+    assert found["quadratic"] < found["none"] / 10
+
+
+def test_nearly_incompressible_cells_in_mixed_form():
+    found = {}
+    for form in ("none", "linear", "quadratic"):
+        case = waves("TRIA6", "QUAD8", 20, form)
+        for material in case["materials"].values():
+            material |= {"poisson": 0.4999, "form": "mixed"}
+        found[form] = errors(solved(case))["pressure_l2"]
+    assert found["linear"] < found["none"] / 10
+    assert found["quadratic"] < found["none"] / 10
+
+
+def test_multigrid_in_place_of_a_factor(monkeypatch):
+    """The sweeps are solved to two digits more than they change: the same pressure."""
+
+    def found():
+        case = blocks("HEXA8", "TETRA10", 6, recovery="linear")
+        case["supports"].append({"group": "base", "fix": ["z"]})
+        case["loads"] = [{"group": "press", "pressure": "25*(1 + 0.2*cos(pi*x/50))"}]
+        return solved(case)
+
+    factored = found()
+    monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: 0)
+    iterated = found()
+    assert factored.linear_solver != iterated.linear_solver
+    one, other = factored.zones[0].recovered, iterated.zones[0].recovered
+    assert other.at_nodes == pytest.approx(one.at_nodes, rel=1e-4)
+    assert iterated.steps[0].residual < 1e-12
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_load_steps_each_have_their_sweeps(form):
+    """The last of three steps is the state of that load alone."""
+    case = pressed(10, 7, form)
+    steps = solved(case | {"steps": [0.25, 0.5, 1.0]})
+    assert steps.zones[0].multiplier == pytest.approx(solved(case).zones[0].multiplier, rel=1e-11)
+
+
+def test_a_contact_edge_keeps_its_status():
+    plain = hertz("quad8", 1.0)[0].zones[0]
+    for form in FORMS:
+        zone = hertz("quad8", 1.0, form)[0].zones[0]
+        assert (zone.closed == plain.closed).all()
+        assert zone.resultants.force == pytest.approx(plain.resultants.force, abs=1e-9)
