@@ -5,7 +5,6 @@ from functools import cached_property, partial
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import nnls
 
 from ..mechanics.fem.bodies import (
     nodes_of_unknowns,
@@ -269,6 +268,8 @@ class ContactProblem:
         Of the e multipliers that may close; symmetric, positive semidefinite. Raises SolveError
         where no contact pressure balances the loads on a rigid motion that supports leave free.
         """
+        from scipy.optimize import nnls  # only where status search needs it: it loads slowly
+
         eligible = self.constraints.eligible
         push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
         loads = factor * self.unsupported.T @ self.scene.force.ravel()

@@ -289,8 +289,7 @@ def _fans(regions: Regions, degree: int) -> list[Pieces]:
     Signs are kept: the fans of regions that are not convex then still sum to them.
     """
     curved = regions.bulge.any(axis=2) & regions.used
-    before = np.where(np.arange(curved.shape[1]) > 0, np.roll(curved, 1, axis=1), False)
-    n = np.arange(len(curved))
+    n, before = np.arange(len(curved)), np.roll(curved, 1, axis=1)
     before[:, 0] = curved[n, regions.count - 1]
     neighbours = np.where(regions.used, curved.astype(int) + before, 3)
     middle = regions.start[n, neighbours.argmin(axis=1)]
@@ -302,8 +301,7 @@ def _fans(regions: Regions, degree: int) -> list[Pieces]:
     reference, weights = simplex_rule(2, degree)
     corner = np.stack([first[straight], last[straight]], axis=1)
     points = middle[which[straight]][:, None] + np.einsum("qk,skd->sqd", reference, corner)
-    area = _cross(first[straight], last[straight])
-    pieces = [(which[straight], points, area[:, None] * weights)]
+    pieces = [(which[straight], points, _cross(first, last)[straight, None] * weights)]
     if bent.any():
         reference, weights = gauss_rule("TRIA3", degree // 2 + 2)
         radius = 1 - reference[:, 1]

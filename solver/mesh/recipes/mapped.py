@@ -34,7 +34,6 @@ from collections.abc import Callable
 
 import meshio
 import numpy as np
-from scipy.optimize import brentq
 
 from ..catalogue import cell_type
 from ..keys import Keys
@@ -137,6 +136,8 @@ def _graded(x: np.ndarray, size: float, core: float, share: float) -> np.ndarray
     """
     rest = size - core
     start = core / share * (1 - share) / rest
+    from scipy.optimize import brentq
+
     growth = brentq(lambda g: g / np.sinh(g) - start, 1e-9, 700)
     beyond = np.maximum(x - share, 0) / (1 - share)
     grown = core + rest * np.sinh(growth * beyond) / np.sinh(growth)
