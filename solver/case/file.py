@@ -58,7 +58,7 @@ class Perturbation(Section, frozen=True):
 
     amplitude: by at most this share of the shortest edge at a node
     seed: of the random numbers
-    group: the nodes of this group alone
+    group: only the nodes of this group
     """
 
     amplitude: Positive
@@ -69,8 +69,8 @@ class Perturbation(Section, frozen=True):
 class Shift(Section, frozen=True):
     """A group moved.
 
-    group: which
-    by: by how much
+    group: the group
+    by: the vector of the move
     """
 
     group: Group
@@ -80,8 +80,8 @@ class Shift(Section, frozen=True):
 class Turn(Section, frozen=True):
     """A group turned.
 
-    group: which
-    angle: by how much
+    group: the group
+    angle: the angle of rotation
     """
 
     group: Group
@@ -107,8 +107,8 @@ class Renumbering(Section, frozen=True):
     seed: Whole
 
 
-_ROTATE = "an angle in degrees (plane), or {axis: [x, y, z], angle: degrees}"
-_STRETCH = "a list of two (plane) or three positive numbers"
+_ROTATE = "an angle in degrees (2D), or {axis: [x, y, z], angle: degrees}"
+_STRETCH = "a list of two (2D) or three positive numbers"
 _PERTURB = "a positive share of the edges, or {amplitude, seed, group}"
 _RENUMBER = "a seed (a whole number, not negative), or {seed}"
 _PICK = "{from, low, high, name, rest}, or a list of them"
@@ -116,12 +116,12 @@ _Picks = Annotated[tuple[Pick, ...], Meta(min_length=1)]
 
 
 class Transform(Section, frozen=True):
-    """What is done to the mesh, in the order of the keys.
+    """Changes of the mesh, in the order of the keys.
 
     scale: multiply all coordinates
     rotate: turn the mesh about the origin
     translate: move the mesh
-    stretch: multiply each coordinate by a factor of its own
+    stretch: multiply each coordinate by its own factor
     perturb: move inner nodes at random
     shift: move the nodes of a group
     turn: turn the nodes of a group about the last axis
@@ -163,8 +163,8 @@ class MaterialKeys(Section, frozen=True):
 
     young: Young's modulus
     poisson: Poisson's ratio
-    form: the unknowns: displacement, or also pressure for nearly incompressible material;
-      automatic: mixed above 0.499
+    form: the unknowns: displacement, or displacement and pressure (mixed) for nearly
+      incompressible material; automatic: mixed above 0.499
     """
 
     young: Positive
@@ -185,8 +185,8 @@ _FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
 class SupportKeys(Section, frozen=True):
     """Imposed displacements.
 
-    group: on the nodes of this group
-    fix: which components are fixed, or have a value; `normal`: along the normal of the group's
+    group: the nodes of this group
+    fix: the components that are fixed or have a value; `normal`: along the normal of the group's
       faces, a plane of any direction
     """
 
@@ -199,7 +199,7 @@ class SupportKeys(Section, frozen=True):
 class LoadKeys(Section, frozen=True):
     """A load.
 
-    group: on the faces of this group, or, a body force, on its cells
+    group: the faces of this group or, for a body force, its cells
     pressure: force per area against the faces, positive inwards
     traction: force per area, as a vector
     body_force: force per volume, as a vector
@@ -220,8 +220,8 @@ class LoadKeys(Section, frozen=True):
 class BodyKeys(Section, frozen=True):
     """A body.
 
-    rigid: the body is fixed where it is and does not deform: no load or displacement may be given
-      to it, and a rigid side is always master
+    rigid: the body neither moves nor deforms; it takes no load or displacement, and a rigid side
+      is always master
     """
 
     rigid: bool = False
@@ -233,13 +233,13 @@ class ZoneKeys(Section, frozen=True):
     name: the zone's name in the results
     slave: the faces that carry the multipliers: the finer ones, or those of the softer body
     master: the faces opposite to them
-    hexahedra: into what slave hexahedra are cut
-    treatment: how the interface is treated
-    points: points each way on a slave face, for the treatment quadrature alone
-    normal: along what gaps are measured: normals of the faces, or their means at the nodes
+    hexahedra: the cells into which slave hexahedra are cut
+    treatment: the treatment of the interface
+    points: points per direction on a slave face, only for the treatment quadrature
+    normal: the direction of gaps: normals of the faces, or their means at the nodes
     recovery: how a pressure of higher order is recovered from the constants
-    interference: overlap at the start of bodies modelled apart: taken off the gap
-    clearance: the gap at the start, in place of the one between the faces as meshed
+    interference: initial overlap of bodies that are modelled without it; subtracted from the gap
+    clearance: the initial gap, which replaces the gap between the meshed faces
     """
 
     slave: Group
@@ -259,8 +259,8 @@ class ZoneKeys(Section, frozen=True):
 class ObservationKeys(Section, frozen=True):
     """A macro-element to report at every step.
 
-    zone: in this zone
-    nearest: the one nearest to this point
+    zone: its zone
+    nearest: the macro-element nearest to this point
     """
 
     zone: Name
@@ -278,7 +278,7 @@ class CodeKeys(Section, frozen=True):
     version: Version
 
 
-_UNCERTAINTY = "a positive number: how far the reference may be off, relative"
+_UNCERTAINTY = "a positive number: the possible relative error of the reference"
 _SOLUTION = "the name of a documented solution, or {name: NAME, …} with its parameters"
 _STRESS = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions, or `solution`"
 _Stress = Annotated[dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar], Meta(min_length=1)]
@@ -287,10 +287,10 @@ _Stress = Annotated[dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar], M
 class ReferenceKeys(Section, frozen=True):
     """What the result is compared with.
 
-    kind: where the right answer comes from
-    uncertainty: how far the reference itself may be off; needed with refined
-    code: which code it is from; needed with other_code
-    remark: more on where it comes from, for the report
+    kind: the origin of the reference
+    uncertainty: the possible error of the reference itself; needed with refined
+    code: the code that computed it; needed with other_code
+    remark: more about its origin, for the report
     solution: an exact solution of the project; then `solution` may be a value here, in loads and
       in supports
     contact_pressure: contact pressure on the slave faces, positive in compression
@@ -343,25 +343,25 @@ _TOLERANCE = (
 class CaseFile(Section, frozen=True):
     """A case file.
 
-    name: the case's name: of its folder of results, and in the report
+    name: the name of the case, in the report and of its results folder
     title: one line for the report
-    description: anything worth knowing, for readers
-    mesh: the mesh: `file`, a mesh file (.med, .msh, .inp, .vtu, .vtkhdf), relative to the case
-      file; or `recipe`, a recipe that makes the mesh, and the keys of the recipe
-    transform: what is done to the mesh, in the order of the keys
-    plane: plane strain: for plane meshes, and only there
-    units: what the numbers are in: labels of fields and pictures, and nothing else
+    description: free text for readers
+    mesh: either `file`, a mesh file (.med, .msh, .inp, .vtu, .vtkhdf), relative to the case file,
+      or `recipe`, a recipe that generates the mesh, and the keys of the recipe
+    transform: changes of the mesh, in the order of the keys
+    plane: plane strain, only for 2D meshes
+    units: the units of the numbers, only labels of fields and pictures
     materials: the material of each group of cells, or of `all`
-    supports: where displacements are imposed
-    loads: what acts on the bodies
-    bodies: bodies of which more is to be said than their material
+    supports: imposed displacements
+    loads: loads on the bodies
+    bodies: further properties of bodies
     contact: the contact zones
     directions: solved once, or again with slave and master exchanged
     steps: load factors, solved one after the other
     observe: macro-elements to report at every step
     reference: what the result is compared with
-    tolerance: of the relative checks, or check by check
-    counts: how many cells and contact faces a body must have, as another code has them
+    tolerance: the tolerance of the relative checks, or one for each check
+    counts: the expected numbers of cells and contact faces of a body
     """
 
     name: Name

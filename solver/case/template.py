@@ -9,14 +9,14 @@ from .reader import parse_case
 
 TEMPLATE = """\
 # A case file: change it to your problem, then
-#   {program} validate --mesh FILE    says whether it is valid
+#   {program} validate --mesh FILE    checks that it is valid
 #   {program} solve FILE -o {name}.vtkhdf    solves and checks it
-# Paths are relative to this file. Units are yours: lengths, forces, stresses that fit together.
+# Paths are relative to this file. Use consistent units of length, force and stress.
 
 name: {name}
 title: Two blocks pressed together
 
-# What your numbers are in; shown beside them, and nothing else.
+# The units of your numbers: labels only.
 units: {{length: mm, stress: MPa}}
 
 # A mesh made by recipe ...
@@ -25,17 +25,17 @@ mesh:
   size: 50.0
   bottom: {{cells: HEXA8, divisions: 3}}
   top: {{cells: HEXA8, divisions: 2}}
-# ... or your own (.med .msh .inp .vtu), whose groups are then known by their names there:
+# ... or your own mesh (.med .msh .inp .vtu) with its named groups:
 # mesh: {{file: my-mesh.med}}
 
-# plane: strain                          # for plane meshes, and only there
+# plane: strain                          # only for 2D meshes
 
 # By group of volume cells, or `all`. `form` of the unknowns: displacement, or mixed (displacement
-# and pressure) for nearly incompressible material; automatic takes the latter above 0.499.
+# and pressure) for nearly incompressible material; automatic: mixed above 0.499.
 materials:
   all: {{young: 2000.0, poisson: 0.3, form: automatic}}
 
-# Directions x, y, z, or `normal` (a plane of symmetry that lies any way); with a colon, a value.
+# Directions x, y, z, or `normal` (a plane of symmetry of any direction); a mapping imposes values.
 supports:
   - {{group: symx, fix: [x]}}
   - {{group: symy, fix: [normal]}}
@@ -53,23 +53,23 @@ contact:
     master: top_contact
     hexahedra: pyramids                  # how slave hexahedra are cut: pyramids or hexahedra
     treatment: lac                       # or uncut, nodal, nodal_dual, node_to_segment, quadrature
-    # points: 4                          # each way on a slave face, for quadrature alone
+    # points: 4                          # per direction on a slave face, only for quadrature
     normal: element                      # gaps are measured along: element (normals of faces),
                                          # nodal (their means at the nodes)
-    interference: 0.0                    # overlap at the start, of bodies modelled apart
+    interference: 0.0                    # initial overlap of bodies that are modelled without it
     recovery: none                       # of a pressure of higher order from constants: none,
                                          # linear, quadratic, smooth, or automatic by the cells
-#   clearance: 0.0                       # the gap at the start, a number or an expression, in place
-                                         # of the one between the faces as meshed
+#   clearance: 0.0                       # the initial gap, a number or an expression; replaces
+                                         # the gap between the meshed faces
 
-directions: first                        # or both: solved again with slave and master exchanged
+directions: first                        # or both: also with slave and master exchanged
 steps: [0.5, 1.0]                        # load factors
 observe:                                 # the contact element nearest to a point, at every step
   - {{zone: interface, nearest: [25.0, 25.0, 0.0]}}
 
-# What the results are checked against; leave out what you do not know. A documented solution is
-# named under `solution`, with its parameters; then `solution` stands for any value here, in loads
-# (traction: solution) and in supports (fix: {{x: solution}}), and errors are measured in norms.
+# The expected results; omit what you do not know. `solution` names a documented solution with its
+# parameters. Then `solution` stands for any value here, in loads (traction: solution) and in
+# supports (fix: {{x: solution}}), and errors are measured in norms.
 reference:
   kind: analytical                       # analytical, manufactured, refined (with its relative
                                          # uncertainty: 2.0e-3) or other_code (with code: {{name:

@@ -329,7 +329,7 @@ def _accept(options: argparse.Namespace) -> int:
             raise InputError(path, "case", str(case), allowed)
         checks = run_checks(solution, accepted_values(solution))
         changes = accept(solution, checks)
-        print(f"{solution.job}: {len(changes)} values accepted anew of {len(checks)}")
+        print(f"{solution.job}: {len(changes)} new accepted values of {len(checks)}")
         for line in changes:
             print(f"  {line}")
     return PASSED

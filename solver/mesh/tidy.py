@@ -86,7 +86,7 @@ class _Table:
             if block.type not in BY_MESHIO:
                 raise InputError(where, "cell type", block.type, f"allowed: {', '.join(BY_NAME)}")
             if block.data.dtype.kind not in "iu" and block.data.size:
-                allowed = f"nodes must be told by whole numbers, not {block.data.dtype}"
+                allowed = f"node numbers must be whole numbers, not {block.data.dtype}"
                 raise InputError(where, f"cells {block.type}", None, allowed)
             nodes = np.asarray(block.data, dtype=np.int64)
             number = np.arange(1, len(nodes) + 1) if numbers is None else numbers[i]

@@ -85,8 +85,13 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def to_html(found: Comparison) -> str:
     """The page."""
+    named = {"Before": found.base, "Now": found.this}
     return render(
         TEMPLATES / "compare.html.jinja",
+        title="Two batches side by side",
+        sortable=True,
+        good=not found.groups["worse"],
+        facts=[(n, f"{b.file}: {b.outcome} {b.origin}") for n, b in named.items()],
         found=found,
         outcome=verdict(found),
         sections=sections(found),

@@ -15,16 +15,16 @@ MEANING = {
     "nodal_stress": "normal stress at every node of both bodies",
     "surface_stress_slave": "normal stress on the slave surface",
     "surface_stress_master": "normal stress on the master surface",
-    "element_pressure": "pressure of every contact element, by the forces at the slave nodes",
-    "element_gap": "average gap of every contact element, over the block size",
+    "element_pressure": "pressure of every contact element, from the forces at the slave nodes",
+    "element_gap": "average gap of every contact element, relative to the block size",
     "element_status": "contact status of every contact element: 1 in contact, 0 open",
     "coverage": "intersected area over the area of the macro-element",
     "covered_pressure": "coverage × pressure",
     "displacement": "displacement at every node",
     "stress_components": "the other components of stress at every node",
-    "integration_stress": "stress at the integration points, by the displacement alone",
-    "balance": "contact forces and reactions against the loads: forces and moments",
-    "counts": "cells and contact faces of the bodies as meshed",
+    "integration_stress": "stress at the integration points, from the displacement alone",
+    "balance": "contact forces of both sides, and reactions against loads: forces and moments",
+    "counts": "cells and contact faces of the bodies before the cut",
     "observation": "pressure of one contact element at every load step",
     "observation_gap": "gap of one contact element at every load step",
 }
@@ -44,7 +44,7 @@ NORMS = {
 MEANING |= {name: f"error of {what}, relative" for name, what in NORMS.items()}
 KINDS = {
     "analytical": "an exact solution",
-    "manufactured": "a solution chosen first, loads derived from it",
+    "manufactured": "a solution chosen first, with loads derived from it",
     "refined": "our own result on a much finer mesh",
     "other_code": "another code's result",
 }

@@ -24,12 +24,16 @@ LEFT_OUT = {
 def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
     rows = [row for section in sections for row in section.rows]
+    bad = [row for row in rows if not row.sound]
     checks = {check.name: check for row in rows for check in row.verdict.checks}
     return render(
         TEMPLATES / "summary.html.jinja",
+        title="Verification of contact solves",
+        sortable=True,
         rows=rows,
         pages={name for name in _PAGES if (folder / f"{name}.html").is_file()},
-        bad=[row for row in rows if not row.sound],
+        bad=bad,
+        good=bool(rows) and not bad,
         outcome=outcome(rows),
         counts=counted(rows),
         families=sections,
@@ -45,6 +49,10 @@ def family_page(section: FamilySection, folder: Path) -> str:
     """The page of a family: problem, reference, figures, its solves case by case."""
     return render(
         TEMPLATES / "family.html.jinja",
+        title=section.family.title,
+        sortable=True,
+        outcome=section.outcome,
+        good=not section.bad,
         section=section,
         orders=(folder / "orders.html").is_file(),
         norms=NORMS,

@@ -293,7 +293,7 @@ REFUSED = [
     ("reference: {kind: refined, gap: 0}", "reference.uncertainty: this key is needed"),
     (
         "reference: {kind: refined, uncertainty: 0}",
-        "reference.uncertainty = 0: must be a positive number: how far the reference may be off",
+        "reference.uncertainty = 0: must be a positive number: the possible relative error",
     ),
     ("reference: {kind: other_code, gap: 0}", "reference.code: this key is needed"),
     (

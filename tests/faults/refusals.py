@@ -21,12 +21,12 @@ _RAISED = {
 HEAD = """\
 # Refusals
 
-Every message with which the program refuses its input or gives up a solve, by the module that says
-it. `…` stands for what changes from one to another. A message starts with the file and, mostly, the
-key and its value; one line, exit status 2 for input, 3 for a solve. Keys that the schema of a case
-file refuses say what is allowed by the words of their types (`solver/case/file.py`).
+This page lists every message that refuses input or gives up a solve, by module. `…` stands for
+the parts that vary. A message is one line. It starts with the file and usually the key and its
+value. The exit status is 2 for input and 3 for a solve. If a key of a case file is invalid, the
+message describes the allowed values by the type of the key (`solver/case/file.py`).
 
-The table is made from the sources by `python -m tests.faults.refusals`; a test keeps it so.
+`python -m tests.faults.refusals` generates the table from the sources; a test compares both.
 
 | module | message |
 |---|---|

@@ -36,4 +36,4 @@ def test_the_page_lists_them_all():
     rows = [f"| `{m.name}` | {m.what} | {m.case} |" for m in MUTANTS]
     assert listed == rows
     assert len({m.name for m in MUTANTS}) == len(rows)
-    assert f"{len(rows)} of {len(rows)} are caught" in PAGE.read_text(encoding="utf-8")
+    assert f"It catches {len(rows)} of {len(rows)} faults." in PAGE.read_text(encoding="utf-8")

@@ -93,7 +93,7 @@ def test_a_plane_mesh_has_two_columns():
     [
         ([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [("triangle", [[0, 1, 2]])], {}, "must have z = 0"),
         ([[0, 0, 0], [1, 0, 0], [0, 1, 1e-6]], [("triangle", [[0, 1, 2]])], {}, "must have z = 0"),
-        (SQUARE, [("triangle", [[0, 1.5, 2]])], {}, "cells triangle: nodes must be told by whole"),
+        (SQUARE, [("triangle", [[0, 1.5, 2]])], {}, "cells triangle: node numbers must be whole"),
         (SQUARE, [("triangle", [[0, 1, 2]])], {"": [[0]]}, "group = '': must have a name of prin"),
         (SQUARE, [("triangle", [[0, 1, 2]])], {"a\n": [[0]]}, r"group = 'a\\n': must have a name"),
         ([[0], [1], [2]], [("triangle", [[0, 1, 2]])], {}, "must be two or three numbers a node"),

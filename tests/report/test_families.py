@@ -157,7 +157,7 @@ def test_kinds_of_reference_are_kept_apart_with_uncertainty_code_and_version(tmp
             "Reference: an exact solution",
             "Reference: our own result on a much finer mesh",
             "Reference: another code's result: solver 14.6",
-            "Reference: a solution chosen first, loads derived from it",
+            "Reference: a solution chosen first, with loads derived from it",
         ]
     html = (tmp_path / "summary.html").read_text()
     heads = [

@@ -275,7 +275,7 @@ def test_what_the_solves_of_a_family_left_out():
     plan = [
         ["interface: plain Gauss rules", "every face is an affine image", "quadrature"],
         ["no second active-set solve", "complementary", "status"],
-        ["linear solver: CHOLMOD", "in the plane a factor is small", ""],
+        ["linear solver: CHOLMOD", "a factor is small in 2D", ""],
         ["a line of", "another version"],
     ]
     rows = [Row(record(verdict(name, "passed", plan=plan)), Path()) for name in "ab"]

@@ -113,7 +113,7 @@ def prepare(matrix: Symmetric, unknowns: Unknowns | None = None, gave_up: str = 
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
         least = multigrid_from(unknowns.quadratic)
-        why = f"{least} unknowns or more in space: quicker and smaller than a factor"
+        why = f"{least} unknowns or more in 3D: faster and smaller than a factor"
         try:
             solver = Multigrid(matrix, unknowns)
             return LinearSolver(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
@@ -131,9 +131,9 @@ def _against_multigrid(size: int, unknowns: Unknowns) -> str:
     if wanted() != "auto":
         return "" if wanted() == MULTIGRID else _ASKED
     if unknowns.dim == 2:
-        return "in the plane a factor is small"
+        return "a factor is small in 2D"
     least = multigrid_from(unknowns.quadratic)
-    return f"fewer than {least} unknowns: a factor is quicker than multigrid" * (size < least)
+    return f"fewer than {least} unknowns: a factor is faster than multigrid" * (size < least)
 
 
 def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:

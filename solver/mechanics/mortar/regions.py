@@ -19,8 +19,6 @@ from .clipping import triangles
 
 # Edges whose middle is off the chord by less than this share of it are straight.
 _BENT = 1e-13
-# The centroid of a region with less than this share of the square of its extent is not looked for.
-_THIN = 1e-3
 # Halvings after which an interval within [0, 1] is as short as rounding allows.
 _HALVINGS = 54
 
@@ -286,20 +284,16 @@ def quadrature(regions: Regions, degree: int) -> list[Pieces]:
 
 
 def _fans(regions: Regions, degree: int) -> list[Pieces]:
-    """The same of regions with bent arcs, around the centroid: away from edges bent inward."""
-    total = np.where(regions.used[..., None], regions.start, 0.0).sum(axis=1)
-    middle = total / np.maximum(regions.count, 1)[:, None]
-    area, moment = np.zeros(len(middle)), np.zeros_like(middle)
-    for which, points, weights in _fan(regions, middle, 1):
-        area += np.bincount(which, weights.sum(axis=1), minlength=len(middle))
-        np.add.at(moment, which, np.einsum("sq,sqd->sd", weights, points - middle[which][:, None]))
-    extent = np.where(regions.used[..., None], np.abs(regions.start - middle[:, None]), 0.0)
-    thin = np.abs(area) <= _THIN * extent.max(axis=(1, 2)) ** 2
-    shift = np.where(thin[:, None], 0.0, moment / np.where(thin, 1.0, area)[:, None])
-    return _fan(regions, middle + shift, degree)
+    """The same of regions with bent arcs, around a corner, between straight arcs if there is one.
 
-
-def _fan(regions: Regions, middle: np.ndarray, degree: int) -> list[Pieces]:
+    Signs are kept: the fans of regions that are not convex then still sum to them.
+    """
+    curved = regions.bulge.any(axis=2) & regions.used
+    before = np.where(np.arange(curved.shape[1]) > 0, np.roll(curved, 1, axis=1), False)
+    n = np.arange(len(curved))
+    before[:, 0] = curved[n, regions.count - 1]
+    neighbours = np.where(regions.used, curved.astype(int) + before, 3)
+    middle = regions.start[n, neighbours.argmin(axis=1)]
     which, arc = np.nonzero(regions.used)
     first, last = regions.start[which, arc] - middle[which], regions.end[which, arc] - middle[which]
     bulge = regions.bulge[which, arc]

@@ -44,6 +44,7 @@ def write_gallery(
     by_family = families([picture.row for picture in pictures])
     page = render(
         TEMPLATES / "gallery.html.jinja",
+        title="Gallery",
         families={
             name: [p for p in pictures if p.row.group == name and (p.path or p.reason)]
             for name in by_family

@@ -115,6 +115,7 @@ def _point_rows(curves: Sequence[Curve]) -> list[dict[str, Any]]:
             "unknowns": row.verdict.dofs,
             "macro_elements": row.verdict.macro_elements,
             "seconds": row.total,
+            "pressure_error_estimate": row.verdict.pressure_error_estimate,
             **{error: row.norms.get(error) for error in ERRORS},
         }
         for curve in curves

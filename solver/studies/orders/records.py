@@ -1,7 +1,7 @@
 """Refinement ladders as the report shows them: the verdicts of every ladder, and fitted slopes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -12,11 +12,13 @@ from ...report.html import NORMS
 from ...report.rows import Row, read_rows
 from ..fits import Fit, fit_order, is_rounding
 from .description import Ladder, LadderFamily
-from .theory import DEGREES, THEORY, UNKNOWN, Order, element_size
+from .theory import DEGREES, RECOVERED, THEORY, UNKNOWN, Order, element_size
 
 VERDICT = "verdict.json"
 # The errors of ladders in the order in which they are shown.
-ERRORS = {name: what for name, what in NORMS.items() if name != "stress_max"}
+ERRORS = NORMS
+# Errors of the pressure as a field, which a recovery makes smaller.
+_OF_FIELD = ("pressure_l2", "pressure_max")
 # A slope this much below an order is still that order: levels are few, and not yet the limit.
 LEEWAY = 0.1
 
@@ -100,11 +102,13 @@ class Curve:
     def theory(self, error: str) -> Order:
         """What theory says of the slope."""
         own = self.family.theory.get(self.degree, {}).get(error)
-        return Order(*own) if own else THEORY.get(self.degree, {}).get(error, UNKNOWN)
+        known = Order(*own) if own else THEORY.get(self.degree, {}).get(error, UNKNOWN)
+        best = RECOVERED.get((self.ladder.recovery or "none", self.degree))
+        return replace(known, best=best) if best and error in _OF_FIELD else known
 
     def least(self, error: str) -> float | None:
         """The slope that has to be reached, if any."""
-        return self.family.least.get(self.degree, {}).get(error)
+        return self.ladder.least.get(error, self.family.least.get(self.degree, {}).get(error))
 
     def reached(self, error: str) -> bool | None:
         """Whether the slope asked for is reached; None where none is asked for."""
@@ -122,6 +126,18 @@ class Curve:
         """Whether the error at the finest level is as small as asked; None where none is asked."""
         bound, found = self.ladder.finest.get(error), self.at_finest(error)
         return None if bound is None else found is not None and found <= bound
+
+    @cached_property
+    def effectivity(self) -> float | None:
+        """The estimated over the true error of constant pressures at the finest level.
+
+        None where the pressure is recovered, or not constant, or has no error.
+        """
+        finest = max(self.solved, key=lambda row: row.verdict.macro_elements or 0, default=None)
+        if finest is None or (self.ladder.recovery or "none") != "none":
+            return None
+        estimate, true = finest.verdict.pressure_error_estimate, finest.norms.get("pressure_l2")
+        return estimate / true if estimate is not None and true else None
 
     def below_theory(self, error: str) -> bool:
         """Whether the slope is less than theory guarantees, by more than its spread explains."""

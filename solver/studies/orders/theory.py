@@ -5,7 +5,8 @@ The LAC method on cells of degree one or two has a multiplier that is constant o
 order 1 or 1.5 at least, in L2 with one more; where the solution is smooth, it may reach what
 interpolation allows, 2 in H1 and 3 in L2 for degree two. The pressure error in L2 falls with order
 0.5 or 1 at least; 1 is the most that a piecewise constant can show. Its values at the means of
-macro-elements have no such bound.
+macro-elements have no such bound. A pressure recovered from the constants is a polynomial of degree
+one or two, of order two or three where the solution is smooth and its means are as exact.
 """
 
 from collections.abc import Mapping
@@ -32,6 +33,12 @@ class Order:
 
 
 UNKNOWN = Order(None, None)
+# The best order of a recovered pressure, by form of the recovery and degree of the cells.
+RECOVERED = {
+    ("linear", "quadratic"): 2.0,
+    ("quadratic", "quadratic"): 3.0,
+    ("automatic", "quadratic"): 3.0,
+} | {(form, "linear"): 2.0 for form in ("linear", "quadratic", "smooth", "automatic")}
 DEGREES = {1: "linear", 2: "quadratic"}
 THEORY: Mapping[str, Mapping[str, Order]] = {
     "linear": {

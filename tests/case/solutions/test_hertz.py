@@ -65,11 +65,13 @@ def test_outside_there_is_no_pressure_and_the_end_is_not_regular():
 
 
 def test_the_half_ellipse_is_found_again_in_its_values():
-    x = np.c_[np.linspace(-7, 7, 41), np.zeros(41)]
-    a, peak = CYLINDER.fitted(x, 1.02 * CYLINDER.contact_pressure(x))
-    assert a == pytest.approx(CYLINDER.half_width, rel=1e-12)
-    assert peak == pytest.approx(1.02 * CYLINDER.peak, rel=1e-12)
-    assert CYLINDER.fitted(x, np.abs(x[:, 0]))[0] == 0  # no ellipse at all
+    # Gauss–Chebyshev points of the second kind integrate √(1 − t²) times polynomials exactly.
+    angle = np.pi * np.arange(1, 12) / 12
+    x = np.c_[CYLINDER.half_width * np.cos(angle), np.zeros(11)]
+    pressure = 1.02 * CYLINDER.contact_pressure(x)
+    found = CYLINDER.measured(x, np.sin(angle) ** 2, x, pressure)
+    assert found == pytest.approx((CYLINDER.half_width, 1.02 * CYLINDER.peak), rel=1e-12)
+    assert CYLINDER.measured(x, np.sin(angle) ** 2, x[:2], pressure[:2]) is None  # too few
 
 
 def test_the_interior_is_not_offered():

@@ -154,10 +154,10 @@ def test_choice_by_size_and_dimension(monkeypatch):
     monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: matrix.shape[0])
     large = choice.prepare(matrix, unknowns)
     assert "multigrid" in large.name
-    assert "unknowns or more in space" in large.why
+    assert "unknowns or more in 3D" in large.why
     plane = choice.prepare(matrix, replace(unknowns, dim=2))
     assert "multigrid" not in plane.name
-    assert "plane" in plane.why
+    assert "2D" in plane.why
     monkeypatch.setattr(choice, "multigrid_from", lambda quadratic: matrix.shape[0] + 1)
     small = choice.prepare(matrix, unknowns)
     assert "multigrid" not in small.name
