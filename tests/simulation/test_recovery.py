@@ -13,6 +13,7 @@ from solver.mechanics.mortar import recovery as mortar
 from solver.mechanics.mortar.recovery import FORMS
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME
+from solver.simulation import recovery as sweeps
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -139,6 +140,35 @@ def test_the_estimate_is_the_error_of_the_constants(form):
     [zone] = solution.zones
     constants = error("TRIA6", "QUAD8", 40, "none")
     assert zone.relative_pressure_error == pytest.approx(constants, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("bottom", "top", "form", "n", "bound"),
+    [
+        ("TRIA3", "QUAD4", "linear", 10, 0.26),
+        ("QUAD8", "TRIA6", "linear", 10, 0.22),
+        ("QUAD8", "TRIA6", "quadratic", 10, 0.37),
+        ("QUAD8", "TRIA6", "quadratic", 20, 0.37),
+    ],
+)
+def test_sweeps_converge(monkeypatch, bottom, top, form, n, bound):
+    """Eigenvalues of a sweep are real, at most 0 and above −`bound`, whatever the mesh size."""
+    seen = []
+
+    def eigenvalues(problem, state, zones):
+        [zone] = zones
+        loads = (zone.recovery.loads.T @ zone.applied.matrix).toarray()
+        closed = state.status.closed
+        sweep = np.array([problem.pressure_change(closed, force) for force in loads.T])
+        seen.append(np.linalg.eigvals(sweep))
+        return true(problem, state, zones)
+
+    true = sweeps._corrected
+    monkeypatch.setattr(sweeps, "_corrected", eigenvalues)
+    solved(waves(bottom, top, n, form))
+    assert np.abs(seen[0].imag).max() < 0.01
+    assert -bound < seen[0].real.min() < -bound / 2
+    assert seen[0].real.max() < 1e-6
 
 
 def test_a_wrong_sign_of_the_loads_shows(monkeypatch):

@@ -24,7 +24,7 @@ from .recovery import Asked, Recovery, recovery
 from .segments import Segments, intersect
 from .surface_points import Samples, Surface, face_samples
 
-# Slave-side entries of dual multipliers below this share of their row's largest are round-off.
+# Slave-side entries of nodal multipliers below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
 # A slave face that misses more than this share of its area is looked at again, farther away.
 _MISSED = 1e-6
@@ -152,7 +152,7 @@ def gap_operator(
     surface = _surface(data)
     averages = space.averages(samples, [block.number for block in slaves], n_macro)
     return GapOperator(
-        matrix=(master - (_diagonal(slave) if space.dual else slave)).tocsr(),
+        matrix=(master - (slave if space.nodes is None else _diagonal(slave))).tocsr(),
         initial=initial,
         area=averages.area,
         covered=covered,
@@ -252,7 +252,11 @@ def _joined(parts: list[np.ndarray]) -> np.ndarray:
 
 
 def _diagonal(slave: sparse.csr_matrix) -> sparse.csr_matrix:
-    """Without the round-off that dual multipliers leave at other nodes than their own."""
+    """Without the round-off at nodes where the integral of a nodal multiplier vanishes.
+
+    Dual multipliers see their own node alone. Linear ones see no other end of a quadratic edge:
+    ∫ t (1 − t) (1 − 2t) dt = 0; then each has an unknown of its own, and can be condensed.
+    """
     largest = abs(slave).max(axis=1).toarray().ravel()
     limit = np.repeat(_ROUND_OFF * largest, np.diff(slave.indptr))
     slave.data[np.abs(slave.data) <= limit] = 0.0

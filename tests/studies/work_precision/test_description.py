@@ -113,8 +113,8 @@ def test_the_project_s_own_study_is_what_its_page_promises():
     assert study.repetitions >= 5
     assert len({v[:3] for v in study.varied}) == 2
     assert {len(problem.levels) for problem in quick.problems} == {3}
-    assert sum(len(problem.pairs) for problem in quick.problems) == 4
-    assert (len(quick.problems), quick.repetitions) == (2, 1)
+    assert sum(len(problem.pairs) for problem in quick.problems) == 6
+    assert (len(quick.problems), quick.repetitions) == (3, 1)
 
 
 @pytest.mark.parametrize(
