@@ -4,19 +4,23 @@ One case file is a job for each direction, and where asked for one for each cut 
 that is refused is one job too: the solve says why. So no file keeps the others from being solved.
 """
 
+from __future__ import annotations
+
 import argparse
 import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..case import job_name
-from ..case.model import Case
-from ..case.reader import load_case
-from ..mesh.size import Size, of_mesh
 from ..system.errors import InputError
 from .options import add_command
+
+if TYPE_CHECKING:
+    from ..case.model import Case
+    from ..mesh.size import Size
 
 # Files of these names describe a folder of cases.
 DESCRIPTIONS = ("family.yaml", "orders.yaml")
@@ -76,6 +80,8 @@ def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Listed]:
 
 def jobs_of(file: Path, variants: bool = False) -> Iterator[Listed]:
     """The jobs of one case file."""
+    from ..case.reader import load_case
+
     family, plain = file.resolve().parent.name or "cases", _ODD.sub("_", file.stem)[:64]
     alone = Listed(_printable(family), plain, plain, str(file), mesh=())
     try:
@@ -137,6 +143,8 @@ def _mesh_files(case: Case) -> list[str] | None:
 
 
 def _size(case: Case) -> Size:
+    from ..mesh.size import of_mesh
+
     path = case.mesh.get("path")
     return of_mesh({"file": str(path)} if path else case.mesh, Path())
 

@@ -273,6 +273,20 @@ def test_a_damaged_verdict_or_a_lost_result_is_solved_again(project, damage):
     assert not jobs(project) & {"solve tiny-a", "solve tiny-a-swapped"}
 
 
+def test_what_is_damaged_is_solved_again_in_a_batch_that_fails(project):
+    """A run that fails leaves no marker behind that would hide what the next one has to do."""
+    write_case(project / "cases" / "other", "wrong", pressure=26.0)
+    verdict = project / "results" / "tiny" / "tiny-b" / "verdict.json"
+    for _ in range(2):
+        verdict.write_bytes(b"\xff{}")
+        assert snakemake(project).returncode == 1
+        assert json.loads(verdict.read_text())["verdict"] == "passed"
+    (project / "results" / ".again").touch()  # as a kill leaves it
+    verdict.write_bytes(b"\xff{}")
+    assert snakemake(project).returncode == 1
+    assert json.loads(verdict.read_text())["verdict"] == "passed"
+
+
 def test_a_mesh_that_includes_a_changed_file_is_solved_again(project):
     own = project / "cases" / "tiny" / "tiny-b.yaml"
     text = re.sub(r"mesh: \{.*?\}\}\n", "mesh: {file: own.inp}\n", own.read_text(), flags=re.DOTALL)

@@ -182,5 +182,24 @@ onstart:
                 keep_warm()
 
 
+def forget_marker():
+    """Remove what a run that failed or was killed left behind: a marker that is never there."""
+    if not os.path.isfile(AGAIN):
+        return
+    with open(".snakemake/run.lock", "a+") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return  # another run is at work
+        os.unlink(AGAIN)
+
+
+onerror:
+    if workflow.is_main_process and os.path.isfile(AGAIN):
+        os.unlink(AGAIN)
+
+
 if workflow.is_main_process:
+    if not workflow.output_settings.dryrun:
+        forget_marker()
     tell_progress()
