@@ -1,8 +1,15 @@
 """Recovery where it gains little or nothing: it must do no harm there, and leave the status."""
 
-import pytest
+from pathlib import Path
 
+import numpy as np
+import pytest
+import yaml
+
+from solver.case.reader import parse_case
 from solver.mechanics.linear import choice
+from solver.mesh import generate
+from solver.simulation.simulate import simulate
 from solver.verification.norms import errors
 from tests.simulation.test_recovery import blocks, solved, waves
 from tests.simulation.test_resultants import hertz
@@ -103,3 +110,28 @@ def test_a_contact_edge_keeps_its_status():
         zone = hertz("quad8", 1.0, form)[0].zones[0]
         assert (zone.closed == plain.closed).all()
         assert zone.resultants.force == pytest.approx(plain.resultants.force, abs=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_macro_element_covered_by_five_per_cent(form):
+    """The master ends just over the last of five: the sweeps settle, status and force are kept."""
+
+    def found(form):
+        content = pressed(5, 4, form)
+        mesh = generate(content["mesh"], "recovered.yaml")
+        top = [
+            block.data[chosen]
+            for block, chosen in zip(mesh.cells, mesh.cell_sets["top"], strict=True)
+        ]
+        nodes = np.unique(np.concatenate([cells.ravel() for cells in top]))
+        mesh.points[nodes, 0] *= 0.81
+        case = parse_case(yaml.safe_dump(content), Path("recovered.yaml"))
+        return simulate(case, mesh).zones[0]
+
+    zone, plain = found(form), found("none")
+    assert zone.coverage.min() == pytest.approx(0.05)
+    assert (zone.closed == plain.closed).all()
+    assert zone.resultants.force == pytest.approx(plain.resultants.force, abs=1e-9)
+    # What the neighbours make of the others is of the size of what varies among these.
+    whole = zone.coverage > 0.99
+    assert np.abs(zone.multiplier - plain.multiplier)[whole].max() < np.ptp(plain.multiplier[whole])
