@@ -1,12 +1,22 @@
 """Recovery where it gains little or nothing: it must do no harm there, and leave the status."""
 
-import pytest
+from pathlib import Path
 
+import numpy as np
+import pytest
+import yaml
+
+from solver.case.reader import parse_case
 from solver.mechanics.linear import choice
+from solver.mesh import generate
+from solver.simulation.simulate import simulate
 from solver.verification.norms import errors
+from tests.scenes import block_mesh
 from tests.simulation.test_recovery import blocks, solved, waves
 from tests.simulation.test_resultants import hertz
+from tests.simulation.test_unloaded import SCENE, side_by_side
 
+STUDY = Path(__file__).parents[2] / "cases/study/templates"
 FORMS = ["linear", "quadratic", "smooth"]
 
 
@@ -103,3 +113,61 @@ def test_a_contact_edge_keeps_its_status():
         zone = hertz("quad8", 1.0, form)[0].zones[0]
         assert (zone.closed == plain.closed).all()
         assert zone.resultants.force == pytest.approx(plain.resultants.force, abs=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_macro_element_covered_by_five_per_cent(form):
+    """The master ends just over the last of five: the sweeps settle, status and force are kept."""
+
+    def found(form):
+        content = pressed(5, 4, form)
+        mesh = generate(content["mesh"], "recovered.yaml")
+        top = [
+            block.data[chosen]
+            for block, chosen in zip(mesh.cells, mesh.cell_sets["top"], strict=True)
+        ]
+        nodes = np.unique(np.concatenate([cells.ravel() for cells in top]))
+        mesh.points[nodes, 0] *= 0.81
+        case = parse_case(yaml.safe_dump(content), Path("recovered.yaml"))
+        return simulate(case, mesh).zones[0]
+
+    zone, plain = found(form), found("none")
+    assert zone.coverage.min() == pytest.approx(0.05)
+    assert (zone.closed == plain.closed).all()
+    assert zone.resultants.force == pytest.approx(plain.resultants.force, abs=1e-9)
+    # What the neighbours make of the others is of the size of what varies among these.
+    whole = zone.coverage > 0.99
+    assert np.abs(zone.multiplier - plain.multiplier)[whole].max() < np.ptp(plain.multiplier[whole])
+
+
+def test_each_zone_has_its_own_form():
+    """Two pairs of blocks: a zone is as where both have its form, but for the sweeps."""
+    mesh = block_mesh("QUAD8", "TRIA6", (6, 5))
+    both = side_by_side(mesh, mesh)
+    load = "pressure: '25*(1 + 0.2*cos(pi*x))'"
+
+    def pressures(forms):
+        text = SCENE.replace("pressure: 25.0", load)
+        text = text.replace("contact:", f"  - {{group: press_far, {load}}}\ncontact:")
+        for name, form in zip(("top_contact}", "top_contact_far}"), forms, strict=True):
+            text = text.replace(name, f"{name[:-1]}, recovery: {form}}}")
+        zones = simulate(parse_case(text, Path("zones.yaml")), both).zones
+        return [zone.multiplier for zone in zones]
+
+    alone = {form: pressures((form, form)) for form in ("none", "linear", "quadratic", "smooth")}
+    for forms in (("quadratic", "none"), ("linear", "quadratic")):
+        for number, pressure in enumerate(pressures(forms)):
+            assert pressure == pytest.approx(alone[forms[number]][number], rel=1e-3)
+    assert not np.allclose(alone["none"][0], alone["linear"][0], rtol=1e-4)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_curved_faces(swapped):
+    """Oval tubes: quadratic recovery takes the error of the constants down ten times and more."""
+    case = yaml.safe_load((STUDY / "oval.yaml").read_text())
+    case["mesh"] |= {"refine": 4}
+    found = {}
+    for form in ("none", "quadratic"):
+        case["contact"][0]["recovery"] = form
+        found[form] = errors(solved(case, swapped))["pressure_l2"]
+    assert found["quadratic"] < found["none"] / 10
