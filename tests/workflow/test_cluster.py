@@ -76,8 +76,9 @@ def test_jobs_ask_for_memory_and_time_by_size_and_again_for_more(tmp_path):
     tiny = project / "cases" / "tiny" / "tiny-b.yaml"
     case = yaml.safe_load(tiny.read_text())
     case["name"] = "large"
-    section = {"cells": "HEXA8", "divisions": [50, 50, 35]}
-    case["mesh"] |= {"bottom": section, "top": section}
+    for side in ("bottom", "top"):
+        case["mesh"][side] = {"cells": "HEXA8", "divisions": [50, 50, 35]}
+    del case["plane"]
     tiny.with_name("large.yaml").write_text(yaml.safe_dump(case))
     tiny.with_name("broken.yaml").write_text("name: [broken\n")
     name = 'BATCH["tiny", "{}"]'.format
