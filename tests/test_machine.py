@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -187,6 +188,22 @@ def test_a_solve_without_enough_memory_is_refused_or_ends_with_its_reason(case, 
     assert (status, verdict["verdict"], verdict["transient"]) == (3, "crashed", True)
     assert line.startswith("out of memory: ")
     assert len(line.splitlines()) == 1
+
+
+def test_meshing_has_a_time_limit(case, tmp_path):
+    """Nothing interrupts gmsh: the process is ended, and the batch says why."""
+    endless = (
+        "import sys, time; from solver.verification import run; run.MESHING_SECONDS = 1\n"
+        "run.generate = lambda *_: time.sleep(60)\n"
+        "from solver.commands.cli import main; main(sys.argv[1:])"
+    )
+    command = [sys.executable, "-c", endless, "mesh", case, "-o", tmp_path / "m.vtkhdf"]
+    done = subprocess.run(list(map(str, command)), cwd=ROOT, capture_output=True, timeout=30)
+    assert done.returncode == -signal.SIGALRM
+    verdict = tmp_path / "v.json"
+    crashed = ["crashed", case, "--status", str(128 + signal.SIGALRM), "--verdict", verdict]
+    subprocess.run([sys.executable, "-m", "solver", *map(str, crashed)], cwd=ROOT, check=True)
+    assert "meshing took longer than 1800 s" in json.loads(verdict.read_text())["reason"]
 
 
 def test_the_numbers_are_the_same_on_every_run(tmp_path):

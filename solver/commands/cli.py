@@ -185,7 +185,7 @@ def _mesh(options: argparse.Namespace) -> int:
     from ..mesh import write_mesh
     from ..verification.run import mesh_of
 
-    write_mesh(mesh_of(load_case(options.case)), options.output)
+    write_mesh(mesh_of(load_case(options.case), limited=True), options.output)
     return PASSED
 
 

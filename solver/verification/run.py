@@ -35,6 +35,8 @@ from .verdict import (
     write_verdict,
 )
 
+# After so many seconds a process that meshes is ended: ten million unknowns take half of that.
+MESHING_SECONDS = 1800
 # The part of the estimated nodes that a mesh has for certain.
 _SURELY = 0.8
 
@@ -80,10 +82,11 @@ def refined(case: Case, factor: int) -> Case:
     return replace(case, mesh=mesh, counts={})
 
 
-def mesh_of(case: Case, memory_check: bool = True) -> meshio.Mesh:
+def mesh_of(case: Case, memory_check: bool = True, limited: bool = False) -> meshio.Mesh:
     """The case's mesh, read or generated, its transform applied.
 
     `memory_check`: MachineError before it is generated, where no solve on it could fit in memory.
+    `limited`: SIGALRM ends this process if gmsh, which nothing interrupts, takes too long.
     """
     if "path" in case.mesh:
         check_mesh_file(case)
@@ -92,7 +95,11 @@ def mesh_of(case: Case, memory_check: bool = True) -> meshio.Mesh:
         if memory_check:
             size = of_mesh(case.mesh, case.path.parent)
             check_memory(int(_SURELY * size.points), size.dim, case.path)
-        mesh = generate(case.mesh, str(case.path))
+        signal.alarm(MESHING_SECONDS if limited else 0)
+        try:
+            mesh = generate(case.mesh, str(case.path))
+        finally:
+            signal.alarm(0)
     return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
 
 
@@ -183,7 +190,9 @@ def _death(status: int) -> str:
     names = {128 + number: number.name for number in signal.Signals}
     if status not in names:
         return died
-    hint = ", as a system does that runs out of memory" * (names[status] == "SIGKILL")
+    hints = {"SIGKILL": ", as a system does that runs out of memory"}
+    hints["SIGALRM"] = f": meshing took longer than {MESHING_SECONDS} s"
+    hint = hints.get(names[status], "")
     return f"{died}, ended by {names[status]}{hint}"
 
 
@@ -194,7 +203,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
     check_name(output)
     output.parent.mkdir(parents=True, exist_ok=True)
     with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
-        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check)
+        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check, limited=True)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path)
     # What was accepted is a result on the case's own mesh.
