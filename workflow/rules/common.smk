@@ -49,8 +49,9 @@ def read_config():
         refuse(
             f"config: {place[1] + ': ' if place else ''}{told[1] if told else error}"
         )
-    if workflow.cores is not None and workflow.cores < 1:
-        refuse(f"cores = {workflow.cores}: must be 1 or more, or `all`")
+    cores = workflow.resource_settings.cores  # none where a cluster has the jobs
+    if cores is not None and cores < 1:
+        refuse(f"cores = {cores}: must be 1 or more, or `all`")
 
 
 def listed(value):
