@@ -65,9 +65,9 @@ def instead(tmp_path_factory, monkeypatch):
 
     def putting(script):
         python = tmp_path_factory.mktemp("fake") / "python"
-        python.write_text(f'#!/bin/sh\n[ "$3" = mesh ] && exit 0\n{script}\n')
+        python.write_text(f'#!/bin/sh\n[ "$1" = mesh ] && exit 0\n{script}\n')
         python.chmod(0o755)
-        monkeypatch.setattr(measuring.sys, "executable", str(python))
+        monkeypatch.setattr(measuring, "COMMAND", [str(python)])
 
     return putting
 
