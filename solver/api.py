@@ -5,7 +5,7 @@
     solved = solve_case("cases/ssnp170/e.yaml")
     print(solved.verdict, solved.pressure.max())
 
-What a case says is held against the same schema whether it comes from a file or as a mapping, and
+A case is checked by the same types whether it comes from a file or as a mapping, and
 is refused by the same messages.
 """
 
@@ -71,7 +71,7 @@ def solve_case(
     not need is done all the same (see `solver.simulation.options`). With `memory_check` a solve
     that cannot fit into memory is not begun. `log` is given lines on how it goes: `log=print`.
 
-    A case of a file on its own mesh is held against its accepted values too.
+    A case file on its own mesh is compared with its accepted values too.
 
     Raises:
         InputError: case or mesh are refused, in one line: file, key, value, what is allowed.

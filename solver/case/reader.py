@@ -173,7 +173,7 @@ class _Reader:
 
 
 def _only(values: Iterable[Any]) -> float | None:
-    """The one number among the values; None where there is none, or another value beside it."""
+    """The only number among the values; None if there is no number, or any other value."""
     different = {value for value in values if value is not None}
     value = different.pop() if len(different) == 1 else None
     return float(value) if isinstance(value, int | float) else None

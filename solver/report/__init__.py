@@ -15,7 +15,7 @@ def write_report(
 ) -> int:
     """Write the report of the verdict files into `folder`; the exit status, always 0.
 
-    Every verdict stands in every file: the main page and the page of its family, summary.json,
+    Every verdict is in every file: the main page and the page of its family, summary.json,
     .csv, .md, junit.xml, and failures.txt (empty when all passed). `families` are files
     `family.yaml`, each in the folder of its family. Logs one line for each solve that did not pass,
     the outcome, and the processor time by family.

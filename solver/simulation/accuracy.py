@@ -56,7 +56,7 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Estimated relative errors of the pressure by cause; of the stress where there is none."""
+    """Estimated relative errors of the pressure by cause; of the stress if there is no pressure."""
 
     causes: dict[str, float]
 

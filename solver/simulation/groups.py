@@ -1,4 +1,4 @@
-"""A case held against its mesh: groups, dimension, materials, contact surfaces.
+"""Whether a case fits its mesh: groups, dimension, materials, contact surfaces.
 
 Every refusal is an `InputError` that names the case file, the key and the groups that are there.
 """

@@ -35,7 +35,7 @@ class Safeguards(Switches):
     """What keeps the digits of a result; each can be turned off to show what it does.
 
     local_coordinates: points are counted from the middle of the mesh.
-    gap_threshold: an initial gap of the size of the coordinates' rounding is none.
+    gap_threshold: an initial gap of the size of the coordinates' rounding counts as zero.
     closure: integrals over segments sum exactly to those over whole faces.
     refinement: the linear solution is refined by its residual.
     differences: residuals and gaps are summed from differences of displacement, else the residual

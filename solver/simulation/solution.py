@@ -156,7 +156,7 @@ class ZoneResult:
 
     @property
     def relative_pressure_error(self) -> float | None:
-        """The estimated L2 error of the constants over their norm; None where there is none."""
+        """The estimated L2 error of the constants over their norm; None if unknown."""
         return pressure_error([self])
 
 

@@ -52,7 +52,7 @@ class PointStudy:
         raise NotImplementedError
 
     def point(self, name: str) -> Any:
-        """The point of that name; InputError where there is none."""
+        """The point of that name; InputError for an unknown name."""
         known = {point.name: point for point in self.points}
         if name not in known:
             raise InputError(self.path, "point", name, f"no such point; {hint(name, known)}")
@@ -72,7 +72,7 @@ class MeasuredPoint:
 
     @property
     def why_not(self) -> str:
-        """Why there is none."""
+        """Why it is missing."""
         return f"{self.record['outcome']}: {self.record['reason']}"
 
 

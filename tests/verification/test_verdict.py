@@ -218,7 +218,7 @@ def test_any_damage_to_a_byte_is_found_out_without_a_traceback(solved):
 
 
 def json_of(content):
-    """What a JSON file says; None where it is none."""
+    """The content of a JSON file; None for any other file."""
     try:
         return json.loads(content)
     except ValueError:

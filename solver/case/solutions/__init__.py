@@ -77,7 +77,7 @@ class Known:
 def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
     """The solution that a case file names, alone or with parameters.
 
-    Raises InputError for a name or parameter that there is none of, and for a value not allowed.
+    Raises InputError for an unknown name or parameter, and for a value not allowed.
     """
     key = "reference.solution"
     values = {"name": given} if isinstance(given, str) else dict(given)

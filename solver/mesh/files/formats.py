@@ -18,7 +18,7 @@ from ...system.errors import InputError
 from ..tidy import tidy
 from .apart import read_apart, read_here
 
-# Modules with a function `read(path)` that gives the mesh as it stands in the file.
+# Modules with a function `read(path)` that returns the mesh as stored in the file.
 _READERS = {
     ".med": ".med",
     ".mmed": ".med",

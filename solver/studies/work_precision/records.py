@@ -53,7 +53,7 @@ class TimedSolve(MeasuredPoint):
         return medians(times, "wall")
 
     def error(self, name: str) -> float | None:
-        """An error against the exact solution; None where there is none."""
+        """An error against the exact solution; None if there is no such solution."""
         return self.record["errors"].get(name) if self.solved else None
 
     @property
