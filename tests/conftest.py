@@ -8,3 +8,6 @@ settings.register_profile("project", deadline=None, derandomize=True)
 settings.load_profile("project")
 # Output is buffered in the processes of the tests as it is on a user's machine.
 os.environ.pop("PYTHONUNBUFFERED", None)
+# `make test ARGS=…` hands its settings down to any make that a test runs.
+for name in ("MAKEFLAGS", "MAKEOVERRIDES", "MFLAGS", "ARGS"):
+    os.environ.pop(name, None)
