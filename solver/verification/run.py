@@ -95,11 +95,13 @@ def mesh_of(case: Case, memory_check: bool = True, limited: bool = False) -> mes
         if memory_check:
             size = of_mesh(case.mesh, case.path.parent)
             check_memory(int(_SURELY * size.points), size.dim, case.path)
-        signal.alarm(MESHING_SECONDS if limited else 0)
+        if limited:
+            signal.alarm(MESHING_SECONDS)
         try:
             mesh = generate(case.mesh, str(case.path))
         finally:
-            signal.alarm(0)
+            if limited:
+                signal.alarm(0)
     return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
 
 

@@ -222,7 +222,7 @@ wildcard_constraints:
 
 
 def has_mesh(folder):
-    """Whether there is a mesh, or the case is to blame that there is none."""
+    """Whether the mesh is there, or was refused because of the case."""
     return any(Path(folder, name).is_file() for name in ("mesh.vtkhdf", "refused"))
 
 
