@@ -259,10 +259,8 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
 
 def _gallery(options: argparse.Namespace) -> int:
     from ..report.gallery import write_gallery
-    from ..system.progress import saying
 
-    with saying(print):
-        write_gallery(_verdicts(options), options.output)
+    print(write_gallery(_verdicts(options), options.output))
     return PASSED
 
 
@@ -273,13 +271,16 @@ def _report(options: argparse.Namespace) -> int:
     families = options.families
     if families is None:
         families = sorted(Path("cases").glob("*/family.yaml"))
-    return write_report(verdicts, options.output, families=families)
+    print(write_report(verdicts, options.output, families))
+    return PASSED
 
 
 def _compare(options: argparse.Namespace) -> int:
     from ..report.compare import compare
 
-    return FAILED if compare(options.base, options.this, options.output).groups["worse"] else PASSED
+    found, text = compare(options.base, options.this, options.output)
+    print(text)
+    return FAILED if found.groups["worse"] else PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:

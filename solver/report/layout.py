@@ -32,16 +32,12 @@ def mean_normal(solution: Solution) -> np.ndarray:
     return mean / length if length > 1e-6 else upward
 
 
-def apart(solution: Solution, share: float, magnified: float = 0.0) -> np.ndarray:
-    """Points with slave and master moved apart by `share` of the mesh's size, (n, dim).
-
-    Each is moved by its displacement as well, `magnified` so many times.
-    """
+def apart(solution: Solution, share: float) -> np.ndarray:
+    """Points with slave and master moved apart by `share` of the mesh's size, (n, dim)."""
     side = {"slave": -0.5, "master": 0.5}
     shift = np.array([side.get(body.role, 0.0) for body in solution.bodies] or [0.0])
     away = share * solution.length * mean_normal(solution)
-    points = solution.mesh.points + magnified * solution.displacement
-    return points + shift[solution.body][:, None] * away
+    return solution.mesh.points + shift[solution.body][:, None] * away
 
 
 def fit(points: np.ndarray, frame: Frame) -> Placement:

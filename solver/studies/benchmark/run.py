@@ -1,5 +1,6 @@
 """Runs the benchmark: each way in a process of its own, one after the other, nothing beside it."""
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,13 +12,14 @@ from ...system.clock import now
 from ...system.errors import SolveError
 from ...system.package import COMMAND
 from ...system.process import cores_for, run_apart
+from ...system.progress import OUTCOME
 from ..points import FAILED, MISSING, SOLVED, ended, measure_apart, surroundings
 from ..scaling.description import ScalingPoint
 from . import calculix, ways
 from .description import Benchmark, WarmBatch, Way, WayComparison
 
 Record = dict[str, Any]
-Log = Callable[[str], Any]
+_LOG = logging.getLogger(__name__)
 
 _OFTEN = 5
 
@@ -60,7 +62,7 @@ def bench(benchmark: Benchmark) -> Iterator[Bench]:
         yield Bench(Path(folder), cores_for(benchmark.threads), benchmark.limit)
 
 
-def run_benchmark(benchmark: Benchmark, log: Log) -> Record:
+def run_benchmark(benchmark: Benchmark) -> Record:
     """Run all of it, logging what is about to be measured; the record (see `page`).
 
     Raises SolveError where a mesh cannot be made.
@@ -78,11 +80,11 @@ def run_benchmark(benchmark: Benchmark, log: Log) -> Record:
             "comparisons": [],
         }
         for comparison in benchmark.comparisons:
-            log(f"measuring: {comparison.title}")
+            _LOG.log(OUTCOME, "measuring: %s", comparison.title)
             record["comparisons"].append(_compare(place, comparison))
-        log(f"measuring: {benchmark.batch.title}")
+        _LOG.log(OUTCOME, "measuring: %s", benchmark.batch.title)
         record["batch"] = _batch(place, benchmark.batch)
-        log("measuring: start of the program")
+        _LOG.log(OUTCOME, "measuring: start of the program")
         record["start"] = _start(place, benchmark.batch.cases[0])
     return record | {"whole": now() - started}
 
