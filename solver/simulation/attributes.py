@@ -160,9 +160,9 @@ class Attributes:
         Cells of rigid bodies, which need no material, get a unit one. Without `mixed_form` none is
         in it, whatever the case says; `plain`: cells with straight edges have plain quadrature.
         """
-        young = self._by_material(lambda m: m.young, 1.0)
-        poisson = self._by_material(lambda m: m.poisson, 0.0)
-        mixed = self._by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
+        young = self.by_material(lambda m: m.young, 1.0)
+        poisson = self.by_material(lambda m: m.poisson, 0.0)
+        mixed = self.by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
         blocks = [
             Block(
                 BY_NAME[name],
@@ -183,10 +183,13 @@ class Attributes:
             [self.cut.members(name, meshed) for name in self.cut.cells],
         )
 
-    def _by_material(
+    def by_material(
         self, value: Callable[[Material], float], otherwise: float
     ) -> dict[str, np.ndarray]:
-        """A value of the material of each cell (n,) by type; a group's own goes before `all`."""
+        """A value of the material of each cell (n,) by type; a group's own goes before `all`.
+
+        `otherwise`: that of cells without a material, which belong to rigid bodies.
+        """
         materials = self.case.materials
         start = value(materials[ALL]) if ALL in materials else otherwise
         values = {name: np.full(len(c), float(start)) for name, c in self.cut.cells.items()}
