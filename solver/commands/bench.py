@@ -1,4 +1,4 @@
-"""The commands of other codes: their input."""
+"""The commands that run other codes, or write their input."""
 
 import argparse
 from pathlib import Path
