@@ -24,6 +24,7 @@ from ..mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from ..mesh.catalogue import BY_NAME
 from ..system.clock import Clock
 from ..system.errors import InputError
+from ..system.progress import stage
 from .attributes import Attributes, CutZone, faces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .options import LEAN, Options
@@ -153,20 +154,20 @@ def build_scene(
         origin[0] = 0.0
     local = replace_points(mesh, mesh.points - origin)
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
-    with clock.stage("cut"):
+    with stage(clock, "cut"):
         surfaces = _surfaces(case, local)
         cut_mesh, sub_faces = _cut(local, case.zones, surfaces)
     cut_zones = [
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
     ]
     groups = Attributes(case, local, cut_mesh, cut_zones, origin)
-    with clock.stage("pairing"):
+    with stage(clock, "pairing"):
         noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
         operators = [
             _operator(groups, zone, faces, master, noise, options)
             for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
         ]
-    with clock.stage("assembly"):
+    with stage(clock, "assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
         force = groups.forces()
