@@ -126,7 +126,6 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
-    command.add_argument("--plain", action="store_true", help="without PyVista and OpenGL")
 
     command = add_command(commands, "compare", _compare, "compare with another batch")
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
@@ -261,8 +260,10 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
 
 def _gallery(options: argparse.Namespace) -> int:
     from ..report.gallery import write_gallery
+    from ..system.progress import saying
 
-    write_gallery(_verdicts(options), options.output, options.plain, partial(print, flush=True))
+    with saying(print):
+        write_gallery(_verdicts(options), options.output)
     return PASSED
 
 

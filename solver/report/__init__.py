@@ -22,6 +22,7 @@ def write_report(
     """
     from ..system.files import write_text
     from . import tables
+    from .charts import write_script
     from .junit import to_junit
     from .page import family_page, main_page
     from .rows import read_rows
@@ -42,6 +43,7 @@ def write_report(
     }
     for name, content in contents.items():
         write_text(folder / name, content)
+    write_script(folder)
     complaints = "".join(f"{c}\n" for part in parts if (c := part.family.complaint))
     said = f"{tables.outcome(rows)} Report: {folder / PAGE}\n{_costs(parts)}"
     log(f"{complaints}{contents['failures.txt']}{said}")
