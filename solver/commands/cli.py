@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import jobs, studies
+from . import bench, jobs, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
@@ -134,6 +134,7 @@ def _parser() -> argparse.ArgumentParser:
 
     studies.add_commands(commands)
     jobs.add_commands(commands)
+    bench.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "check whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
