@@ -12,6 +12,7 @@ from scipy import sparse
 
 from ...system.errors import SolveError
 from ..fem.bodies import joined_bodies
+from .augmented import augment
 from .choice import LinearSolver, against_condensation
 from .condensation import (
     CondensedSystem,
@@ -23,7 +24,8 @@ from .direct import Factor
 from .krylov import EPSILON
 from .multigrid import Unknowns
 
-_NOTHING_OWN = "constraints without an unknown of their own leave a saddle point"
+_NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
+_DEPENDENT = "constraints that nearly depend on one another: a saddle point"
 
 
 @dataclass(frozen=True)
@@ -101,8 +103,8 @@ class Systems:
     """K x = f + Gᵀ p under the constraints of closed multipliers, factored and kept.
 
     `matrix` K (n, n), `constraints` (k, n) of all multipliers, `own` (n,) the unknowns that may be
-    eliminated by condensation, None where some multiplier has none: then the saddle point is
-    factored. `unknowns` describes each.
+    eliminated by condensation, None where some multiplier has none: then the constraints augment
+    the stiffness. `unknowns` describes each.
     """
 
     def __init__(
@@ -162,7 +164,7 @@ class Systems:
             matrix, constraints = matrix[chosen][:, chosen], constraints[:, chosen]
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
-            return _saddle_point(matrix, constraints)
+            return _augmented(matrix, constraints, unknowns.dim)
         if why := against_condensation(matrix, constraints):
             try:
                 return saddle_point(matrix, constraints, why, weighted=False)
@@ -171,9 +173,15 @@ class Systems:
         return condense(matrix, constraints, own, unknowns, self._gave_up.get(number, ""))
 
 
-def _saddle_point(matrix: sparse.csr_matrix, constraints: sparse.csr_matrix) -> ConstrainedSystem:
+def _augmented(
+    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, dim: int
+) -> ConstrainedSystem:
     try:
-        return saddle_point(matrix, constraints, _NOTHING_OWN)
+        return augment(matrix, constraints, dim, _NOTHING_OWN)
+    except SolveError:
+        pass
+    try:
+        return saddle_point(matrix, constraints, _DEPENDENT)
     except SolveError as error:
         raise SolveError(
             f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
