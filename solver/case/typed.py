@@ -65,10 +65,13 @@ class Section(Struct, frozen=True, forbid_unknown_fields=True):
                 raise FieldError((name,), allowed)
 
 
-def read_as(kind: type[AnySection], content: object, where: Path) -> AnySection:
+def read_as(
+    kind: type[AnySection], content: object, where: str | Path, key: str = ""
+) -> AnySection:
     """An object of the class from the content of the file `where`; raises `InputError`.
 
-    A `Path` in the class is a file that has to be there, named relative to `where`.
+    A `Path` in the class is a file that has to be there, named relative to `where`. `key`: the
+    content is what the file has under this key.
     """
     convert = partial(msgspec.convert, dec_hook=partial(_file_beside, where))
     try:
@@ -76,14 +79,14 @@ def read_as(kind: type[AnySection], content: object, where: Path) -> AnySection:
             return convert(content, kind)
     except msgspec.ValidationError:
         pass
-    fault = _fault(convert, content, kind, ())
+    fault = _fault(convert, content, kind, (key,) if key else ())
     raise InputError(where, key_path(fault.keys) or "file", fault.value, fault.problem)
 
 
-def _file_beside(where: Path, kind: type, value: object) -> Path:
+def _file_beside(where: str | Path, kind: type, value: object) -> Path:
     if kind is not Path or not isinstance(value, str) or not value:
         raise FieldError((), f"must be {_WORDS[Path]}")
-    file = where.parent / value
+    file = Path(where).parent / value
     if not is_file(file):
         raise FieldError((), "no such file")
     return file
@@ -104,9 +107,22 @@ def refuse_unknown(keys: Keys, name: str, kind: str, known: Collection[str]) -> 
         raise FieldError(keys, f"no such {kind}; {hint(name, known)}")
 
 
-def json_schema(kind: type[Section]) -> dict[str, Any]:
-    """The JSON Schema of a class, for editors."""
-    schema = msgspec.json.schema(kind, schema_hook=lambda _: {"type": "string"})
+def json_schema(kind: type[Section], **alternatives: Collection[type[Section]]) -> dict[str, Any]:
+    """The JSON Schema of a class, for editors.
+
+    `alternatives`: of a key that the class leaves open, the classes of what it may be.
+    """
+    others = [other for kinds in alternatives.values() for other in kinds]
+    (schema, *parts), definitions = msgspec.json.schema_components(
+        (kind, *others), schema_hook=lambda _: {"type": "string"}, ref_template="#/$defs/{name}"
+    )
+    for key, kinds in alternatives.items():
+        options, parts = parts[: len(kinds)], parts[len(kinds) :]
+        open_key = definitions[kind.__name__]["properties"][key]
+        definitions[kind.__name__]["properties"][key] = {"anyOf": options} | {
+            name: open_key[name] for name in ("description",) if name in open_key
+        }
+    schema = {**schema, "$defs": definitions}
     for part in schema["$defs"].values():
         part["description"], titles = _headed(part.get("description", ""))
         for name, key in part["properties"].items():

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import jobs, studies
+from . import bench, jobs, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
@@ -126,7 +126,6 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
-    command.add_argument("--plain", action="store_true", help="without PyVista and OpenGL")
 
     command = add_command(commands, "compare", _compare, "compare with another batch")
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
@@ -135,6 +134,7 @@ def _parser() -> argparse.ArgumentParser:
 
     studies.add_commands(commands)
     jobs.add_commands(commands)
+    bench.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "check whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -261,7 +261,7 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
 def _gallery(options: argparse.Namespace) -> int:
     from ..report.gallery import write_gallery
 
-    write_gallery(_verdicts(options), options.output, options.plain, partial(print, flush=True))
+    print(write_gallery(_verdicts(options), options.output))
     return PASSED
 
 
@@ -272,13 +272,16 @@ def _report(options: argparse.Namespace) -> int:
     families = options.families
     if families is None:
         families = sorted(Path("cases").glob("*/family.yaml"))
-    return write_report(verdicts, options.output, families=families)
+    print(write_report(verdicts, options.output, families))
+    return PASSED
 
 
 def _compare(options: argparse.Namespace) -> int:
     from ..report.compare import compare
 
-    return FAILED if compare(options.base, options.this, options.output).groups["worse"] else PASSED
+    found, text = compare(options.base, options.this, options.output)
+    print(text)
+    return FAILED if found.groups["worse"] else PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:

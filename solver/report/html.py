@@ -7,6 +7,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from . import PAGE, formats
+from .charts import SCRIPT
 from .families import page_name, paragraphs
 
 # What each check looks at, in the order of the table of checks.
@@ -82,6 +83,7 @@ def environment(*folders: Path) -> Environment:
         "paragraphs": paragraphs,
         "style": style(),
         "script": _template("sort.js"),
+        "chart_script": SCRIPT,
     }
     return templates
 

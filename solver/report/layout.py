@@ -32,27 +32,12 @@ def mean_normal(solution: Solution) -> np.ndarray:
     return mean / length if length > 1e-6 else upward
 
 
-def magnification(displacement: np.ndarray, size: float) -> float:
-    """How much a displacement (n, dim) is drawn larger on a model of that size.
-
-    So that the largest is a sixteenth of the size or somewhat less: 1, 2 or 5 times a power of ten.
-    """
-    largest = float(np.linalg.norm(displacement, axis=1).max(initial=0.0))
-    wanted = size / (16 * largest) if largest else 1.0
-    decade = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(m * decade for m in (1, 2, 5) if m * decade <= wanted * (1 + 1e-9)))
-
-
-def apart(solution: Solution, share: float, magnified: float = 0.0) -> np.ndarray:
-    """Points with slave and master moved apart by `share` of the mesh's size, (n, dim).
-
-    Each is moved by its displacement as well, `magnified` so many times.
-    """
+def apart(solution: Solution, share: float) -> np.ndarray:
+    """Points with slave and master moved apart by `share` of the mesh's size, (n, dim)."""
     side = {"slave": -0.5, "master": 0.5}
     shift = np.array([side.get(body.role, 0.0) for body in solution.bodies] or [0.0])
     away = share * solution.length * mean_normal(solution)
-    points = solution.mesh.points + magnified * solution.displacement
-    return points + shift[solution.body][:, None] * away
+    return solution.mesh.points + shift[solution.body][:, None] * away
 
 
 def fit(points: np.ndarray, frame: Frame) -> Placement:

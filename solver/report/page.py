@@ -50,6 +50,7 @@ def family_page(section: FamilySection, folder: Path) -> str:
     return render(
         TEMPLATES / "family.html.jinja",
         title=section.family.title,
+        charts=True,
         sortable=True,
         outcome=section.outcome,
         good=not section.bad,

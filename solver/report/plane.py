@@ -14,16 +14,10 @@ from .svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
 WIDTH, HEIGHT = 760, 330
 
 
-def draw_plane(solution: Solution, title: str, magnified: float = 0.0) -> Markup:
-    """Blocks on the left, the first zones' pressure on the right.
-
-    The blocks are moved by their displacement, `magnified` so many times.
-    """
+def draw_plane(solution: Solution, title: str) -> Markup:
+    """Blocks on the left, the first zones' pressure on the right."""
     drawing = Drawing(WIDTH, HEIGHT, title)
-    room = 14 if magnified else 0
-    _blocks(drawing, solution, (4, 10, 190, HEIGHT - 20 - room), magnified)
-    if magnified:
-        drawing.text(6, HEIGHT - 4, f"displacement × {magnified:g}", color=MUTED)
+    _blocks(drawing, solution, (4, 10, 190, HEIGHT - 20))
     zones = solution.zones[:3]
     each = HEIGHT / max(1, len(zones))
     for i, zone in enumerate(zones):
@@ -31,9 +25,9 @@ def draw_plane(solution: Solution, title: str, magnified: float = 0.0) -> Markup
     return drawing.svg()
 
 
-def _blocks(drawing: Drawing, solution: Solution, frame: Frame, magnified: float) -> None:
+def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     """The cells of every body, the bodies drawn a little apart, each with its name beside it."""
-    points = apart(solution, 0.03, magnified)
+    points = apart(solution, 0.03)
     place = fit(points, frame)
     for polygons, node in plane_cells(points, solution.mesh):
         for number, body in enumerate(solution.bodies):

@@ -8,12 +8,12 @@ from pathlib import Path
 from markupsafe import Markup
 
 from . import formats
-from .errors import COLORS, draw_errors, drawn, floor
+from .charts import Chart
+from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
 from .html import KINDS, NORMS
 from .pictures import profile
 from .rows import Row, families
-from .svg import INK
 from .tables import outcome
 
 # Profiles on a page where the family does not say which.
@@ -126,9 +126,9 @@ class FamilySection:
         return [(row, Figure(row.name)) for row in list(first.values())[:_MOST_PROFILES]]
 
     @cached_property
-    def figure(self) -> Markup | str:
-        """Error against run time; nothing where no solve has both."""
-        return draw_errors(self.rows, self.family.reference_code) if drawn(self.rows) else ""
+    def figure(self) -> Chart | None:
+        """Error against run time; None where no solve has both."""
+        return draw_errors(self.rows, self.family.reference_code) if drawn(self.rows) else None
 
     @property
     def floor(self) -> tuple[float, float]:
@@ -140,12 +140,6 @@ class FamilySection:
         """The rows that the figure cannot show."""
         points = drawn(self.rows)
         return [row for row in self.rows if row not in points]
-
-    @property
-    def colors(self) -> dict[str, str]:
-        """The colours of the figure's marks by kind of reference."""
-        kinds = {row.verdict.reference_kind or "" for row in drawn(self.rows)}
-        return {kind: COLORS.get(kind, INK) for kind in kinds}
 
 
 def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[FamilySection]:

@@ -27,16 +27,10 @@ LEVELS = 32
 MASTER = "#ffa45c"  # readable on every pressure
 
 
-def draw_space(solution: Solution, title: str, magnified: float = 0.0) -> Markup:
-    """Axonometric view on the left, plan of the first zone on the right.
-
-    In the view points are moved by their displacement, `magnified` so many times.
-    """
+def draw_space(solution: Solution, title: str) -> Markup:
+    """Axonometric view on the left, plan of the first zone on the right."""
     drawing = Drawing(WIDTH, HEIGHT, title)
-    room = 10 if magnified else 0
-    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24 - room), magnified)
-    if magnified:
-        drawing.text(6, HEIGHT - 4, f"displacement × {magnified:g}", color=MUTED)
+    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24))
     if solution.zones:
         _plan(drawing, solution, solution.zones[0], (420, 40, 240, HEIGHT - 110))
     return drawing.svg()
@@ -55,9 +49,9 @@ def _camera(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([right, np.cross(eye, right)]), eye
 
 
-def _blocks(drawing: Drawing, solution: Solution, frame: Frame, magnified: float) -> None:
+def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     """The faces turned to the eye, from far to near, the bodies drawn apart."""
-    points = apart(solution, 0.3, magnified)
+    points = apart(solution, 0.3)
     screen, eye = _camera(solution)
     place = fit(points @ screen.T, frame)
     numbers = range(len(solution.bodies))

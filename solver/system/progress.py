@@ -13,12 +13,23 @@ from contextlib import contextmanager
 from logging.handlers import MemoryHandler
 from threading import Timer, get_ident
 
+from .clock import Clock
 from .package import PACKAGE
 
 OUTCOME = 25
 """The level of what a solve says of its course, between information and warnings."""
+_LOG = logging.getLogger(__name__)
 # A solve that ends sooner tells nothing on a terminal.
 PATIENCE = 2.0
+
+
+@contextmanager
+def stage(clock: Clock, name: str) -> Iterator[None]:
+    """Log a stage of the work when it begins for the first time, and count its time."""
+    if name not in clock.seconds:
+        _LOG.info("%s", name)
+    with clock.stage(name):
+        yield
 
 
 class _Saying(logging.Handler):

@@ -19,7 +19,7 @@ from ..simulation.solution import Solution
 from ..system.clock import Clock, processor_time
 from ..system.errors import InputError, MachineError, SolveError, of_machine
 from ..system.files import last_line
-from ..system.progress import OUTCOME
+from ..system.progress import OUTCOME, stage
 from ..system.provenance import gather
 from .checks import run_checks
 from .judge import judge, without_result
@@ -140,7 +140,7 @@ def solve_checked(
     """
     clock = clock or Clock()
     solution = simulate(case, mesh, options, clock)
-    with clock.stage("checks"):
+    with stage(clock, "checks"):
         solution.errors = errors(solution)
         checks = run_checks(solution, accepted_values(solution) if accepted else {})
     return solution, checks
@@ -204,7 +204,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
     # Better refused now than after the solve.
     check_name(output)
     output.parent.mkdir(parents=True, exist_ok=True)
-    with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
+    with stage(clock, "read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check, limited=True)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path)
@@ -214,7 +214,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
     solution, checks = solve_checked(case, mesh, options, accepted, clock)
     solution.cpu_seconds = processor_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
-    with clock.stage("write"):
+    with stage(clock, "write"):
         sha256 = write_result(output, solution, checks, provenance)
     name = os.path.relpath(output, beside.parent)
     return judge(solution, checks, name, provenance, sha256)

@@ -209,7 +209,7 @@ def again(folder, kept=is_kept):
 
 
 # The wildcards stand for names that exist: no recursion is to be detected in a name that ends in
-# twenty zeros.
+# twenty zeros. This is for such names alone, not for time.
 snakemake.dag.PeriodicityDetector = lambda: type(
     "Never", (), {"is_periodic": lambda *_: None}
 )()

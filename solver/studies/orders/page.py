@@ -1,6 +1,6 @@
 """The page of orders of convergence, its tables for machines, and what was not reached."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +25,11 @@ PAGE, SLOPES, POINTS, GAINS, FAILURES = (
 )
 
 
-def write_orders(
-    families: Sequence[LadderFamily], results: Path, folder: Path, log: Callable[[str], Any] = print
-) -> None:
+def write_orders(families: Sequence[LadderFamily], results: Path, folder: Path) -> str:
     """Write the page, the tables and the failures of the ladders into `folder`.
 
-    `results` holds a folder a family, a ladder, a level, each with its verdict. Logs one line for
-    each level without a result and each slope that is not reached.
+    `results` holds a folder a family, a ladder, a level, each with its verdict. Returns a line for
+    each level without a result and each slope that is not reached, and the outcome.
     """
     curves = {family.name: read_curves(family, results) for family in families}
     every = [curve for members in curves.values() for curve in members]
@@ -55,7 +53,7 @@ def write_orders(
     contents = {PAGE: page, FAILURES: failures} | {k: as_csv(rows) for k, rows in tables.items()}
     for name, content in contents.items():
         write_text(folder / name, content)
-    log(f"{failures}{outcome(every)} Report: {folder / PAGE}")
+    return f"{failures}{outcome(every)} Report: {folder / PAGE}"
 
 
 def outcome(curves: Sequence[Curve]) -> str:

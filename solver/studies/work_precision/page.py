@@ -1,6 +1,6 @@
 """The page itself, its figures as files, and the table for machines."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +30,10 @@ from .records import (
 _OVERVIEW = ("pressure_l2", "pressure_means", "displacement_l2", "stress_l2")
 
 
-def write_study(
-    study: Study, results: Path, folder: Path, log: Callable[[str], Any] = print
-) -> None:
+def write_study(study: Study, results: Path, folder: Path) -> str:
     """Write the page, its table and its figures into `folder`; `results` holds the records.
 
-    Logs one line: what was measured, and where the page is.
+    Returns one line: what was measured, and where the page is.
     """
     points, name = read_points(study, results), page_name("study", study.size)
     sections = [_section(problem, points) for problem in study.problems]
@@ -45,7 +43,7 @@ def write_study(
             write_text(folder / name / part["file"], part["figure"])
     write_text(folder / f"{name}.csv", as_csv(rows(points)))
     write_text(folder / f"{name}.html", _to_html(study, points, name, sections, solvers))
-    log(f"{outcome(points)} Page: {folder / name}.html")
+    return f"{outcome(points)} Page: {folder / name}.html"
 
 
 def rows(points: Sequence[TimedSolve]) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ import pytest
 
 from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.gauss import gauss_rule
-from solver.mechanics.mortar.facets import facets, surface_vectors
+from solver.mechanics.mortar.facets import facets, measured
 from solver.mechanics.mortar.operator import LAC, gap_operator
 from solver.mechanics.mortar.regions import Regions, clip_to_face, quadrature, without_face
 from solver.mechanics.mortar.segments import intersect
@@ -109,8 +109,7 @@ def test_segments_of_a_warped_face_sum_to_it(kind):
     assert {segments.master.index for segments in found} == {0, 1, 2, 3}
     summed = sum(np.einsum("sq,sqd,sqa->ad", s.weight, s.normal, s.slave.values) for s in found)
     reference, weights = gauss_rule(BY_NAME[kind].skeleton, 8)
-    values, slopes = shape_functions(kind).both(reference)
-    vectors = surface_vectors(lower, slopes)[0]
+    values, [vectors] = measured(lower, reference)
     exact = np.einsum("q,qa,qd->ad", weights, values, vectors)
     assert summed == pytest.approx(exact, abs=1e-13)
 

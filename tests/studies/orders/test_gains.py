@@ -60,7 +60,7 @@ def test_goals_are_those_of_cells_and_form(family, results):
 
 
 def test_the_page_marks_goals_that_are_reached_and_those_that_are_not(family, results, tmp_path):
-    write_orders([family], results, tmp_path, lambda _: None)
+    write_orders([family], results, tmp_path)
     page = (tmp_path / PAGE).read_text()
     assert "3.00 ✓" in page
     assert "2.00 ✗" in page

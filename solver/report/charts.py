@@ -1,0 +1,285 @@
+"""Charts as Vega-Lite specifications: records, and how they are shown.
+
+A page embeds the specification, and one script beside the pages draws it without a network: values
+under the pointer, series switched in the legend, zoom, saving. `Chart.svg` draws it for print.
+Source of the grammar: Satyanarayan, Moritz, Wongsuphasawat, Heer, Vega-Lite: A Grammar of
+Interactive Graphics, IEEE TVCG 23 (2017) 341–350.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from ..system.files import write_text
+
+SCRIPT = "charts.js"
+_SCHEMA = "https://vega.github.io/schema/vega-lite/v6.json"
+_TEMPLATES = Path(__file__).with_name("templates")
+EPSILON = float(np.finfo(float).eps)
+INK, MUTED, PAPER, FLOOR = "#1f2933", "#66727f", "#ffffff", "#e6eaee"
+# Colours that the colour-blind tell apart (Okabe and Ito).
+BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "#aa5588"
+SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", "cross")
+# The values of a mark under the pointer: powers of ten as 1.2e-10.
+_FORMAT = ".4~g"
+
+Spec = dict[str, Any]
+Record = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a series is drawn, on every page the same: colour, shape of its marks, dashes."""
+
+    color: str
+    shape: str = "circle"
+    dashes: tuple[float, ...] = ()
+
+
+# Colour and mark by the shape of cells, so that either tells them apart.
+LOOKS = {
+    "TRIA": Look(BLUE),
+    "TETRA": Look(BLUE),
+    "QUAD": Look(ORANGE, "square"),
+    "HEXA": Look(ORANGE, "square"),
+    "PENTA": Look(GREEN, "triangle-up"),
+    "PYRA": Look(PURPLE, "diamond"),
+}
+
+
+def look_of(cells: str, looks: Mapping[str, Look] = LOOKS) -> Look:
+    """The look of a cell type: the first of `looks` whose key its name begins with."""
+    return next(look for shape, look in looks.items() if cells.startswith(shape))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A field of the records along an axis: its title, logarithmic or not, its range if given."""
+
+    field: str
+    title: str
+    log: bool = False
+    domain: tuple[float, float] | None = None
+
+    def channel(self, **more: Any) -> Spec:
+        """The channel of an encoding."""
+        scale: Spec = {"zero": False, "nice": False, "padding": 8}
+        if self.log:
+            scale = {"type": "log", "nice": False, "padding": 8}
+        if self.domain:
+            scale |= {"domain": list(self.domain), "padding": 0}
+        labels = "datum.value >= 0.01 && datum.value < 10000 ? '~g' : '.0e'" if self.log else "'~g'"
+        axis = {"labelExpr": f"format(datum.value, {labels})"}
+        return {
+            "field": self.field,
+            "type": "quantitative",
+            "title": self.title,
+            "scale": scale,
+            "axis": axis,
+        } | more
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart: `name` is its anchor and the name of saved files, `width` its largest in pixels."""
+
+    name: str
+    title: str
+    spec: Spec
+    width: int = 560
+
+    @property
+    def full(self) -> Spec:
+        """The specification that stands alone, in the colours of the report."""
+        return {"$schema": _SCHEMA, "config": theme()["config"]} | self.spec
+
+    def __html__(self) -> Markup:
+        """Its place in a page that has the script; without it, a line that says what is missing."""
+        spec = json.dumps(self.spec, ensure_ascii=False, separators=(",", ":"), default=float)
+        return Markup(
+            '<div class=chart id="{}" role=img aria-label="{}" style="max-width:{}px">'
+            '<script type="application/json">{}</script><div class=drawn></div><p class=none>The '
+            "chart “{}” needs JavaScript and the file {} beside this page.</p></div>"
+        ).format(
+            self.name,
+            self.title,
+            self.width,
+            Markup(spec.replace("<", "\\u003c")),
+            self.title,
+            SCRIPT,
+        )
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
+        return {"application/vnd.vegalite.v6+json": self.full}
+
+    def svg(self) -> str:
+        """The chart as SVG, drawn without a browser."""
+        import vl_convert
+
+        return str(vl_convert.vegalite_to_svg(json.dumps(self.full, default=float)))
+
+
+def write_script(folder: Path) -> None:
+    """Write the script that draws charts into `folder`, unless it is there already."""
+    import vl_convert
+
+    own = (_TEMPLATES / SCRIPT).read_text(encoding="utf-8")
+    versions = vl_convert.get_vega_version(), vl_convert.get_vega_embed_version()
+    head = "// Vega {} and Vega-Embed {} (BSD-3-Clause)\n".format(*versions)
+    tail = f"\nconst THEME = {json.dumps(theme())};\n{own}"
+    file = folder / SCRIPT
+    there = file.read_text(encoding="utf-8") if file.is_file() else ""
+    if not (there.startswith(head) and there.endswith(tail)):
+        write_text(file, head + _libraries() + tail)
+
+
+@cache
+def _libraries() -> str:
+    """Vega, Vega-Lite and Vega-Embed as one script; it takes more than a second."""
+    import vl_convert
+
+    return vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
+
+
+@cache
+def theme() -> Spec:
+    """Fonts and colours of all charts, and what stands for each colour on a dark page."""
+    return dict(json.loads((_TEMPLATES / "charts.json").read_text(encoding="utf-8")))
+
+
+def series_chart(
+    name: str,
+    title: str,
+    records: Sequence[Record],
+    x: Axis,
+    y: Axis,
+    looks: Mapping[str, Look],
+    *,
+    lines: bool = True,
+    tips: Mapping[str, str] | None = None,
+    layers: Sequence[Spec] = (),
+    size: str = "",
+    span: tuple[str, str] | None = None,
+    width: int = 560,
+    height: int = 260,
+) -> Chart:
+    """Records by their `series` as marks, joined by lines, in the looks of these series.
+
+    `tips` maps fields to their titles under the pointer, besides series, x and y; a `url` in a
+    record makes its mark a link. `layers` are drawn below. `size` names the field that marks grow
+    with, `span` the fields of a range across a mark.
+    """
+    shared = {"x": x.channel(), "y": y.channel()} | series(looks)
+    shape, dash = shared.pop("shape"), shared.pop("strokeDash")
+    titles = {"series": "series", x.field: x.title, y.field: y.title, **(tips or {})}
+    marks: Spec = {"shape": shape, "tooltip": tooltip(records, titles)}
+    if size:
+        marks["size"] = {
+            "field": size,
+            "type": "quantitative",
+            "legend": None,
+            "scale": {"range": [25, 130]},
+        }
+    if any("url" in record for record in records):
+        marks["href"] = {"field": "url"}
+    drawn: list[Spec] = [*layers]
+    if lines:
+        line = {"type": "line", "strokeWidth": 1.8}
+        drawn.append({"mark": line, "encoding": shared | {"strokeDash": dash}})
+    if span:
+        ends = {"x": x.channel(field=span[0]), "x2": {"field": span[1]}}
+        drawn.append({"mark": "rule", "encoding": shared | ends})
+    point = {"type": "point", "filled": not lines, "size": 45, "strokeWidth": 1.8}
+    drawn.append({"mark": point, "encoding": shared | marks, "params": interaction()})
+    spec = {"data": {"values": list(records)}, "width": width, "height": height, "layer": drawn}
+    return Chart(name, title, spec, width)
+
+
+def series(looks: Mapping[str, Look], field: str = "series") -> Spec:
+    """The channels of series in their looks, faint where the legend switches them off."""
+    domain = list(looks)
+
+    def channel(values: list[Any]) -> Spec:
+        return {"field": field, "type": "nominal", "scale": {"domain": domain, "range": values}}
+
+    return {
+        "color": channel([look.color for look in looks.values()]),
+        "shape": channel([look.shape for look in looks.values()]),
+        "strokeDash": channel([list(look.dashes) or [1, 0] for look in looks.values()]),
+        "opacity": {"condition": {"param": "shown", "value": 1}, "value": 0.08},
+    }
+
+
+def interaction(field: str = "series") -> list[Spec]:
+    """Zoom by wheel and drag; the legend switches series."""
+    return [
+        {"name": "zoom", "select": "interval", "bind": "scales"},
+        {"name": "shown", "select": {"type": "point", "fields": [field]}, "bind": "legend"},
+    ]
+
+
+def tooltip(records: Sequence[Record], titles: Mapping[str, str]) -> list[Spec]:
+    """What is shown under the pointer: fields that records have, numbers to four digits."""
+    found = []
+    for field, title in titles.items():
+        values = [record[field] for record in records if record.get(field) is not None]
+        number = values and not isinstance(values[0], str)
+        style = {"format": _FORMAT, "type": "quantitative"} if number else {"type": "nominal"}
+        found.append({"field": field, "title": title} | style)
+    return found
+
+
+def level(value: float, label: str, color: str, dashes: Sequence[float] = ()) -> Spec:
+    """A line across the chart at a value of y, with its label above."""
+    place = {"y": {"datum": value}, "color": {"value": color}}
+    words = {"type": "text", "text": label, "align": "right", "dx": -3, "dy": -6}
+    return {
+        "data": {"values": [{}]},
+        "layer": [
+            {"mark": {"type": "rule", "strokeDash": list(dashes)}, "encoding": place},
+            {"mark": words, "encoding": place | {"x": {"value": "width"}}},
+        ],
+    }
+
+
+def floor_band(unknowns: int) -> Spec:
+    """The band of round-off from ε to ε√N, N `unknowns`."""
+    low, high = round_off(unknowns)
+    return {
+        "data": {"values": [{}]},
+        "mark": {"type": "rect", "color": FLOOR},
+        "encoding": {"y": {"datum": low}, "y2": {"datum": high}},
+    }
+
+
+def round_off(unknowns: int) -> tuple[float, float]:
+    """The round-off floor: the unit round-off ε, and ε√N for N unknowns."""
+    return EPSILON, EPSILON * max(1, unknowns) ** 0.5
+
+
+def slopes(records: Sequence[Record], x: str, y: str, orders: Sequence[float]) -> list[Spec]:
+    """The directions of orders in a log–log chart, in its lower right corner."""
+    if not records:
+        return []
+    low, high = (f(r[x] for r in records) for f in (min, max))
+    foot = min(r[y] for r in records)
+    start, end = (high / (high / low) ** share for share in (0.35, 0.08))
+    rows = [
+        {"x": at, "y": foot * (at / start) ** order, "order": f"{order:g}"}
+        for order in orders
+        for at in (start, end)
+    ]
+    place = {axis: {"field": axis, "type": "quantitative"} for axis in "xy"}
+    place |= {"color": {"value": MUTED}}
+    order = {"field": "order", "type": "nominal"}
+    line = {"mark": {"type": "line", "strokeWidth": 1}, "encoding": place | {"detail": order}}
+    label = {"type": "text", "align": "left", "dx": 4, "fontSize": 10}
+    words: Spec = {"mark": label, "encoding": place | {"text": order}}
+    words["transform"] = [{"filter": f"datum.x > {1.0001 * start}"}]
+    return [{"data": {"values": rows}} | part for part in (line, words)]

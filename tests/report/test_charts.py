@@ -1,0 +1,117 @@
+"""Charts: what a specification holds, what a page embeds, and what a browser makes of it."""
+
+import json
+import xml.etree.ElementTree as ET
+from urllib.parse import unquote
+
+import pytest
+
+from solver.report.charts import (
+    BLUE,
+    EPSILON,
+    ORANGE,
+    SCRIPT,
+    Axis,
+    Look,
+    floor_band,
+    level,
+    series_chart,
+    slopes,
+    write_script,
+)
+from tests.browser import MISSING, browser
+
+RECORDS = [
+    {"series": "one </script>", "x": 1.0, "y": 1e-3, "cells": "QUAD4"},
+    {"series": "one </script>", "x": 10.0, "y": 1e-5, "cells": "QUAD4"},
+    {"series": "two", "x": 2.0, "y": 1e-4, "cells": "TRIA3", "url": "#there"},
+]
+LOOKS = {"one </script>": Look(BLUE), "two": Look(ORANGE, "square", (6, 3))}
+
+
+def chart():
+    x, y = Axis("x", "size", log=True), Axis("y", "error", log=True)
+    layers = [floor_band(100), level(1e-4, "limit", ORANGE), *slopes(RECORDS, "x", "y", [1, 2])]
+    return series_chart("a", "Title", RECORDS, x, y, LOOKS, tips={"cells": "cells"}, layers=layers)
+
+
+def test_a_chart_is_its_records():
+    spec = chart().spec
+    assert spec["data"]["values"] == RECORDS
+    marks = spec["layer"][-1]["encoding"]
+    assert marks["color"]["scale"] == {"domain": list(LOOKS), "range": [BLUE, ORANGE]}
+    assert [t["title"] for t in marks["tooltip"]] == ["series", "size", "error", "cells"]
+    assert [t["type"] for t in marks["tooltip"]] == ["nominal", *["quantitative"] * 2, "nominal"]
+    assert marks["href"] == {"field": "url"}
+
+
+def test_a_page_holds_the_specification_and_says_what_it_needs():
+    html = str(chart().__html__())
+    text = html.partition('json">')[2].partition("</script>")[0]
+    assert json.loads(text) == json.loads(json.dumps(chart().spec))
+    assert f"needs JavaScript and the file {SCRIPT} beside this page" in html
+
+
+def test_slopes_are_powers():
+    for order in (1, 2):
+        rows = [
+            r
+            for r in slopes(RECORDS, "x", "y", [1, 2])[0]["data"]["values"]
+            if r["order"] == f"{order}"
+        ]
+        (low, high) = rows
+        assert high["y"] / low["y"] == pytest.approx((high["x"] / low["x"]) ** order)
+
+
+def test_the_floor_grows_with_the_root_of_the_unknowns():
+    place = floor_band(10_000)["encoding"]
+    assert (place["y"]["datum"], place["y2"]["datum"]) == (EPSILON, 100 * EPSILON)
+
+
+def test_a_chart_is_drawn_without_a_browser():
+    root = ET.fromstring(chart().svg())
+    words = {text.text for text in root.iter("{http://www.w3.org/2000/svg}text")}
+    assert {"size", "error", "two", "limit", "one </script>"} <= words
+
+
+def test_the_script_is_written_where_it_is_missing_or_another(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr("solver.report.charts._libraries", lambda: written.append(1) or "vega;")
+    write_script(tmp_path)
+    text = (tmp_path / SCRIPT).read_text(encoding="utf-8")
+    write_script(tmp_path)
+    assert len(written) == 1
+    (tmp_path / SCRIPT).write_text(text.replace("Vega ", "Vega 0"), encoding="utf-8")
+    write_script(tmp_path)
+    assert len(written) == 2
+    assert (tmp_path / SCRIPT).read_text(encoding="utf-8") == text
+
+
+@pytest.mark.skipif(bool(MISSING), reason=MISSING)
+def test_a_browser_draws_the_chart_and_shows_its_values(tmp_path):
+    write_script(tmp_path)
+    page = tmp_path / "page.html"
+    page.write_text(
+        f"<!DOCTYPE html><meta charset=utf-8><script src={SCRIPT} defer></script>"
+        f"<body style='margin:0'>{chart().__html__()}<p id=there style='margin-top:2000px'>there",
+        encoding="utf-8",
+    )
+    mark = "document.querySelector('.mark-symbol path[aria-label*=\"series: two\"]')"
+    with browser() as window:
+        for dark, paper in ((False, "rgb(255, 255, 255)"), (True, "rgb(20, 25, 31)")):
+            window.open(page, dark=dark)
+            window.wait("!!document.querySelector('.drawn svg')")
+            assert not window.run("!!document.querySelector('.chart .none')")
+            drawn = "getComputedStyle(document.querySelector('.drawn svg'))"
+            assert window.run(f"{drawn}.backgroundColor") == paper
+        place = "(({x, y, width, height}) => [x + width / 2, y + height / 2])"
+        window.point(*window.run(f"{place}({mark}.getBoundingClientRect())"))
+        tip = window.wait("document.querySelector('#vg-tooltip-element.visible')?.innerText")
+        assert "two" in tip
+        assert "0.0001" in tip
+        assert "TRIA3" in tip
+        saved = window.run("document.querySelector('.vega-actions a[download$=csv]').href")
+        assert "one </script>,1,0.001,QUAD4" in unquote(saved)
+        window.point(*window.run(f"{place}({mark}.getBoundingClientRect())"), press=True)
+        window.wait("location.hash === '#there'")
+        assert window.complaints() == []
