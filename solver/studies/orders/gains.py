@@ -14,7 +14,7 @@ _NONE = (None, "none")
 
 
 @dataclass(frozen=True)
-class Goal:
+class GainGoal:
     """The least order between the last two levels, and the least gain; None: no goal."""
 
     order: float | None = None
@@ -22,13 +22,13 @@ class Goal:
 
 
 # By form of the recovery and cells of the slave: goals of smooth problems on about 40 faces in 2D.
-GOALS: Mapping[tuple[str, str], Goal] = (
-    {("automatic", cells): Goal(2.8, 400) for cells in ("TRIA6", "QUAD9")}
-    | {("automatic", "QUAD8"): Goal(2.2, 300)}
-    | {("linear", cells): Goal(2.1, 50) for cells in ("TRIA6", "QUAD8", "QUAD9")}
-    | {("automatic", cells): Goal(2.0, 12) for cells in ("TETRA10", "HEXA20", "HEXA27")}
+GOALS: Mapping[tuple[str, str], GainGoal] = (
+    {("automatic", cells): GainGoal(2.8, 400) for cells in ("TRIA6", "QUAD9")}
+    | {("automatic", "QUAD8"): GainGoal(2.2, 300)}
+    | {("linear", cells): GainGoal(2.1, 50) for cells in ("TRIA6", "QUAD8", "QUAD9")}
+    | {("automatic", cells): GainGoal(2.0, 12) for cells in ("TETRA10", "HEXA20", "HEXA27")}
     | {
-        ("automatic", cells): Goal(1.2, 2.5)
+        ("automatic", cells): GainGoal(1.2, 2.5)
         for cells in ("TRIA3", "QUAD4", "HEXA8", "PENTA6", "PYRA5")
     }
 )
@@ -87,9 +87,13 @@ class Gain:
         return _last_order(self.curve, _STRESS)
 
     @cached_property
-    def goal(self) -> Goal:
+    def goal(self) -> GainGoal:
         """Goals are set for smooth pressures alone."""
-        return GOALS.get((self.form, self.cells), Goal()) if self.curve.family.smooth else Goal()
+        return (
+            GOALS.get((self.form, self.cells), GainGoal())
+            if self.curve.family.smooth
+            else GainGoal()
+        )
 
     @cached_property
     def stress_goal(self) -> float | None:

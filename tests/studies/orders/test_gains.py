@@ -3,7 +3,7 @@
 import pytest
 
 from solver.studies.orders.description import read_ladders
-from solver.studies.orders.gains import GOALS, Goal, gains
+from solver.studies.orders.gains import GOALS, GainGoal, gains
 from solver.studies.orders.page import GAINS, PAGE, write_orders
 from solver.studies.orders.records import read_curves
 from tests.studies.orders.test_page import put, read
@@ -54,7 +54,7 @@ def test_gain_and_order_between_the_last_two_levels(family, results):
 
 def test_goals_are_those_of_cells_and_form(family, results):
     automatic, linear = gains(read_curves(family, results))
-    assert automatic.goal == GOALS["automatic", "QUAD8"] == Goal(2.2, 300)
+    assert automatic.goal == GOALS["automatic", "QUAD8"] == GainGoal(2.2, 300)
     assert automatic.marks == {"order": True, "gain": True, "stress": True}
     assert linear.marks == {"order": False, "gain": True}
 
