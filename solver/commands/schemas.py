@@ -18,6 +18,7 @@ TYPES = {
     "family": "..report.families:FamilyFile",
     "infsup": "..studies.infsup.description:InfSupFile",
     "ladders": "..studies.orders.description:LaddersFile",
+    "map": "..codes.files.map:ResultMap",
     "scaling": "..studies.scaling.description:ScalingFile",
     "study": "..studies.work_precision.description:StudyFile",
     "sweep": "..studies.stability.description:SweepFile",
