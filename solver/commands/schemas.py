@@ -13,7 +13,7 @@ from ..system.files import write_text
 
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
-    "benchmark": "..studies.benchmark.description:BenchmarkFile",
+    "benchmark": "..studies.benchmark.description:Benchmark",
     "case": "..case.file:CaseFile",
     "family": "..report.families:FamilyFile",
     "infsup": "..studies.infsup.description:InfSupFile",

@@ -152,7 +152,7 @@ def _benchmark(options: argparse.Namespace) -> int:
 
     benchmark = read_benchmark(options.benchmark, QUICK if options.quick else FULL)
     with saying(partial(print, file=sys.stderr, flush=True)):
-        record = run_benchmark(benchmark)
+        record = run_benchmark(options.benchmark, benchmark)
     write_text(options.output, to_json(record) + "\n")
     print(as_text(record))
     return 0

@@ -10,6 +10,7 @@ from ...report.tables import as_csv
 from ...system.files import write_text
 from ..points import REFUSED, SOLVED, disturbed, facts, outcome, page_name
 from ..timing import TOTAL, spread
+from . import first
 from .description import AUTO, Problem, Study
 from .figure import LIMIT, Looks, draw_figure, draw_note
 from .records import (
@@ -105,6 +106,19 @@ def _part(panel: Panel, looks: Looks, prefix: str) -> dict[str, Any]:
     }
 
 
+def _firsts(
+    sections: Sequence[dict[str, Any]],
+) -> list[tuple[str, str, str, dict[float, first.First]]]:
+    """Problem, pair and error, and who is first to each accuracy; see `first`."""
+    return [
+        (section["problem"].title, pair, part["panel"].error, found)
+        for section in sections
+        for part in section["panels"]
+        if part["panel"].error in _OVERVIEW
+        for pair, found in first.firsts(part["panel"]).items()
+    ]
+
+
 def _linear_solvers(study: Study, points: Sequence[TimedSolve]) -> list[dict[str, Any]]:
     """A section for each problem and pair on which the linear solver is varied.
 
@@ -130,6 +144,8 @@ def _to_html(
     sections: Sequence[dict[str, Any]],
     solvers: Sequence[dict[str, Any]],
 ) -> str:
+    found = _firsts(sections)
+    words = [one.word for row in found for one in row[3].values()]
     return render(
         Path(__file__).with_name("page.html.jinja"),
         title=study.title + f" ({study.size})" * (name != "study"),
@@ -143,6 +159,10 @@ def _to_html(
         disturbed=disturbed(points),
         repetitions=study.repetitions,
         targets=TARGETS,
+        firsts=found,
+        first_targets=first.TARGETS,
+        won=sum(word in (first.OURS, first.TIED) for word in words),
+        decided=sum(word != first.NONE for word in words),
         tie=f"{100 * (TIE - 1):.0f} %",
         limit=LIMIT,
         errors=NORMS,
