@@ -349,7 +349,8 @@ class CaseFile(Section, frozen=True):
     mesh: either `file`, a mesh file (.med, .msh, .inp, .vtu, .vtkhdf), relative to the case file,
       or `recipe`, a recipe that generates the mesh, and the keys of the recipe
     transform: changes of the mesh, in the order of the keys
-    plane: plane strain, only for 2D meshes
+    plane: plane strain, or a section of axisymmetric bodies with x as the radius and y along the
+      axis; only for 2D meshes
     units: the units of the numbers, only labels of fields and pictures
     materials: the material of each group of cells, or of `all`
     supports: imposed displacements
@@ -371,7 +372,7 @@ class CaseFile(Section, frozen=True):
     title: str = ""
     description: str = ""
     transform: Transform | None = None
-    plane: Literal["strain"] | None = None
+    plane: Literal["strain", "axisymmetric"] | None = None
     units: Units | None = None
     loads: tuple[LoadKeys, ...] = ()
     bodies: dict[Group, BodyKeys] = field(default_factory=dict)

@@ -112,6 +112,11 @@ class Case:
     hexahedra: str | None = None
     recovery: str | None = None
 
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether the mesh is a meridian plane, x the radius and y the height."""
+        return self.plane == "axisymmetric"
+
     def as_solved(
         self, swapped: bool = False, hexahedra: str | None = None, recovery: str | None = None
     ) -> "Case":

@@ -136,7 +136,8 @@ class _Reader:
         known = Known(
             where=self.path,
             materials=self.materials,
-            dimension=2 if self.file.plane else 3,
+            dimension=2 if self.file.plane == "strain" else 3,
+            axisymmetric=self.file.plane == "axisymmetric",
             pressure=_only(load.pressure for load in self.file.loads),
             interference=_only(zone.interference for zone in self.zones),
         )

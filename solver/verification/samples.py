@@ -15,7 +15,12 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..mechanics.fem import shape_functions, volume_rule
-from ..mechanics.fem.elasticity import lame_parameters, physical_gradients
+from ..mechanics.fem.elasticity import (
+    hoop_values,
+    lame_parameters,
+    physical_gradients,
+    with_hoop,
+)
 from ..mechanics.fem.stress import COMPONENTS
 from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues, deformable
@@ -183,13 +188,17 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
             gradient, _ = physical_gradients(points, cells, kind, reference)
             nodal = solution.displacement[cells]
             slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ gradient
+            if solution.case.axisymmetric:
+                hoop, _ = hoop_values(points, cells, kind, reference)
+                slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
+            dim = slope.shape[-1]
             lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
             mean = lame * np.einsum("cqii->cq", slope)
             if mixed is not None:
                 own = mixed[part] @ values.T
                 mean = np.where(np.isnan(own), mean, own)
             tensor = np.zeros((*mean.shape, 3, 3))
-            tensor[..., : kind.dim, : kind.dim] = slope + np.swapaxes(slope, 2, 3)
+            tensor[..., :dim, :dim] = slope + np.swapaxes(slope, 2, 3)
             tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
             stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]].reshape(-1, 6)
             owners = (np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))

@@ -137,12 +137,11 @@ def test_pages_of_the_report_are_no_family_s():
 
 def report(folder, verdicts, *families):
     """Write a report of verdicts into the folder; what was logged."""
-    paths, logged = [], []
+    paths = []
     for content in verdicts:
         path = folder / "results" / content["family"] / content["job"] / "verdict.json"
         paths.append(put(path, content))
-    write_report(paths, folder, logged.append, families)
-    return "\n".join(logged)
+    return write_report(paths, folder, families)
 
 
 REFINED = {"reference_kind": "refined", "reference_uncertainty": 2e-3}

@@ -24,6 +24,7 @@ from .base import (
 )
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .manufactured import Parabola2d, Paraboloid3d
+from .meridian import Meridian
 from .nested import NestedCylinders, NestedSpheres
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
@@ -65,6 +66,7 @@ class Known:
     """What a case says already: its file, materials by group, dimension, and single values.
 
     `pressure` and `interference` are None where the case has none, or more than one.
+    `axisymmetric`: a solution of three dimensions is seen in one meridian plane.
     """
 
     where: object
@@ -72,6 +74,7 @@ class Known:
     dimension: int
     pressure: float | None = None
     interference: float | None = None
+    axisymmetric: bool = False
 
 
 def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
@@ -103,7 +106,7 @@ def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
     if solution.dim != known.dimension:
         allowed = f"is for {solution.dim} dimensions; the case has {known.dimension}"
         raise InputError(known.where, key, name, allowed)
-    return solution
+    return Meridian(solution) if known.axisymmetric else solution
 
 
 class _ParameterReader:
