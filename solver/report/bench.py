@@ -14,21 +14,39 @@ import numpy as np
 
 from ..codes.recorded import recorded_verdicts
 from ..codes.verdicts import PRESSURE, read_pressures
+from ..simulation.solution import Solution
 from ..system.errors import InputError
 from ..system.files import write_text
 from ..verification.results import read_result
 from . import formats
-from .charts import BLUE, GREEN, INK, ORANGE, PURPLE, RED, SHAPES, Axis, Chart, Look, series_chart
+from .charts import (
+    BLUE,
+    CROSS,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    RED,
+    SHAPES,
+    Axis,
+    Chart,
+    Look,
+    series_chart,
+)
 from .families import page_name
 from .html import TEMPLATES, render
 from .junit import to_junit
-from .profile import expected
+from .profile import PRESSED, expected, position
 from .rows import Row, natural
 from .tables import as_csv
 from .tables import to_json as rows_to_json
 
 PAGE = "bench.html"
-OURS = "this project"
+OURS, _REFERENCE = "this project", "reference"
+# Pressures below this share of the largest are none, for the part of the interface that is drawn.
+_NOTHING = 1e-6
+# A pressure that varies by a smaller share is drawn as constant.
+_ROUND_OFF = 1e-3
 # Digits of a number in double precision; an error of zero has all of them.
 _MOST = 16.0
 _COLORS = (ORANGE, GREEN, PURPLE, RED, "#000000", "#e69f00")
@@ -62,15 +80,20 @@ class Cell:
                 return self.row.norms[name]
         return None
 
+    def _digits(self, names: Iterable[str]) -> float | None:
+        """The digits of these checks, no more than the result has."""
+        found, printed = digits(self._error(names)), self.row.verdict.printed_digits
+        return found if found is None or printed is None else min(found, printed)
+
     @property
     def pressure(self) -> float | None:
         """Digits of the contact pressure."""
-        return digits(self._error(PRESSURES))
+        return self._digits(PRESSURES)
 
     @property
     def stress(self) -> float | None:
         """Digits of the stress."""
-        return digits(self._error(STRESSES))
+        return self._digits(STRESSES)
 
     @property
     def reason(self) -> str:
@@ -161,64 +184,86 @@ class Bench:
     def chart(self, case: tuple[str, str]) -> Chart | None:
         """The pressure along the interface of a case by all codes; None where none is known."""
         cells = self.cells[case]
-        found = {code: _pressures(cell.row) for code, cell in cells.items()}
-        known = {code: rows for code, rows in found.items() if rows is not None}
-        if not known.keys() - {OURS}:
+        known = {code: rows for code, cell in cells.items() if len(rows := _pressures(cell.row))}
+        if not known.keys():
             return None
-        places = np.concatenate([rows[:, :-1] for rows in known.values()])
-        axis = int(np.ptp(places, axis=0).argmax())
-        if OURS in cells and (rows := _reference(cells[OURS].row)) is not None:
-            known["reference"] = rows
+        own = _solution(cells[OURS].row) if OURS in cells else None
+        if own is not None and own.zones:
+            known = {OURS: _of_solution(own), **known}
+            where, place = position(own, own.zones[0], None)
+            if all((means := expected(own, zone)) is not None for zone in own.zones):
+                means = np.concatenate([expected(own, zone) for zone in own.zones])
+                known[_REFERENCE] = np.column_stack([known[OURS][:, :-1], means])
+        else:
+            axis = int(np.ptp(np.concatenate(list(known.values()))[:, :-1], axis=0).argmax())
+            where, place = "xyz"[axis], lambda points: points[:, axis]
+        flat = next(iter(known.values())).shape[1] == 3
         records = [
-            {"series": code, "place": float(row[axis]), "pressure": float(row[-1])}
+            {"series": code, "place": float(at), "pressure": float(f"{pressure:.7g}")}
             for code, rows in known.items()
-            for row in rows[np.argsort(rows[:, axis], kind="stable")]
+            for at, pressure in sorted(zip(place(rows[:, :-1]), rows[:, -1], strict=True))
         ]
-        looks = {code: self._look(code) for code in known}
         return series_chart(
             f"pressure-{case[1]}",
             f"{case[1]}: contact pressure along the interface",
-            records,
-            Axis("place", "xyz"[axis]),
-            Axis("pressure", "contact pressure"),
-            looks,
-            lines=places.shape[1] == 2,
+            _pressed(records),
+            Axis("place", where),
+            Axis("pressure", "contact pressure", domain=_nearly_constant(records)),
+            {code: self._look(code) for code in known},
+            lines=flat,
             height=200,
         )
 
     def _look(self, code: str) -> Look:
-        if code in (OURS, "reference"):
-            return Look(BLUE) if code == OURS else Look(INK, "cross", (4, 3))
+        if code in (OURS, _REFERENCE):
+            return Look(BLUE) if code == OURS else Look(INK, CROSS, (4, 3))
         number = [name for name in self.codes if name != OURS].index(code)
         return Look(_COLORS[number % len(_COLORS)], SHAPES[1 + number % (len(SHAPES) - 1)])
 
 
-def _pressures(row: Row) -> np.ndarray | None:
-    """Place and pressure (k, dim + 1) of one solve; None where they are not known."""
-    try:
-        if row.verdict.code:
-            file = row.folder / PRESSURE
-            return read_pressures(file) if file.is_file() else None
-        if row.result_file is None:
-            return None
-        zones = read_result(row.result_file).solution.zones
-    except (InputError, OSError, ValueError):
-        return None
-    parts = [np.column_stack([zone.centre, zone.multiplier]) for zone in zones]
-    return np.concatenate(parts) if parts else None
+def _pressures(row: Row) -> np.ndarray:
+    """Place and pressure (k, dim + 1) that another code has; empty where they are not known."""
+    file = row.folder / PRESSURE
+    if not row.verdict.code or row.verdict.recorded or not file.is_file():
+        return np.empty((0, 3))
+    return read_pressures(file)
 
 
-def _reference(row: Row) -> np.ndarray | None:
-    """The reference's pressure at the same places."""
+def _solution(row: Row) -> Solution | None:
+    """The solution of a solve of ours; None where there is none."""
     if row.result_file is None:
         return None
     try:
-        solution = read_result(row.result_file).solution
-    except InputError:
+        return read_result(row.result_file).solution
+    except (InputError, OSError):
         return None
-    parts = [(zone, expected(solution, zone)) for zone in solution.zones]
-    known = [np.column_stack([zone.centre, values]) for zone, values in parts if values is not None]
-    return np.concatenate(known) if known else None
+
+
+def _of_solution(solution: Solution) -> np.ndarray:
+    """Place and pressure (k, dim + 1) by macro-element."""
+    parts = [np.column_stack([zone.centre, zone.multiplier]) for zone in solution.zones]
+    return np.concatenate(parts)
+
+
+def _pressed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The records where little is pressed: of that part and what is next to it."""
+    at = np.array([record["place"] for record in records])
+    size = np.abs([record["pressure"] for record in records])
+    pressed = at[size > _NOTHING * size.max(initial=0.0)]
+    if not len(pressed) or np.ptp(pressed) > PRESSED * np.ptp(at):
+        return records
+    more = 0.25 * np.ptp(pressed)
+    low, high = pressed.min() - more, pressed.max() + more
+    return [r for r, place in zip(records, at, strict=True) if low <= place <= high]
+
+
+def _nearly_constant(records: list[dict[str, Any]]) -> tuple[float, float] | None:
+    """The range of an axis on which round-off is not seen; None where values vary."""
+    values = np.array([record["pressure"] for record in records])
+    low, high = float(values.min()), float(values.max())
+    if high <= 0 or high - low > _ROUND_OFF * high:
+        return None
+    return (1 - _ROUND_OFF) * low, (1 + _ROUND_OFF) * high
 
 
 def write_bench(rows: Sequence[Row], folder: Path, families: Iterable[Path] = ()) -> None:
