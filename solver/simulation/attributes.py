@@ -215,8 +215,8 @@ class Attributes:
             return free_motion(len(self.points), dim, list(fixed.values()))
         except SupportClashError as clash:
             key = list(fixed)[clash.number]
-            axis = " (on the axis x is fixed)" if len(on_axis) else ""
-            raise InputError(self.case.path, key, clash.value, f"{clash}{axis}") from None
+            note = " (on the axis x is fixed)" if len(on_axis) else ""
+            raise InputError(self.case.path, key, clash.value, f"{clash}{note}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:
         """What supports hold, by the key of the case file."""
