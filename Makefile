@@ -87,7 +87,7 @@ scaling: environment ## cost up to a million unknowns; small sizes in a minute: 
 	@$(SNAKEMAKE) scaling
 
 BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
-benchmark: environment ## time ratios: linear solvers, cut, safeguards, batch, CalculiX
+benchmark: environment ## time ratios: linear solvers, cut, safeguards, CalculiX
 	@$(OURS) solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
 	  $(if $(filter quick,$(LEVEL)),--quick)
 

@@ -13,11 +13,12 @@ from ..system.files import write_text
 
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
-    "benchmark": "..studies.benchmark.description:BenchmarkFile",
+    "benchmark": "..studies.benchmark.description:Benchmark",
     "case": "..case.file:CaseFile",
     "family": "..report.families:FamilyFile",
     "infsup": "..studies.infsup.description:InfSupFile",
     "ladders": "..studies.orders.description:LaddersFile",
+    "map": "..codes.files.map:ResultMap",
     "scaling": "..studies.scaling.description:ScalingFile",
     "study": "..studies.work_precision.description:StudyFile",
     "sweep": "..studies.stability.description:SweepFile",

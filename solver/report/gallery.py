@@ -1,6 +1,5 @@
 """The gallery: PyVista draws each result file off-screen, and a page shows the pictures."""
 
-import logging
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,14 +11,12 @@ import numpy as np
 from ..system.errors import MachineError
 from ..system.files import replacing, write_text
 from ..system.process import cores_for, run_apart
-from ..system.progress import OUTCOME
 from ..verification.units import with_unit
 from .html import TEMPLATES, render
 from .rows import Row, families, read_rows
 
 PAGE, FOLDER = "gallery.html", "gallery"
 WIDTH, HEIGHT = 1500, 560
-_LOG = logging.getLogger(__name__)
 _TRIAL = "import pyvista; pyvista.Plotter(off_screen=True).screenshot(None)"
 # The first start of a graphics driver may take its time.
 _SECONDS = 120.0
@@ -37,8 +34,8 @@ class Picture:
     reason: str = ""
 
 
-def write_gallery(verdicts: Sequence[Path], folder: Path) -> None:
-    """Draw the results of the verdict files into `folder`/gallery, and write the page.
+def write_gallery(verdicts: Sequence[Path], folder: Path) -> str:
+    """Draw the results of the verdict files into `folder`/gallery, and write the page; the outcome.
 
     A picture that is newer than its result is kept. Raises MachineError where VTK cannot draw.
     """
@@ -55,8 +52,7 @@ def write_gallery(verdicts: Sequence[Path], folder: Path) -> None:
     page = render(TEMPLATES / "gallery.html.jinja", title="Gallery", families=groups, folder=folder)
     write_text(folder / PAGE, page)
     drawn = sum(bool(picture.path) for picture in pictures)
-    without = len(pictures) - drawn
-    _LOG.log(OUTCOME, "%d pictures, %d without. Gallery: %s", drawn, without, folder / PAGE)
+    return f"{drawn} pictures, {len(pictures) - drawn} without. Gallery: {folder / PAGE}"
 
 
 def _picture(row: Row, folder: Path) -> Picture:

@@ -161,9 +161,9 @@ class Attributes:
         Cells of rigid bodies, which need no material, get a unit one. Without `mixed_form` none is
         in it, whatever the case says; `plain`: cells with straight edges have plain quadrature.
         """
-        young = self._by_material(lambda m: m.young, 1.0)
-        poisson = self._by_material(lambda m: m.poisson, 0.0)
-        mixed = self._by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
+        young = self.by_material(lambda m: m.young, 1.0)
+        poisson = self.by_material(lambda m: m.poisson, 0.0)
+        mixed = self.by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
         blocks = [
             Block(
                 BY_NAME[name],
@@ -185,10 +185,13 @@ class Attributes:
             [self.cut.members(name, meshed) for name in self.cut.cells],
         )
 
-    def _by_material(
+    def by_material(
         self, value: Callable[[Material], float], otherwise: float
     ) -> dict[str, np.ndarray]:
-        """A value of the material of each cell (n,) by type; a group's own goes before `all`."""
+        """A value of the material of each cell (n,) by type; a group's own goes before `all`.
+
+        `otherwise`: that of cells without a material, which belong to rigid bodies.
+        """
         materials = self.case.materials
         start = value(materials[ALL]) if ALL in materials else otherwise
         values = {name: np.full(len(c), float(start)) for name, c in self.cut.cells.items()}
@@ -215,8 +218,8 @@ class Attributes:
             return free_motion(len(self.points), dim, list(fixed.values()))
         except SupportClashError as clash:
             key = list(fixed)[clash.number]
-            note = " (on the axis x is fixed)" if len(on_axis) else ""
-            raise InputError(self.case.path, key, clash.value, f"{clash}{note}") from None
+            told = " (on the axis x is fixed)" if len(on_axis) else ""
+            raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:
         """What supports hold, by the key of the case file."""

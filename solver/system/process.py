@@ -2,9 +2,11 @@
 
 import os
 import resource
+import signal
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
@@ -78,7 +80,7 @@ def run_apart(
     """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
 
     `memory` (bytes) is the most that it may ask for, `folder` where it runs if not here. It reads
-    nothing; what it prints is kept.
+    nothing; what it prints is kept. What it started ends with it.
     """
 
     def prepare() -> None:
@@ -97,22 +99,21 @@ def run_apart(
             stdout=output,
             stderr=complaint,
             preexec_fn=prepare,  # noqa: PLW1509 -- it calls the system alone
+            process_group=0,
         )
         over = Event()
 
         def stop() -> None:
             over.set()
-            process.kill()
+            _kill_group(process.pid)
 
         timer = Timer(limit, stop)
         timer.start()
         try:
             _, status, used = os.wait4(process.pid, 0)
-        except BaseException:
-            process.kill()
-            raise
         finally:
             timer.cancel()
+            _kill_group(process.pid)
         wall = now() - started
         process.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)
@@ -121,3 +122,9 @@ def run_apart(
     cpu = used.ru_utime + used.ru_stime
     ending = None if over.is_set() else process.returncode
     return Ended(ending, said, complained, wall, cpu, peak_mb(used), limit)
+
+
+def _kill_group(leader: int) -> None:
+    """End what is left of a group of processes."""
+    with suppress(ProcessLookupError):
+        os.killpg(leader, signal.SIGKILL)

@@ -148,26 +148,33 @@ CHECKS: tuple[Check, ...] = (
 
 
 def run_checks(
-    solution: Solution, accepted: Mapping[str, Accepted] | None = None
+    solution: Solution,
+    accepted: Mapping[str, Accepted] | None = None,
+    samplers: Mapping[str, samples.Sampler] | None = None,
+    allow: Callable[[Check, float], float] = lambda _, tolerance: tolerance,
 ) -> list[CheckResult]:
     """Run every check of the table whose reference the case gives, zone by zone.
 
-    `accepted` maps check titles to the accepted extremes. Raises `InputError` when a reference
-    expression has no finite value at one of the places.
+    `accepted` maps check titles to the accepted extremes. `samplers`, by check, stand for those of
+    the table, and other checks are left out; `allow` makes the tolerance of a check from the
+    case's. Raises `InputError` when a reference expression has no finite value at one of the
+    places.
     """
     accepted = accepted or {}
     exact = solution.case.solution and ExactValues(solution, solution.case.solution)
     results = []
     for check in CHECKS:
         reference: samples.Reference = solution.case.reference.get(check.key) if check.key else 0.0
-        if reference is None:
+        sampler = check.sample if samplers is None else samplers.get(check.name)
+        if reference is None or sampler is None:
             continue
+        tolerance = allow(check, check.tolerance_in(solution.case.tolerance))
         if isinstance(reference, Exact):
             reference = exact
         for zone in solution.zones if check.by_zone else [None]:
-            sample = check.sample(solution, zone, reference)
+            sample = sampler(solution, zone, reference)
             if sample is not None:
-                results.append(_judge(check, solution, zone, sample, accepted))
+                results.append(_judge(check, solution, zone, sample, accepted, tolerance))
     return results
 
 
@@ -177,6 +184,7 @@ def _judge(
     zone: ZoneResult | None,
     sample: samples.Sample,
     accepted: Mapping[str, Accepted],
+    tolerance: float,
 ) -> CheckResult:
     name = zone.name if zone else None
     magnitude = float(np.abs(sample.reference).max(initial=0.0))
@@ -193,7 +201,6 @@ def _judge(
         extremes, where = (value, value), "no place at all"
     old = accepted.get(f"{check.name} {name}" if name else check.name)
     regression = None if old is None else _compare(extremes, old, scale, check.accepted)
-    tolerance = check.tolerance_in(solution.case.tolerance)
     return CheckResult(
         name=check.name,
         alias=check.alias,

@@ -137,6 +137,9 @@ class Verdict:
     wall times by stage and their `total`. `pressure_error_estimate` is relative and in L2: how far
     constant pressures are from a reconstruction. `transient`: the machine is the reason (memory,
     disk, a kill), so that the same solve may succeed another time.
+
+    Of the result of another code: `code`, its version and `settings`; `not_given` are the checks
+    that it has no values for; `recorded` has date and source of values that were not computed here.
     """
 
     case: str = ""
@@ -187,6 +190,11 @@ class Verdict:
     attainable: float | None = None
     errors: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, str | int] = field(default_factory=dict)
+    code: str | None = None
+    code_version: str = ""
+    settings: dict[str, str] = field(default_factory=dict)
+    not_given: list[str] = field(default_factory=list)
+    recorded: dict[str, str] = field(default_factory=dict)
     transient: bool = False
 
     @property
@@ -203,7 +211,9 @@ class Verdict:
         error = f", worst error {self.worst.error:.1e} ({self.worst.name})" if self.worst else ""
         if (self.pressure_error_estimate or 0.0) > _NEGLIGIBLE:
             error += f", constant pressures within {self.pressure_error_estimate:.1e} (estimated)"
-        return f"{line}{error}, {self.seconds['total']:.2f} s"
+        missing = f", not given: {', '.join(self.not_given)}" if self.not_given else ""
+        time = f", {self.seconds['total']:.2f} s" if "total" in self.seconds else ""
+        return f"{line}{error}{missing}{time}"
 
     def plain(self) -> dict[str, Any]:
         """The verdict as plain values for strict JSON, with its digest."""

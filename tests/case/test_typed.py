@@ -21,6 +21,7 @@ FILES = {
     "family": "*/family.yaml",
     "infsup": "stability/infsup/*.yaml",
     "ladders": "*/orders.yaml",
+    "map": "../docs/examples/map.yaml",
     "scaling": "scaling/scaling.yaml",
     "study": "study/study.yaml",
     "sweep": "stability/sweeps/*.yaml",

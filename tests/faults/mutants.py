@@ -47,6 +47,7 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
     "lame/cylinders-two-materials",
     "hydrostatic/tilted-hexa20-tetra10",
 )
+SPHERES = "lame/spheres-hexa20"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -262,6 +263,9 @@ MUTANTS = (
     Mutant("segment-weight", "one quadrature weight of the segments is 10 % off", TILTED,
            "solver.mechanics.mortar.segments:simplex_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
+    Mutant("segment-arc", "the slopes of arcs in the reference face are 0.1 % too large", SPHERES,
+           "solver.mechanics.mortar.segments:_into_reference",
+           changed(lambda image: lambda *arcs: (image(*arcs)[0], 1.001 * image(*arcs)[1]))),
     Mutant("load-weight", "one quadrature weight of the loads is 10 % off", PLANE,
            "solver.mechanics.fem.loads:face_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),

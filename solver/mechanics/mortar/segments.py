@@ -20,8 +20,10 @@ import numpy as np
 
 from ..fem import mortar_degree, shape_functions, simplex_rule
 from ..fem.faces import circumference
+from ..fem.small_matrices import invert
 from .clipping import clip, overlap
 from .facets import Facets, project_along
+from .fans import Image, Pieces, quadrature
 from .pairing import (
     Outlines,
     Pairs,
@@ -31,11 +33,9 @@ from .pairing import (
 )
 from .regions import (
     Parts,
-    Pieces,
     Regions,
     clip_to_face,
     joined,
-    quadrature,
     without_face,
 )
 
@@ -210,12 +210,12 @@ def _areas(pairs: Pairs, behind: Behind, degree: int, curved: bool) -> list[Piec
         faces = subject[which], bulge[which]
         cut = _bent(pairs.of(which), slave, faces, _among(behind, which, len(special)))
         parts += [(which[k], regions) for k, regions in cut]
-    if curved:
-        parts = [(which, _in_reference(pairs.of(which), regions)) for which, regions in parts]
     return [
         (which[number], points, weight)
         for which, regions in parts
-        for number, points, weight in quadrature(regions, degree)
+        for number, points, weight in quadrature(
+            regions, degree, _into_reference(pairs.of(which)) if curved else None
+        )
     ]
 
 
@@ -236,24 +236,23 @@ def _bent(
     return [(np.concatenate([which for which, _ in parts]), joined([part for _, part in parts]))]
 
 
-def _in_reference(pairs: Pairs, regions: Regions) -> Regions:
-    """The same regions in the reference faces of the slaves, where their functions are polynomials.
+def _into_reference(pairs: Pairs) -> Image:
+    """The map of places in the slaves' planes into their reference faces, of slopes as well."""
 
-    Arcs become parabolas through the places of their ends and middles: edges of the slave its
-    reference edges, and edges that two masters share one curve.
-    """
-    start = np.where(regions.used[..., None], regions.start, regions.start[:, :1])
-    middle = np.where(regions.used[..., None], regions.middle, start)
-    slave, i, v = pairs.slave, pairs.i, start.shape[1]
-    points = np.einsum("sat,std->sad", np.hstack([start, middle]), slave.tangents[i])
-    direction = slave.normal[i][:, None]
-    place, _ = project_along(slave.type, pairs.corner, points, direction)
-    mapped = Regions(start=place[:, :v], bulge=np.zeros_like(start), count=regions.count)
-    chord = mapped.end - mapped.start
-    bulge = place[:, v:] - mapped.start - chord / 2
-    sideways = np.abs(chord[..., 0] * bulge[..., 1] - chord[..., 1] * bulge[..., 0])
-    bent = regions.used & (sideways > _STRAIGHT * np.linalg.norm(chord, axis=2))
-    return replace(mapped, bulge=np.where(bent[..., None], bulge, 0.0))
+    def image(
+        which: np.ndarray, points: np.ndarray, slopes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        slave, some = pairs.slave, pairs.of(which)
+        tangents, corner = slave.tangents[some.i], some.corner
+        direction = slave.normal[some.i][:, None]
+        targets = np.einsum("sqt,std->sqd", points, tangents)
+        place, _ = project_along(slave.type, corner, targets, direction)
+        gradients = shape_functions(slave.type.name).gradients(place)
+        across = seen_along(corner, tangents)
+        _, inverse = invert(np.einsum("sat,sqar->sqtr", across, gradients))
+        return place, np.einsum("sqrt,sqt->sqr", inverse, slopes)
+
+    return image
 
 
 def _layers(behind: Behind, count: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -44,8 +44,8 @@ def sections(record: InfSupRecord) -> Markup:
     )
 
 
-def write_page(record: InfSupRecord, folder: Path, log: Callable[[str], Any] = print) -> None:
-    """Write the page, its table and what does not hold into `folder`."""
+def write_page(record: InfSupRecord, folder: Path) -> str:
+    """Write the page, its table and what does not hold into `folder`; returns that."""
     complaints = failures(record)
     page = render(
         Path(__file__).with_name("page.html.jinja"),
@@ -59,7 +59,7 @@ def write_page(record: InfSupRecord, folder: Path, log: Callable[[str], Any] = p
     write_text(folder / PAGE, page)
     write_text(folder / TABLE, as_csv(_rows(record[0])))
     write_text(folder / FAILURES, "".join(f"{line}\n" for line in complaints))
-    log("\n".join([*complaints, f"Report: {folder / PAGE}"]))
+    return "\n".join([*complaints, f"Report: {folder / PAGE}"])
 
 
 def _panel(ladder: InfSupLadder) -> str:

@@ -1,6 +1,6 @@
 """The page of growth with size, and its tables for machines."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +39,14 @@ _PLOTS = {
 }
 
 
-def write_scaling(
-    scaling: Scaling, results: Path, folder: Path, log: Callable[[str], Any] = print
-) -> None:
-    """Write page and tables into `folder`; `results` holds the records. Logs what was found."""
+def write_scaling(scaling: Scaling, results: Path, folder: Path) -> str:
+    """Write page and tables into `folder`; `results` holds the records. Returns the outcome."""
     lines, name = read_series(scaling, results), page_name("scaling", scaling.size)
     write_text(folder / f"{name}.html", _to_html(scaling, lines, name))
     write_text(folder / f"{name}.csv", as_csv(point_rows(lines)))
     write_text(folder / f"{name}-exponents.csv", as_csv(exponent_rows(lines)))
     goals, points = reached(scaling, lines), [m for line in lines for m in line.points]
-    log(f"{outcome(points)} {goals_reached(goals)} Page: {folder / name}.html")
+    return f"{outcome(points)} {goals_reached(goals)} Page: {folder / name}.html"
 
 
 def goals_reached(goals: Sequence[Reached]) -> str:

@@ -1,7 +1,7 @@
 """The page of numerical stability, its table for machines, and which points do not hold."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,13 +46,12 @@ def write_stability(
     records: Sequence[Record],
     folder: Path,
     quick: bool,
-    log: Callable[[str], Any] = print,
     theory: InfSupRecord | None = None,
-) -> None:
+) -> str:
     """Write the page, the table and the failures of the sweeps into `folder`.
 
     They are called stability…, or stability-quick… for the quick version. `theory` adds the inf-sup
-    test and the half-loaded block.
+    test and the half-loaded block. Returns the failures and the outcome.
     """
     stem = "stability-quick" if quick else "stability"
     lines = [line for record in records for line in complaints(record)]
@@ -64,7 +63,7 @@ def write_stability(
     }
     for name, content in contents.items():
         write_text(folder / f"{stem}{name}", content)
-    log("".join(f"{line}\n" for line in lines) + f"{outcome(records)} Page: {folder / stem}{PAGE}")
+    return contents[FAILURES] + f"{outcome(records)} Page: {folder / stem}{PAGE}"
 
 
 def complaints(record: Record) -> list[str]:

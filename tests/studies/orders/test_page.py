@@ -70,10 +70,7 @@ def results(tmp_path):
 
 @pytest.fixture
 def page(family, results, tmp_path):
-    said = []
-    write_orders([family], results, tmp_path, said.append)
-    assert len(said) == 1
-    return said[0]
+    return write_orders([family], results, tmp_path)
 
 
 def read(path):
@@ -118,7 +115,7 @@ def test_where_no_slope_is_asked_for_none_is_counted(family, results):
 
 
 def test_a_ladder_never_solved_is_missed(family, tmp_path):
-    write_orders([family], tmp_path / "nothing", tmp_path, lambda line: None)
+    write_orders([family], tmp_path / "nothing", tmp_path)
     failures = (tmp_path / orders.FAILURES).read_text()
     assert "powers/tria3: level 1, 2, 4, 8: not solved\n" in failures
     assert failures.count("not solved") == 3
@@ -215,13 +212,13 @@ def test_slopes_below_theory_are_told_with_the_reason_where_it_is_known(family, 
         if curve.below_theory(error)
     ]
     assert below == [("tria3", "displacement_l2")]
-    write_orders([family], results, tmp_path, lambda line: None)
+    write_orders([family], results, tmp_path)
     text = (tmp_path / orders.PAGE).read_text()
     assert "1 slopes (▽) are below theory by more than their spread." in text
     assert "The reason is not known." in text
     path = tmp_path / "cases" / "powers" / "orders.yaml"
     path.write_text(LADDERS + "shortfalls: Few <levels>.\n")
-    write_orders([read_ladders(path)], results, tmp_path, lambda line: None)
+    write_orders([read_ladders(path)], results, tmp_path)
     assert "Few &lt;levels&gt;.</p>" in (tmp_path / orders.PAGE).read_text()
 
 

@@ -95,8 +95,7 @@ def test_an_exponent_of_small_sizes_answers_no_goal(scaling, results):
 
 
 def test_the_page_says_what_the_records_do(scaling, results, tmp_path):
-    logged = []
-    write_scaling(scaling, results, tmp_path / "page", logged.append)
+    logged = write_scaling(scaling, results, tmp_path / "page")
     page = (tmp_path / "page" / "scaling.html").read_text()
     assert "9 of 10 points are measured. 1 have no solve" in page
     assert "memory: &lt;more&gt; &amp; more" in page
@@ -104,7 +103,7 @@ def test_the_page_says_what_the_records_do(scaling, results, tmp_path):
     assert "<td class=n>1,000,000</td>" in page
     assert "1.30" in page
     assert page.count("<svg") > 8
-    assert logged[-1].endswith("scaling.html")
+    assert logged.endswith("scaling.html")
     with (tmp_path / "page" / "scaling.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == len(scaling.points)
@@ -124,7 +123,7 @@ def test_points_whose_checks_fail_are_listed(scaling, results):
 
 
 def test_a_family_without_any_record_still_has_a_page(scaling, tmp_path):
-    write_scaling(scaling, tmp_path / "nothing", tmp_path, lambda line: None)
+    write_scaling(scaling, tmp_path / "nothing", tmp_path)
     page = (tmp_path / "scaling.html").read_text()
     assert "not measured" in page
     assert "These sizes answer no goal" in page

@@ -57,9 +57,7 @@ def written(tmp_path):
         path = tmp_path / f"{name}.json"
         path.write_text(to_json(RECORD | {"sweep": name, "order": order}))
     records = read_records([tmp_path / "later.json", tmp_path / "pull.json"])
-    logged = []
-    write_stability(records, tmp_path, quick=True, log=logged.append)
-    return tmp_path, logged[0]
+    return tmp_path, write_stability(records, tmp_path, quick=True)
 
 
 def test_every_point_has_three_squares_that_lead_to_its_row(written):

@@ -148,9 +148,9 @@ def test_times_that_noise_cannot_tell_apart_are_ties(study, slower, tied):
     points = [TimedSolve(record(p, 1e-4, 0.1), p) for p in study.points]
     for m in points:
         if m.point.treatment.name == "uncut":
-            m.record["times"]["total"]["wall"] = [0.1 * factor for factor in slower]
+            m.record["times"]["total"]["cpu"] = [0.1 * factor for factor in slower]
         if m.point.treatment.name == "nodal":
-            m.record["times"]["total"]["wall"] = [0.9]
+            m.record["times"]["total"]["cpu"] = [0.9]
     found = pressure(study, points).quickest(1e-3)
     assert list(found) == (["LAC", "whole faces"] if tied else ["LAC"])
 
@@ -218,9 +218,8 @@ class Text(HTMLParser):
 
 
 def test_the_page_its_table_and_its_figures(study, results, tmp_path):
-    said = []
-    write_study(study, results, tmp_path / "report", said.append)
-    assert said[0].startswith("20 of 21 points are measured. 1 have no solve")
+    said = write_study(study, results, tmp_path / "report")
+    assert said.startswith("20 of 21 points are measured. 1 have no solve")
     text = Text()
     text.feed((tmp_path / "report/study.html").read_text())
     page = " ".join(" ".join(text.parts).split())
@@ -246,10 +245,10 @@ def test_the_page_its_table_and_its_figures(study, results, tmp_path):
 
 
 def test_points_begun_on_a_busy_machine_are_counted_and_warned_of(study, results, tmp_path):
-    write_study(study, results, tmp_path / "quiet", lambda line: None)
+    write_study(study, results, tmp_path / "quiet")
     path = results / "patch/tria3-quad4/lac/1.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"load": 3.5}))
-    write_study(study, results, tmp_path / "busy", lambda line: None)
+    write_study(study, results, tmp_path / "busy")
     quiet, busy = ((tmp_path / name / "study.html").read_text() for name in ("quiet", "busy"))
     assert "1 points began while the machine was busy with other work" in busy
     assert "points began while" not in quiet
@@ -257,7 +256,7 @@ def test_points_begun_on_a_busy_machine_are_counted_and_warned_of(study, results
 
 
 def test_a_study_without_any_record_still_has_a_page(study, tmp_path):
-    write_study(study, tmp_path / "nothing", tmp_path, lambda line: None)
+    write_study(study, tmp_path / "nothing", tmp_path)
     page = (tmp_path / "study.html").read_text()
     assert "not measured" in page
     assert "No point of this problem is measured" in page

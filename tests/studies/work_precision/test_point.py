@@ -95,6 +95,6 @@ def test_more_threads_than_there_are_cores_are_refused(study, tmp_path):
 
 
 def test_a_reference_is_asked_for_where_there_is_no_exact_solution(tmp_path, capsys):
-    command = ["study", "point", "cases/study/study.yaml", "half-loaded/tria3-quad4/lac/1"]
+    command = ["study", "point", "cases/study/study.yaml", "half-loaded/quad4-tria3/lac/1"]
     assert main([*command, "-o", str(tmp_path / "record.json")]) == 2
     assert "half-loaded has no exact solution" in capsys.readouterr().err
