@@ -7,6 +7,7 @@ from urllib.parse import quote
 from . import formats, stages
 from .charts import (
     BLUE,
+    CROSS,
     EPSILON,
     GREEN,
     INK,
@@ -56,7 +57,7 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
     shown = drawn(rows)
     records = [_record(row) for row in shown]
     looks = {KINDS.get(kind, "no reference"): look for kind, look in _LOOKS.items()}
-    looks[_BAD] = Look(RED, "cross")
+    looks[_BAD] = Look(RED, CROSS)
     found = {record["series"] for record in records}
     allowed = sorted({row.allowed for row in shown if row.allowed})
     top = max(1e-2, *(3 * record["error"] for record in records), *(3 * a for a in allowed))

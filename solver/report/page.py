@@ -1,11 +1,13 @@
 """The pages for people: the main one, and one a family; no network is needed."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from . import stages
+from .charts import Chart
 from .html import MEANING, NORMS, TEMPLATES, render
-from .pictures import picture
+from .pictures import picture, profile
 from .rows import Row, counted
 from .sections import FamilySection
 from .tables import outcome
@@ -59,9 +61,16 @@ def family_page(section: FamilySection, folder: Path) -> str:
         norms=NORMS,
         stages=_stages(section.rows),
         picture=lambda row: picture(row, section.pictures),
+        pressure=lambda row: _pressure(row, section.pictures),
         left_out=left_out(section.rows),
         folder=folder,
     )
+
+
+def _pressure(row: Row, pictures: Path) -> Chart | str:
+    """The chart of the pressure beside the picture of a 2D solve, which does not show it."""
+    chart = profile(row, pictures) if row.dim == 2 else ""
+    return replace(chart, name=f"case-{row.name}") if isinstance(chart, Chart) else ""
 
 
 def left_out(rows: Sequence[Row]) -> list[tuple[str, str, int]]:

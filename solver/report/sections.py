@@ -25,7 +25,7 @@ class Profile:
     """The pressure of one solve along its interface."""
 
     row: Row
-    drawing: Markup
+    drawing: Chart | Markup
     caption: str
 
 
