@@ -77,7 +77,9 @@ def sources(*patterns):
     return sorted(map(str, files))
 
 
-STUDY_PAGES = [f"studies/**/{page}.py" for page in ("page", "figure", "records")]
+STUDY_PAGES = [
+    f"studies/**/{page}.py" for page in ("page", "figure", "records", "first", "gains")
+]
 OF_PAGES = ("report/**/*.*", "studies/**/*.jinja", *STUDY_PAGES)
 REPORT_SOURCES = [f for f in sources(*OF_PAGES) if not f.endswith(".pyc")]
 SOLVER_SOURCES = sorted({*sources("**/*.py", "case/schemas/*")} - {*REPORT_SOURCES})
