@@ -106,7 +106,7 @@ class Cell:
         verdict = self.row.verdict
         return {
             "family": verdict.family,
-            "case": base_name(self.row),
+            "case": self.row.case,
             "code": self.code,
             "version": verdict.code_version,
             "verdict": self.row.word,
@@ -129,12 +129,6 @@ def digits(error: float | None) -> float | None:
     return _MOST if error <= 10**-_MOST else max(0.0, -math.log10(error))
 
 
-def base_name(row: Row) -> str:
-    """The name of the solve without that of the code."""
-    code = row.verdict.code
-    return row.name.removesuffix(f"@{code}") if code else row.name
-
-
 @dataclass(frozen=True)
 class Bench:
     """All codes side by side; `rows` are those of a report, and what is recorded."""
@@ -147,7 +141,7 @@ class Bench:
         found: dict[tuple[str, str], dict[str, Cell]] = {}
         for row in self.rows:
             cell = Cell(row)
-            found.setdefault((row.group, base_name(row)), {})[cell.code] = cell
+            found.setdefault((row.group, row.case), {})[cell.code] = cell
         others = {key: of for key, of in found.items() if of.keys() - {OURS}}
         return dict(sorted(others.items(), key=lambda item: (item[0][0], natural(item[0][1]))))
 
@@ -272,7 +266,7 @@ def write_bench(rows: Sequence[Row], folder: Path, families: Iterable[Path] = ()
     `families` are the folders of families, for what is recorded in them. Raises InputError for a
     recorded file that is not valid.
     """
-    there = {(row.group, base_name(row)) for row in rows}
+    there = {(row.group, row.case) for row in rows}
     recorded = [
         Row(verdict, folder)
         for family in families

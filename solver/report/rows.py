@@ -26,6 +26,12 @@ class Row:
         return self.verdict.job
 
     @property
+    def case(self) -> str:
+        """The name of the solve without that of the code."""
+        code = self.verdict.code
+        return self.name.removesuffix(f"@{code}") if code else self.name
+
+    @property
     def group(self) -> str:
         """The family's name."""
         return self.verdict.family
