@@ -310,9 +310,10 @@ def _validate_one(path: Path, with_mesh: bool) -> None:
     check_mesh_file(case)
     if with_mesh:
         from ..simulation.groups import check_groups
+        from ..simulation.selections import with_groups
         from ..verification.run import mesh_of
 
-        check_groups(case, mesh_of(case))
+        check_groups(case, with_groups(case, mesh_of(case)))
 
 
 def _new(options: argparse.Namespace) -> int:

@@ -28,7 +28,7 @@ X, Y, Z = POINTS.T
         ("sin(pi*x) + cos(y)", np.sin(np.pi * X) + np.cos(Y)),
         ("  sqrt((x - 1)**2)", abs(X - 1)),
         ("abs(x - y)", np.where(X > Y, X - Y, Y - X)),
-        ("min(x, y) + max(x, y, z)", np.where(X < Y, X, Y) + [2.0, 4.0, 1.0]),
+        ("min(x, y) + max(x, y, z)", np.minimum(X, Y) + np.array([2.0, 4.0, 1.0])),
         ("atan2(y, -x)", [math.pi - math.atan(4), math.pi - math.atan(1 / 12), 0.75 * math.pi]),
     ],
 )
