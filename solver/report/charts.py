@@ -25,7 +25,8 @@ EPSILON = float(np.finfo(float).eps)
 INK, MUTED, PAPER, FLOOR = "#1f2933", "#66727f", "#ffffff", "#e6eaee"
 # Colours that the colour-blind tell apart (Okabe and Ito).
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "#aa5588"
-SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", "cross")
+CROSS = "M-1,-1L1,1M1,-1L-1,1"
+SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
 # The values of a mark under the pointer: powers of ten as 1.2e-10.
 _FORMAT = ".4~g"
 
@@ -60,16 +61,17 @@ def look_of(cells: str, looks: Mapping[str, Look] = LOOKS) -> Look:
 
 @dataclass(frozen=True)
 class Axis:
-    """A field of the records along an axis: its title, logarithmic or not, its range if given."""
+    """A field along an axis: its title, logarithmic or with zero, its range if given."""
 
     field: str
     title: str
     log: bool = False
     domain: tuple[float, float] | None = None
+    zero: bool = False
 
     def channel(self, **more: Any) -> Spec:
         """The channel of an encoding."""
-        scale: Spec = {"zero": False, "nice": False, "padding": 8}
+        scale: Spec = {"zero": self.zero, "nice": False, "padding": 8}
         if self.log:
             scale = {"type": "log", "nice": False, "padding": 8}
         if self.domain:

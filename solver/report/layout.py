@@ -1,6 +1,6 @@
 """What the pictures share: colours of the two sides, bodies drawn apart, coordinates to pixels."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -8,6 +8,8 @@ from ..simulation.solution import BodyInfo, Solution, ZoneResult
 from .svg import BLUE, MUTED, ORANGE, PAPER, mixed
 
 Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
+# A picture of the contact shows this share of its extent around it.
+_AROUND = 0.15
 Placement = Callable[[np.ndarray], np.ndarray]  # coordinates (…, dim) to pixels (…, 2)
 
 
@@ -52,6 +54,23 @@ def fit(points: np.ndarray, frame: Frame) -> Placement:
         return np.stack([left + moved[..., 0], bottom - moved[..., 1]], axis=-1)
 
     return place
+
+
+def pressed_box(points: np.ndarray, zones: Sequence[ZoneResult], within: np.ndarray) -> np.ndarray:
+    """Corners (2, 2) of a square around what is pressed in zones of points (n, 2).
+
+    Cut to the extent of the points `within` (k, 2), which is all where nothing is pressed.
+    """
+    pressed = [
+        points[nodes[zone.multiplier[owner] > 0]].reshape(-1, 2)
+        for zone in zones
+        for _, nodes, owner in zone.faces
+    ]
+    found = np.concatenate([np.empty((0, 2)), *pressed])
+    found = found if len(found) else within
+    middle = (found.min(axis=0) + found.max(axis=0)) / 2
+    half = (0.5 + _AROUND) * np.ptp(found, axis=0).max()
+    return np.clip([middle - half, middle + half], within.min(axis=0), within.max(axis=0))
 
 
 def tangent(zone: ZoneResult) -> np.ndarray:

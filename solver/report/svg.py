@@ -4,6 +4,9 @@ Written directly rather than through a plotting library: a picture of a thousand
 milliseconds and kilobytes, and needs no library where there is nothing to draw.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from markupsafe import Markup, escape
 
@@ -28,9 +31,10 @@ class Drawing:
 
     @staticmethod
     def _data(points: np.ndarray, closed: bool = True) -> str:
-        pattern = "M" + " ".join(["%d %d"] * points.shape[1]) + ("Z" if closed else "")
-        whole = np.rint(points * 10).astype(int).ravel().tolist()
-        return pattern * len(points) % tuple(whole)
+        pattern = "M%d %dl" + " ".join(["%d %d"] * (points.shape[1] - 1)) + ("Z" if closed else "")
+        whole = np.rint(points * 10).astype(int)
+        whole[:, 1:] -= whole[:, :-1].copy()  # steps have fewer digits than places
+        return pattern * len(points) % tuple(whole.ravel().tolist())
 
     def path(self, data: str, **style: Style) -> None:
         """Add a path whose data are in tenths of a pixel."""
@@ -56,6 +60,15 @@ class Drawing:
         r = round(radius * 10)
         strokes = f"m-{r}-{r}l{2 * r} {2 * r}m0-{2 * r}l-{2 * r} {2 * r}"
         self.path("".join(f"M{x} {y}{strokes}" for x, y in _tenths(centres)), **style)
+
+    @contextmanager
+    def clipped(self, x: float, y: float, width: float, height: float) -> Iterator[None]:
+        """What is added meanwhile is seen inside this rectangle alone."""
+        box = f'x="{x * 10:g}" y="{y * 10:g}" width="{width * 10:g}" height="{height * 10:g}"'
+        seen = " ".join(f"{10 * length:g}" for length in (x, y, width, height))
+        self._parts.append(f'<svg {box} viewBox="{seen}">')
+        yield
+        self._parts.append("</svg>")
 
     def text(
         self,

@@ -77,7 +77,9 @@ def sources(*patterns):
     return sorted(map(str, files))
 
 
-STUDY_PAGES = [f"studies/**/{page}.py" for page in ("page", "figure", "records")]
+STUDY_PAGES = [
+    f"studies/**/{page}.py" for page in ("page", "figure", "records", "first", "gains")
+]
 OF_PAGES = ("report/**/*.*", "studies/**/*.jinja", *STUDY_PAGES)
 REPORT_SOURCES = [f for f in sources(*OF_PAGES) if not f.endswith(".pyc")]
 SOLVER_SOURCES = sorted({*sources("**/*.py", "case/schemas/*")} - {*REPORT_SOURCES})
@@ -218,7 +220,7 @@ snakemake.dag.PeriodicityDetector = lambda: type(
 wildcard_constraints:
     family=f"(?!(?:{'|'.join(RESERVED)})/)[^/]+",
     case="[^/]+",
-    job="[^/]+",
+    job="[^/@]+",
 
 
 def has_mesh(folder):

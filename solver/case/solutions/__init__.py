@@ -23,9 +23,10 @@ from .base import (
     Part,
 )
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
+from .indenter import Indenter
 from .manufactured import Parabola2d, Paraboloid3d
 from .meridian import Meridian
-from .nested import NestedCylinders, NestedSpheres
+from .nested import NestedCylinders, NestedSpheres, NestedTubes
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
 from .uniform import Hydrostatic, UniformCompression
@@ -45,6 +46,7 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     UniformCompression,
     Hydrostatic,
     NestedCylinders,
+    NestedTubes,
     NestedSpheres,
     OvalCylinders,
     Parabola2d,
@@ -52,6 +54,7 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     HertzCylinder,
     HertzSphere,
     HertzApproach,
+    Indenter,
     Waves2d,
     Waves3d,
     PolynomialPressure2d,

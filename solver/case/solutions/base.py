@@ -85,8 +85,8 @@ class ExactSolution:
 
     def measured(
         self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
-    ) -> tuple[float, float] | None:
-        """Half-width and peak of a computed pressure, from this alone; None where it has too few.
+    ) -> dict[str, float]:
+        """Half-width and peak of a computed pressure, from this alone, as far as they are known.
 
         Forces (n,) at points x (n, dim), means (m,) of macro-elements at their centres (m, dim).
         """
