@@ -4,8 +4,8 @@ All follow from u = (A + B/r^d − k r²) x, d being 2 around an axis and 3 arou
 body force k = 0 and σ_rr = (dλ + 2μ) A − 2μ (d − 1) B/r^d. The body force ρω² r of cylinders that
 rotate gives k = ρω²/(8 (λ + 2μ)), and takes (4λ + 6μ) k r² from σ_rr. A and B follow by the
 pressures on both walls of a shell. The contact pressure makes the outer shell's displacement at the
-interface exceed the inner one's by the interference. Source: Timoshenko, Goodier, Theory of Elasticity, §28
-(cylinders, shrink fit), §32 (rotating discs, here in plane strain) and §136 (spheres).
+interface exceed the inner one's by the interference. Source: Timoshenko, Goodier, Theory of
+Elasticity, §28 (cylinders, shrink fit), §32 (rotating discs, here in plane strain), §136 (spheres).
 """
 
 from dataclasses import dataclass, field
