@@ -86,6 +86,8 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
     """
     check_groups(case, mesh)
     mesh, _ = named_parts(case, mesh)
+    if case.axisymmetric:
+        raise UnsupportedError("axisymmetric bodies: not written for codes")
     plane = len(mesh.points) if layer and mesh.points.shape[1] == 2 else 0
     if plane:
         case, mesh = as_layer(case, mesh)
