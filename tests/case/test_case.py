@@ -175,7 +175,7 @@ REFUSED = [
     # unknown keys, with the nearest allowed one
     ('"a\\nb": 1', "'a\\nb' = 1: unknown key; allowed: "),
     ("suports: []", "suports = []: unknown key; did you mean supports?"),
-    ("plane: stress", "plane = 'stress': must be strain"),
+    ("plane: stressed", "plane = 'stress': must be strain"),
     ("transform: {rotation: 1}", "transform.rotation = 1: unknown key; did you mean rotate?"),
     ("transform: {scale: 0}", "transform.scale = 0: must be a positive number"),
     ("transform: {stretch: [1, 0]}", "transform.stretch[1] = 0: must be a positive number"),
