@@ -33,6 +33,7 @@ FILE_NAME = "family.yaml"
 _TAKEN = (
     "index",
     "summary",
+    "bench",
     "compare",
     "orders",
     "workflow",

@@ -72,23 +72,25 @@ def cores_for(threads: int) -> list[int]:
 
 def run_apart(
     command: Sequence[str],
-    cores: Sequence[int],
+    cores: Sequence[int] | None,
     limit: float,
     memory: float = float("inf"),
     folder: Path | None = None,
 ) -> Ended:
     """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
 
+    Without `cores` it has one thread, on any of them.
     `memory` (bytes) is the most that it may ask for, `folder` where it runs if not here. It reads
     nothing; what it prints is kept. What it started ends with it.
     """
 
     def prepare() -> None:
-        os.sched_setaffinity(0, cores)
+        if cores is not None:
+            os.sched_setaffinity(0, cores)
         if memory < float("inf"):
             resource.setrlimit(resource.RLIMIT_DATA, (int(memory), int(memory)))
 
-    threads = dict.fromkeys(THREADS, str(len(cores)))
+    threads = dict.fromkeys(THREADS, str(1 if cores is None else len(cores)))
     with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as complaint:
         started = now()
         process = subprocess.Popen(

@@ -138,7 +138,8 @@ class Verdict:
     constant pressures are from a reconstruction. `transient`: the machine is the reason (memory,
     disk, a kill), so that the same solve may succeed another time.
 
-    Of the result of another code: `code`, its version and `settings`; `not_given` are the checks
+    Of the result of another code: `code`, its version and `settings`; `printed_digits` are the
+    significant ones of its values, where a file has fewer than a number; `not_given` are the checks
     that it has no values for; `recorded` has date and source of values that were not computed here.
     """
 
@@ -193,6 +194,7 @@ class Verdict:
     code: str | None = None
     code_version: str = ""
     settings: dict[str, str] = field(default_factory=dict)
+    printed_digits: int | None = None
     not_given: list[str] = field(default_factory=list)
     recorded: dict[str, str] = field(default_factory=dict)
     transient: bool = False

@@ -220,7 +220,7 @@ snakemake.dag.PeriodicityDetector = lambda: type(
 wildcard_constraints:
     family=f"(?!(?:{'|'.join(RESERVED)})/)[^/]+",
     case="[^/]+",
-    job="[^/]+",
+    job="[^/@]+",
 
 
 def has_mesh(folder):

@@ -5,7 +5,8 @@ body force k = 0 and σ_rr = (dλ + 2μ) A − 2μ (d − 1) B/r^d. The body for
 rotate gives k = ρω²/(8 (λ + 2μ)), and takes (4λ + 6μ) k r² from σ_rr. A and B follow by the
 pressures on both walls of a shell. The contact pressure makes the outer shell's displacement at the
 interface exceed the inner one's by the interference. Source: Timoshenko, Goodier, Theory of
-Elasticity, §28 (cylinders, shrink fit), §32 (rotating discs, here in plane strain), §136 (spheres).
+Elasticity, §28 (cylinders, shrink fit), §32 (rotating discs, here in plane strain) and §136
+(spheres).
 """
 
 from dataclasses import dataclass, field
