@@ -1,4 +1,4 @@
-"""Targets of the batch: `all_cases` (default), `report`, `gallery`, `orders`, `study`, `stability`, `scaling`, or the folder of a solve by its path."""
+"""Targets of the batch: `all_cases` (default), `report`, `gallery`, `bench`, `orders`, `study`, `stability`, `scaling`, or the folder of a solve by its path."""
 
 from snakemake.utils import min_version
 
@@ -33,6 +33,7 @@ include: "workflow/rules/study.smk"
 include: "workflow/rules/infsup.smk"
 include: "workflow/rules/stability.smk"
 include: "workflow/rules/scaling.smk"
+include: "workflow/rules/codes.smk"
 
 
 # Pages and gates run where Snakemake does, wherever it sends the other jobs.
@@ -50,3 +51,4 @@ localrules:
     stability,
     scaling,
     gallery,
+    bench,

@@ -43,7 +43,7 @@ def _multiple(values: np.ndarray, reference: np.ndarray) -> str:
     sign = "the opposite sign" if ratio < 0 else ""
     size = abs(ratio)
     if abs(size - 1) < _SAME:
-        return f"values have {sign}"
+        return f"values have {sign}" if sign else ""
     for factor, text in UNITS.items():
         if abs(size / factor - 1) < _SAME:
             unit = f"values are {text} times the reference: another unit?"

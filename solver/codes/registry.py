@@ -12,6 +12,7 @@ from .foreign import ForeignResult
 # Module and class; each is imported where it is asked for.
 _CODES = {
     "calculix": (".calculix", "CalculiX"),
+    "kratos": (".kratos", "Kratos"),
 }
 
 

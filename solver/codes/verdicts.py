@@ -108,6 +108,7 @@ def _judged(compared: Compared) -> Verdict:
     named = _named(verdict, foreign.code, foreign.version, foreign.settings)
     return replace(
         named,
+        printed_digits=foreign.digits,
         not_given=compared.not_given(ran),
         plan=[[name, "given; the case has no check of it"] for name in compared.unchecked(ran)],
         pressure=compared.extremes("pressure"),

@@ -19,6 +19,7 @@ TYPES = {
     "infsup": "..studies.infsup.description:InfSupFile",
     "ladders": "..studies.orders.description:LaddersFile",
     "map": "..codes.files.map:ResultMap",
+    "recorded": "..codes.recorded:RecordedFile",
     "scaling": "..studies.scaling.description:ScalingFile",
     "study": "..studies.work_precision.description:StudyFile",
     "sweep": "..studies.stability.description:SweepFile",

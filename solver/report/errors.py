@@ -39,8 +39,9 @@ _BAD = "not passed"
 
 
 def drawn(rows: Sequence[Row]) -> list[Row]:
-    """The rows that have both an error and a time."""
-    return [row for row in rows if row.accuracy is not None and row.total]
+    """The solves of our own that have both an error and a time."""
+    known = (row for row in rows if row.accuracy is not None and row.total)
+    return [row for row in known if not row.verdict.code]
 
 
 def floor(rows: Sequence[Row]) -> tuple[float, float]:

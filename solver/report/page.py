@@ -8,12 +8,12 @@ from . import stages
 from .charts import Chart
 from .html import MEANING, NORMS, TEMPLATES, render
 from .pictures import picture, profile
-from .rows import Row, counted
+from .rows import Row, counted, ours
 from .sections import FamilySection
 from .tables import outcome
 
 # Pages beside the report that other commands write.
-_PAGES = ("orders", "study", "stability", "gallery")
+_PAGES = ("orders", "study", "stability", "gallery", "bench")
 
 # What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
 LEFT_OUT = {
@@ -26,7 +26,7 @@ LEFT_OUT = {
 def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
     rows = [row for section in sections for row in section.rows]
-    bad = [row for row in rows if not row.sound]
+    bad = [row for row in ours(rows) if not row.sound]
     checks = {check.name: check for row in rows for check in row.verdict.checks}
     return render(
         TEMPLATES / "summary.html.jinja",
@@ -37,7 +37,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         bad=bad,
         good=bool(rows) and not bad,
         outcome=outcome(rows),
-        counts=counted(rows),
+        counts=counted(ours(rows)),
         families=sections,
         facts=_facts(rows),
         checks=[checks[name] for name in sorted(checks, key=_order)],

@@ -46,7 +46,7 @@ _LOOKS = {
     MASTER: Look(ORANGE, "square"),
 }
 # Where less than this share of the interface is pressed, only that and what is next to it is drawn.
-_PRESSED = 0.6
+PRESSED = 0.6
 # Cosine of the turn of the normals, over what is pressed, from which on places are arc lengths.
 _STRAIGHT = np.cos(np.radians(10))
 # Points in each face at which p* and the reference are evaluated.
@@ -67,7 +67,7 @@ def draw_profile(
     """
     units = solution.case.units
     means = expected(solution, zone)
-    where, place = _position(solution, zone, along)
+    where, place = position(solution, zone, along)
     where = where if along else with_unit(where, units.get("length"))
     flat = solution.mesh.points.shape[1] == 2 and along is None
     records = _of_elements(zone, place(solution.mesh.points), place, means)
@@ -221,7 +221,7 @@ def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
 
 
 def _reference(solution: Solution) -> float | Expression | ExactValues | None:
-    """What gives the right pressure, be it checked or not."""
+    """The reference pressure, checked or not."""
     given, exact = solution.case.reference.get("contact_pressure"), solution.case.solution
     if isinstance(given, float | Expression):
         return given
@@ -230,7 +230,7 @@ def _reference(solution: Solution) -> float | Expression | ExactValues | None:
     return None
 
 
-def _position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:
+def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:
     """What the pressure is drawn over: its name, and its value (n,) at points (n, dim)."""
     if along is not None:
         return mathematics(along.text), along
@@ -300,7 +300,7 @@ def _range(
     low, high = float(first.min()), float(last.max())
     if pressed.any():
         start, end = float(first[pressed].min()), float(last[pressed].max())
-        if end - start < _PRESSED * (high - low):
+        if end - start < PRESSED * (high - low):
             more = 0.25 * (end - start)
             low, high = max(low, start - more), min(high, end + more)
     return (low, high) if high > low else (low - 0.5, high + 0.5)

@@ -188,12 +188,7 @@ def _ellipse_errors(solution: Solution, exact: ExactSolution) -> dict[str, float
         for name in ("centre", "multiplier")
     )
     found = exact.measured(np.concatenate(places), np.concatenate(forces), centre, mean)
-    if found is None:
-        return {}
-    return {
-        name: abs(value / getattr(exact, name) - 1)
-        for name, value in zip(("half_width", "peak"), found, strict=True)
-    }
+    return {name: abs(value / getattr(exact, name) - 1) for name, value in found.items()}
 
 
 def _root(error: float, whole: float) -> float:

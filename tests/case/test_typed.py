@@ -22,6 +22,7 @@ FILES = {
     "infsup": "stability/infsup/*.yaml",
     "ladders": "*/orders.yaml",
     "map": "../docs/examples/map.yaml",
+    "recorded": "*/recorded/*.yaml",
     "scaling": "scaling/scaling.yaml",
     "study": "study/study.yaml",
     "sweep": "stability/sweeps/*.yaml",

@@ -75,7 +75,7 @@ class Meridian(ElasticSolution):
 
     def measured(
         self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
-    ) -> tuple[float, float] | None:
+    ) -> dict[str, float]:
         """Radius and peak, from forces (n,) on rings through points x (n, 2)."""
         return self.whole.measured(_around(x), force, _around(centre), mean)
 

@@ -22,7 +22,7 @@ _CELLS = {
 _ORDER = {4: [*range(12), *range(16, 20), *range(12, 16)], 5: [*range(9), 12, 13, 14, 9, 10, 11]}
 # Blocks that list only the nodes concerned: all others have zero.
 _PARTIAL = {"CONTACT"}
-_VALUE = 12
+_VALUE, _DIGITS = 12, 6
 
 
 def read(path: Path) -> Raw:
@@ -77,7 +77,7 @@ def _assembled(
             given[nodes] = values[:, : len(components)]
             nodes = np.arange(len(places))
         fields[name] = RawField(given, components, mesh.points[nodes], nodes)
-    return Raw(mesh, fields, "calculix", version)
+    return Raw(mesh, fields, "calculix", version, _DIGITS)
 
 
 def _block(lines: list[str], start: int) -> tuple[list[str], int]:

@@ -26,12 +26,16 @@ class RawField(NamedTuple):
 
 @dataclass(frozen=True)
 class Raw:
-    """The content of one file: its mesh if it has one, fields by name, the code if it says so."""
+    """The content of one file: its mesh if it has one, fields by name, the code if it says so.
+
+    `digits`: the significant ones of its values, None for all.
+    """
 
     mesh: meshio.Mesh | None
     fields: Mapping[str, RawField] = field(default_factory=dict)
     code: str = ""
     version: str = ""
+    digits: int | None = None
 
 
 def plain_mesh(points: np.ndarray, cells: list[tuple[str, np.ndarray]]) -> meshio.Mesh:

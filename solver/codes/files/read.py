@@ -70,6 +70,7 @@ def read_result_files(
         version=mapping.version or next((raw.version for _, raw in raws if raw.version), ""),
         mesh=mesh and _scaled(mesh, mapping.length),
         step=mapping.step,
+        digits=min((raw.digits for _, raw in raws if raw.digits), default=None),
         settings=mapping.settings,
         seconds=mapping.seconds,
         **found,  # type: ignore[arg-type]

@@ -76,7 +76,7 @@ def _fans(regions: Regions, degree: int, image: Image | None) -> list[Pieces]:
     following = np.where(arc + 1 < regions.count[which], np.arange(1, len(arc) + 1), begin[which])
     last = first[following]
     if image is None:
-        bent = regions.bulge[which, arc].any(axis=1)
+        bent = np.asarray(regions.bulge[which, arc].any(axis=1))
     else:
         chord = last - first
         sideways = np.abs(_cross(chord[:, None], rim - first[:, None])).max(axis=1)
