@@ -200,6 +200,8 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
             tensor = np.zeros((*mean.shape, 3, 3))
             tensor[..., :dim, :dim] = slope + np.swapaxes(slope, 2, 3)
             tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
+            if solution.case.thin:
+                tensor[..., 2, 2] = 0.0
             stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]].reshape(-1, 6)
             owners = (np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
             yield (values @ points[cells]).reshape(-1, kind.dim), stress, *owners
