@@ -70,6 +70,8 @@ class _Reader:
         self.selections: dict[str, Selection] = {}
         for name in file.groups:
             self.select(name)
+        if file.plane == "stress":
+            self.materials = {g: m.in_plane_stress() for g, m in self.materials.items()}
         self.zones = tuple(map(self.zone, range(len(file.contact))))
         self.solution = self.exact_solution()
 
@@ -172,7 +174,8 @@ class _Reader:
         known = Known(
             where=self.path,
             materials=self.materials,
-            dimension=2 if self.file.plane == "strain" else 3,
+            dimension=2 if self.file.plane in ("strain", "stress") else 3,
+            plane_stress=self.file.plane == "stress",
             axisymmetric=self.file.plane == "axisymmetric",
             pressure=_only(load.pressure for load in self.file.loads),
             interference=_only(zone.interference for zone in self.zones),

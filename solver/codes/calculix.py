@@ -9,6 +9,7 @@ layer of cells.
 import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,11 +18,11 @@ import numpy as np
 from ..mechanics.fem.faces import FaceBlock
 from ..mesh.catalogue import BY_NAME, CellType
 from ..mesh.files.abaqus import FACES
-from ..system.errors import SolveError
+from ..system.errors import InputError, SolveError
 from ..system.process import cores_for, run_apart
 from .deck import Deck, UnsupportedError
-from .foreign import Field, ForeignResult
-from .frd import read_frd
+from .files.read import read_result_files
+from .foreign import ForeignResult
 
 PROGRAM = "ccx"
 # Cells whose nodes have the same order here and there.
@@ -32,8 +33,6 @@ ELEMENTS = {
 # Pressure by overlap, over Young's modulus: the manual advises 5 to 50 for lengths in millimetres.
 STIFFNESS = 50.0
 _NAME = "deck"
-# The result file has them as xx, yy, zz, xy, yz, zx, as we do.
-_PRESSURE = 3
 
 
 class CalculiX:
@@ -77,34 +76,15 @@ class CalculiX:
 
     def read(self, deck: Deck, folder: Path) -> ForeignResult:
         """The fields at the end; SolveError where the run came to none."""
-        blocks = read_frd(folder / f"{_NAME}.frd")
-        for wanted in ("DISP", "STRESS", "CONTACT"):
-            if wanted not in blocks:
-                raise SolveError(f"CalculiX: its result file has no block {wanted}")
-        return ForeignResult(
-            code=self.name,
-            displacement=_field(deck, *blocks["DISP"]),
-            stress=_field(deck, *blocks["STRESS"]),
-            pressure=_pressure(deck, *blocks["CONTACT"]),
-            step=deck.case.steps[-1],
-        )
-
-
-def _field(deck: Deck, numbers: np.ndarray, values: np.ndarray) -> Field:
-    """Values at nodes; those of the plane mesh alone where the deck is a layer over it."""
-    nodes = numbers - 1
-    if not deck.plane:
-        return Field(places=deck.points[nodes], values=values, nodes=nodes)
-    mine = nodes < deck.plane
-    values = values[mine, :2] if values.shape[1:] == (3,) else values[mine]
-    return Field(places=deck.points[nodes[mine], :2], values=values, nodes=nodes[mine])
-
-
-def _pressure(deck: Deck, numbers: np.ndarray, values: np.ndarray) -> Field:
-    """The pressure at the slave nodes."""
-    slave = np.unique([n for p in deck.pairs for b in p.slave for n in b.nodes.ravel().tolist()])
-    mine = np.isin(numbers - 1, slave)
-    return _field(deck, numbers[mine], values[mine, _PRESSURE])
+        file = folder / f"{_NAME}.frd"
+        try:
+            found = read_result_files([file], code=self.name)
+        except InputError as error:
+            raise SolveError(f"its result file: {error}") from None
+        for quantity in ("displacement", "stress", "pressure"):
+            if getattr(found, quantity) is None:
+                raise SolveError(f"{file.name}: it holds no {quantity}")
+        return replace(found, step=deck.case.steps[-1])
 
 
 def deck_lines(deck: Deck, stiffness: float = STIFFNESS) -> Iterator[str]:

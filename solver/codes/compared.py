@@ -92,6 +92,10 @@ class Compared:
             np.isfinite(zone.multiplier).all() for zone in solution.zones
         )
         found = errors(solution if whole else replace(solution, zones=[]))
+        means = any(surface.kind == "face" for surface in self.pressures_by_zone)
+        if means and any(zone.recovery != "none" for zone in self.model.case.zones):
+            # The case asks for more than means, which the result does not give.
+            found = {n: v for n, v in found.items() if n not in ("pressure_l2", "pressure_max")}
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
     def _balance(self) -> dict[str, float]:

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..case.expressions import evaluate
-from ..mechanics.fem import shape_functions
-from ..mechanics.fem.faces import FACE_POINTS, area_vectors, surface_points
+from ..mechanics.fem.faces import FACE_POINTS, surface_points, surface_vectors
 from ..mechanics.fem.gauss import gauss_rule
 from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues, computed_pressure
@@ -66,7 +65,7 @@ class SurfaceValues:
     def force(self, model: Model) -> np.ndarray | None:
         """The force (dim,) of the pressure on the slave; None where no area is known."""
         if self.whole:
-            return -_integral(model.points, self.zone)
+            return -_integral(model.points, self.zone, model.case.axisymmetric)
         if self.kind != "point" or self.placed.area is None:
             return None
         near = cKDTree(self.zone.centre).query(self.placed.places)[1]
@@ -118,7 +117,7 @@ def _is_on(model: Model, zone: ZoneResult, places: np.ndarray) -> np.ndarray:
     at = surface_points(model.points, zone.faces)
     near = cKDTree(at.place).query(places)[1]
     face = at.macro[near]
-    size = zone.area[face] ** (1 / (model.dim - 1))
+    size = model.face_size(zone)[face]
     offset = places - at.place[near]
     across = np.abs(np.einsum("kd,kd->k", offset, zone.normal[face]))
     return (across < _SAGITTA * size) & (np.linalg.norm(offset, axis=1) < size)
@@ -155,7 +154,7 @@ def _at_nodes(
     nothing = np.zeros(len(known))
     nodal = NodalContact(known, mean[known], nothing, mean[known] > 0)
     filled = replace(zone, nodal=nodal)
-    at = surface_points(model.points, zone.faces)
+    at = surface_points(model.points, zone.faces, model.case.axisymmetric)
     means = at.means(computed_pressure(model.points, filled))
     filled = replace(filled, multiplier=means, gap=np.zeros(len(means)), closed=means > 0)
     return replace(surface, zone=filled)
@@ -172,16 +171,13 @@ def _at_faces(zone: ZoneResult, placed: Placed, faces: np.ndarray, name: str) ->
     return replace(surface, zone=filled)
 
 
-def _integral(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
+def _integral(points: np.ndarray, zone: ZoneResult, axisymmetric: bool) -> np.ndarray:
     """∫ p n dS (dim,) over a slave surface."""
     pressure, start, total = computed_pressure(points, zone), 0, np.zeros(points.shape[1])
     for name, nodes, _ in zone.faces:
-        kind = cell_type(name)
-        reference, weights = gauss_rule(kind.name, FACE_POINTS)
-        slopes = shape_functions(kind.name).gradients(reference)
-        vectors = (area_vectors(points, nodes, slopes) * weights[:, None]).reshape(
-            -1, points.shape[1]
-        )
-        total += pressure[start : start + len(vectors)] @ vectors
-        start += len(vectors)
+        reference, weights = gauss_rule(name, FACE_POINTS)
+        _, vectors = surface_vectors(points, nodes, name, reference, axisymmetric)
+        flat = (vectors * weights[:, None]).reshape(-1, points.shape[1])
+        total += pressure[start : start + len(flat)] @ flat
+        start += len(flat)
     return total

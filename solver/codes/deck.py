@@ -39,8 +39,8 @@ class Deck:
     `material` holds each cell's number (m,) in `materials`, by type. `held` (n, dim) are the
     displacements given to nodes, NaN where they are free. `pressures`: faces, turned outward, and
     the constant pressure on them. `forces` (n, dim) are the consistent nodal forces of all other
-    loads. `plane`: how many of the nodes are those of the plane mesh under one layer of cells; 0
-    where the deck is the mesh itself.
+    loads, `all_forces` those of the pressures too. `plane`: how many of the nodes are those of the
+    plane mesh under one layer of cells; 0 where the deck is the mesh itself.
     """
 
     case: Case
@@ -51,6 +51,7 @@ class Deck:
     held: np.ndarray
     pressures: list[tuple[list[FaceBlock], float]]
     forces: np.ndarray
+    all_forces: np.ndarray
     pairs: list[PairedFaces]
     plane: int = 0
 
@@ -64,6 +65,20 @@ class Deck:
     def softest(self) -> float:
         """The smallest Young's modulus of a deformable body."""
         return min(m.young for m in self.case.materials.values())
+
+    def of_plane_strain(self, stress: np.ndarray) -> np.ndarray:
+        """Stress (n, 6) at all nodes from xx, yy, xy (n, 3): zz = ν (xx + yy), the others zero.
+
+        At a node between materials ν is that of one of them.
+        """
+        poisson = np.zeros(len(self.points))
+        of = np.array([material.poisson for material in self.materials])
+        for name, cells in self.cells.items():
+            poisson[cells] = of[self.material[name]][:, None]
+        found = np.zeros((len(stress), 6))
+        found[:, [0, 1, 3]] = stress
+        found[:, 2] = poisson * (stress[:, 0] + stress[:, 1])
+        return found
 
     def fixed(self) -> Iterator[tuple[int, int, float]]:
         """Node and axis, both from 0, and value of each displacement that is given."""
@@ -83,15 +98,15 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
     """The deck of a case on its mesh; `layer`: a plane one as one layer of cells in space.
 
     Raises InputError where case and mesh do not fit, UnsupportedError for what no code is given:
-    supports across the axes, an initial gap that varies.
+    supports across the axes, an initial gap that varies, axisymmetric bodies.
     """
     mesh = with_groups(case, mesh)
     check_groups(case, mesh)
     mesh, _ = named_parts(case, mesh)
+    _refuse(case)
     plane = len(mesh.points) if layer and mesh.points.shape[1] == 2 else 0
     if plane:
         case, mesh = as_layer(case, mesh)
-    _refuse(case)
     cells = volume_cells(mesh)
     whole = cut(mesh.points, cells, [], [], [], [])
     others = tuple(load for load in case.loads if not _is_constant(load))
@@ -113,6 +128,7 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
             if isinstance(load.value, float) and _is_constant(load)
         ],
         forces=factor * given.forces(),
+        all_forces=factor * Attributes(case, mesh, whole, [], origin).forces(),
         pairs=[
             PairedFaces(
                 zone=zone,
@@ -131,6 +147,8 @@ def _is_constant(load: Load) -> bool:
 
 
 def _refuse(case: Case) -> None:
+    if case.plane == "axisymmetric":
+        raise UnsupportedError("axisymmetric bodies: not written for other codes")
     for zone in case.zones:
         if zone.clearance is not None and not isinstance(zone.clearance, float):
             raise UnsupportedError("initial gap given as an expression: the codes take a number")

@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 
 from ..case.model import Case
-from ..mechanics.fem.faces import FaceBlock, nodal_normals
+from ..mechanics.fem.faces import FaceBlock, nodal_normals, surface_points
 from ..simulation.exact import ExactValues
 from ..simulation.naming import body_infos
 from ..simulation.scene import Scene, ZoneScene, build_scene
@@ -135,6 +135,11 @@ class Model:
         faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
         return nodal_normals(self.points, list(faces))
 
+    def face_size(self, zone: ZoneResult) -> np.ndarray:
+        """How wide the slave faces (m,) of a zone are."""
+        at = surface_points(self.points, zone.faces)
+        return np.bincount(at.macro, at.weight) ** (1 / (self.dim - 1))
+
     @cached_property
     def rigid(self) -> np.ndarray:
         """Which bodies are rigid."""
@@ -168,7 +173,9 @@ class Model:
                 continue
             mine = self.scene.body == body
             basis = self.scene.free.basis
-            for axis in np.flatnonzero(np.isnan(force)):
+            # A ring does not move across its axis.
+            axes = [1] if self.case.axisymmetric else range(self.dim)
+            for axis in (axis for axis in axes if np.isnan(force[axis])):
                 motion = np.zeros(self.scene.points.shape)
                 motion[mine, axis] = 1.0
                 left = motion.ravel() - basis @ (basis.T @ motion.ravel())

@@ -111,6 +111,8 @@ class Placer:
             self._refuse_elsewhere(places, name, whole=name not in CONTACT)
             body = np.full(len(places), -1)
         node = self._nodes(places, body)
+        # A table of all nodes in their order tells the sides of the interface apart.
+        numbered = numbered or np.array_equal(node, np.arange(len(self.model.points)))
         body = np.where(node >= 0, self.model.body[node], body)
         return Placed(
             places=places, values=values, node=node, body=body, numbered=numbered, area=area

@@ -255,21 +255,13 @@ def test_results_with_cell_data(tmp_path, capsys):
     assert "multiplier" in capsys.readouterr().out
 
 
-def test_the_worked_example_of_the_docs(tmp_path, capsys):
-    """Metres and pascals, a multiplier of the opposite sign: what the map of the docs is for."""
-    answer = results.patch()
-    columns = [1e-3 * answer.points, 1e-3 * answer.displacement]
-    columns += [1e6 * answer.stress[:, [0, 1, 2, 3, 5, 4]], -1e6 * answer.pressure]
-    data = {
-        "ux": columns[1][:, 0],
-        "uy": columns[1][:, 1],
-        "sig": columns[2],
-        "lambda_n": columns[3],
-    }
-    points = np.pad(columns[0], ((0, 0), (0, 1)))
-    meshio.vtu.write(tmp_path / "a.vtu", meshio.Mesh(points, answer.cells, point_data=data))
-    mapping = str(results.ROOT / "docs/examples/map.yaml")
-    assert main(["check-result", CASE, str(tmp_path / "a.vtu"), "--map", mapping]) == 0
-    assert "ssnp170-a@mycode: passed" in capsys.readouterr().out
-    assert main(["check-result", CASE, str(tmp_path / "a.vtu")]) == 2
-    assert "lengths are 10⁻³ times the case's" in capsys.readouterr().err
+def test_a_ring_presses_with_all_of_its_circumference():
+    """25 on a disc: π R² times it; moved along its radius a ring is no rigid motion."""
+    mesh, case = results.mesh_and_case("axisymmetric/disc-quad4-tria6")
+    slave = mesh.points[results.slave_nodes(mesh, case)]
+    load = -25.0 * np.pi * slave[:, 0].max() ** 2
+    given = {case.zones[0].name: np.array([0.0, load])}
+    assert check_foreign(case, foreign(forces=given), mesh).checks[0].error < 1e-12
+    pressure = Field(places=slave, values=np.full(len(slave), 25.0))
+    checks = {c.name: c for c in check_foreign(case, foreign(pressure=pressure), mesh).checks}
+    assert checks["balance"].error < 1e-12
