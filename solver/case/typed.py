@@ -11,12 +11,12 @@ refused with its key and what is allowed. The words for that are the `descriptio
 """
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import cache, partial
 from inspect import getdoc
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
 import msgspec
 from msgspec import Meta, Struct
@@ -51,11 +51,18 @@ class FieldError(ValueError):
         super().__init__(problem)
 
 
+class _UnknownKeyError(FieldError):
+    """A key that a section has not."""
+
+
 class Section(Struct, frozen=True, forbid_unknown_fields=True):
     """A mapping in a file, with a field for each key.
 
-    A subclass may check its values in `__post_init__`, and raise `FieldError`.
+    A subclass may check its values in `__post_init__`, and raise `FieldError`. `out_of_scope`: keys
+    that are refused for a reason, wherever they are in a file that is read as the subclass.
     """
+
+    out_of_scope: ClassVar[Mapping[str, str]] = {}
 
     def __post_init__(self) -> None:
         for name in _different(type(self)):
@@ -80,6 +87,9 @@ def read_as(
     except msgspec.ValidationError:
         pass
     fault = _fault(convert, content, kind, (key,) if key else ())
+    if isinstance(fault, _UnknownKeyError):
+        name = str(fault.keys[-1])
+        fault.problem = kind.out_of_scope.get(name.lower(), fault.problem)
     raise InputError(where, key_path(fault.keys) or "file", fault.value, fault.problem)
 
 
@@ -262,7 +272,7 @@ def _wrong_key(value: Any, known: Any, keys: Keys) -> FieldError | None:
     """The first key that is unknown, else the first that is missing."""
     for key in value:
         if key not in known:
-            return FieldError((*keys, key), f"unknown key; {hint(key, known)}", value[key])
+            return _UnknownKeyError((*keys, key), f"unknown key; {hint(key, known)}", value[key])
     missing = (name for name in known if known[name].required and name not in value)
     name = next(missing, None)
     return name and FieldError((*keys, name), "this key is needed")

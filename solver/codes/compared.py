@@ -23,7 +23,7 @@ from ..verification.verdict import CheckResult
 from .contact import SurfaceValues, pressure_force, surfaces
 from .faults import fault, summed_up
 from .model import Model
-from .own import own_solution
+from .own_mesh import own_solution
 from .placing import Placed, Placer, flattened
 
 if TYPE_CHECKING:

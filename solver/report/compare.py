@@ -11,7 +11,7 @@ from .tables import md
 PAGE = "compare.html"
 CHANGES = ("solve", "quantity", "before", "now", "change")
 TIMES = ("before", "now", "ratio")
-# By what became of a verdict: in the line of the outcome, and over the list of solves.
+# By the change of a verdict: the words of the outcome, and the heading of the list.
 SAID = {
     "worse": "got worse",
     "better": "got better",

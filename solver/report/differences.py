@@ -48,7 +48,7 @@ class Batch:
 
     @property
     def origin(self) -> str:
-        """Revision and machine, as far as the solves tell."""
+        """Revision and machine, if the solves have them."""
         found = [row.verdict.provenance for row in self.rows.values()]
         values = [sorted({str(o[k]) for o in found if o.get(k)}) for k in ("revision", "cpu")]
         return "; ".join(", ".join(each) for each in values if each)
@@ -148,7 +148,7 @@ class Comparison:
 
     @cached_property
     def groups(self) -> dict[str, list[Pair]]:
-        """The solves by what became of their verdict (`Pair.change`), worst verdicts first."""
+        """The solves by the change of their verdict (`Pair.change`), worst verdicts first."""
         found: dict[str, list[Pair]] = defaultdict(list)
         for pair in self.pairs:
             found[pair.change].append(pair)

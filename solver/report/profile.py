@@ -221,7 +221,7 @@ def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
 
 
 def _reference(solution: Solution) -> float | Expression | ExactValues | None:
-    """What gives the right pressure, be it checked or not."""
+    """The reference pressure, checked or not."""
     given, exact = solution.case.reference.get("contact_pressure"), solution.case.solution
     if isinstance(given, float | Expression):
         return given

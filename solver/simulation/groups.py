@@ -23,7 +23,7 @@ def check_groups(case: Case, mesh: meshio.Mesh) -> None:
     """Raise `InputError` where the case does not fit the mesh."""
     dim = mesh.points.shape[1]
     if dim == 2 and case.plane is None:
-        allowed = "this key is needed (strain or axisymmetric): the mesh is plane"
+        allowed = "this key is needed (strain, stress or axisymmetric): the mesh is plane"
         raise InputError(case.path, "plane", None, allowed)
     if dim == 3 and case.plane is not None:
         allowed = "only for plane meshes; this one has three dimensions"

@@ -117,6 +117,8 @@ def _recover(
         scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
     )
     stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
+    if scene.case.thin:
+        stress[:, 2] = 0.0
     scale = _stress_scale(scene, stress)
     strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
     zones = [

@@ -1,4 +1,4 @@
-"""Groups of bodies that nothing moves are left out of a solve: their answer is zero.
+"""Groups of bodies without any load are left out of a solve: their displacement is zero.
 
 Bodies belong together where a multiplier moves free unknowns of both. Without load, displacement
 imposed and initial overlap, u = 0 and p = 0 fulfil equilibrium, p ≥ 0, ḡ ≥ 0 and p ḡ = 0, whatever

@@ -1,7 +1,7 @@
 """The checks of a solve against its reference: one table, one small function per quantity.
 
-A check compares values with the reference at the places where they live: macro-element centres,
-nodes, or load steps. `error` is the largest deviation over the check's scale: the largest magnitude
+A check compares values with the reference at their own places: macro-element centres, nodes, or
+load steps. `error` is the largest deviation over the check's scale: the largest magnitude
 of the reference, or, where the reference is zero everywhere, the quantity's own measure (load for
 stresses, load / stiffness × size for displacements). A gap is always measured against the block
 size, status, coverage and balance against one. A value that is not a number fails.
@@ -79,7 +79,7 @@ def block_size(solution: Solution) -> float:
 def _load(solution: Solution) -> float:
     """The load; without loads the stress that the displacement would cause, if that is larger.
 
-    Of bodies that merely move the stress itself is round-off.
+    If bodies only move, the stress itself is round-off.
     """
     if solution.case.loads:
         return float(solution.load_scale)
@@ -238,7 +238,7 @@ def _compare(
 
 
 def _over(deviation: float, scale: float) -> float:
-    """The deviation over the scale; with no scale at all only no deviation is none."""
+    """The deviation over the scale; with a scale of zero, 0 only for no deviation."""
     if scale == 0:
         return 0.0 if deviation == 0 else float("inf") if deviation > 0 else float("nan")
     return float(deviation / scale)

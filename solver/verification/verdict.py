@@ -130,7 +130,7 @@ class Body:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """The verdict of one solve; None and empty where it came to no end.
+    """The verdict of one solve; None and empty without a result.
 
     `worst` is the check with the largest relative error, `closest_to_tolerance` the one nearest to
     its tolerance or furthest past it. Pairs are minimum and maximum over all zones; `seconds` has
@@ -244,7 +244,7 @@ def read_verdict(path: str | Path) -> Verdict:
 
 
 def unbound(verdict: Verdict, path: Path) -> str:
-    """What of folder (in `results`) and result is not the verdict's own; empty where both are.
+    """Why folder (in `results`) or result do not belong to the verdict; empty if they do.
 
     Reads the whole result.
     """
@@ -261,7 +261,7 @@ def unbound(verdict: Verdict, path: Path) -> str:
 
 
 def typed(kind: type[T], content: object, where: Path) -> T:
-    """Plain values, as `json.loads` returns them, as verdicts; `InputError` where they are none.
+    """Plain values, as `json.loads` returns them, as typed verdicts; `InputError` otherwise.
 
     Unknown keys are ignored. A key that is missing or null has its default, NaN for a number.
     """
@@ -280,7 +280,7 @@ def _without_nulls(value: Any) -> Any:
 
 
 def to_json(content: Any) -> str:
-    """Strict JSON of plain values, arrays and numbers; what is no finite number becomes null."""
+    """Strict JSON of plain values, arrays and numbers; numbers that are not finite become null."""
     return json.dumps(_strict(content), indent=1, ensure_ascii=False, allow_nan=False)
 
 

@@ -151,5 +151,5 @@ def test_refusals_on_and_beyond_the_axis():
 
 
 def test_a_plane_mesh_needs_to_say_what_it_is():
-    with pytest.raises(InputError, match=r"this key is needed \(strain or axisymmetric\)"):
+    with pytest.raises(InputError, match=r"this key is needed \(strain, stress or axisymmetric\)"):
         simulate(case(**{"plane: axisymmetric\n": ""}), mesh("QUAD4", "QUAD8", 0.0))

@@ -69,7 +69,8 @@ class Known:
     """What a case says already: its file, materials by group, dimension, and single values.
 
     `pressure` and `interference` are None where the case has none, or more than one.
-    `axisymmetric`: a solution of three dimensions is seen in one meridian plane.
+    `plane_stress`: so is the solution. `axisymmetric`: a solution of three dimensions is seen in
+    one meridian plane.
     """
 
     where: object
@@ -78,6 +79,7 @@ class Known:
     pressure: float | None = None
     interference: float | None = None
     axisymmetric: bool = False
+    plane_stress: bool = False
 
 
 def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
@@ -155,7 +157,7 @@ class _ParameterReader:
             young, poisson = (self.number(f"{name}.{k}", given[k]) for k in ("young", "poisson"))
             material = Material(young, poisson)
             if material.young > 0 and -1 < material.poisson < 0.5:
-                return material
+                return material.in_plane_stress() if self.known.plane_stress else material
         elif given is None and (name in groups or _ALL in groups):
             return groups.get(name) or groups[_ALL]
         elif isinstance(given, str) and given in groups:

@@ -118,7 +118,8 @@ class ExactSolution:
 class ElasticSolution(ExactSolution):
     """A solution of linear elasticity, known in the interior too: small strain, isotropic.
 
-    In two dimensions plane strain. Stress follows from `gradient` by Hooke's law.
+    In two dimensions plane strain, or plane stress of thin materials. Stress follows from
+    `gradient` by Hooke's law.
     """
 
     quantities: ClassVar[frozenset[str]] = frozenset(
@@ -151,6 +152,8 @@ class ElasticSolution(ExactSolution):
         stress[:, :3] = (lame * np.einsum("nii->n", gradient))[:, None]
         for i in range(dim):
             stress[:, i] += 2 * shear * strain[:, i, i]
+        if self.materials[0].thin:
+            stress[:, 2] = 0.0
         stress[:, 3] = 2 * shear * strain[:, 0, 1]
         if dim == 3:
             stress[:, 4] = 2 * shear * strain[:, 1, 2]

@@ -149,7 +149,7 @@ def _measured(point: _Point, safeguards: Safeguards) -> dict[str, Any]:
 def _known(
     problem: ContactProblem, raw: meshio.Mesh, mesh: meshio.Mesh, state: State
 ) -> dict[str, Any]:
-    """What the exact answer says of the point, and what the system solved is like."""
+    """The floors of the exact answer, and properties of the system that is solved."""
     pressure, stress = floor(problem, raw, mesh, state)
     known: dict[str, Any] = {"floor_pressure": pressure, "floor_stress": stress}
     system = problem.system
