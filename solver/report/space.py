@@ -8,6 +8,7 @@ from markupsafe import Markup
 from ..mesh.catalogue import cell_type
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
+from .charts import BLUE, INK, MUTED, PAPER
 from .geometry import boundary_faces, macro_edges, normals, outlines
 from .layout import (
     Frame,
@@ -21,7 +22,7 @@ from .layout import (
     tint,
 )
 from .profile import expected
-from .svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
+from .svg import Drawing, mixed
 
 WIDTH, HEIGHT = 960, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)

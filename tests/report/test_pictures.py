@@ -7,13 +7,14 @@ import meshio
 import numpy as np
 import pytest
 
+from solver.report.charts import BLUE, ORANGE
 from solver.report.geometry import boundary_faces, macro_edges, normals, outlines
 from solver.report.layout import pressed_box
 from solver.report.pictures import picture
 from solver.report.plane import draw_plane
 from solver.report.rows import Row
 from solver.report.space import DEVIATION, draw_space, shade
-from solver.report.svg import BLUE, ORANGE, Drawing, mixed
+from solver.report.svg import Drawing, mixed
 from solver.verification.results import write_result
 from tests import handmade
 from tests.report.verdicts import record

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ...mechanics.linear.backends import BACKENDS
-from ...report.axes import EPSILON
+from ...report.charts import EPSILON
 from ..fits import ROUND_OFF, Fit, fit_order
 from ..points import MeasuredPoint, read_record
 from ..timing import TOTAL, Spread, medians, spread
