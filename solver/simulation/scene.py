@@ -319,12 +319,13 @@ def _operator(
 def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> Asked:
     """How a zone's pressure is recovered, and which of its macro-elements may be neighbours."""
     count = sum(len(block.nodes) for block in slave_faces)
-    quadratic = all(block.owner_type.order == 2 for block in slave_faces)
+    order = min(block.owner_type.order for block in slave_faces)
+    corners = min(block.type.n_vertices for block in slave_faces)
     vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
     material = np.zeros(count, dtype=int)
     for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
         material[block.number] = number
-    form = form_of(zone.recovery, quadratic, groups.points.shape[1])
+    form = form_of(zone.recovery, order, corners)
     return Asked(form, vertex_neighbours(vertices, count), material)
 
 

@@ -45,7 +45,7 @@ class Form:
     `sweeps`: solves with the loads that it adds. The form `none` estimates the error of the
     constants and recovers nothing. `rings`: the fewest rings of neighbours in 2D and in 3D.
     `reach`: neighbours at a distance r have the weight exp(−(r / (reach · farthest))²) where the
-    means are not kept, else 1 / r.
+    means are not kept, else 1 / r. `fitted`: the degree that is fitted, where it is a lower one.
     """
 
     name: str
@@ -54,6 +54,7 @@ class Form:
     sweeps: int
     rings: tuple[int, int] = (1, 1)
     reach: float = 1.0
+    fitted: int = 2
 
     def count(self, dim: int) -> int:
         """The number of functions ψ on a macro-element in `dim` dimensions.
@@ -75,19 +76,25 @@ FORMS = {
         Form("smooth", degree=2, keeps_means=False, sweeps=3, rings=(2, 2), reach=0.7),
     )
 }
-# The means of linear cells scatter more.
-_ON_LINEAR_CELLS = replace(FORMS["smooth"], sweeps=2, rings=(3, 3), reach=1.0)
+# The means of linear cells, by the vertices of their faces: on lines and triangles they scatter
+# more than those of quadratic cells. On quadrilaterals they are too large where the pressure is
+# highest, and a linear fit, which lowers them there, is the better one.
+_WIDE = replace(FORMS["smooth"], sweeps=2, rings=(3, 3), reach=1.0)
+_NEAR = replace(FORMS["smooth"], sweeps=2, rings=(1, 1), reach=1.25, fitted=1)
+_ON_LINEAR_CELLS = {2: _WIDE, 3: _WIDE, 4: _NEAR}
 
 
-def form_of(name: str, quadratic: bool, dim: int) -> Form:
-    """The form of a `name` on cells that are quadratic or linear; `automatic`: the best measured.
+def form_of(name: str, order: int, vertices: int) -> Form:
+    """The form of a `name` on cells of an `order`, their faces with so many vertices.
 
-    >>> [form_of("automatic", *cells).name for cells in ((True, 2), (True, 3), (False, 2))]
+    `automatic` is the one that is best by measurement.
+
+    >>> [form_of("automatic", *faces).name for faces in ((2, 2), (2, 3), (1, 2))]
     ['quadratic', 'smooth', 'smooth']
     """
     if name == "automatic":
-        name = "quadratic" if quadratic and dim == 2 else "smooth"
-    return _ON_LINEAR_CELLS if name == "smooth" and not quadratic else FORMS[name]
+        name = "quadratic" if order == 2 and vertices == 2 else "smooth"
+    return _ON_LINEAR_CELLS[vertices] if name == "smooth" and order == 1 else FORMS[name]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,7 +203,8 @@ def reconstruct(
     m, dim = at.local.centre.shape
     useful = _useful(at, near, closed)
     degree, parts, rings = np.zeros(m, dtype=int), [], [useful]
-    attempts = [(replace(form, degree=lower), closed) for lower in range(form.degree, 0, -1)]
+    highest = min(form.degree, form.fitted)
+    attempts = [(replace(form, degree=lower), closed) for lower in range(highest, 0, -1)]
     if form.degree == 1 and form.keeps_means:
         attempts.insert(0, (FORMS["quadratic"], closed & _one_sided(at, useful)))
     for tried, wanted in attempts:
