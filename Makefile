@@ -31,10 +31,10 @@ SILENCE = $(if $(QUIET),--quiet rules progress reason host)
 SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report summary compare gallery orders study stability infsup
+.PHONY: help all-cases family case report summary compare gallery bench orders study stability infsup
 .PHONY: scaling benchmark test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
-.PHONY: environment gallery-environment test-environment lint-environment docs-environment
+.PHONY: environment code-environment gallery-environment test-environment lint-environment docs-environment
 .PHONY: bill-environment
 
 help: ## list the targets
@@ -70,6 +70,10 @@ gallery: override CONFIG += $(CHOICE)
 gallery: gallery-environment ## draw each result with PyVista, off-screen: all or FAMILY=…
 	@$(SNAKEMAKE) gallery
 
+bench: override CONFIG += $(CHOICE) $(if $(CODES),"codes=$(CODES)")
+bench: environment ## run other codes on the cases: all installed, or CODES=calculix,kratos
+	@$(SNAKEMAKE) bench
+
 orders: override CONFIG += $(CHOICE)
 orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…
 	@$(SNAKEMAKE) orders
@@ -87,7 +91,7 @@ scaling: environment ## cost up to a million unknowns; small sizes in a minute: 
 	@$(SNAKEMAKE) scaling
 
 BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
-benchmark: environment ## time ratios: linear solvers, cut, safeguards, batch, CalculiX
+benchmark: environment ## time ratios: linear solvers, cut, safeguards, CalculiX
 	@$(OURS) solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
 	  $(if $(filter quick,$(LEVEL)),--quick)
 
@@ -132,6 +136,13 @@ lint: lint-environment ## check format, style and types of the sources
 environment:
 	@$(INSTALL) run
 
+code-environment: ## install another code into an environment of its own: CODE=kratos
+	@test -f "requirements-$(CODE).txt" && test -n "$(filter kratos,$(CODE))" \
+	  || { echo "make code-environment: name a code that is installed by it, CODE=kratos"; exit 2; }
+	@$(PYTHON) -Es -m venv --clear .venv-$(CODE)
+	@.venv-$(CODE)/bin/python -Es -m pip --disable-pip-version-check install --quiet \
+	  --require-hashes --only-binary :all: --requirement requirements-$(CODE).txt
+
 gallery-environment:
 	@$(INSTALL) run gallery
 
@@ -166,6 +177,7 @@ lock: ## lock the packages of pyproject.toml again: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --group pyproject.toml:batch \
 	  --output-file requirements.txt
+	@$(LOCK) $(ARGS) --group pyproject.toml:kratos --output-file requirements-kratos.txt
 	@for group in build mkl slurm gallery test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
@@ -179,4 +191,4 @@ clean: ## remove results and caches
 	@find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
 clean-all: clean ## remove the environment too
-	@rm -rf .venv
+	@rm -rf .venv .venv-*

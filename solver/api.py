@@ -186,7 +186,7 @@ class Solved:
         from .report.pictures import draw_pressure
 
         over = Expression(along, where="profile", key="along") if along else None
-        return str(draw_pressure(self.solution, self.solution.job, over, zone))
+        return draw_pressure(self.solution, self.solution.job, over, zone).svg()
 
     def __str__(self) -> str:
         return self.outcome.summary

@@ -1,6 +1,6 @@
-"""What a run tells while it works: a line for each solve that ends, and how far the run is.
+"""The progress of a run: a line for each solve that ends, and the state of the run.
 
-Snakemake logs the start and the end of each job as an event; a filter of its logger hears them,
+Snakemake logs the start and the end of each job as an event; a filter of its logger receives them,
 whatever is shown. On a terminal the state of the run is its last line, rewritten in place; in a
 file it is a line a minute.
 """
@@ -16,7 +16,7 @@ from typing import Any, TextIO
 
 from solver.system.files import last_line
 
-# The rules that a run is about, by what one of their jobs is called.
+# The rules whose jobs are counted, with the word for one of their jobs.
 COUNTED = {
     "solve": "solve",
     "solve_level": "solve",
@@ -25,31 +25,31 @@ COUNTED = {
     "study_point": "point",
     "scaling_point": "point",
 }
-# Rules whose jobs print by themselves: the last line is theirs as long as they run.
+# Rules whose jobs print by themselves: the last line is left to them while they run.
 TALKING = (
     *("report", "orders_page", "stability_page", "infsup_page", "gallery"),
     *("study", "study_point", "scaling", "scaling_point"),
 )
-# What Snakemake says that is of no use to whoever sees the jobs.
+# Lines of Snakemake that are useless beside the jobs.
 _CHATTER = (
     *("Select jobs", "Execute ", "Using shell", "Assuming unrestricted", "Touching output"),
     *("Removing temporary output", "Complete log", "Elapsed time", "Exiting because a job"),
     "WorkflowError:\nAt least one job did not complete",
 )
-# Rules that are to fail where a check does, and what their commands end with: the outcome, which
-# they print, is all there is to say.
+# Rules that fail if a check does, and the end of their commands: they print the outcome
+# themselves.
 _GATES = ("gate", "orders", "stability", "infsup")
 _GATE_MARK = "# gate"
 _BAD = ("failed", "unreliable", "refused", "crashed")
 _EVENTS = ("job_info", "job_started", "job_finished", "progress", "run_info", "resources_info")
 _ON_TERMINAL, _IN_FILE = 1.0, 60.0
-# A guess of the time left from less than this is no guess.
+# The time left is estimated from this many jobs and seconds on.
 _LEAST_JOBS, _LEAST_SECONDS = 3, 5.0
 
 
 @dataclass(frozen=True)
 class Running:
-    """A job at work: its rule, what it says of itself, its log if it has one, when it began."""
+    """A running job: its rule, message, log if any, and start time."""
 
     rule: str
     message: str
@@ -58,7 +58,7 @@ class Running:
 
 
 class State:
-    """How far a run is, by the events of its jobs; `clock` gives seconds."""
+    """The state of a run, by the events of its jobs; `clock` returns seconds."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
         self.clock = clock
@@ -69,21 +69,21 @@ class State:
         self.word = "job"
 
     def expect(self, jobs: Mapping[str, int]) -> None:
-        """Take what a run is going to do, as numbers of jobs by rule."""
+        """Set the expected numbers of jobs by rule."""
         rules = [rule for rule in COUNTED if jobs.get(rule)]
         self.total = sum(jobs[rule] for rule in rules)
         words = {COUNTED[rule] for rule in rules}
         self.word = words.pop() if len(words) == 1 else "job"
 
     def start(self, number: int, rule: str, message: str, log: Path | None) -> None:
-        """A job begins, perhaps once more."""
+        """A job starts, possibly again."""
         self.broken.discard(number)
         self.running[number] = Running(rule, message, log, self.clock())
         if rule in COUNTED and self.began is None:
             self.began = self.clock()
 
     def fail(self, number: int) -> None:
-        """A job breaks off; it may begin once more."""
+        """A job fails; it may start again."""
         self.running.pop(number, None)
         self.broken.add(number)
 
@@ -99,17 +99,17 @@ class State:
 
     @property
     def not_passed(self) -> int:
-        """How many solves did not pass, and how many jobs broke off."""
+        """The number of solves that did not pass, plus that of failed jobs."""
         return self.bad + len(self.broken)
 
     @property
     def talking(self) -> bool:
-        """Whether a job is at work that prints by itself."""
+        """Whether a running job prints by itself."""
         return any(job.rule in TALKING for job in self.running.values())
 
     @property
     def left(self) -> float | None:
-        """Seconds that the rest may take, going by those that are done; None while unknown."""
+        """Estimated seconds for the rest; None while unknown."""
         if self.began is None or self.done < _LEAST_JOBS:
             return None
         spent = self.clock() - self.began
@@ -125,7 +125,7 @@ class State:
         return ", ".join(parts) + self._longest()
 
     def _longest(self) -> str:
-        """The job that has run longest, and what it does."""
+        """The job that has run longest, with the last line of its log."""
         jobs = sorted(self.running.values(), key=lambda job: job.began)
         if not jobs:
             return ""
@@ -135,7 +135,7 @@ class State:
 
 
 class Progress(logging.Filter):
-    """Hears the events of Snakemake's logger and tells what comes of them; lets all pass.
+    """Turns the events of Snakemake's logger into lines; lets all records pass.
 
     Ends of solves go to `out`, the state to `status`.
     """
@@ -147,7 +147,7 @@ class Progress(logging.Filter):
         self._lock, self._stop, self._shown = RLock(), Event(), False
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Take an event in; never refuses a record."""
+        """Handle an event; never drops a record."""
         with self._lock:
             self._wipe()
             self._hear(str(getattr(record, "event", None) or ""), record.__dict__)
@@ -177,7 +177,7 @@ class Progress(logging.Filter):
                 self._show()
 
     def _show(self) -> None:
-        """Write the state where nobody else does."""
+        """Write the state, unless another job is printing."""
         state = self.state
         if self._stop.is_set() or state.talking or not state.total or state.done == state.total:
             return
@@ -204,7 +204,7 @@ class Progress(logging.Filter):
 
 
 def hides(record: logging.LogRecord) -> bool:
-    """Whether a record is of no use beside the progress."""
+    """Whether a record is useless beside the progress."""
     event, message = str(getattr(record, "event", None) or ""), record.getMessage()
     if event == "job_error":
         return getattr(record, "rule_name", None) in _GATES

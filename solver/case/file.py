@@ -1,6 +1,6 @@
 """The keys of a case file, as types; the lines of a docstring say what each key is."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, field
 
@@ -340,6 +340,23 @@ _TOLERANCE = (
 )
 
 
+_OUT_OF_SCOPE = {
+    "friction is out of scope: frictionless contact only": (
+        "friction", "mu", "coulomb", "friction_coefficient", "stick"),
+    "contact that holds in tension is out of scope: it may open": (
+        "tied", "glue", "glued", "bonded", "adhesion", "cohesive"),
+    "out of scope: small strain only": (
+        "large_strain", "finite_strain", "large_displacement", "large_deformation", "nlgeom",
+        "hyperelastic"),
+    "out of scope: linear elasticity only": (
+        "plasticity", "plastic", "yield", "yield_stress", "hardening", "creep", "viscosity"),
+    "dynamics is out of scope: static equilibrium only": (
+        "dynamics", "dynamic", "density", "mass", "inertia", "damping", "velocity", "time"),
+    "beams, shells and trusses are out of scope: bodies are meshed with plane or solid cells": (
+        "beam", "beams", "shell", "shells", "truss", "trusses"),
+}  # fmt: skip
+
+
 class CaseFile(Section, frozen=True):
     """A case file.
 
@@ -349,7 +366,8 @@ class CaseFile(Section, frozen=True):
     mesh: either `file`, a mesh file (.med, .msh, .inp, .vtu, .vtkhdf), relative to the case file,
       or `recipe`, a recipe that generates the mesh, and the keys of the recipe
     transform: changes of the mesh, in the order of the keys
-    plane: plane strain, only for 2D meshes
+    plane: plane strain, plane stress, or a section of axisymmetric bodies with x as the radius and
+      y along the axis; only for 2D meshes
     units: the units of the numbers, only labels of fields and pictures
     materials: the material of each group of cells, or of `all`
     supports: imposed displacements
@@ -364,6 +382,8 @@ class CaseFile(Section, frozen=True):
     counts: the expected numbers of cells and contact faces of a body
     """
 
+    out_of_scope: ClassVar = {word: why for why, words in _OUT_OF_SCOPE.items() for word in words}
+
     name: Name
     mesh: Annotated[dict[str, Any], Meta(description=FORM)]
     materials: Annotated[dict[Group, MaterialKeys], Meta(min_length=1, description=_MATERIALS)]
@@ -371,7 +391,7 @@ class CaseFile(Section, frozen=True):
     title: str = ""
     description: str = ""
     transform: Transform | None = None
-    plane: Literal["strain"] | None = None
+    plane: Literal["strain", "stress", "axisymmetric"] | None = None
     units: Units | None = None
     loads: tuple[LoadKeys, ...] = ()
     bodies: dict[Group, BodyKeys] = field(default_factory=dict)

@@ -75,12 +75,12 @@ class Observation:
 class Case:
     """A case: one file, ready to be solved once its mesh is there.
 
-    `mesh` is the file's mapping, the key `file` replaced by `path`, relative to the case file.
-    `tolerance` holds the overrides by check name, under `all` where one number was given. `units`
-    names those of length and stress, for labels alone. `source` is the file's text. `family` is the
-    name of the file's folder. `reference_uncertainty` is relative, `reference_code` has the keys
-    name and version. `swapped`, `hexahedra` and `recovery`: how the case is solved, as `as_solved`
-    was told.
+    `materials` in plane stress are those of `Material.in_plane_stress`. `mesh` is the file's
+    mapping, the key `file` replaced by `path`, relative to the case file. `tolerance` holds the
+    overrides by check name, under `all` where one number was given. `units` names those of length
+    and stress, for labels alone. `source` is the file's text. `family` is the name of the file's
+    folder. `reference_uncertainty` is relative, `reference_code` has the keys name and version.
+    `swapped`, `hexahedra` and `recovery`: how the case is solved, as `as_solved` was told.
     """
 
     name: str
@@ -111,6 +111,16 @@ class Case:
     swapped: bool = False
     hexahedra: str | None = None
     recovery: str | None = None
+
+    @property
+    def thin(self) -> bool:
+        """Whether the bodies are in plane stress: none across the plane."""
+        return self.plane == "stress"
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether the mesh is a meridian plane, x the radius and y the height."""
+        return self.plane == "axisymmetric"
 
     def as_solved(
         self, swapped: bool = False, hexahedra: str | None = None, recovery: str | None = None

@@ -67,6 +67,8 @@ class _Reader:
         self.materials = {
             group: Material(**structs.asdict(keys)) for group, keys in file.materials.items()
         }
+        if file.plane == "stress":
+            self.materials = {g: m.in_plane_stress() for g, m in self.materials.items()}
         self.zones = tuple(map(self.zone, range(len(file.contact))))
         self.solution = self.exact_solution()
 
@@ -136,7 +138,9 @@ class _Reader:
         known = Known(
             where=self.path,
             materials=self.materials,
-            dimension=2 if self.file.plane else 3,
+            dimension=2 if self.file.plane in ("strain", "stress") else 3,
+            plane_stress=self.file.plane == "stress",
+            axisymmetric=self.file.plane == "axisymmetric",
             pressure=_only(load.pressure for load in self.file.loads),
             interference=_only(zone.interference for zone in self.zones),
         )

@@ -37,6 +37,10 @@ def check_rules(case: Case) -> None:
     _check_reference(case)
     if case.plane:
         check_dimension(case, 2)
+    for group, material in case.materials.items():
+        if case.thin and material.form == "mixed":
+            allowed = "plane stress has no incompressible limit; allowed: automatic, displacement"
+            raise InputError(case.path, f"materials.{group}.form", material.form, allowed)
 
 
 def _check_names(case: Case) -> None:

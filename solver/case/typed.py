@@ -11,12 +11,12 @@ refused with its key and what is allowed. The words for that are the `descriptio
 """
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import cache, partial
 from inspect import getdoc
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
 import msgspec
 from msgspec import Meta, Struct
@@ -51,11 +51,18 @@ class FieldError(ValueError):
         super().__init__(problem)
 
 
+class _UnknownKeyError(FieldError):
+    """A key that a section has not."""
+
+
 class Section(Struct, frozen=True, forbid_unknown_fields=True):
     """A mapping in a file, with a field for each key.
 
-    A subclass may check its values in `__post_init__`, and raise `FieldError`.
+    A subclass may check its values in `__post_init__`, and raise `FieldError`. `out_of_scope`: keys
+    that are refused for a reason, wherever they are in a file that is read as the subclass.
     """
+
+    out_of_scope: ClassVar[Mapping[str, str]] = {}
 
     def __post_init__(self) -> None:
         for name in _different(type(self)):
@@ -65,10 +72,13 @@ class Section(Struct, frozen=True, forbid_unknown_fields=True):
                 raise FieldError((name,), allowed)
 
 
-def read_as(kind: type[AnySection], content: object, where: Path) -> AnySection:
+def read_as(
+    kind: type[AnySection], content: object, where: str | Path, key: str = ""
+) -> AnySection:
     """An object of the class from the content of the file `where`; raises `InputError`.
 
-    A `Path` in the class is a file that has to be there, named relative to `where`.
+    A `Path` in the class is a file that has to be there, named relative to `where`. `key`: the
+    content is what the file has under this key.
     """
     convert = partial(msgspec.convert, dec_hook=partial(_file_beside, where))
     try:
@@ -76,14 +86,17 @@ def read_as(kind: type[AnySection], content: object, where: Path) -> AnySection:
             return convert(content, kind)
     except msgspec.ValidationError:
         pass
-    fault = _fault(convert, content, kind, ())
+    fault = _fault(convert, content, kind, (key,) if key else ())
+    if isinstance(fault, _UnknownKeyError):
+        name = str(fault.keys[-1])
+        fault.problem = kind.out_of_scope.get(name.lower(), fault.problem)
     raise InputError(where, key_path(fault.keys) or "file", fault.value, fault.problem)
 
 
-def _file_beside(where: Path, kind: type, value: object) -> Path:
+def _file_beside(where: str | Path, kind: type, value: object) -> Path:
     if kind is not Path or not isinstance(value, str) or not value:
         raise FieldError((), f"must be {_WORDS[Path]}")
-    file = where.parent / value
+    file = Path(where).parent / value
     if not is_file(file):
         raise FieldError((), "no such file")
     return file
@@ -104,9 +117,22 @@ def refuse_unknown(keys: Keys, name: str, kind: str, known: Collection[str]) -> 
         raise FieldError(keys, f"no such {kind}; {hint(name, known)}")
 
 
-def json_schema(kind: type[Section]) -> dict[str, Any]:
-    """The JSON Schema of a class, for editors."""
-    schema = msgspec.json.schema(kind, schema_hook=lambda _: {"type": "string"})
+def json_schema(kind: type[Section], **alternatives: Collection[type[Section]]) -> dict[str, Any]:
+    """The JSON Schema of a class, for editors.
+
+    `alternatives`: of a key that the class leaves open, the classes of what it may be.
+    """
+    others = [other for kinds in alternatives.values() for other in kinds]
+    (schema, *parts), definitions = msgspec.json.schema_components(
+        (kind, *others), schema_hook=lambda _: {"type": "string"}, ref_template="#/$defs/{name}"
+    )
+    for key, kinds in alternatives.items():
+        options, parts = parts[: len(kinds)], parts[len(kinds) :]
+        open_key = definitions[kind.__name__]["properties"][key]
+        definitions[kind.__name__]["properties"][key] = {"anyOf": options} | {
+            name: open_key[name] for name in ("description",) if name in open_key
+        }
+    schema = {**schema, "$defs": definitions}
     for part in schema["$defs"].values():
         part["description"], titles = _headed(part.get("description", ""))
         for name, key in part["properties"].items():
@@ -246,7 +272,7 @@ def _wrong_key(value: Any, known: Any, keys: Keys) -> FieldError | None:
     """The first key that is unknown, else the first that is missing."""
     for key in value:
         if key not in known:
-            return FieldError((*keys, key), f"unknown key; {hint(key, known)}", value[key])
+            return _UnknownKeyError((*keys, key), f"unknown key; {hint(key, known)}", value[key])
     missing = (name for name in known if known[name].required and name not in value)
     name = next(missing, None)
     return name and FieldError((*keys, name), "this key is needed")

@@ -33,7 +33,8 @@ class ForeignResult:
     of cells in 3D. `displacement` (k, dim), `stress` (k, 6) in the order xx, yy, zz, xy, yz, xz and
     positive in tension, `pressure` (k,) ≥ 0 in compression and `gap` (k,) ≥ 0 when open, both at
     nodes, faces or other points of the interface. `forces` are those of contact on the slave (dim,)
-    by zone. `step`: the load factor that the result belongs to. `settings` are those of the code,
+    by zone. `step`: the load factor that the result belongs to. `digits`: the significant digits of
+    values, where a file has fewer than a number in memory. `settings` are those of the code,
     to be shown. Times in seconds.
     """
 
@@ -46,6 +47,7 @@ class ForeignResult:
     gap: Field | None = None
     forces: Mapping[str, np.ndarray] = field(default_factory=dict)
     step: float | None = None
+    digits: int | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     seconds: float | None = None
     cpu_seconds: float | None = None

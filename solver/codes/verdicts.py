@@ -8,10 +8,19 @@ runs it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..verification.verdict import Verdict
+import numpy as np
+
+from ..case import job_name
+from ..system.files import seal, write_text
+from ..verification.checks import run_checks
+from ..verification.judge import judge, without_result
+from ..verification.run import mesh_of
+from ..verification.verdict import FAILED, Verdict, write_verdict
+from .compared import Compared
 
 if TYPE_CHECKING:
     import meshio
@@ -29,7 +38,13 @@ def check_foreign(case: Case, foreign: ForeignResult, mesh: meshio.Mesh | None =
     the result does not give is listed in the verdict's `not_given`. Raises InputError where the
     result does not belong to the case: another unit of length, mirrored, turned, shifted.
     """
-    raise NotImplementedError
+    return _judged(Compared.of(case, foreign, mesh or mesh_of(case)))
+
+
+def folder_of(results: Path, case: Case, code: str) -> Path:
+    """Where the verdict of a code belongs in a folder of results."""
+    job = job_name(case.name, case.swapped, case.hexahedra, case.recovery)
+    return results / case.family / f"{job}@{code}"
 
 
 def store(
@@ -39,7 +54,16 @@ def store(
 
     Raises InputError as `check_foreign` does; then nothing is written.
     """
-    raise NotImplementedError
+    compared = Compared.of(case, foreign, mesh or mesh_of(case))
+    verdict = _judged(compared)
+    folder.mkdir(parents=True, exist_ok=True)
+    if foreign.mesh is not None:
+        _write_fields(folder / RESULT, foreign)
+        verdict = replace(verdict, result=RESULT, result_sha256=seal(folder / RESULT))
+    if (rows := compared.pressures()) is not None:
+        _write_pressures(folder / PRESSURE, rows)
+    write_verdict(folder / VERDICT, verdict)
+    return verdict
 
 
 def without_foreign(
@@ -52,9 +76,89 @@ def without_foreign(
     settings: Mapping[str, str] | None = None,
     seconds: float | None = None,
 ) -> Verdict:
-    """The verdict of a code that gave no result, for the reason given, to be written by `write`.
+    """The verdict of a code that gave no result, for the reason given, for `write_verdict`.
 
     `word`: refused (it cannot express the case, or is not installed), failed (no convergence) or
     crashed (a crash, a hang).
     """
-    raise NotImplementedError
+    verdict = without_result(word, reason, case, (case.swapped, case.hexahedra, case.recovery))
+    named = _named(verdict, code, version, settings or {})
+    return replace(named, seconds={} if seconds is None else {"total": seconds})
+
+
+def _named(verdict: Verdict, code: str, version: str, settings: Mapping[str, str]) -> Verdict:
+    """The verdict as that of a code."""
+    return replace(
+        verdict,
+        job=f"{verdict.job}@{code}",
+        code=code,
+        code_version=version,
+        settings=dict(settings),
+    )
+
+
+def _judged(compared: Compared) -> Verdict:
+    foreign, solution = compared.foreign, compared.solution
+    checks = run_checks(solution, samplers=compared.samplers, allow=compared.tolerance)
+    ran = [check.name for check in checks]
+    verdict = judge(solution, checks)
+    told = compared.faults([check for check in checks if not check.passed])
+    if told and verdict.verdict == FAILED:
+        verdict = replace(verdict, reason=f"{told} ({verdict.reason})")
+    named = _named(verdict, foreign.code, foreign.version, foreign.settings)
+    return replace(
+        named,
+        printed_digits=foreign.digits,
+        not_given=compared.not_given(ran),
+        plan=[[name, "given; the case has no check of it"] for name in compared.unchecked(ran)],
+        pressure=compared.extremes("pressure"),
+        gap=compared.extremes("gap"),
+        stress=compared.extremes("normal_stress"),
+        status=None,
+        coverage=None,
+        dofs=None,
+        iterations=None,
+        linear_solver=None,
+        matrix_entries=None,
+        linear_iterations=None,
+        pressure_error_estimate=None,
+        seconds={} if foreign.seconds is None else {"total": foreign.seconds},
+        cpu_seconds=foreign.cpu_seconds,
+        peak_memory_mb=foreign.peak_memory_mb,
+    )
+
+
+def _write_fields(path: Path, foreign: ForeignResult) -> None:
+    """The fields of a result at the nodes of its own mesh, for ParaView."""
+    import meshio
+
+    from ..mesh.files.vtkhdf import write_grid
+    from ..system.files import replacing
+    from ..system.hdf5 import new_file
+
+    mesh = foreign.mesh
+    assert mesh is not None
+    fields = {}
+    for name in ("displacement", "stress", "pressure", "gap"):
+        field = getattr(foreign, name)
+        if field is not None and field.nodes is not None:
+            values = np.full((len(mesh.points), *field.values.shape[1:]), np.nan)
+            values[field.nodes] = field.values
+            if name == "displacement":
+                values = np.pad(values, ((0, 0), (0, 3 - values.shape[1])))
+            fields[name] = values
+    plain = meshio.Mesh(mesh.points, [(block.type, block.data) for block in mesh.cells])
+    with replacing(path) as temporary, new_file(temporary) as file:
+        write_grid(file.create_group("VTKHDF"), plain, fields, {})
+
+
+def _write_pressures(path: Path, rows: np.ndarray) -> None:
+    """Place and pressure (k, dim + 1), a line each."""
+    head = ",".join([*"xyz"[: rows.shape[1] - 1], "pressure"])
+    lines = [",".join(f"{value:.9g}" for value in row) for row in rows.tolist()]
+    write_text(path, "\n".join([head, *lines]) + "\n")
+
+
+def read_pressures(path: Path) -> np.ndarray:
+    """The rows (k, dim + 1) that `store` wrote."""
+    return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)

@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING
 
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import jobs, studies
+from . import bench, codes, jobs, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
     from ..verification.run import Job
-    from ..verification.verdict import CheckResult
+    from ..verification.verdict import CheckResult, Verdict
 
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
@@ -126,15 +126,16 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
-    command.add_argument("--plain", action="store_true", help="without PyVista and OpenGL")
 
     command = add_command(commands, "compare", _compare, "compare with another batch")
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
+    codes.add_commands(commands)
     studies.add_commands(commands)
     jobs.add_commands(commands)
+    bench.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "check whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
@@ -232,10 +233,15 @@ def _check(options: argparse.Namespace) -> int:
         print(to_json([verdict.plain() for verdict in verdicts]))
     else:
         for verdict in verdicts:
-            print(verdict.summary)
-            for row in verdict.checks:
-                print("  " + _row(row))
+            print_checks(verdict)
     return PASSED if all(verdict.sound for verdict in verdicts) else FAILED
+
+
+def print_checks(verdict: "Verdict") -> None:
+    """Print a verdict, a line for each check."""
+    print(verdict.summary)
+    for row in verdict.checks:
+        print("  " + _row(row))
 
 
 def _row(check: "CheckResult") -> str:
@@ -261,7 +267,7 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
 def _gallery(options: argparse.Namespace) -> int:
     from ..report.gallery import write_gallery
 
-    write_gallery(_verdicts(options), options.output, options.plain, partial(print, flush=True))
+    print(write_gallery(_verdicts(options), options.output))
     return PASSED
 
 
@@ -272,13 +278,16 @@ def _report(options: argparse.Namespace) -> int:
     families = options.families
     if families is None:
         families = sorted(Path("cases").glob("*/family.yaml"))
-    return write_report(verdicts, options.output, families=families)
+    print(write_report(verdicts, options.output, families))
+    return PASSED
 
 
 def _compare(options: argparse.Namespace) -> int:
     from ..report.compare import compare
 
-    return FAILED if compare(options.base, options.this, options.output).groups["worse"] else PASSED
+    found, text = compare(options.base, options.this, options.output)
+    print(text)
+    return FAILED if found.groups["worse"] else PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:
@@ -299,6 +308,10 @@ def _validate_one(path: Path, with_mesh: bool) -> None:
 
     case = load_case(path)
     check_mesh_file(case)
+    if "recipe" in case.mesh:
+        from ..mesh.recipes import read_recipe
+
+        read_recipe(case.mesh, path)
     if with_mesh:
         from ..simulation.groups import check_groups
         from ..verification.run import mesh_of

@@ -7,16 +7,20 @@ import json
 from importlib import import_module
 from pathlib import Path
 
-from ..case.typed import json_schema
+from ..case.typed import Section, json_schema
+from ..mesh.keys import RECIPES, MeshFileKeys
 from ..system.files import write_text
 
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
-    "benchmark": "..studies.benchmark.description:BenchmarkFile",
+    "benchmark": "..studies.benchmark.description:Benchmark",
     "case": "..case.file:CaseFile",
+    "code": "..codes.own:OwnCodeFile",
     "family": "..report.families:FamilyFile",
     "infsup": "..studies.infsup.description:InfSupFile",
     "ladders": "..studies.orders.description:LaddersFile",
+    "map": "..codes.files.map:ResultMap",
+    "recorded": "..codes.recorded:RecordedFile",
     "scaling": "..studies.scaling.description:ScalingFile",
     "study": "..studies.work_precision.description:StudyFile",
     "sweep": "..studies.stability.description:SweepFile",
@@ -26,9 +30,10 @@ TYPES = {
 def schema_text(name: str) -> str:
     """The JSON Schema of a kind of file, as written to disk."""
     module, kind = TYPES[name].split(":")
-    return (
-        json.dumps(json_schema(getattr(import_module(module, __package__), kind)), indent=2) + "\n"
-    )
+    meshes: list[type[Section]] = [MeshFileKeys, *RECIPES.values()]
+    parts = {"mesh": meshes} if name == "case" else {}
+    schema = json_schema(getattr(import_module(module, __package__), kind), **parts)
+    return json.dumps(schema, indent=2) + "\n"
 
 
 if __name__ == "__main__":

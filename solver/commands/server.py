@@ -1,7 +1,7 @@
-"""The warm process: all there is to import is imported, and each command gets a fork of it.
+"""The warm process: all modules are loaded, and each command runs in a fork of it.
 
-A fork is a process of its own: it may crash, run out of memory or be killed, and nobody else
-notices. It runs the command as `python -m solver` does, on the standard output and error of its
+A fork is a separate process: it may crash, run out of memory or be killed without effect on others.
+ It runs the command as `python -m solver` does, on the standard output and error of its
 client (`solver.commands.warm`).
 """
 
@@ -23,14 +23,14 @@ from typing import NoReturn
 from ..system.package import PACKAGE
 from .warm import GREETING, LIMIT, THREADS, outcome
 
-# What the solver imports only where it is needed; what is missing here, the command will say.
+# Modules that the solver imports late. The command itself reports a missing one.
 _LATE = ("gmsh", "jsonschema.validators", "skfem.element", "cvxopt")
 _INPUT = 0
 _BUG = 70
 
 
 def serve(listener: socket.socket) -> None:
-    """Run the commands of all who connect, each in a fork, until standard input ends.
+    """Run the commands of all clients, each in a fork, until standard input ends.
 
     Forks that are at work then come to their end; Ctrl-C is for them, not for their server.
     """
@@ -48,14 +48,14 @@ def serve(listener: socket.socket) -> None:
 
 
 def _reap(options: int = 0) -> None:
-    """Take leave of the forks that have ended, or wait for all."""
+    """Collect the forks that have ended, or wait for all."""
     with suppress(ChildProcessError):
         while os.waitpid(-1, options)[0]:
             pass
 
 
 def load() -> None:
-    """Import all of the solver, and keep it out of the collector's way: forks share it."""
+    """Import the whole solver and exclude it from garbage collection: forks share it."""
     ours = [
         module.name
         for module in pkgutil.walk_packages(sys.modules[PACKAGE].__path__, f"{PACKAGE}.")
@@ -69,11 +69,11 @@ def load() -> None:
 
 
 def _answer(client: socket.socket) -> int:
-    """Run the client's command in a process of its own and tell how it ended."""
+    """Run the client's command in a separate process and report how it ended."""
     client.send(GREETING)
     message, streams, *_ = socket.recv_fds(client, LIMIT, 2)
     request = json.loads(message or "{}")
-    # Libraries take the number of threads when they are loaded: for another one, no answer.
+    # Libraries read the number of threads when they are loaded: no answer for another number.
     if request.get("threads") == os.environ.get(THREADS):
         process = os.fork()
         if process == 0:
@@ -84,7 +84,7 @@ def _answer(client: socket.socket) -> int:
 
 
 def _run(command: Sequence[str], streams: Sequence[int]) -> int:
-    """Do what `python -m solver` does; its exit status."""
+    """Run a command as `python -m solver` does; its exit status."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     nothing = os.open(os.devnull, os.O_RDONLY)
     for number, stream in enumerate((nothing, *streams)):
@@ -100,7 +100,7 @@ def _run(command: Sequence[str], streams: Sequence[int]) -> int:
 
 
 def _end(run: Callable[[], int]) -> NoReturn:
-    """Run and end this fork, without the endings that its parent has registered."""
+    """Run and end this fork without the exit handlers of its parent."""
     status = _BUG
     try:
         status = run()

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..studies import FULL, QUICK, SIZES
 from ..system.errors import InputError
+from ..system.progress import saying
 from .options import add_command, add_threads
 
 RECORD, FOLDER = "RECORD.json", "DIR"
@@ -58,7 +59,8 @@ def _orders(options: argparse.Namespace) -> int:
     from ..studies.orders.description import read_ladders
     from ..studies.orders.page import write_orders
 
-    write_orders([read_ladders(path) for path in options.ladders], options.results, options.output)
+    ladders = [read_ladders(path) for path in options.ladders]
+    print(write_orders(ladders, options.results, options.output))
     return 0
 
 
@@ -102,7 +104,8 @@ def _study_page(options: argparse.Namespace) -> int:
     from ..studies.work_precision.description import read_study
     from ..studies.work_precision.page import write_study
 
-    write_study(read_study(options.study, options.size), options.results, options.output)
+    study = read_study(options.study, options.size)
+    print(write_study(study, options.results, options.output))
     return 0
 
 
@@ -128,7 +131,8 @@ def _scaling_page(options: argparse.Namespace) -> int:
     from ..studies.scaling.description import read_scaling
     from ..studies.scaling.page import write_scaling
 
-    write_scaling(read_scaling(options.study, options.size), options.results, options.output)
+    scaling = read_scaling(options.study, options.size)
+    print(write_scaling(scaling, options.results, options.output))
     return 0
 
 
@@ -147,7 +151,8 @@ def _benchmark(options: argparse.Namespace) -> int:
     from ..verification.verdict import to_json
 
     benchmark = read_benchmark(options.benchmark, QUICK if options.quick else FULL)
-    record = run_benchmark(benchmark, partial(print, file=sys.stderr, flush=True))
+    with saying(partial(print, file=sys.stderr, flush=True)):
+        record = run_benchmark(options.benchmark, benchmark)
     write_text(options.output, to_json(record) + "\n")
     print(as_text(record))
     return 0
@@ -173,8 +178,11 @@ def _sweep(options: argparse.Namespace) -> int:
     from ..studies.stability.description import read_sweep
     from ..studies.stability.point import run_sweep
 
-    record = run_sweep(read_sweep(options.sweep, options.quick), options.output, print)
-    return 0 if all(point["holds"] for point in record["points"]) else 1
+    record = run_sweep(read_sweep(options.sweep, options.quick), options.output)
+    held = [point["holds"] for point in record["points"]]
+    seconds = f"{record['cpu_seconds']:.1f} s"
+    print(f"{record['sweep']}: {sum(held)} of {len(held)} points hold, {seconds}")
+    return 0 if all(held) else 1
 
 
 def _stability(options: argparse.Namespace) -> int:
@@ -183,7 +191,7 @@ def _stability(options: argparse.Namespace) -> int:
 
     theory = read_record(options.infsup) if options.infsup else None
     records = read_records(options.records)
-    write_stability(records, options.output, options.quick, theory=theory)
+    print(write_stability(records, options.output, options.quick, theory))
     return 0
 
 
@@ -202,7 +210,8 @@ def _add_infsup(commands: Any) -> None:
 def _infsup(options: argparse.Namespace) -> int:
     from ..studies.infsup.point import measure
 
-    measure(options.ladders, options.output, options.quick, partial(print, flush=True))
+    with saying(partial(print, flush=True)):
+        measure(options.ladders, options.output, options.quick)
     return 0
 
 
@@ -210,5 +219,5 @@ def _infsup_page(options: argparse.Namespace) -> int:
     from ..studies.infsup.page import write_page
     from ..studies.infsup.records import read_record
 
-    write_page(read_record(options.record), options.output)
+    print(write_page(read_record(options.record), options.output))
     return 0

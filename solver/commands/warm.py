@@ -1,11 +1,11 @@
-"""Run a command of the solver in a process that is warm, or in a new one where there is none.
+"""Run a command of the solver in the warm process, or in a new one if there is no warm one.
 
     python -IS solver/commands/warm.py BENCHMARK COMMAND …
 
-Python with all packages takes 0.7 s to start, a small case 0.1 s to solve. This client needs none
+Python with all packages takes 0.7 s to start, a small case 0.1 s to solve. This client imports none
 of them; `solver.commands.server`, at the socket that the environment names, forks for each command.
-Exit status, output and files are those of the command. What it took goes to the file BENCHMARK:
-wall and processor time (s), largest resident memory (MB).
+Exit status, output and files are those of the command. The file BENCHMARK gets its
+wall and processor time (s) and largest resident memory (MB).
 """
 
 import json
@@ -16,11 +16,11 @@ import sys
 import time
 from contextlib import suppress
 
-# The package's folder; this file runs as a script, which knows no package.
+# The package's folder: this file runs as a script, without a package.
 PACKAGE = os.path.abspath(__file__).rsplit("/", 3)[1]  # noqa: PTH100 -- pathlib is long to import
 SOCKET = "WARM_SOLVER"
 LIMIT = 1 << 16  # bytes of a message
-# A fork keeps the threads that its libraries were loaded with.
+# A fork keeps the number of threads with which its libraries were loaded.
 THREADS = "OMP_NUM_THREADS"
 GREETING = b"ready"
 # Seconds to wait for the server's greeting, which comes once all its packages are loaded.
@@ -28,8 +28,8 @@ PATIENCE = 30.0
 
 
 def main(benchmark: str, command: list[str]) -> int:
-    """The exit status of the command, as a shell tells it."""
-    # Ctrl-C is for the command to answer: its end is waited for.
+    """The exit status of the command, as in a shell."""
+    # The command handles Ctrl-C; this process waits for its end.
     signal.signal(signal.SIGINT, lambda *_: None)
     started = time.monotonic()
     place = os.environ.get(SOCKET)
@@ -43,7 +43,7 @@ def main(benchmark: str, command: list[str]) -> int:
 
 
 def outcome(process: int) -> dict:
-    """How a child ended, once it has: its wait status, processor time (s), memory (kB)."""
+    """Wait for a child; its wait status, processor time (s), memory (kB)."""
     _, status, used = os.wait4(process, 0)
     return {
         "status": status,
@@ -53,10 +53,10 @@ def outcome(process: int) -> dict:
 
 
 def _warm(place: str, command: list[str]) -> dict | None:
-    """What became of the command in a fork; None where no answer comes.
+    """The outcome of the command in a fork; None without an answer.
 
-    A server that does not greet in time hangs: no later client asks it, for its socket is removed.
-    It never runs the command, which is sent after the greeting.
+    A server that does not greet in time hangs. Its socket is removed, so that no later client asks
+    it. It never runs the command, which is sent after the greeting.
     """
     request = {"command": command, "threads": os.environ.get(THREADS)}
     with socket.socket(socket.AF_UNIX) as connection:

@@ -1,135 +1,226 @@
-"""The keys below `mesh:` and `transform:` of a case file, read with care."""
+"""The keys of `mesh:` in a case file, as a type for each recipe; see `recipes`."""
 
-from __future__ import annotations
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
-import difflib
-from collections.abc import Collection, Mapping
-from typing import Any
+from msgspec import Meta
 
-from ..system.errors import InputError
+from ..case.typed import FieldError, Number, Positive, Section, Text, fields
+from .catalogue import BY_NAME
 
 LARGEST = 1e150
-"""The largest magnitude of a coordinate or length: the square of twice it is finite."""
-_MOST = 100_000  # pieces of an edge
+"""The largest magnitude of a coordinate: the square of twice it is finite."""
+
+if TYPE_CHECKING:  # cells are looked up by text
+    Cells: TypeAlias = str
+else:
+    Cells = Literal[tuple(name for name, cell in BY_NAME.items() if cell.dim > 1)]
+Pieces = Annotated[int, Meta(ge=1, le=100_000, description="a whole number from 1 to 100000")]
+_PIECES = "a whole number from 1 to 100000, or a list of one for each axis"
+Divisions = Annotated[Pieces | tuple[Pieces, ...], Meta(description=_PIECES)]
+_LENGTHS = "a positive number, or a list of one for each axis"
+Lengths = Annotated[Positive | tuple[Positive, ...], Meta(description=_LENGTHS)]
+_Height = Annotated[float, Meta(gt=-0.5, lt=0.5, description="a number between -0.5 and 0.5")]
+_Share = Annotated[float, Meta(gt=0, le=1, description="a share of the side, at most 1")]
 
 
-class Keys:
-    """The keys of a mapping, read one by one; what is missing, wrong or left over is refused."""
-
-    def __init__(self, values: Mapping[str, Any], where: str, path: str):
-        self._values, self._where, self._path = dict(values), where, path
-        self._asked: set[str] = set()
-
-    def refuse(self, key: str, value: object, allowed: str) -> InputError:
-        """The refusal of a value, naming file, key and what is allowed."""
-        return InputError(self._where, f"{self._path}.{key}", value, allowed)
-
-    def _get(self, key: str) -> Any:
-        self._asked.add(key)
-        return self._values.get(key)
-
-    def given(self, key: str) -> bool:
-        """Whether the key is there."""
-        self._asked.add(key)
-        return key in self._values
-
-    def known(self, key: str, allowed: Collection[str]) -> str:
-        """The key itself, out of a list."""
-        if key not in allowed:
-            self._asked.update(allowed)
-            self.finish()
-        return key
-
-    def choice(self, key: str, allowed: Collection[str], default: str | None = None) -> str:
-        """A word out of a list."""
-        value = self._get(key)
-        if value is None and default is not None:
-            return default
-        if not isinstance(value, str) or value not in allowed:
-            raise self.refuse(key, value, f"allowed: {', '.join(allowed)}")
-        return value
-
-    def text(self, key: str) -> str:
-        """A text that is not empty."""
-        value = self._get(key)
-        if not isinstance(value, str) or not value:
-            raise self.refuse(key, value, "must be a name")
-        return value
-
-    def numbers(self, key: str, count: int, default: float | None = None) -> list[float]:
-        """Positive numbers up to 1e150; a single one stands for all `count` of them."""
-        value = self._get(key)
-        value = default if value is None else value
-        values: list[Any] = value if isinstance(value, list) else [value] * count
-        if len(values) != count or not all(_finite(v) and v > 0 for v in values):
-            raise self.refuse(key, value, f"must be a positive number{_or_list(count)}")
-        return [float(v) for v in values]
-
-    def integers(
-        self, key: str, count: int, default: list[int] | None = None, least: int = 1
-    ) -> list[int]:
-        """Whole numbers from `least` to 100,000; a single one stands for all `count` of them."""
-        value = self._get(key)
-        value = default if value is None else value
-        values: list[Any] = value if isinstance(value, list) else [value] * count
-        if len(values) != count or any(
-            type(v) is not int or not least <= v <= _MOST for v in values
-        ):
-            allowed = f"must be a whole number from {least} to {_MOST}{_or_list(count)}"
-            raise self.refuse(key, value, allowed)
-        return values
-
-    def number(self, key: str) -> float:
-        """A number."""
-        return self.vector(key, 1)[0]
-
-    def vector(self, key: str, count: int) -> list[float]:
-        """A list of numbers; where `count` is 1, a number."""
-        value = self._get(key)
-        values = [value] if count == 1 else value
-        if not isinstance(values, list) or len(values) != count or not all(map(_finite, values)):
-            what = "a number" if count == 1 else f"a list of {count} numbers"
-            raise self.refuse(key, value, f"must be {what}")
-        return [float(v) for v in values]
-
-    def one_or_section(self, key: str, main: str) -> Keys:
-        """A mapping of keys below this one, of which the key `main` may stand alone."""
-        value = self._get(key)
-        if isinstance(value, dict):
-            return self.section(key)
-        return Keys({main: value}, self._where, f"{self._path}.{key}")
-
-    def section(self, key: str, what: str = "a mapping of keys") -> Keys:
-        """A mapping of keys below this one."""
-        value = self._get(key)
-        if not isinstance(value, dict):
-            raise self.refuse(key, value, f"must be {what}")
-        return Keys(value, self._where, f"{self._path}.{key}")
-
-    def sections(self, key: str, what: str) -> list[Keys]:
-        """One mapping of keys below this one, or a list of them."""
-        value = self._get(key)
-        if not isinstance(value, list):
-            return [self.section(key, what)]
-        if not all(isinstance(item, dict) for item in value):
-            raise self.refuse(key, value, f"must be {what}, or a list of them")
-        return [Keys(v, self._where, f"{self._path}.{key}[{i}]") for i, v in enumerate(value)]
-
-    def finish(self) -> None:
-        """Refuse keys that nobody asked for."""
-        for key in self._values:
-            if key not in self._asked:
-                near = difflib.get_close_matches(str(key), self._asked, 1)
-                hint = f" (did you mean {near[0]}?)" if near else ""
-                allowed = f"unknown key{hint}; allowed: {', '.join(sorted(self._asked))}"
-                raise InputError(self._where, f"{self._path}.{key}", None, allowed)
+def each(value: Any, count: int, key: str) -> list[Any]:
+    """A value for each of `count` axes, where one stands for all. Raises FieldError."""
+    values = list(value) if isinstance(value, tuple) else [value] * count
+    if len(values) != count:
+        raise FieldError((key,), f"must be one number, or a list of {count}")
+    return values
 
 
-def _finite(value: Any) -> bool:
-    """Whether a value is a number of a magnitude that can be squared."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and abs(value) <= LARGEST
+class MeshFileKeys(Section, frozen=True):
+    """A mesh of your own.
+
+    file: .med, .msh, .inp, .vtu or .vtkhdf, relative to the case file
+    """
+
+    file: Text
 
 
-def _or_list(count: int) -> str:
-    return f", or a list of {count}" if count > 1 else ""
+class BlockKeys(Section, frozen=True):
+    """One of the two blocks.
+
+    cells: its cell type
+    divisions: pieces of its edges along each axis
+    far: of TRIA and TETRA cells, pieces of the lateral edges on the side away from the interface
+    inner: of TRIA and TETRA cells, the edge length inside
+    algorithm: of TRIA and TETRA cells, gmsh's algorithm for surfaces
+    contact: of PENTA and PYRA cells, the type of the faces on the interface
+    """
+
+    cells: Cells
+    divisions: Divisions | None = None
+    far: Divisions | None = None
+    inner: Positive | None = None
+    algorithm: Literal["frontal", "delaunay", "meshadapt"] | None = None
+    contact: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        kind = BY_NAME[self.cells]
+        allowed, needed = ["cells", "divisions"], "divisions"
+        if self.cells.startswith(("PENTA", "PYRA")):
+            allowed, needed = [*allowed, "contact"], "contact"
+            faces = sorted({face.type for face in kind.faces})
+            if self.contact and self.contact not in faces:
+                raise FieldError(("contact",), f"must be {' or '.join(faces)}")
+        elif self.cells.startswith(("TRIA", "TETRA")):
+            allowed += ["far", "inner", "algorithm"]
+        for key in fields(type(self)):
+            if getattr(self, key) is not None and key not in allowed:
+                problem = f"unknown key for {self.cells}; allowed: {', '.join(allowed)}"
+                raise FieldError((key,), problem)
+        if getattr(self, needed) is None:
+            raise FieldError((needed,), "this key is needed")
+        each(self.divisions, kind.dim, "divisions")
+        each(self.far, kind.dim - 1, "far")
+
+
+class Recipe(Section, frozen=True, kw_only=True):
+    """The keys that all recipes share.
+
+    bottom: the lower block
+    top: the upper block
+    refine: multiplies all divisions
+    """
+
+    bottom: BlockKeys
+    top: BlockKeys
+    refine: Pieces = 1
+
+    @property
+    def dim(self) -> int:
+        """The dimension of the mesh."""
+        return BY_NAME[self.bottom.cells].dim
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if BY_NAME[self.top.cells].dim != self.dim:
+            raise FieldError(("top", "cells"), f"must be of dimension {self.dim} as bottom")
+
+
+class BlocksKeys(Recipe, frozen=True, kw_only=True):
+    """Two rectangular blocks, one on the other.
+
+    size: of each block along each axis
+    """
+
+    recipe: Literal["blocks"]
+    size: Lengths
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        each(self.size, self.dim, "size")
+
+
+class _Nested(Recipe, frozen=True, kw_only=True):
+    radii: Annotated[
+        tuple[Positive, Positive, Positive], Meta(description="a list of three positive numbers")
+    ]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.radii[0] < self.radii[1] < self.radii[2]:
+            raise FieldError(("radii",), "must increase: bore, interface, rim")
+        wanted = 2 if self.recipe == "rings" else 3  # type: ignore[attr-defined]
+        if self.dim != wanted:
+            raise FieldError(("bottom", "cells"), f"must be a cell type of {wanted}D")
+
+
+class RingsKeys(_Nested, frozen=True, kw_only=True):
+    """2D: a quarter of two nested tubes.
+
+    radii: bore, interface, rim
+    """
+
+    recipe: Literal["rings"]
+
+
+class ShellsKeys(_Nested, frozen=True, kw_only=True):
+    """3D: a sector of two nested spheres.
+
+    radii: bore, interface, rim
+    """
+
+    recipe: Literal["shells"]
+
+
+class WavyKeys(Recipe, frozen=True, kw_only=True):
+    """Two blocks of edge 1 with an interface that is no plane.
+
+    shape: the shape of the interface
+    height: its largest height
+    """
+
+    recipe: Literal["wavy"]
+    shape: Literal["tilt", "kink", "arc", "wave", "twist"]
+    height: _Height
+
+
+class ParabolaKeys(Recipe, frozen=True, kw_only=True):
+    """A block of edge 1 above a parabolic die.
+
+    height: of the parabola
+    """
+
+    recipe: Literal["parabola"]
+    height: Number
+
+
+class HertzKeys(Recipe, frozen=True, kw_only=True):
+    """A parabolic body on a flat one, their cells even around the point of contact.
+
+    radius: of the parabolic body
+    size: the edge of each body
+    core: the length of the even part
+    share: the share of the divisions in the even part
+    """
+
+    recipe: Literal["hertz"]
+    radius: Positive
+    size: Positive
+    core: Positive
+    share: Positive
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        least, largest = self.core / self.size, 2 * self.radius / (self.dim - 1)
+        if not least < self.share < 1:
+            raise FieldError(("share",), f"must lie between core / size = {least:g} and 1")
+        if not self.size < largest:
+            raise FieldError(("size",), f"must be smaller than {largest:g}, or it folds")
+
+
+class PunchKeys(Recipe, frozen=True, kw_only=True):
+    """A straight block on another.
+
+    bottom_size: of the lower block along each axis
+    top_size: of the upper block along each axis
+    gap: between the blocks; negative: they overlap
+    loaded: the share of `press` along x that belongs to `press_left`
+    """
+
+    recipe: Literal["punch"]
+    bottom_size: Lengths
+    top_size: Lengths
+    gap: Number = 0.0
+    loaded: _Share = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        each(self.bottom_size, self.dim, "bottom_size")
+        each(self.top_size, self.dim, "top_size")
+
+
+RECIPES: dict[str, type[Recipe]] = {
+    "blocks": BlocksKeys,
+    "rings": RingsKeys,
+    "shells": ShellsKeys,
+    "wavy": WavyKeys,
+    "parabola": ParabolaKeys,
+    "hertz": HertzKeys,
+    "punch": PunchKeys,
+}

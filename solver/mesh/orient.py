@@ -45,7 +45,7 @@ def _tangent(
 def right_side_out(
     points: np.ndarray, cells: np.ndarray, cell: CellType
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cells with mirrored ones renumbered, and a mask (n_cells,) of the cells that are no cells.
+    """Cells with mirrored ones renumbered, and a mask (n_cells,) of invalid cells.
 
     The latter have a Jacobian that is zero at a vertex or changes its sign from one to another.
     """

@@ -1,12 +1,12 @@
-"""How large a solve will be, known before there is a mesh: unknowns, seconds, memory.
+"""The size of a solve, estimated before meshing: unknowns, seconds, memory.
 
 Memory was measured as the peak of solves of all cell types, 547 of them with a factor by PARDISO
 and 20,000 to 640,000 unknowns: 100 MB for the program, then for each unknown (nodes times
 dimensions) 1.9 to 7.4 kB in 2D and 4.4 to 16 kB in 3D, less for more elongated bodies. With
 multigrid it is 1.9 (TETRA4) to 4.1 kB (HEXA20), for HEXA8 cubes 2.3 to 2.4 kB from 500,000 to
-1,000,000 unknowns. A solve is refused by the least figure, so that none is refused that fits; the
-usual one is for a warning, and a cluster is asked for the most, in case a factor is needed. Time
-was measured from 10,000 to 1,000,000 unknowns on two cores, meshing included.
+1,000,000 unknowns. The smallest figure decides a refusal, so that no solve that fits is refused;
+the usual one decides a warning; a cluster is asked for the largest, in case a factor is needed.
+Time was measured from 10,000 to 1,000,000 unknowns on two cores, meshing included.
 """
 
 import logging
@@ -46,7 +46,7 @@ _SIMPLICES = {
     "TETRA4": (0.674, 4.8),
     "TETRA10": (5.0, 26.0),
 }
-# No machine has room for so many divisions of an edge.
+# More divisions of an edge than any machine can hold.
 _MANY = 10**9
 # Bytes for each node of a mesh file, cells included: VTU files are packed.
 _BYTES = {".vtu": 20}

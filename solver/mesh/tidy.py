@@ -1,4 +1,4 @@
-"""From a mesh as its file gives it to the mesh the solver works on."""
+"""From the mesh of a file to the mesh of the solver."""
 
 import meshio
 import numpy as np
@@ -120,7 +120,7 @@ class _Table:
 
 
 def _numbered(cell: CellType, numbers: np.ndarray) -> str:
-    """Type and numbers of cells to be complained of."""
+    """Type and numbers of faulty cells."""
     shown = ", ".join(str(n) for n in numbers[:_SHOWN])
     more = f" and {len(numbers) - _SHOWN} more" if len(numbers) > _SHOWN else ""
     return f"{cell.name} {shown}{more}"

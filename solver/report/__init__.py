@@ -1,6 +1,6 @@
 """The report of many verdicts: pages for people, tables for machines, failures first."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +10,18 @@ PAGE = "summary.html"
 def write_report(
     verdicts: Sequence[Path],
     folder: Path,
-    log: Callable[[str], Any] = print,
     families: Sequence[Path] = (),
-) -> int:
-    """Write the report of the verdict files into `folder`; the exit status, always 0.
+) -> str:
+    """Write the report of the verdict files into `folder`; returns what it found.
 
     Every verdict is in every file: the main page and the page of its family, summary.json,
-    .csv, .md, junit.xml, and failures.txt (empty when all passed). `families` are files
-    `family.yaml`, each in the folder of its family. Logs one line for each solve that did not pass,
-    the outcome, and the processor time by family.
+    .csv, .md, junit.xml, and failures.txt (empty when all passed); `bench.html` where other codes
+    have results. `families` are files `family.yaml`, each in the folder of its family. Returned are
+    a line for each solve that did not pass, the outcome, and the processor time by family.
     """
     from ..system.files import write_text
     from . import tables
+    from .bench import write_bench
     from .charts import write_script
     from .junit import to_junit
     from .page import family_page, main_page
@@ -32,6 +32,7 @@ def write_report(
     files = {file.resolve().parent.name: file for file in families}
     parts = sections(read_rows(verdicts), files, folder / "pictures")
     rows = [row for part in parts for row in part.rows]
+    write_bench(rows, folder, [file.resolve().parent for file in families])
     contents = {
         PAGE: main_page(parts, folder),
         "summary.json": tables.to_json(rows),
@@ -46,8 +47,7 @@ def write_report(
     write_script(folder)
     complaints = "".join(f"{c}\n" for part in parts if (c := part.family.complaint))
     said = f"{tables.outcome(rows)} Report: {folder / PAGE}\n{_costs(parts)}"
-    log(f"{complaints}{contents['failures.txt']}{said}")
-    return 0
+    return f"{complaints}{contents['failures.txt']}{said}"
 
 
 def _costs(sections: Sequence[Any]) -> str:

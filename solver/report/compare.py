@@ -1,8 +1,7 @@
 """Two batches side by side: Markdown for the terminal, and a page in the style of the report's."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from ..system.files import write_text
 from .differences import Comparison, Pair, read_batch
@@ -12,7 +11,7 @@ from .tables import md
 PAGE = "compare.html"
 CHANGES = ("solve", "quantity", "before", "now", "change")
 TIMES = ("before", "now", "ratio")
-# By what became of a verdict: in the line of the outcome, and over the list of solves.
+# By the change of a verdict: the words of the outcome, and the heading of the list.
 SAID = {
     "worse": "got worse",
     "better": "got better",
@@ -31,18 +30,15 @@ HEADINGS = {
 _MOST = 40
 
 
-def compare(
-    base: Path, this: Path, page: Path | None = None, log: Callable[[str], Any] = print
-) -> Comparison:
-    """Compare two batches: log Markdown, write the page, by default into the report of `this`.
+def compare(base: Path, this: Path, page: Path | None = None) -> tuple[Comparison, str]:
+    """Compare two batches: write the page, by default into the report of `this`; also as Markdown.
 
     Raises `InputError` for what is no batch.
     """
     found = Comparison(read_batch(base), read_batch(this))
     page = page or found.this.file.with_name(PAGE)
     write_text(page, to_html(found))
-    log(f"{to_markdown(found)}\nReport: {page}")
-    return found
+    return found, f"{to_markdown(found)}\nReport: {page}"
 
 
 def verdict(found: Comparison) -> str:

@@ -8,12 +8,12 @@ import json
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..system.errors import InputError
+from ..system.errors import InputError, hint
 from ..verification.checks import ROUND_OFF
 from ..verification.verdict import WORDS, CheckResult, Verdict, typed
 from . import formats, stages
@@ -21,6 +21,8 @@ from .rows import Row, natural
 from .tables import outcome
 
 SUMMARY = "summary.json"
+# The name of our own solver beside those of codes.
+OURS = "ours"
 # A solve whose time changed is worth a line from this ratio on, and from these seconds.
 _RATIO, _SECONDS, _MOST = 1.5, 0.2, 10
 _SUMS = ("total", "processor time")
@@ -46,7 +48,7 @@ class Batch:
 
     @property
     def origin(self) -> str:
-        """Revision and machine, as far as the solves tell."""
+        """Revision and machine, if the solves have them."""
         found = [row.verdict.provenance for row in self.rows.values()]
         values = [sorted({str(o[k]) for o in found if o.get(k)}) for k in ("revision", "cpu")]
         return "; ".join(", ".join(each) for each in values if each)
@@ -100,6 +102,8 @@ class Pair:
     @property
     def name(self) -> str:
         """Family and name."""
+        if self.base and self.this and self.base.name != self.this.name:
+            return f"{self.row.group}/{self.row.case}"
         return self.row.anchor
 
     @property
@@ -144,7 +148,7 @@ class Comparison:
 
     @cached_property
     def groups(self) -> dict[str, list[Pair]]:
-        """The solves by what became of their verdict (`Pair.change`), worst verdicts first."""
+        """The solves by the change of their verdict (`Pair.change`), worst verdicts first."""
         found: dict[str, list[Pair]] = defaultdict(list)
         for pair in self.pairs:
             found[pair.change].append(pair)
@@ -190,8 +194,14 @@ class Comparison:
 def read_batch(path: Path) -> Batch:
     """A batch, by its folder of results, the folder of its report, or its summary.json.
 
-    Raises `InputError` where there is none, or the file is not what a report writes.
+    `FOLDER@CODE` is what one code has in it, `FOLDER@ours` what our solver has; the solves go by
+    the names of their cases then. Raises `InputError` where there is none, or the file is not what
+    a report writes.
     """
+    code = ""
+    if not path.exists() and "@" in path.name:
+        name, _, code = path.name.partition("@")
+        path = path.with_name(name)
     candidates = (path / "report" / SUMMARY, path / SUMMARY) if path.is_dir() else (path,)
     file = next((each for each in candidates if each.is_file()), None)
     if file is None:
@@ -203,7 +213,13 @@ def read_batch(path: Path) -> Batch:
         raise InputError(file, "file", None, f"must be JSON ({error})") from None
     verdicts = typed(list[Verdict], content, file)
     rows = [Row(verdict, file.parent.parent / verdict.family) for verdict in verdicts]
-    return Batch(file, {(row.group, row.name): row for row in rows})
+    if not code:
+        return Batch(file, {(row.group, row.name): row for row in rows})
+    mine = [row for row in rows if (row.verdict.code or OURS) == code]
+    if not mine:
+        there = {row.verdict.code or OURS for row in rows}
+        raise InputError(path, "code", code, f"it has no result there; {hint(code, there)}")
+    return Batch(file, {(row.group, row.case): row for row in mine})
 
 
 def _times(row: Row) -> dict[str, float | None]:
@@ -212,12 +228,19 @@ def _times(row: Row) -> dict[str, float | None]:
 
 def _changes(base: Row, this: Row) -> Iterator[Change]:
     solve = this.anchor
-    for key, name in _COUNTS.items():
+    alike = base.verdict.code == this.verdict.code
+    for key, name in _COUNTS.items() if alike else ():
         before, now = getattr(base.verdict, key), getattr(this.verdict, key)
         if before != now:
             yield Change(solve, name, _text(before), _text(now), None)
-    yield from _checks(solve, *({c.title: c for c in row.verdict.checks} for row in (base, this)))
-    for name in {**base.norms, **this.norms}:
+    checks = [{c.title: c for c in row.verdict.checks} for row in (base, this)]
+    norms = {**base.norms, **this.norms}
+    if not alike:  # what only one code has is no change, nor is a tolerance of its own
+        both = checks[0].keys() & checks[1].keys()
+        checks = [{t: replace(of[t], tolerance=0.0) for t in of if t in both} for of in checks]
+        norms = {name: norms[name] for name in base.norms if name in this.norms}
+    yield from _checks(solve, *checks)
+    for name in norms:
         yield from _number(solve, f"error {name}", base.norms.get(name), this.norms.get(name))
 
 

@@ -7,6 +7,7 @@ from urllib.parse import quote
 from . import formats, stages
 from .charts import (
     BLUE,
+    CROSS,
     EPSILON,
     GREEN,
     INK,
@@ -38,8 +39,9 @@ _BAD = "not passed"
 
 
 def drawn(rows: Sequence[Row]) -> list[Row]:
-    """The rows that have both an error and a time."""
-    return [row for row in rows if row.accuracy is not None and row.total]
+    """The solves of our own that have both an error and a time."""
+    known = (row for row in rows if row.accuracy is not None and row.total)
+    return [row for row in known if not row.verdict.code]
 
 
 def floor(rows: Sequence[Row]) -> tuple[float, float]:
@@ -56,7 +58,7 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
     shown = drawn(rows)
     records = [_record(row) for row in shown]
     looks = {KINDS.get(kind, "no reference"): look for kind, look in _LOOKS.items()}
-    looks[_BAD] = Look(RED, "cross")
+    looks[_BAD] = Look(RED, CROSS)
     found = {record["series"] for record in records}
     allowed = sorted({row.allowed for row in shown if row.allowed})
     top = max(1e-2, *(3 * record["error"] for record in records), *(3 * a for a in allowed))

@@ -1,4 +1,4 @@
-"""What a family of cases tells about itself: `family.yaml` in the folder of its case files.
+"""The description of a family of cases: `family.yaml` in the folder of its case files.
 
 title: A block on a rigid parabola
 description: What it shows, in a few sentences.
@@ -33,6 +33,7 @@ FILE_NAME = "family.yaml"
 _TAKEN = (
     "index",
     "summary",
+    "bench",
     "compare",
     "orders",
     "workflow",

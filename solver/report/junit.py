@@ -34,7 +34,7 @@ def _suite(number: int, family: str, rows: Sequence[Row]) -> ET.Element:
         "package": _xml(family),
         "name": _xml(family),
         "timestamp": _started(rows),
-        "hostname": "localhost",  # a result does not tell
+        "hostname": "localhost",  # not in a result
         "tests": str(len(rows)),
         "failures": str(sum(counts.get(word, 0) for word in _FAILURES)),
         "errors": str(sum(counts.get(word, 0) for word in _ERRORS)),
@@ -61,7 +61,7 @@ def _case(row: Row) -> ET.Element:
 
 
 def _started(rows: Sequence[Row]) -> str:
-    """When the first of the solves ended, in UTC as the schema wants it; now where none tells."""
+    """When the first of the solves ended, in UTC as the schema wants it; now if unknown."""
     times = [str(time) for row in rows if (time := row.verdict.provenance.get("time_utc"))]
     return min(times, default=datetime.now(UTC).isoformat())[:19]
 

@@ -1,13 +1,16 @@
 """What the pictures share: colours of the two sides, bodies drawn apart, coordinates to pixels."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..simulation.solution import BodyInfo, Solution, ZoneResult
-from .svg import BLUE, MUTED, ORANGE, PAPER, mixed
+from .charts import BLUE, MUTED, ORANGE, PAPER
+from .svg import mixed
 
 Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
+# A picture of the contact shows this share of its extent around it.
+_AROUND = 0.15
 Placement = Callable[[np.ndarray], np.ndarray]  # coordinates (…, dim) to pixels (…, 2)
 
 
@@ -32,27 +35,12 @@ def mean_normal(solution: Solution) -> np.ndarray:
     return mean / length if length > 1e-6 else upward
 
 
-def magnification(displacement: np.ndarray, size: float) -> float:
-    """How much a displacement (n, dim) is drawn larger on a model of that size.
-
-    So that the largest is a sixteenth of the size or somewhat less: 1, 2 or 5 times a power of ten.
-    """
-    largest = float(np.linalg.norm(displacement, axis=1).max(initial=0.0))
-    wanted = size / (16 * largest) if largest else 1.0
-    decade = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(m * decade for m in (1, 2, 5) if m * decade <= wanted * (1 + 1e-9)))
-
-
-def apart(solution: Solution, share: float, magnified: float = 0.0) -> np.ndarray:
-    """Points with slave and master moved apart by `share` of the mesh's size, (n, dim).
-
-    Each is moved by its displacement as well, `magnified` so many times.
-    """
+def apart(solution: Solution, share: float) -> np.ndarray:
+    """Points with slave and master moved apart by `share` of the mesh's size, (n, dim)."""
     side = {"slave": -0.5, "master": 0.5}
     shift = np.array([side.get(body.role, 0.0) for body in solution.bodies] or [0.0])
     away = share * solution.length * mean_normal(solution)
-    points = solution.mesh.points + magnified * solution.displacement
-    return points + shift[solution.body][:, None] * away
+    return solution.mesh.points + shift[solution.body][:, None] * away
 
 
 def fit(points: np.ndarray, frame: Frame) -> Placement:
@@ -67,6 +55,23 @@ def fit(points: np.ndarray, frame: Frame) -> Placement:
         return np.stack([left + moved[..., 0], bottom - moved[..., 1]], axis=-1)
 
     return place
+
+
+def pressed_box(points: np.ndarray, zones: Sequence[ZoneResult], within: np.ndarray) -> np.ndarray:
+    """Corners (2, 2) of a square around what is pressed in zones of points (n, 2).
+
+    Cut to the extent of the points `within` (k, 2), which is all where nothing is pressed.
+    """
+    pressed = [
+        points[nodes[zone.multiplier[owner] > 0]].reshape(-1, 2)
+        for zone in zones
+        for _, nodes, owner in zone.faces
+    ]
+    found = np.concatenate([np.empty((0, 2)), *pressed])
+    found = found if len(found) else within
+    middle = (found.min(axis=0) + found.max(axis=0)) / 2
+    half = (0.5 + _AROUND) * np.ptp(found, axis=0).max()
+    return np.clip([middle - half, middle + half], within.min(axis=0), within.max(axis=0))
 
 
 def tangent(zone: ZoneResult) -> np.ndarray:

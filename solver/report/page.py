@@ -1,17 +1,19 @@
 """The pages for people: the main one, and one a family; no network is needed."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from . import stages
+from .charts import Chart
 from .html import MEANING, NORMS, TEMPLATES, render
-from .pictures import picture
-from .rows import Row, counted
+from .pictures import picture, profile
+from .rows import Row, counted, ours
 from .sections import FamilySection
 from .tables import outcome
 
 # Pages beside the report that other commands write.
-_PAGES = ("orders", "study", "stability", "gallery")
+_PAGES = ("orders", "study", "stability", "gallery", "bench")
 
 # What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
 LEFT_OUT = {
@@ -24,7 +26,7 @@ LEFT_OUT = {
 def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
     rows = [row for section in sections for row in section.rows]
-    bad = [row for row in rows if not row.sound]
+    bad = [row for row in ours(rows) if not row.sound]
     checks = {check.name: check for row in rows for check in row.verdict.checks}
     return render(
         TEMPLATES / "summary.html.jinja",
@@ -35,7 +37,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         bad=bad,
         good=bool(rows) and not bad,
         outcome=outcome(rows),
-        counts=counted(rows),
+        counts=counted(ours(rows)),
         families=sections,
         facts=_facts(rows),
         checks=[checks[name] for name in sorted(checks, key=_order)],
@@ -59,9 +61,16 @@ def family_page(section: FamilySection, folder: Path) -> str:
         norms=NORMS,
         stages=_stages(section.rows),
         picture=lambda row: picture(row, section.pictures),
+        pressure=lambda row: _pressure(row, section.pictures),
         left_out=left_out(section.rows),
         folder=folder,
     )
+
+
+def _pressure(row: Row, pictures: Path) -> Chart | str:
+    """The chart of the pressure beside the picture of a 2D solve, which does not show it."""
+    chart = profile(row, pictures) if row.dim == 2 else ""
+    return replace(chart, name=f"case-{row.name}") if isinstance(chart, Chart) else ""
 
 
 def left_out(rows: Sequence[Row]) -> list[tuple[str, str, int]]:

@@ -1,8 +1,12 @@
 """The pictures of the solves, drawn anew only where a result or the drawing has changed."""
 
+import json
 from collections.abc import Callable
+from dataclasses import asdict
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
+from urllib.parse import quote
 
 from markupsafe import Markup
 
@@ -11,27 +15,36 @@ from ..simulation.solution import Solution
 from ..system.errors import InputError
 from ..system.files import write_text
 from ..verification.results import read_result
-from .plane import draw_plane
+from . import plane, space
+from .charts import Chart
 from .profile import draw_profile
 from .rows import Row
-from .space import draw_space
 
 MOST_CELLS = 100_000
+# Width and height by the dimension of the bodies.
+SIZES = {2: (plane.WIDTH, plane.HEIGHT), 3: (space.WIDTH, space.HEIGHT)}
 
 
 def picture(row: Row, folder: Path) -> Markup:
-    """The picture of one solve, kept in `folder`; a line that says why there is none."""
-    return _kept(row, folder, "", lambda row: draw(_solution(row), row.name))
+    """The picture of one solve, a file in `folder`; a line that says why there is none."""
+    kept = _kept(row, folder, ".svg", lambda row: draw(_solution(row), row.name))
+    if isinstance(kept, Markup):
+        return kept
+    source, (width, height) = f"{folder.name}/{_name(row)}.svg", SIZES.get(row.dim, SIZES[3])
+    size = f"width={width} height={height}"
+    tag = f'<img class=mesh loading=lazy {size} src="{{}}" alt="{{}}: meshes and contact">'
+    return Markup(tag).format(quote(source), row.name)
 
 
-def profile(row: Row, folder: Path, along: Expression | None = None) -> Markup:
+def profile(row: Row, folder: Path, along: Expression | None = None) -> Chart | Markup:
     """The pressure of one solve's first zone along the interface, kept in `folder` too."""
 
-    def draw_row(row: Row) -> Markup:
-        return draw_pressure(_solution(row), row.name, along)
+    def draw_row(row: Row) -> str:
+        return json.dumps(asdict(draw_pressure(_solution(row), row.name, along)))
 
     over = f"-{sha256(along.text.encode()).hexdigest()[:8]}" if along else ""
-    return _kept(row, folder, f"-profile{over}", draw_row)
+    kept = _kept(row, folder, f"-profile{over}.json", draw_row)
+    return kept if isinstance(kept, Markup) else Chart(**json.loads(kept))
 
 
 def draw(solution: Solution, name: str) -> Markup:
@@ -39,13 +52,13 @@ def draw(solution: Solution, name: str) -> Markup:
     cells = sum(len(block.data) for block in solution.mesh.cells)
     if cells > MOST_CELLS:
         raise ValueError(f"{cells} cells are too many to draw")
-    drawn = draw_plane if solution.mesh.points.shape[1] == 2 else draw_space
+    drawn = plane.draw_plane if solution.mesh.points.shape[1] == 2 else space.draw_space
     return drawn(solution, f"{name}: meshes and contact pressure")
 
 
 def draw_pressure(
     solution: Solution, name: str, along: Expression | None = None, zone: str | None = None
-) -> Markup:
+) -> Chart:
     """The pressure of a zone, the first or the one named, along the interface.
 
     Raises ValueError where there is no such zone.
@@ -53,13 +66,14 @@ def draw_pressure(
     shown = next((z for z in solution.zones if zone in (None, z.name)), None)
     if shown is None:
         raise ValueError(f"there is no contact zone {zone}" if zone else "no contact, no pressure")
-    return draw_profile(solution, shown, f"{name}: contact pressure along the interface", along)
+    title = f"{name}: contact pressure along the interface"
+    return draw_profile(solution, shown, f"pressure-{name}", title, along)
 
 
-def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], Markup]) -> Markup:
+def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], str]) -> str:
     if row.result_file is None:
         return Markup("<p class=none>No result, no picture.</p>")
-    kept = folder / f"{row.group}-{row.folder.name}{ending}.svg"
+    kept = folder / f"{_name(row)}{ending}"
     if not is_current(kept, row.result_file):
         try:
             drawing = draw(row)
@@ -67,7 +81,11 @@ def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], Markup]) ->
             reason = f"{type(error).__name__}: {error}"
             return Markup("<p class=none>No picture: {}</p>").format(reason)
         write_text(kept, drawing)
-    return Markup(kept.read_text(encoding="utf-8"))
+    return kept.read_text(encoding="utf-8")
+
+
+def _name(row: Row) -> str:
+    return f"{row.group}-{row.folder.name}"
 
 
 def is_current(kept: Path, result: Path, *drawing: Path) -> bool:
@@ -78,4 +96,11 @@ def is_current(kept: Path, result: Path, *drawing: Path) -> bool:
 
 
 def _solution(row: Row) -> Solution:
-    return read_result(row.result_file).solution  # type: ignore[arg-type]
+    assert row.result_file is not None
+    return _read(row.result_file, row.result_file.stat().st_mtime)
+
+
+@lru_cache(maxsize=1)
+def _read(file: Path, _time: float) -> Solution:
+    """A result: picture and profile of one solve are drawn one after the other."""
+    return read_result(file).solution

@@ -1,49 +1,64 @@
-"""The picture of a 2D case: both blocks with the cut, and the pressure along each interface."""
+"""The picture of a 2D case: both blocks after the cut, and the contact enlarged beside them."""
 
 import numpy as np
 from markupsafe import Markup
 
-from ..simulation.solution import Solution, ZoneResult
-from ..verification.units import with_unit
-from .axes import Scale, draw_axes
+from ..simulation.solution import Solution
+from .charts import BLUE, MUTED, PAPER
 from .geometry import plane_cells
-from .layout import Frame, apart, edge_color, extents, fit, tangent, tint
-from .profile import expected
-from .svg import BLUE, INK, MUTED, ORANGE, PAPER, Drawing, mixed
+from .layout import Placement, apart, edge_color, fit, pressed_box, tint
+from .svg import Drawing, mixed
 
 WIDTH, HEIGHT = 760, 330
+# Where the contact is more than this share of the model, it is not enlarged.
+_LARGE = 0.5
 
 
-def draw_plane(solution: Solution, title: str, magnified: float = 0.0) -> Markup:
-    """Blocks on the left, the first zones' pressure on the right.
-
-    The blocks are moved by their displacement, `magnified` so many times.
-    """
+def draw_plane(solution: Solution, title: str) -> Markup:
+    """Blocks on the left with their names; on the right what is pressed, with its surroundings."""
     drawing = Drawing(WIDTH, HEIGHT, title)
-    room = 14 if magnified else 0
-    _blocks(drawing, solution, (4, 10, 190, HEIGHT - 20 - room), magnified)
-    if magnified:
-        drawing.text(6, HEIGHT - 4, f"displacement × {magnified:g}", color=MUTED)
-    zones = solution.zones[:3]
-    each = HEIGHT / max(1, len(zones))
-    for i, zone in enumerate(zones):
-        _interface(drawing, solution, zone, (324, i * each, WIDTH - 340, each))
+    points = apart(solution, 0.03)
+    whole = solution.mesh.points
+    low, high = pressed_box(whole, solution.zones, whole)
+    enlarged = np.ptp([low, high], axis=0).max() < _LARGE * solution.length
+    frame = (4.0, 10.0, 190.0 if enlarged else 420.0, HEIGHT - 20.0)
+    place = fit(points, frame)
+    _blocks(drawing, solution, place, points)
+    _names(drawing, solution, place(points))
+    if enlarged:
+        (x0, y1), (x1, y0) = place(np.stack([low, high]))
+        drawing.rectangle(x0, y0, x1 - x0, y1 - y0, stroke=MUTED, stroke_width=1)
+        place = fit(np.stack([low, high]), (WIDTH - 410.0, 10.0, 400.0, HEIGHT - 20.0))
+        (x0, y1), (x1, y0) = place(np.stack([low, high]))
+        with drawing.clipped(x0, y0, x1 - x0, y1 - y0):
+            _blocks(drawing, solution, place, solution.mesh.points, (low, high))
+        drawing.rectangle(x0, y0, x1 - x0, y1 - y0, stroke=MUTED, stroke_width=1)
     return drawing.svg()
 
 
-def _blocks(drawing: Drawing, solution: Solution, frame: Frame, magnified: float) -> None:
-    """The cells of every body, the bodies drawn a little apart, each with its name beside it."""
-    points = apart(solution, 0.03, magnified)
-    place = fit(points, frame)
+def _blocks(
+    drawing: Drawing,
+    solution: Solution,
+    place: Placement,
+    points: np.ndarray,
+    box: tuple[np.ndarray, np.ndarray] = (np.array(-np.inf), np.array(np.inf)),
+) -> None:
+    """The cells of every body that reach into a box, the slave's surface in blue."""
+    low, high = box
     for polygons, node in plane_cells(points, solution.mesh):
+        seen = ((polygons.max(axis=1) > low) & (polygons.min(axis=1) < high)).all(axis=1)
         for number, body in enumerate(solution.bodies):
             drawing.polygons(
-                place(polygons[solution.body[node] == number]),
+                place(polygons[seen & (solution.body[node] == number)]),
                 fill=tint(body),
                 stroke=mixed(edge_color(body), PAPER, 0.25),
                 stroke_width=0.6,
             )
-    _names(drawing, solution, place(points))
+    for zone in solution.zones:
+        for _, nodes, _ in zone.faces:
+            drawing.polygons(
+                place(points[nodes[:, :2]]), closed=False, stroke=BLUE, stroke_width=1.6
+            )
 
 
 def _names(drawing: Drawing, solution: Solution, pixels: np.ndarray) -> None:
@@ -57,93 +72,3 @@ def _names(drawing: Drawing, solution: Solution, pixels: np.ndarray) -> None:
         drawing.text(right, middle + 10, ", ".join(body.cells), color=MUTED)
         drawing.text(right, middle + 24, body.role, color=edge_color(body))
         free = middle + 46
-
-
-def _interface(drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Frame) -> None:
-    """Pressure by macro-element and surface stresses along the interface; both meshes below."""
-    left, top, width, height = frame
-    points = solution.mesh.points
-    along = tangent(zone)
-    start, end = extents(zone, points @ along)
-    master = np.unique(np.concatenate([nodes[:, :2].ravel() for _, nodes in zone.master_faces]))
-    low = min(start.min(), (points[master] @ along).min())
-    high = max(end.max(), (points[master] @ along).max())
-    means = expected(solution, zone)
-    pressures = zone.multiplier if means is None else np.concatenate([zone.multiplier, means])
-    largest = max(float(pressures.max()), 1e-300)
-    x = Scale(low, high, left, left + width)
-    y = Scale(min(0.0, float(zone.multiplier.min())), 1.25 * largest, top + height - 78, top + 36)
-    label = with_unit(f"pressure along {zone.name}", solution.case.units.get("stress"))
-    draw_axes(drawing, x, y, "", label)
-    steps = np.stack([np.stack([x(start), y(zone.multiplier)], -1)] * 2, axis=1)
-    steps[:, 1, 0] = x(end)
-    ground = np.stack([steps[:, 1], steps[:, 0]], axis=1)
-    ground[:, :, 1] = y(0.0)
-    drawing.polygons(np.concatenate([steps, ground], axis=1), fill=mixed(BLUE, PAPER, 0.8))
-    drawing.polygons(steps, closed=False, stroke=BLUE, stroke_width=2.2)
-    _reference(drawing, zone, means, x, y, along)
-    for nodes, stress, mark, color in (
-        (zone.slave_nodes, zone.stress_slave, drawing.circles, BLUE),
-        (zone.master_nodes, zone.stress_master, drawing.crosses, ORANGE),
-    ):
-        inside = (-stress >= y.low) & (-stress <= y.high)
-        at = np.column_stack([x(points[nodes] @ along), y(-stress)])[inside]
-        mark(at, 2.6, stroke=color, stroke_width=1.1)
-    _nodes_of_both(drawing, zone, points @ along, master, x, top + height - 46)
-    _legend(drawing, left, top + height - 6)
-
-
-def _reference(
-    drawing: Drawing,
-    zone: ZoneResult,
-    values: np.ndarray | None,
-    x: Scale,
-    y: Scale,
-    along: np.ndarray,
-) -> None:
-    if values is None:
-        return
-    position = zone.centre @ along
-    order = np.argsort(position)
-    position, values = position[order], values[order]
-    if np.ptp(values) == 0:  # a constant reference is drawn over the whole width
-        position, values = np.array([x.low, x.high]), values[[0, -1]]
-    line = np.column_stack([x(position), y(values)])
-    drawing.polygons(line[None], closed=False, stroke=INK, stroke_width=1, stroke_dasharray=(5, 4))
-
-
-def _nodes_of_both(
-    drawing: Drawing,
-    zone: ZoneResult,
-    position: np.ndarray,
-    master: np.ndarray,
-    x: Scale,
-    at: float,
-) -> None:
-    """Two rulers: ends of macro-elements (long), nodes of the cut (short), master nodes below."""
-    start, end = extents(zone, position)
-    inner = np.unique(np.concatenate([nodes[:, :2].ravel() for _, nodes, _ in zone.faces]))
-    for positions, low, high, color in (
-        (position[inner], 0, 6, BLUE),
-        (np.concatenate([start, end]), 0, 12, BLUE),
-        (position[master], -12, 0, ORANGE),
-    ):
-        pixels = x(np.unique(positions))
-        ends = np.stack([np.full_like(pixels, at - low), np.full_like(pixels, at - high)], -1)
-        lines = np.stack([np.stack([pixels] * 2, -1), ends], axis=-1)
-        drawing.polygons(lines, closed=False, stroke=color, stroke_width=1.2)
-    drawing.line(x.start, at, x.end, at, stroke=INK, stroke_width=0.8)
-
-
-def _legend(drawing: Drawing, x: float, y: float) -> None:
-    drawing.line(x, y - 4, x + 16, y - 4, stroke=BLUE, stroke_width=2.2)
-    drawing.text(x + 21, y, "multiplier")
-    drawing.circles(np.array([[x + 92, y - 4]]), 2.6, stroke=BLUE, stroke_width=1.1)
-    drawing.text(x + 100, y, "−σₙ slave")
-    drawing.crosses(np.array([[x + 168, y - 4]]), 2.6, stroke=ORANGE, stroke_width=1.1)
-    drawing.text(x + 176, y, "−σₙ master")
-    drawing.line(
-        x + 250, y - 4, x + 268, y - 4, stroke=INK, stroke_width=1, stroke_dasharray=(5, 4)
-    )
-    drawing.text(x + 273, y, "reference")
-    drawing.text(x + 335, y, "| nodes", color=MUTED)

@@ -1,56 +1,217 @@
-"""Contact pressure along an interface against its reference, and how far it deviates."""
+"""Contact pressure along an interface against its reference, and how far it deviates.
 
-from collections.abc import Callable
-from dataclasses import dataclass
+In 2D each macro-element's constant p is drawn over its extent, and a recovered p* as a line within
+each face; in 3D both are marks. The deviation is (p − reference) over the largest reference.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from ..case.expressions import Expression, evaluate
 from ..mechanics.fem.faces import surface_points
 from ..simulation.exact import ExactValues
-from ..simulation.solution import NodalContact, Solution, ZoneResult
+from ..simulation.solution import Solution, ZoneResult
 from ..verification.samples import expected_pressure
 from ..verification.units import with_unit
-from .axes import Scale, draw_axes
+from .charts import (
+    BLUE,
+    CROSS,
+    GREEN,
+    INK,
+    ORANGE,
+    Axis,
+    Chart,
+    Look,
+    Spec,
+    interaction,
+    series,
+    tooltip,
+)
 from .layout import extents, plan_axes, tangent
-from .svg import BLUE, INK, PAPER, Drawing, mixed
 
-WIDTH, HEIGHT = 470, 372
+CONSTANT, MEANS, NODES = "p, constant by macro-element", "means of p by face", "p at nodes"
+RECOVERED, REFERENCE = "p*, recovered", "reference"
+SLAVE, MASTER = "−σₙ, slave", "−σₙ, master"
+_LOOKS = {
+    CONSTANT: Look(BLUE),
+    MEANS: Look(BLUE),
+    NODES: Look(BLUE, "diamond"),
+    RECOVERED: Look(GREEN, "triangle-up", (5, 3)),
+    REFERENCE: Look(INK, CROSS),
+    SLAVE: Look(BLUE),
+    MASTER: Look(ORANGE, "square"),
+}
 # Where less than this share of the interface is pressed, only that and what is next to it is drawn.
-_PRESSED = 0.6
+PRESSED = 0.6
+# Cosine of the turn of the normals, over what is pressed, from which on places are arc lengths.
+_STRAIGHT = np.cos(np.radians(10))
+# Points in each face at which p* and the reference are evaluated.
+_WITHIN = np.linspace(0.0, 1.0, 5)
+# Digits of a number in a chart.
+_DIGITS = 7
+
+Place = Callable[[np.ndarray], np.ndarray]
 
 
 def draw_profile(
-    solution: Solution, zone: ZoneResult, title: str, along: Expression | None = None
-) -> Markup:
-    """The pressure of each macro-element over its place, with the reference; below, the deviation.
+    solution: Solution, zone: ZoneResult, name: str, title: str, along: Expression | None = None
+) -> Chart:
+    """The pressure of a zone over its place, with the reference; below, the deviation.
 
-    The place is the distance along the interface, or what `along` says. The deviation is taken over
-    the largest pressure of the reference. Multipliers at nodes are drawn there, over their means.
+    The place is the distance along the interface, or what `along` says. Multipliers at nodes are
+    drawn there, over their means.
     """
-    drawing = Drawing(WIDTH, HEIGHT, title)
+    units = solution.case.units
     means = expected(solution, zone)
-    elements = _elements(solution, zone, along, means)
-    nodal = np.empty(0) if zone.nodal is None else zone.nodal.multiplier
-    pressures = np.concatenate([zone.multiplier, nodal, [0.0] if means is None else means])
-    x = Scale(elements.low, elements.high, 64, WIDTH - 14)
-    low = min(0.0, float(pressures.min()))
-    y = Scale(low, 1.12 * max(float(pressures.max()), 1e-300), 290 if means is None else 196, 30)
-    pressure = with_unit("contact pressure", solution.case.units.get("stress"))
-    draw_axes(drawing, x, y, elements.name if means is None else "", pressure)
-    elements.draw(drawing, x, y, zone.multiplier)
-    if zone.nodal:
-        _draw_nodes(drawing, x, y, elements, elements.place(solution.mesh.points), zone.nodal)
+    where, place = position(solution, zone, along)
+    where = where if along else with_unit(where, units.get("length"))
+    flat = solution.mesh.points.shape[1] == 2 and along is None
+    records = _of_elements(zone, place(solution.mesh.points), place, means)
+    records += _of_nodes(solution, zone, place, flat)
+    if flat:
+        records += _within_faces(solution, zone, place)
+    elif means is not None:
+        records += _records(REFERENCE, s=place(zone.centre), p=means)
+    low, high = _range(zone, records, means)
+    records = [r for r in records if r.get("end", r["s"]) >= low and r["s"] <= high]
+    x = Axis("s", where, domain=(low, high))
+    pressure = Axis("p", with_unit("contact pressure", units.get("stress")), zero=True)
+    looks = _looks(records, flat)
+    views = [_view(records, x, pressure, looks, flat, 170, first=True)]
     if means is not None:
-        _draw_reference(drawing, x, y, elements, means, _curve(solution, zone))
-        deviation = (zone.multiplier - means) / (np.abs(means).max() or 1.0)
-        most = 1.25 * max(float(np.abs(deviation[elements.shown]).max(initial=0.0)), 1e-17)
-        below = Scale(-most, most, 302, 242)
-        draw_axes(drawing, x, below, elements.name, "deviation, over the largest reference")
-        elements.draw(drawing, x, below, deviation)
-    _draw_legend(drawing, elements.steps, zone.nodal is not None, means is not None)
-    return drawing.svg()
+        most = max((abs(r["deviation"]) for r in records if "deviation" in r), default=0.0)
+        most = 1.25 * max(most, 1e-17)
+        relative = Axis("deviation", "Δp / max p", domain=(-most, most))
+        of_means = [r for r in records if "deviation" in r]
+        views.append(_view(of_means, x, relative, looks, flat, 70))
+    shared = {"scale": {"x": "shared"}}
+    spec = {"data": {"values": records}, "vconcat": views, "resolve": shared}
+    return Chart(name, title, spec, 520)
+
+
+def _looks(records: Sequence[Any], flat: bool) -> dict[str, Look]:
+    """The looks of the series found; in the legend, what is drawn as a line is one."""
+    found = {record["series"] for record in records}
+    looks = {name: look for name, look in _LOOKS.items() if name in found}
+    lines = (CONSTANT, MEANS, RECOVERED, REFERENCE) if flat else ()
+    return looks | {n: replace(looks[n], shape="stroke") for n in lines if n in found}
+
+
+def _view(
+    records: Sequence[Any],
+    x: Axis,
+    y: Axis,
+    looks: Mapping[str, Look],
+    flat: bool,
+    height: int,
+    first: bool = False,
+) -> Spec:
+    """One view: steps and lines where the interface is a line, else marks."""
+    found = list(dict.fromkeys(record["series"] for record in records))
+    lines = [name for name in (REFERENCE, NODES, RECOVERED) if name in found and flat]
+    steps = [name for name in (CONSTANT, MEANS) if name in found and flat]
+    channels = series(looks)
+    shape, _ = channels.pop("shape"), channels.pop("strokeDash")
+    shared = {"x": x.channel(), "y": y.channel()} | channels
+    shared["y"]["axis"]["tickCount"] = max(4, height // 35)
+    titles = {"series": "series", "number": "macro-element", x.field: x.title, y.field: y.title}
+    tips = {"tooltip": tooltip(records, titles)}
+    layers: list[Spec] = []
+    if steps:
+        rule = {"type": "rule", "strokeWidth": 2.5, "clip": True}
+        channels = shared | {"x2": {"field": "end"}} | tips
+        layers.append({"mark": rule, "encoding": channels} | _only(steps))
+    order = {"detail": {"field": "face", "type": "nominal"}}
+    for name in lines:
+        line = {"type": "line", "strokeWidth": 1.6, "strokeDash": looks[name].dashes, "clip": True}
+        layers.append({"mark": line, "encoding": shared | order} | _only([name]))
+    marks = [name for name in found if name not in steps]
+    size = {"type": "point", "strokeWidth": 1.3, "size": 22, "clip": True}
+    shown = [name for name in marks if name not in (RECOVERED, REFERENCE) or not flat]
+    point = {"mark": size, "encoding": shared | {"shape": shape} | tips} | _only(shown)
+    layers.append(point | {"params": interaction()} if first else point)
+    return {"width": 400, "height": height, "layer": layers}
+
+
+def _only(names: Sequence[str]) -> Spec:
+    return {"transform": [{"filter": {"field": "series", "oneOf": list(names)}}]}
+
+
+def _records(name: str, **columns: np.ndarray) -> list[dict[str, Any]]:
+    """A record for each entry of the columns (n,), all of one series."""
+    plain = [
+        c.tolist() if c.dtype.kind in "iu" else [float(f"{v:.{_DIGITS}g}") for v in c.tolist()]
+        for c in columns.values()
+    ]
+    return [
+        {"series": name, **dict(zip(columns, r, strict=True))} for r in zip(*plain, strict=True)
+    ]
+
+
+def _of_elements(
+    zone: ZoneResult, position: np.ndarray, place: Place, means: np.ndarray | None
+) -> list[dict[str, Any]]:
+    """The pressure of every macro-element: over its extent in 2D, else at its centre."""
+    numbers = np.arange(len(zone.centre))
+    columns = {"number": numbers, "p": zone.multiplier}
+    if means is not None:
+        columns["deviation"] = (zone.multiplier - means) / (np.abs(means).max() or 1.0)
+    if zone.centre.shape[1] == 2:
+        start, end = extents(zone, position)
+        columns |= {"s": start, "end": end}
+    else:
+        columns["s"] = place(zone.centre)
+    return _records(MEANS if zone.nodal else CONSTANT, **columns)
+
+
+def _of_nodes(
+    solution: Solution, zone: ZoneResult, place: Place, flat: bool
+) -> list[dict[str, Any]]:
+    """What belongs to nodes: multipliers, p* in 3D, and in 2D the stress on both surfaces."""
+    given = []
+    if zone.nodal:
+        given.append((NODES, zone.nodal.nodes, zone.nodal.multiplier))
+    if zone.recovered and not flat:
+        given.append((RECOVERED, zone.recovered.nodes, zone.recovered.at_nodes))
+    if flat:
+        given.append((SLAVE, zone.slave_nodes, -zone.stress_slave))
+        given.append((MASTER, zone.master_nodes, -zone.stress_master))
+    points, found = solution.mesh.points, []
+    for name, nodes, values in given:
+        found += _records(name, s=place(points[nodes]), p=values)
+    return found
+
+
+def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[dict[str, Any]]:
+    """Along the faces of an interface in the plane: p* by face, and the reference."""
+    points, found, first = solution.mesh.points, [], 0
+    for _, nodes, owner in zone.faces:
+        ends = points[nodes[:, :2]]
+        where = ends[:, :1] + _WITHIN[:, None] * (ends[:, 1:] - ends[:, :1])
+        at = np.sort(place(where.reshape(-1, 2)).reshape(where.shape[:2]), axis=1)
+        if zone.recovered:
+            values = zone.recovered.values(zone.multiplier, owner, where)
+            order = np.argsort(place(where.reshape(-1, 2)).reshape(where.shape[:2]), axis=1)
+            values = np.take_along_axis(values, order, axis=1)
+            closed = zone.closed[owner]
+            face = np.repeat(first + np.arange(len(nodes))[closed], len(_WITHIN))
+            found += _records(RECOVERED, s=at[closed].ravel(), p=values[closed].ravel(), face=face)
+        first += len(nodes)
+    reference = _reference(solution)
+    if reference is not None:
+        where = surface_points(points, zone.faces).place
+        if isinstance(reference, ExactValues):
+            values = reference.exact.contact_pressure(where)
+        else:
+            values = evaluate(reference, where)
+        at = place(where)
+        order = np.argsort(at, kind="stable")[:: max(1, len(at) // 400)]
+        found += _records(REFERENCE, s=at[order], p=values[order])
+    return found
 
 
 def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
@@ -60,7 +221,7 @@ def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
 
 
 def _reference(solution: Solution) -> float | Expression | ExactValues | None:
-    """What tells the right pressure, be it checked or not."""
+    """The reference pressure, checked or not."""
     given, exact = solution.case.reference.get("contact_pressure"), solution.case.solution
     if isinstance(given, float | Expression):
         return given
@@ -69,143 +230,77 @@ def _reference(solution: Solution) -> float | Expression | ExactValues | None:
     return None
 
 
-def _curve(solution: Solution, zone: ZoneResult) -> tuple[np.ndarray, np.ndarray]:
-    """Places (k, dim) all over the slave surface, and the reference's pressure (k,) there."""
-    place = surface_points(solution.mesh.points, zone.faces).place
-    reference = _reference(solution)
-    if isinstance(reference, ExactValues):
-        return place, reference.exact.contact_pressure(place)
-    return place, evaluate(reference, place)  # type: ignore[arg-type]
-
-
-@dataclass(frozen=True)
-class _Elements:
-    """Where the macro-elements of a zone are drawn: from `first` to `last` (m,), `centre` (m,).
-
-    `place` gives the position (n,) of points (n, dim); `shown` (m,) are those between `low` and
-    `high`; `steps` says whether an element is drawn over its extent, or as a mark at its centre.
-    """
-
-    name: str
-    place: Callable[[np.ndarray], np.ndarray]
-    first: np.ndarray
-    last: np.ndarray
-    centre: np.ndarray
-    low: float
-    high: float
-    steps: bool
-
-    @property
-    def shown(self) -> np.ndarray:
-        """Which macro-elements (m,) are drawn: partly within, or as marks centred within."""
-        first, last = (self.first, self.last) if self.steps else (self.centre, self.centre)
-        return (last >= self.low) & (first <= self.high)
-
-    def draw(self, drawing: Drawing, x: Scale, y: Scale, values: np.ndarray) -> None:
-        """One value (m,) of each macro-element."""
-        values, centre = values[self.shown], self.centre[self.shown]
-        if not self.steps:
-            at = np.column_stack([x(centre), y(values)])
-            drawing.circles(at, 2.6, stroke=BLUE, stroke_width=1.2)
-            return
-        ends = [np.clip(e[self.shown], self.low, self.high) for e in (self.first, self.last)]
-        lines = np.stack([np.stack([x(end), y(values)], axis=-1) for end in ends], axis=1)
-        ground = lines[:, ::-1].copy()
-        ground[:, :, 1] = y(0.0)
-        drawing.polygons(np.concatenate([lines, ground], axis=1), fill=mixed(BLUE, PAPER, 0.85))
-        drawing.polygons(lines, closed=False, stroke=BLUE, stroke_width=2)
-
-
-def _elements(
-    solution: Solution, zone: ZoneResult, along: Expression | None, means: np.ndarray | None
-) -> _Elements:
-    points = solution.mesh.points
-    name, place = _position(zone, along)
-    if along is None:
-        name = with_unit(name, solution.case.units.get("length"))
-    first, last = extents(zone, place(points))
-    pressed = (zone.multiplier > 0) | (means is not None and np.asarray(means) > 0)
-    low, high = _range(first, last, pressed)
-    steps = points.shape[1] == 2 and along is None
-    return _Elements(name, place, first, last, place(zone.centre), low, high, steps)
-
-
-def _position(
-    zone: ZoneResult, along: Expression | None
-) -> tuple[str, Callable[[np.ndarray], np.ndarray]]:
+def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:
     """What the pressure is drawn over: its name, and its value (n,) at points (n, dim)."""
     if along is not None:
-        return along.text, along
+        return mathematics(along.text), along
     if zone.centre.shape[1] == 3:
         (direction, _), (name, _) = plan_axes(zone)
-    else:
-        direction = tangent(zone)
-        name = next(("xy"[i] for i in (0, 1) if direction[i] > 1 - 1e-9), "along the interface")
+        return name, lambda points: points @ direction
+    normals = zone.normal[zone.multiplier > 0]
+    if len(normals) and (normals @ normals.T).min() < _STRAIGHT:
+        return "arc length s", Arc.of(solution.mesh.points, zone)
+    direction = tangent(zone)
+    name = next(("xy"[i] for i in (0, 1) if direction[i] > 1 - 1e-9), "s along the interface")
     return name, lambda points: points @ direction
 
 
-def _range(first: np.ndarray, last: np.ndarray, pressed: np.ndarray) -> tuple[float, float]:
+@dataclass(frozen=True)
+class Arc:
+    """The arc length along slave faces in the plane: `ends` (f, 2, 2), its `start` (f,) on each."""
+
+    ends: np.ndarray
+    start: np.ndarray
+
+    @classmethod
+    def of(cls, points: np.ndarray, zone: ZoneResult) -> "Arc":
+        """Faces one after another, from an end of the interface or, on a ring, from any face."""
+        pairs = np.concatenate([nodes[:, :2] for _, nodes, _ in zone.faces])
+        after = {int(a): i for i, (a, _) in enumerate(pairs)}
+        firsts = [*(after.keys() - set(pairs[:, 1].tolist())), *after]
+        chain: list[int] = []
+        seen: set[int] = set()
+        for first in firsts:
+            node = first
+            while (face := after.get(node)) is not None and face not in seen:
+                seen.add(face)
+                chain.append(face)
+                node = int(pairs[face, 1])
+        ends = points[pairs[chain]]
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return cls(ends, np.concatenate([[0.0], np.cumsum(lengths)[:-1]]))
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """The arc length (n,) of the places on the faces that are next to points (n, 2)."""
+        first, edge = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
+        away = points[:, None] - first
+        share = np.clip((away * edge).sum(-1) / (edge**2).sum(-1), 0.0, 1.0)
+        distance = np.linalg.norm(away - share[..., None] * edge, axis=-1)
+        nearest = distance.argmin(axis=1)
+        length = np.linalg.norm(edge, axis=1)[nearest]
+        return self.start[nearest] + share[np.arange(len(points)), nearest] * length
+
+
+def mathematics(text: str) -> str:
+    """An expression of a case file as people write it: `sqrt(x**2)` is √(x²)."""
+    text = re.sub(r"\*\*(\d)(?!\d)", lambda m: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(m[1])], text)
+    for code, sign in (("sqrt", "√"), ("pi", "π"), ("**", "^"), ("*", "·"), ("-", "−")):
+        text = text.replace(code, sign)
+    return text
+
+
+def _range(
+    zone: ZoneResult, records: Sequence[dict[str, Any]], means: np.ndarray | None
+) -> tuple[float, float]:
     """The part of the interface that is drawn: all, or where little is pressed, that and some."""
+    elements = [record for record in records if "number" in record]
+    first = np.array([record["s"] for record in elements])
+    last = np.array([record.get("end", record["s"]) for record in elements])
+    pressed = (zone.multiplier > 0) | (means is not None and np.asarray(means) > 0)
     low, high = float(first.min()), float(last.max())
     if pressed.any():
         start, end = float(first[pressed].min()), float(last[pressed].max())
-        if end - start < _PRESSED * (high - low):
+        if end - start < PRESSED * (high - low):
             more = 0.25 * (end - start)
             low, high = max(low, start - more), min(high, end + more)
     return (low, high) if high > low else (low - 0.5, high + 0.5)
-
-
-def _draw_nodes(
-    drawing: Drawing,
-    x: Scale,
-    y: Scale,
-    elements: _Elements,
-    position: np.ndarray,
-    nodal: NodalContact,
-) -> None:
-    """The multipliers at their nodes, in the plane joined by the lines between them."""
-    place = position[nodal.nodes]
-    order = np.argsort(place, kind="stable")
-    order = order[(place[order] >= elements.low) & (place[order] <= elements.high)]
-    at = np.column_stack([x(place[order]), y(nodal.multiplier[order])])
-    if elements.steps:
-        drawing.polygons(at[None], closed=False, stroke=BLUE, stroke_width=1)
-    drawing.circles(at, 1.8, fill=BLUE, stroke=BLUE, stroke_width=0.5)
-
-
-def _draw_reference(
-    drawing: Drawing,
-    x: Scale,
-    y: Scale,
-    elements: _Elements,
-    means: np.ndarray,
-    curve: tuple[np.ndarray, np.ndarray],
-) -> None:
-    """A curve over steps; over marks, a cross for each macro-element."""
-    if not elements.steps:
-        shown = elements.shown
-        at = np.column_stack([x(elements.centre[shown]), y(means[shown])])
-        drawing.crosses(at, 2.2, stroke=INK, stroke_width=0.9)
-        return
-    position, values = elements.place(curve[0]), curve[1]
-    order = np.argsort(position, kind="stable")
-    order = order[(position[order] >= elements.low) & (position[order] <= elements.high)]
-    line = np.column_stack([x(position[order]), y(values[order])])
-    drawing.polygons(line[None], closed=False, stroke=INK, stroke_width=1.1)
-
-
-def _draw_legend(drawing: Drawing, steps: bool, nodal: bool, reference: bool) -> None:
-    left, base = 64.0, HEIGHT - 12.0
-    if steps:
-        drawing.line(left, base - 4, left + 16, base - 4, stroke=BLUE, stroke_width=2)
-    else:
-        drawing.circles(np.array([[left + 8, base - 4]]), 2.6, stroke=BLUE, stroke_width=1.2)
-    computed = "computed at nodes (dots), means of faces" if nodal else ""
-    drawing.text(left + 22, base, computed or "computed, one constant per macro-element")
-    if reference:
-        at = left + 290
-        if steps:
-            drawing.line(at, base - 4, at + 16, base - 4, stroke=INK, stroke_width=1.1)
-        else:
-            drawing.crosses(np.array([[at + 8, base - 4]]), 2.2, stroke=INK, stroke_width=0.9)
-        drawing.text(at + 22, base, "reference")

@@ -26,6 +26,12 @@ class Row:
         return self.verdict.job
 
     @property
+    def case(self) -> str:
+        """The name of the solve without that of the code."""
+        code = self.verdict.code
+        return self.name.removesuffix(f"@{code}") if code else self.name
+
+    @property
     def group(self) -> str:
         """The family's name."""
         return self.verdict.family
@@ -54,10 +60,15 @@ class Row:
         return "".join(c if c.isprintable() else "�" for c in reason)
 
     @cached_property
-    def result_file(self) -> Path | None:
-        """The result file, if there is one."""
+    def stored(self) -> Path | None:
+        """The file with the fields, if there is one."""
         path = self.folder / self.verdict.result if self.verdict.result else None
         return path if path and path.is_file() else None
+
+    @property
+    def result_file(self) -> Path | None:
+        """The result of a solve of ours, which pictures can be drawn of."""
+        return None if self.verdict.code else self.stored
 
     def errors(self, names: Iterable[str]) -> list[tuple[float, str]]:
         """Errors of the checks of these names, largest first, with the checks' names."""
@@ -92,7 +103,7 @@ class Row:
 
     def files(self, folder: Path) -> list[tuple[str, str]]:
         """The files in the solve's folder: names, and paths relative to `folder`."""
-        found = {"result": self.result_file, "verdict": self.folder / "verdict.json"}
+        found = {"result": self.stored, "verdict": self.folder / "verdict.json"}
         found["log"] = self.folder / "log"
         return [
             (name, os.path.relpath(path, folder))
@@ -156,6 +167,11 @@ def _read(path: Path) -> Verdict:
     *_, family, job = ("", "", *path.absolute().parts[:-1])
     reason = f"{fault}; solve again"
     return Verdict(case=job, family=family, job=job, verdict=CRASHED, reason=reason, transient=True)
+
+
+def ours(rows: Sequence[Row]) -> list[Row]:
+    """The solves of our own; where there are none, all."""
+    return [row for row in rows if not row.verdict.code] or list(rows)
 
 
 def families(rows: Sequence[Row]) -> dict[str, list[Row]]:

@@ -13,7 +13,7 @@ from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
 from .html import KINDS, NORMS
 from .pictures import profile
-from .rows import Row, families
+from .rows import Row, families, ours
 from .tables import outcome
 
 # Profiles on a page where the family does not say which.
@@ -25,7 +25,7 @@ class Profile:
     """The pressure of one solve along its interface."""
 
     row: Row
-    drawing: Markup
+    drawing: Chart | Markup
     caption: str
 
 
@@ -55,8 +55,8 @@ class FamilySection:
 
     @cached_property
     def bad(self) -> list[Row]:
-        """The rows that did not pass."""
-        return [row for row in self.rows if not row.sound]
+        """The solves of our own that did not pass."""
+        return [row for row in ours(self.rows) if not row.sound]
 
     @property
     def counted(self) -> bool:
@@ -79,14 +79,15 @@ class FamilySection:
         """Rows by where their reference comes from, in words."""
         found: dict[str, list[Row]] = {}
         for row in self.rows:
-            found.setdefault(row.origin(KINDS), []).append(row)
+            other = "; results of other codes" if row.verdict.code else ""
+            found.setdefault(f"{row.origin(KINDS)}{other}", []).append(row)
         return found
 
     @cached_property
     def origins(self) -> dict[tuple[str, str, str, float | None], list[Row]]:
         """Rows by kind, origin in words, exact solution and uncertainty of their reference."""
         found: dict[tuple[str, str, str, float | None], list[Row]] = {}
-        for row in self.rows:
+        for row in ours(self.rows):
             key = (
                 row.verdict.reference_kind or "",
                 row.origin(KINDS),

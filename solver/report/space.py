@@ -1,4 +1,6 @@
-"""The picture of a 3D case: the blocks seen from the slave's side, and the interface in plan."""
+"""The picture of a 3D case: the blocks from the slave's side, pressure and deviation in plan."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from markupsafe import Markup
@@ -6,6 +8,7 @@ from markupsafe import Markup
 from ..mesh.catalogue import cell_type
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
+from .charts import BLUE, INK, MUTED, PAPER
 from .geometry import boundary_faces, macro_edges, normals, outlines
 from .layout import (
     Frame,
@@ -15,30 +18,37 @@ from .layout import (
     fit,
     mean_normal,
     plan_axes,
+    pressed_box,
     tint,
 )
-from .svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
+from .profile import expected
+from .svg import Drawing, mixed
 
-WIDTH, HEIGHT = 760, 400
+WIDTH, HEIGHT = 960, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
 # From no pressure to the largest, light to dark: told apart by lightness alone.
 PRESSURE = ("#f3f6fa", "#cfe1ee", "#9cc3dc", "#5f9dc6", "#2f75a8", "#174f7c")
 LEVELS = 32
 MASTER = "#ffa45c"  # readable on every pressure
+# From too little to too much.
+DEVIATION = ("#b35806", "#f1a340", "#fee0b6", "#f7f7f7", "#d8daeb", "#998ec3", "#542788")
 
 
-def draw_space(solution: Solution, title: str, magnified: float = 0.0) -> Markup:
-    """Axonometric view on the left, plan of the first zone on the right.
-
-    In the view points are moved by their displacement, `magnified` so many times.
-    """
+def draw_space(solution: Solution, title: str) -> Markup:
+    """Axonometric view on the left, plan of the first zone on the right."""
     drawing = Drawing(WIDTH, HEIGHT, title)
-    room = 10 if magnified else 0
-    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24 - room), magnified)
-    if magnified:
-        drawing.text(6, HEIGHT - 4, f"displacement × {magnified:g}", color=MUTED)
+    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24))
     if solution.zones:
-        _plan(drawing, solution, solution.zones[0], (420, 40, 240, HEIGHT - 110))
+        zone = solution.zones[0]
+        largest, unit = max(float(zone.multiplier.max()), 1e-300), solution.case.units.get("stress")
+        label = with_unit(f"p on {zone.name}", unit)
+        _plan(drawing, solution, zone, 400, label, zone.multiplier, (0.0, largest), PRESSURE)
+        means = expected(solution, zone)
+        if means is not None:
+            off = (zone.multiplier - means) / (np.abs(means).max() or 1.0)
+            most = max(float(np.abs(off).max()), 1e-17)
+            _plan(drawing, solution, zone, 690, "Δp / max p", off, (-most, most), DEVIATION)
+        _legend(drawing, zone, (400, HEIGHT - 32))
     return drawing.svg()
 
 
@@ -55,9 +65,9 @@ def _camera(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([right, np.cross(eye, right)]), eye
 
 
-def _blocks(drawing: Drawing, solution: Solution, frame: Frame, magnified: float) -> None:
+def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     """The faces turned to the eye, from far to near, the bodies drawn apart."""
-    points = apart(solution, 0.3, magnified)
+    points = apart(solution, 0.3)
     screen, eye = _camera(solution)
     place = fit(points @ screen.T, frame)
     numbers = range(len(solution.bodies))
@@ -105,33 +115,48 @@ def _macro_outlines(
         drawing.polygons(place(points[edges]), closed=False, stroke=BLUE, stroke_width=1.3)
 
 
-def _plan(drawing: Drawing, solution: Solution, zone: ZoneResult, frame: Frame) -> None:
-    """Slave sub-faces coloured by pressure, macro-elements and master faces in outline."""
+def _plan(
+    drawing: Drawing,
+    solution: Solution,
+    zone: ZoneResult,
+    left: float,
+    label: str,
+    values: np.ndarray,
+    limits: tuple[float, float],
+    colors: Sequence[str],
+) -> None:
+    """What is pressed: sub-faces coloured by a value (m,), macro-elements and master in outline."""
     axes, names = plan_axes(zone)
-    units = solution.case.units
     flat = solution.mesh.points @ axes.T
     used = np.concatenate([nodes.ravel() for _, nodes, _ in zone.faces])
-    place = fit(flat[used], frame)
-    largest = max(float(zone.multiplier.max()), 1e-300)
-    share = np.clip(zone.multiplier / largest, 0.0, 1.0)
+    box = pressed_box(flat, [zone], flat[used])
+    place = fit(box, (left, 40, 200, HEIGHT - 120))
+    (x0, y1), (x1, y0) = place(box)
+    share = np.clip((values - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
     level = np.rint(share * LEVELS).astype(int)
-    for kind, nodes, owner in zone.faces:
-        polygons = place(outlines(flat, kind, nodes))
-        for value in np.unique(level[owner]):
-            fill = pressure_color(value / LEVELS)
-            drawing.polygons(
-                polygons[level[owner] == value], fill=fill, stroke=PAPER, stroke_width=0.5
-            )
-    edges = place(flat[macro_edges(zone.faces)[:, :2]])
-    drawing.polygons(edges, closed=False, stroke=PAPER, stroke_width=1.8)
-    for kind, nodes in zone.master_faces:
-        drawing.polygons(place(outlines(flat, kind, nodes)), stroke=MASTER, stroke_width=1)
-    low, high = place(flat[used]).min(axis=0), place(flat[used]).max(axis=0)
-    label = f"{zone.name} in plan: pressure on the slave"
-    drawing.text(low[0], low[1] - 10, with_unit(label, units.get("stress")))
-    _ends(drawing, low, high, flat[used], (with_unit(names[0], units.get("length")), names[1]))
-    _color_bar(drawing, largest, (high[0] + 16, low[1], 12, high[1] - low[1]))
-    _legend(drawing, zone, (low[0], high[1] + 38))
+    with drawing.clipped(x0, y0, x1 - x0, y1 - y0):
+        for kind, nodes, owner in zone.faces:
+            ring = outlines(flat, kind, nodes)
+            seen = ((ring.max(axis=1) > box[0]) & (ring.min(axis=1) < box[1])).all(axis=1)
+            for value in np.unique(level[owner[seen]]):
+                drawing.polygons(
+                    place(ring[seen & (level[owner] == value)]),
+                    fill=shade(value / LEVELS, colors),
+                    stroke=PAPER,
+                    stroke_width=0.4,
+                )
+        edges = place(flat[macro_edges(zone.faces)[:, :2]])
+        drawing.polygons(edges, closed=False, stroke=PAPER, stroke_width=1.6)
+        for kind, nodes in zone.master_faces:
+            ring = outlines(flat, kind, nodes)
+            seen = ((ring.max(axis=1) > box[0]) & (ring.min(axis=1) < box[1])).all(axis=1)
+            drawing.polygons(place(ring[seen]), stroke=MASTER, stroke_width=0.8)
+    drawing.text(x0, y0 - 10, label)
+    unit = solution.case.units.get("length")
+    _ends(
+        drawing, np.array([x0, y0]), np.array([x1, y1]), box, (with_unit(names[0], unit), names[1])
+    )
+    _color_bar(drawing, limits, colors, (x1 + 10, y0, 10, y1 - y0))
 
 
 def _ends(
@@ -148,22 +173,23 @@ def _ends(
     drawing.text(low[0] - 7, low[1] + 9, f"{last[1]:.4g}", "end", color=MUTED)
 
 
-def pressure_color(share: float) -> str:
-    """The colour of a pressure, `share` of the largest one."""
-    position = share * (len(PRESSURE) - 1)
-    k = min(int(position), len(PRESSURE) - 2)
-    return mixed(PRESSURE[k], PRESSURE[k + 1], position - k)
+def shade(share: float, colors: Sequence[str] = PRESSURE) -> str:
+    """The colour between the first and the last, `share` of the way."""
+    position = share * (len(colors) - 1)
+    k = min(int(position), len(colors) - 2)
+    return mixed(colors[k], colors[k + 1], position - k)
 
 
-def _color_bar(drawing: Drawing, largest: float, frame: Frame) -> None:
+def _color_bar(
+    drawing: Drawing, limits: tuple[float, float], colors: Sequence[str], frame: Frame
+) -> None:
     x, y, width, height = frame
     step = height / LEVELS
     for k in range(LEVELS):
-        fill = pressure_color((LEVELS - k - 0.5) / LEVELS)
+        fill = shade((LEVELS - k - 0.5) / LEVELS, colors)
         drawing.rectangle(x, y + k * step, width, step + 0.3, fill=fill)
-    drawing.rectangle(x, y, width, height, stroke=MUTED, stroke_width=0.6)
-    drawing.text(x + width + 5, y + 9, f"{largest:.4g}")
-    drawing.text(x + width + 5, y + height, "0")
+    drawing.text(x + width + 4, y + 9, f"{limits[1]:.3g}")
+    drawing.text(x + width + 4, y + height, f"{limits[0]:.3g}")
 
 
 def _legend(drawing: Drawing, zone: ZoneResult, corner: tuple[float, float]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..verification.verdict import to_json as strict_json
 from . import formats
-from .rows import Row, counted, families
+from .rows import Row, counted, families, ours
 
 _HEAD = (
     "case",
@@ -96,7 +96,7 @@ def _plain(value: Any) -> str:
 def to_markdown(rows: Sequence[Row]) -> str:
     """The outcome, the failures with their reasons, and a table for each family."""
     parts = [f"# Verification of contact solves\n\n{outcome(rows)}\n"]
-    bad = [row for row in rows if not row.sound]
+    bad = [row for row in ours(rows) if not row.sound]
     if bad:
         parts.append("\n## Not passed\n")
         parts += [f"- **{md(row.name)}** {row.word}: {md(row.why)}" for row in bad]
@@ -141,14 +141,23 @@ def md(text: str) -> str:
 
 
 def to_failures(rows: Sequence[Row]) -> str:
-    """One line for each solve that did not pass: name, verdict, reason; empty if all did."""
-    return "".join(f"{row.name}: {row.word}: {row.why}\n" for row in rows if not row.sound)
+    """One line for each solve that did not pass: name, verdict, reason; empty if all did.
+
+    Other codes are shown in the tables; they fail no batch of ours.
+    """
+    bad = (row for row in rows if not row.sound and not row.verdict.code)
+    return "".join(f"{row.name}: {row.word}: {row.why}\n" for row in bad)
 
 
 def outcome(rows: Sequence[Row]) -> str:
-    """The batch in one line."""
-    counts = counted(rows)
-    if set(counts) == {"passed"}:
-        return f"All {len(rows)} solves passed." if len(rows) > 1 else "The one solve passed."
+    """The batch in one line; results of other codes are counted apart."""
+    mine = ours(rows)
+    counts, others = counted(mine), len(rows) - len(mine)
     words = ", ".join(f"{n} {word}" for word, n in counts.items())
-    return f"{len(rows)} solves: {words or 'none at all'}."
+    said = f"{len(mine)} solves: {words or 'none at all'}."
+    if set(counts) == {"passed"}:
+        said = f"All {len(mine)} solves passed." if len(mine) > 1 else "The one solve passed."
+    if not others:
+        return said
+    good = sum(row.sound for row in rows if row.verdict.code)
+    return f"{said} Of {others} results of other codes {good} passed."

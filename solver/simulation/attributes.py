@@ -66,6 +66,7 @@ class Attributes:
     ):
         self.case, self.mesh, self.cut = case, mesh, cut_mesh
         self.points, self.origin, self.zones = cut_mesh.points, origin, zones
+        self.axisymmetric = case.axisymmetric
 
     def whole_cell_mask(self, group: str) -> dict[str, np.ndarray]:
         """Which volume cells (n,) of each type, as meshed, belong to a group."""
@@ -160,15 +161,16 @@ class Attributes:
         Cells of rigid bodies, which need no material, get a unit one. Without `mixed_form` none is
         in it, whatever the case says; `plain`: cells with straight edges have plain quadrature.
         """
-        young = self._by_material(lambda m: m.young, 1.0)
-        poisson = self._by_material(lambda m: m.poisson, 0.0)
-        mixed = self._by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
+        young = self.by_material(lambda m: m.young, 1.0)
+        poisson = self.by_material(lambda m: m.poisson, 0.0)
+        mixed = self.by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
         blocks = [
             Block(
                 BY_NAME[name],
                 cells,
                 *lame_parameters(young[name], poisson[name]),
                 plain and bool(has_straight_edges(BY_NAME[name], self.points[cells]).all()),
+                self.axisymmetric,
             )
             for name, cells in self.cut.cells.items()
         ]
@@ -183,10 +185,13 @@ class Attributes:
             [self.cut.members(name, meshed) for name in self.cut.cells],
         )
 
-    def _by_material(
+    def by_material(
         self, value: Callable[[Material], float], otherwise: float
     ) -> dict[str, np.ndarray]:
-        """A value of the material of each cell (n,) by type; a group's own goes before `all`."""
+        """A value of the material of each cell (n,) by type; a group's own goes before `all`.
+
+        `otherwise`: that of cells without a material, which belong to rigid bodies.
+        """
         materials = self.case.materials
         start = value(materials[ALL]) if ALL in materials else otherwise
         values = {name: np.full(len(c), float(start)) for name, c in self.cut.cells.items()}
@@ -215,6 +220,10 @@ class Attributes:
         fixed = dict(self._fixed())
         self._refuse_moved(fixed)
         dim = self.points.shape[1]
+        on_axis = np.flatnonzero(self.points[:, 0] == 0) if self.axisymmetric else np.empty(0, int)
+        # The circles of points on the axis have no radius, and keep it.
+        held = Fixed(on_axis, np.tile(np.eye(dim)[0], (len(on_axis), 1)), np.zeros(len(on_axis)))
+        fixed = {"plane": held, **fixed}
         for group in sorted(self.case.rigid):
             nodes = self.nodes(group, f"bodies.{group}")
             for name, axis in zip("xyz", np.eye(dim), strict=False):
@@ -224,7 +233,8 @@ class Attributes:
             return free_motion(len(self.points), dim, list(fixed.values()))
         except SupportClashError as clash:
             key = list(fixed)[clash.number]
-            raise InputError(self.case.path, key, clash.value, str(clash)) from None
+            told = " (on the axis x is fixed)" if len(on_axis) else ""
+            raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:
         """What supports hold, by the key of the case file."""
@@ -278,10 +288,11 @@ class Attributes:
                 for part, mine in self.by_part(nodes):
                     total += self._exact_force(load.kind, name, mine, part)
             elif load.kind == "body_force":
-                total += body_forces(self.points, nodes, name, self.field(load.value))
+                field = self.field(load.value)
+                total += body_forces(self.points, nodes, name, field, self.axisymmetric)
             else:
-                pressure = load.kind == "pressure"
-                total += face_forces(self.points, nodes, name, self.field(load.value), pressure)
+                pressure, field = load.kind == "pressure", self.field(load.value)
+                total += face_forces(self.points, nodes, name, field, pressure, self.axisymmetric)
         return total
 
     def _loaded(self, load: Load, key: str) -> list[tuple[str, np.ndarray]]:
@@ -298,7 +309,11 @@ class Attributes:
         exact, origin = self._exact, self.origin
         if kind == "body_force":
             return body_forces(
-                self.points, nodes, name, lambda local: exact.body_force(local + origin, part)
+                self.points,
+                nodes,
+                name,
+                lambda local: exact.body_force(local + origin, part),
+                self.axisymmetric,
             )
         return stress_forces(
             self.points,
@@ -306,6 +321,7 @@ class Attributes:
             name,
             lambda local: exact.stress(local + origin, part),
             kind == "pressure",
+            self.axisymmetric,
         )
 
 

@@ -18,9 +18,10 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     """Relative imbalances by name.
 
     Forces are divided by the sum of the sizes of the nodal forces at work (loads, or contact forces
-    where there is no load), moments by that times the length of the model.
+    where there is no load), moments by that times the length of the model. Of axisymmetric bodies
+    only forces along the axis have a resultant.
     """
-    points = scene.points
+    points, around = scene.points, scene.case.axisymmetric
     contact = np.zeros_like(points)
     by_zone = {}
     for zone in scene.zones:
@@ -33,20 +34,23 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         by_zone["correction of the pressure"] = state.correction
         contact += state.correction
     for name, forces in by_zone.items():
-        result |= _both(f"zone {name}", points, forces, scale, scene.length)
+        result |= _both(f"zone {name}", points, forces, scale, scene.length, around)
     unbalanced = (state.iterate.internal - state.force - contact).astype(float).ravel()
     basis = scene.free.basis
     # What is left on held unknowns are the reactions; on free ones nothing may be left.
     free_part = (basis @ (basis.T @ unbalanced)).reshape(points.shape)
     reactions = unbalanced.reshape(points.shape) - free_part
-    result |= _both("reactions and loads", points, reactions + state.force, scale, scene.length)
+    whole = reactions + state.force
+    result |= _both("reactions and loads", points, whole, scale, scene.length, around)
     result["free nodes: force"] = float(np.abs(free_part).max(initial=0.0) / scale)
     return result
 
 
 def _both(
-    name: str, points: np.ndarray, forces: np.ndarray, scale: float, length: float
+    name: str, points: np.ndarray, forces: np.ndarray, scale: float, length: float, around: bool
 ) -> dict[str, float]:
+    if around:
+        return {f"{name}: force": float(abs(forces[:, 1].sum()) / scale)}
     force = np.abs(forces.sum(axis=0)).max()
     if points.shape[1] == 2:
         moment = abs(float((points[:, 0] * forces[:, 1] - points[:, 1] * forces[:, 0]).sum()))
@@ -98,7 +102,8 @@ def _integrals(scene: Scene, zone: ZoneScene) -> sparse.csr_matrix:
     for face in zone.sub_faces:
         whole = ~partly[face.macro]
         nodes, macro = face.nodes[whole], face.macro[whole]
-        values, _ = face_integrals(scene.points, nodes, face.type.name)
+        around = scene.case.axisymmetric
+        values, _ = face_integrals(scene.points, nodes, face.type.name, around)
         rows = dim * nodes[:, :, None] + np.arange(dim)
         columns = np.broadcast_to(macro[:, None, None], rows.shape)
         entries = (-values.ravel(), (rows.ravel(), columns.ravel()))

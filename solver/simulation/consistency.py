@@ -125,7 +125,8 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     largest = max(float(np.abs(other.multiplier).max(initial=0.0)) for other in solution.zones)
     round_off = _ROUNDINGS * float(np.finfo(float).eps)
     young = max(material.young for material in solution.case.materials.values())
-    smallest = float(zone.area.min()) ** (1 / (moved.shape[1] - 1))
+    dim = 3 if solution.case.axisymmetric else moved.shape[1]
+    smallest = float(zone.area.min()) ** (1 / (dim - 1))
     error = round_off * young * float(np.abs(moved).max()) / smallest
     error += max(solution.accuracy.values(), default=0.0) * largest
     worst = float(contact.multiplier.min(initial=0.0))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..case.solutions import ExactSolution
 from ..mechanics.fem import shape_functions
-from ..mechanics.fem.faces import FACE_POINTS, nodal_normals, surface_points
+from ..mechanics.fem.faces import FACE_POINTS, SurfacePoints, nodal_normals, surface_points
 from ..mechanics.fem.gauss import gauss_rule
 from ..mechanics.fem.stress import normal_stress
 from ..mesh.catalogue import cell_type
@@ -66,6 +66,10 @@ class ExactValues:
     def __init__(self, solution: Solution, exact: ExactSolution):
         self.solution, self.exact = solution, exact
 
+    def _surface(self, zone: ZoneResult) -> SurfacePoints:
+        points, around = self.solution.mesh.points, self.solution.case.axisymmetric
+        return surface_points(points, zone.faces, around)
+
     @cached_property
     def part(self) -> np.ndarray:
         """The part (n,) of each node."""
@@ -97,16 +101,16 @@ class ExactValues:
 
     def pressure(self, zone: ZoneResult) -> np.ndarray:
         """The mean contact pressure (m,) of each macro-element."""
-        at = surface_points(self.solution.mesh.points, zone.faces)
+        at = self._surface(zone)
         return at.means(self.exact.contact_pressure(at.place))
 
     def gap(self, zone: ZoneResult) -> np.ndarray:
         """The mean gap (m,) of each macro-element."""
-        at = surface_points(self.solution.mesh.points, zone.faces)
+        at = self._surface(zone)
         return at.means(self.exact.gap(at.place))
 
     def ends_within(self, zone: ZoneResult) -> np.ndarray:
         """Which macro-elements (m,) the contact area covers in part only."""
-        at = surface_points(self.solution.mesh.points, zone.faces)
+        at = self._surface(zone)
         share = at.means((self.exact.contact_pressure(at.place) > 0).astype(float))
         return (share > 0) & (share < 1 - 1e-9)

@@ -1,4 +1,4 @@
-"""Geometry that has no sense as a contact problem: refused by the place and the group.
+"""Geometry that makes no sense as a contact problem: refused with place and group.
 
 What a mesh alone shows (flat cells, missing nodes) is refused when it is read; this looks at the
 bodies and at the contact between them.
@@ -64,7 +64,7 @@ def _refuse_deep_overlap(scene: Scene, i: int, zone: ZoneScene) -> None:
 
 
 def _refuse_unmerged(scene: Scene) -> None:
-    """Nodes of one body at one place without contact between them: a slit nobody asked for."""
+    """Nodes of one body at one place without contact between them: an unintended slit."""
     surfaces = [b.nodes.ravel() for z in scene.zones for b in (*z.slave_faces, *z.master_faces)]
     surfaces += [f.nodes.ravel() for z in scene.zones for f in z.sub_faces]
     pairs = cKDTree(scene.points).query_pairs(_ONE_PLACE * scene.length, output_type="ndarray")

@@ -14,6 +14,8 @@ from ..mesh.catalogue import BY_MESHIO
 from ..system.errors import InputError, hint
 
 ALL = "all"
+# Nodes nearer to the axis than this share of the largest coordinate are on it.
+ON_AXIS = 1e-12
 _EMPTY = "is empty, or none of its members touches a volume cell"
 
 
@@ -21,10 +23,13 @@ def check_groups(case: Case, mesh: meshio.Mesh) -> None:
     """Raise `InputError` where the case does not fit the mesh."""
     dim = mesh.points.shape[1]
     if dim == 2 and case.plane is None:
-        raise InputError(case.path, "plane", None, "this key is needed (strain): the mesh is plane")
+        allowed = "this key is needed (strain, stress or axisymmetric): the mesh is plane"
+        raise InputError(case.path, "plane", None, allowed)
     if dim == 3 and case.plane is not None:
         allowed = "only for plane meshes; this one has three dimensions"
         raise InputError(case.path, "plane", case.plane, allowed)
+    if case.axisymmetric:
+        _refuse_beyond_axis(case, mesh.points)
     check_dimension(case, dim)
     groups = _Groups(case, mesh)
     groups.check_materials()
@@ -33,6 +38,14 @@ def check_groups(case: Case, mesh: meshio.Mesh) -> None:
     for i, zone in enumerate(case.zones):
         groups.check_zone(i, zone)
     groups.check_loads()
+
+
+def _refuse_beyond_axis(case: Case, points: np.ndarray) -> None:
+    beyond = np.flatnonzero(points[:, 0] < -ON_AXIS * np.abs(points).max())
+    if len(beyond):
+        at = ", ".join(f"{x:.6g}" for x in points[beyond[0]])
+        allowed = f"{len(beyond)} nodes have a negative radius x (the first at ({at}))"
+        raise InputError(case.path, "plane", case.plane, allowed)
 
 
 def named_parts(case: Case, mesh: meshio.Mesh) -> tuple[meshio.Mesh, tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""What a solve may be told beside its case: shortcuts it takes and safeguards of its digits."""
+"""Options of a solve beside its case: shortcuts, and safeguards against lost digits."""
 
 from dataclasses import dataclass, field, fields
 from typing import Self
@@ -16,7 +16,7 @@ class Switches:
 
 @dataclass(frozen=True)
 class Shortcuts(Switches):
-    """Work that is left out where the scene does not need it; no result changes but to round-off.
+    """Work that is left out where the scene does not need it. Results change by round-off at most.
 
     quadrature: where all faces are affine images, plain Gauss rules integrate over the segments,
         without more points and without closure; cells with straight edges have the rules of these.
@@ -32,7 +32,7 @@ class Shortcuts(Switches):
 
 @dataclass(frozen=True)
 class Safeguards(Switches):
-    """What keeps the digits of a result; each can be turned off to show what it does.
+    """Safeguards against lost digits; each can be turned off to show its effect.
 
     local_coordinates: points are counted from the middle of the mesh.
     gap_threshold: an initial gap of the size of the coordinates' rounding counts as zero.
@@ -59,7 +59,7 @@ class Safeguards(Switches):
 
 @dataclass(frozen=True)
 class Options:
-    """How a case is solved: with all shortcuts and all safeguards, unless some are turned off."""
+    """How a case is solved: by default with all shortcuts and all safeguards."""
 
     shortcuts: Shortcuts = field(default_factory=Shortcuts)
     safeguards: Safeguards = field(default_factory=Safeguards)
@@ -71,4 +71,4 @@ class Options:
 
 
 LEAN = Options()
-"""What is needed is done, and nothing else."""
+"""The default: only the work that is needed."""

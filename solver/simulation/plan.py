@@ -1,7 +1,7 @@
 """The plan of a solve: what its scene does not need and is left out, and why.
 
 Some lines are decided by the scene before the solve, others noted after it. They are read in the
-result file and in the report; `docs/plan.md` tells of all of them, with what they save.
+result file and in the report; `docs/plan.md` describes all of them, with the time saved.
 """
 
 from collections.abc import Iterator, Sequence

@@ -85,7 +85,7 @@ class ContactProblem:
         """Assemble; raises InputError where nothing can hold a body or a macro-element's node."""
         self.scene = scene
         self.constraints = contact_constraints(scene)
-        self.motions = rigid_motions(scene.points, scene.body)
+        self.motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         refuse_unsolvable(scene, self.motions, self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
         self.unsupported = unsupported(self.motions, scene.free.basis)
@@ -95,7 +95,7 @@ class ContactProblem:
         self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
-        unknowns = _unknowns(scene, self.motions)
+        unknowns = _unknowns(scene)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
 
@@ -187,7 +187,7 @@ class ContactProblem:
         force = abs(factor) * np.linalg.norm(scene.force, axis=1).sum()
         push = force * (1 / moduli.min() + 1 / moduli.max())
         gap = constraints.initial / np.where(eligible, constraints.covered, np.inf) - imposed
-        guess = likely_closed(gap, constraints.covered, eligible, push, scene.points.shape[1])
+        guess = likely_closed(gap, constraints.covered, eligible, push, scene.space)
         return eligible if self._free_motion(guess) else guess
 
     def _free_motion(self, closed: np.ndarray) -> str:
@@ -297,10 +297,14 @@ def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
     return matrix, diagonal
 
 
-def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
-    """The meaning of a scene's free unknowns, given the rigid motions of its bodies."""
+def _unknowns(scene: Scene) -> Unknowns:
+    """The meaning of a scene's free unknowns.
+
+    The motions of sections in their plane hardly strain rings that are far from the axis.
+    """
     basis, dim = scene.free.basis, scene.points.shape[1]
     node = nodes_of_unknowns(basis, dim)
+    motions = rigid_motions(scene.points, scene.body)
     together = basis.T @ whole_motions(motions, scene.n_bodies)
     quadratic = any(block.type.order == 2 for block in scene.blocks)
     return Unknowns(dim, node, together, scene.body[node], quadratic)

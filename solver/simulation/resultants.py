@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..mechanics.fem.faces import circumference
 from ..mechanics.mortar.edge import Edges, contact_edges
 from ..mechanics.mortar.reconstruction import vertex_neighbours
 from .problem import Equilibrium
@@ -26,6 +27,8 @@ def resultants(
     force = forces.reshape(scene.points.shape)[nodes]
     places = np.pad(scene.points[nodes] + scene.origin, ((0, 0), (0, 3 - force.shape[1])))
     moment = np.cross(places, np.pad(force, ((0, 0), (0, 3 - force.shape[1])))).sum(axis=0)
+    if scene.case.axisymmetric:
+        moment = np.zeros(3)
     return Resultants(area=area, force=force.sum(axis=0), moment=moment, edges=edges)
 
 
@@ -41,7 +44,10 @@ def _extent(
             ends[number] = nodes
         # Where multipliers belong to nodes, means of macro-elements are no resultants of theirs.
         whole = surface.covered / surface.area * (zone.operator.nodes is None)
-        edges = contact_edges(scene.points + scene.origin, ends, surface.area, whole, mean, closed)
+        points = scene.points + scene.origin
+        around = scene.case.axisymmetric
+        length = surface.area / circumference(surface.centre) if around else surface.area
+        edges = contact_edges(points, ends, length, whole, mean, closed, around)
         return edges, surface.covered[closed].sum() + edges.lengths.sum(axis=0)
     near = vertex_neighbours(faces, len(closed)).astype(int)
     inside, around = closed & (near @ ~closed == 0), closed | (near @ closed > 0)

@@ -25,8 +25,9 @@ from ..mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from ..mesh.catalogue import BY_NAME
 from ..system.clock import Clock
 from ..system.errors import InputError
+from ..system.progress import stage
 from .attributes import Attributes, CutZone, faces_of
-from .groups import check_groups, named_parts
+from .groups import ON_AXIS, check_groups, named_parts
 from .options import LEAN, Options
 
 # Slave and master faces of each zone.
@@ -131,6 +132,11 @@ class Scene:
         return self.points.size
 
     @property
+    def space(self) -> int:
+        """The dimensions of the bodies: 3 where the mesh is a section of axisymmetric ones."""
+        return 3 if self.case.axisymmetric else self.points.shape[1]
+
+    @property
     def n_bodies(self) -> int:
         """Number of bodies."""
         return len(self.rest.unloaded_bodies)
@@ -144,22 +150,25 @@ def build_scene(
     check_groups(case, mesh)
     mesh, unnamed = named_parts(case, mesh)
     origin = mesh.points.mean(axis=0) * safeguards.local_coordinates
+    if case.axisymmetric:
+        mesh = replace_points(mesh, radial(mesh.points))
+        origin[0] = 0.0
     local = replace_points(mesh, mesh.points - origin)
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
-    with clock.stage("cut"):
+    with stage(clock, "cut"):
         surfaces = _surfaces(case, local)
         cut_mesh, sub_faces = _cut(local, case.zones, surfaces)
     cut_zones = [
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
     ]
     groups = Attributes(case, local, cut_mesh, cut_zones, origin)
-    with clock.stage("pairing"):
+    with stage(clock, "pairing"):
         noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
         operators = [
             _operator(groups, zone, faces, master, noise, options)
             for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
         ]
-    with clock.stage("assembly"):
+    with stage(clock, "assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
         force = groups.forces()
@@ -228,6 +237,13 @@ def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndar
     return _cut(replace_points(mesh, values), scene.case.zones, surfaces)[0].points
 
 
+def radial(points: np.ndarray) -> np.ndarray:
+    """Points (n, 2) of a meridian plane, those at the axis but for rounding put on it."""
+    found = points.copy()
+    found[np.abs(points[:, 0]) <= ON_AXIS * np.abs(points).max(), 0] = 0.0
+    return found
+
+
 def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
     """The same cells and groups on other points."""
     return meshio.Mesh(points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets)
@@ -243,6 +259,8 @@ def _surfaces(case: Case, mesh: meshio.Mesh) -> Surfaces:
             for side in ("slave", "master")
         )
         _refuse_untreated(case, i, zone, slave)
+        if case.axisymmetric:
+            _refuse_on_axis(case, mesh, i, slave)
         nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave])).tolist()
         shared = [n for n in nodes if n in owner]
         if shared:
@@ -266,6 +284,22 @@ def _refuse_untreated(case: Case, i: int, zone: Zone, slave: list[FaceBlock]) ->
             allowed = (
                 f"does not exist for slave faces {block.type.name} of {block.owner_type.name}: "
                 f"{treatment.why}; allowed there: {', '.join(others)}"
+            )
+            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
+
+
+def _refuse_on_axis(case: Case, mesh: meshio.Mesh, i: int, slave: list[FaceBlock]) -> None:
+    """Refuse slave faces of no area, and treatments that divide by the area of one node."""
+    zone = case.zones[i]
+    for block in slave:
+        ends = mesh.points[block.nodes[:, : block.type.n_vertices], 0] == 0
+        if flat := int(ends.all(axis=1).sum()):
+            allowed = f"{flat} of its faces lie on the axis: they have no area"
+            raise InputError(case.path, case.zone_key(i, "slave"), zone.slave, allowed)
+        if ends.any() and zone.treatment == "node_to_segment" and block.type.order == 2:
+            allowed = (
+                f"does not exist for slave faces {block.type.name} that end on the axis: a uniform "
+                "pressure has no force at the node there; allowed there: lac, quadrature, nodal"
             )
             raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
 
@@ -303,10 +337,12 @@ def _operator(
 ) -> GapOperator:
     """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
     points, count = groups.points, sum(len(block.nodes) for block in faces.slave_faces)
-    slaves = [facets(points, f.type, f.nodes, f.macro) for f in faces.sub_faces]
+    around = groups.axisymmetric
+    slaves = [facets(points, f.type, f.nodes, f.macro, around) for f in faces.sub_faces]
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
-    masters = _master_facets(points, master_faces, groups.materials_behind(master_faces))
+    materials = groups.materials_behind(master_faces)
+    masters = _master_facets(points, master_faces, materials, around)
     if not options.shortcuts.quadrature:
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
@@ -346,7 +382,8 @@ def _initial_gaps(
         meshed = operator.initial
         initial = np.where(np.abs(meshed) <= noise * operator.covered, 0.0, meshed)
     else:
-        at = surface_points(groups.points, [(f.type.name, f.nodes, f.macro) for f in sub_faces])
+        faces = [(f.type.name, f.nodes, f.macro) for f in sub_faces]
+        at = surface_points(groups.points, faces, groups.axisymmetric)
         means = at.means(groups.field(zone.clearance)(at.place))
         whole = operator.mean.T @ (operator.surface.area * means)
         initial = whole * operator.covered / operator.area
@@ -354,15 +391,13 @@ def _initial_gaps(
 
 
 def _master_facets(
-    points: np.ndarray, faces: list[FaceBlock], materials: list[np.ndarray]
+    points: np.ndarray, faces: list[FaceBlock], materials: list[np.ndarray], around: bool
 ) -> list[Facets]:
     """Master faces, those of one type together whatever cell is behind them, by material (n,)."""
     merged = []
     for name in dict.fromkeys(block.type.name for block in faces):
         alike = [i for i, block in enumerate(faces) if block.type.name == name]
-        nodes, number = (
-            np.concatenate([values[i] for i in alike])
-            for values in ([block.nodes for block in faces], materials)
-        )
-        merged.append(facets(points, BY_NAME[name], nodes, number))
+        nodes = np.concatenate([faces[i].nodes for i in alike])
+        number = np.concatenate([materials[i] for i in alike])
+        merged.append(facets(points, BY_NAME[name], nodes, number, around))
     return merged

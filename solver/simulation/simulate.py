@@ -15,7 +15,7 @@ from ..mesh.catalogue import BY_NAME
 from ..system.clock import Clock, processor_time
 from ..system.errors import SolveError
 from ..system.memory import peak_mb
-from ..system.progress import OUTCOME
+from ..system.progress import OUTCOME, stage
 from .balance import imbalances, pressures_of_forces
 from .consistency import inconsistency
 from .geometry import check_geometry
@@ -57,11 +57,11 @@ def simulate(
     scene = build_scene(case, mesh, options, clock)
     check_geometry(scene)
     if options.shortcuts.unloaded:
-        with clock.stage("assembly"):
+        with stage(clock, "assembly"):
             scene = without_unloaded(scene)
     macro_elements = sum(zone.count for zone in scene.zones)
     _LOG.log(OUTCOME, "%d unknowns, %d macro-elements", scene.n_dofs, macro_elements)
-    with clock.stage("assembly"):
+    with stage(clock, "assembly"):
         problem = ContactProblem(scene)
     solution = solve_problem(problem, clock)
     solution.cpu_seconds = processor_time() - started
@@ -74,10 +74,10 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     plan = list(decided(problem))
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
-    with clock.stage("solve"):
+    with stage(clock, "solve"):
         states, recovered = _walk(problem, problem.scene.case.steps)
     plan += noted(problem, states)
-    with clock.stage("recovery"):
+    with stage(clock, "recovery"):
         solution = _recover(problem, states, recovered, plan)
     for zone in solution.zones:
         _LOG.log(OUTCOME, "zone %s: %s", zone.name, zone.resultants)
@@ -117,6 +117,8 @@ def _recover(
         scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
     )
     stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
+    if scene.case.thin:
+        stress[:, 2] = 0.0
     scale = _stress_scale(scene, stress)
     strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
     zones = [

@@ -1,4 +1,4 @@
-"""What a simulation hands on: fields, contact state, balance and cost of one solve.
+"""The result of a simulation: fields, contact state, balance and cost of one solve.
 
 Lengths, forces and stresses are in the case's own units. `n` counts the nodes of the cut mesh, `m`
 the macro-elements of a zone. Contact pressure is positive in compression, gaps are positive when
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 class Line(NamedTuple):
-    """A line of the plan: what was left out or decided, and why; `skip`: its switch in `Shortcuts`.
+    """A line of the plan: what was left out or decided, and why.
 
-    Empty where it has none.
+    `skip`: its switch in `Shortcuts`, or empty.
     """
 
     what: str
@@ -49,7 +49,7 @@ class BodyInfo:
 
 @dataclass
 class NodalContact:
-    """Contact by node, where the treatment of the interface has its multipliers there.
+    """Contact by node, for treatments of the interface with multipliers at nodes.
 
     `nodes` (k,) into the mesh's points; `multiplier` (pressure ≥ 0), the average `gap` that it sees
     and `closed` (bool), all (k,).
@@ -91,7 +91,7 @@ class RecoveredPressure:
 
 @dataclass
 class Resultants:
-    """What contact comes to in a zone.
+    """The resultants of contact in a zone.
 
     `area` (3,): that of contact, and bounds below and above; `force` (dim,) on the slave and its
     `moment` (3,) about the origin of the coordinates; `edges`: where contact ends in 2D. In 3D the

@@ -1,4 +1,4 @@
-"""Groups of bodies that nothing moves are left out of a solve: their answer is zero.
+"""Groups of bodies without any load are left out of a solve: their displacement is zero.
 
 Bodies belong together where a multiplier moves free unknowns of both. Without load, displacement
 imposed and initial overlap, u = 0 and p = 0 fulfil equilibrium, p ≥ 0, ḡ ≥ 0 and p ḡ = 0, whatever
@@ -79,7 +79,7 @@ def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:
     covered = np.concatenate([zone.operator.covered for zone in scene.zones] or [np.empty(0)])
     there = covered > 0
     per_area = sparse.diags(1 / covered[there]) @ gaps[there]
-    motions = rigid_motions(scene.points, scene.body)
+    motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
     return unheld_motion(motions, scene.free.basis, per_area, scene.n_bodies) is not None
 
 

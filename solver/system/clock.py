@@ -1,12 +1,9 @@
 """Time by stage: wall time, and processor time of all threads and of processes that have ended."""
 
-import logging
 import resource
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-
-_LOG = logging.getLogger(__name__)
 
 # The stages of `simulate`, in the order of the work; `pairing` holds the intersections too.
 SOLVING = ("cut", "pairing", "assembly", "solve", "recovery")
@@ -33,8 +30,6 @@ class Clock:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Count the time within the block to the stage `name`."""
-        if name not in self.seconds:
-            _LOG.info("%s", name)
         wall, cpu = time.perf_counter(), processor_time()
         try:
             yield

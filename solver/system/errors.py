@@ -3,6 +3,9 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+# Names that a message lists.
+_MOST = 60
+
 
 class InputError(Exception):
     """The input is refused: one line that names the file, the key, the value and the problem.
@@ -51,10 +54,11 @@ def printable(name: object) -> str:
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """`did you mean …?` when one of the known names is near, else the list of them."""
+    """`did you mean …?` when one of the known names is near, and the first of them."""
     known = sorted(known)
     near = get_close_matches(str(name), known, n=1)
-    listed = f"allowed: {', '.join(known)}" if known else "there is none"
+    more = f" and {len(known) - _MOST} more" if len(known) > _MOST else ""
+    listed = f"allowed: {', '.join(known[:_MOST])}{more}" if known else "there is none"
     return f"did you mean {near[0]}? ({listed})" if near else listed
 
 

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there at all, and known to be what was written."""
+"""Files that are written whole or not at all, and sealed by a hash."""
 
 import hashlib
 import os
@@ -13,7 +13,7 @@ _SEAL = b"\nsha256 %s\n"
 _SEAL_SIZE = len(_SEAL % (b"0" * 64))
 _CHUNK = 1 << 20
 
-# Folders are shared among machines; a process is known on its own alone.
+# Folders may be shared among machines; a process number is valid on one.
 _HOST = platform.node()
 
 
@@ -48,7 +48,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def last_line(path: Path | None, most: int = 4096) -> str:
-    """The last line with any text among the `most` last bytes of a file; empty where none is."""
+    """The last line that is not blank among the `most` last bytes of a file; empty if none is."""
     try:
         with Path(path or os.devnull).open("rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - most))
@@ -59,7 +59,7 @@ def last_line(path: Path | None, most: int = 4096) -> str:
 
 
 def seal(path: Path) -> str:
-    """Append the hash of all that a file holds, for `seal_of`; the hash."""
+    """Append the hash of a file's content, for `seal_of`; returns the hash."""
     digest = _digest(path, path.stat().st_size)
     with path.open("ab") as file:
         file.write(_SEAL % digest)
@@ -67,9 +67,9 @@ def seal(path: Path) -> str:
 
 
 def seal_of(path: str | Path) -> str:
-    """The hash of a file that is, to the last bit, what `seal` was called for; empty for any other.
+    """The hash of a file that is unchanged since `seal`; empty for any other file.
 
-    HDF5 reads some damaged files as if they were whole, and others take the interpreter down.
+    HDF5 reads some damaged files without an error, and crashes on others.
     """
     path = Path(path)
     try:
@@ -100,7 +100,7 @@ def _to_disk(path: Path) -> None:
 
 
 def _remove_abandoned(path: Path) -> None:
-    """Remove what processes of this machine that were killed have left of the same file."""
+    """Remove temporary files of the same name left by killed processes of this machine."""
     for left in path.parent.glob(f".{escape(path.stem)}.{escape(_HOST)}.*{escape(path.suffix)}"):
         process = left.name.removesuffix(path.suffix).rpartition(".")[2]
         if process.isdigit() and not _lives(int(process)):

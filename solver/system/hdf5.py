@@ -1,6 +1,6 @@
-"""HDF5 files: made in memory, read as a whole in themselves, and tables in them.
+"""HDF5 files: written from memory, read without links to other files, and tables in them.
 
-They are made in memory because HDF5 itself, on a full disk, fails at any later place. A table is a
+They are made in memory because on a full disk HDF5 itself fails at any later place. A table is a
 group with one data set for each column.
 """
 
@@ -38,7 +38,8 @@ def new_file(path: Path) -> Iterator[h5py.File]:
 def read_file(path: str | Path) -> Iterator[h5py.File]:
     """An HDF5 file to be read; InputError for one that takes data from another file.
 
-    That is by external links, external storage or virtual data sets. Groups may be nested 32 deep.
+    Such files have external links, external storage or virtual data sets. Groups may be nested 32
+    deep.
     """
     with h5py.File(path, "r") as file:
         _refuse_foreign(file, path)
@@ -53,7 +54,7 @@ def _refuse_foreign(file: h5py.File, path: str | Path) -> None:
         for group, name in [(each, name) for each in level for name in each]:
             kind = group.links.get_info(name).type
             item = h5o.open(group, name) if kind == h5l.TYPE_HARD else None
-            # What a soft link names is met by itself.
+            # The target of a soft link is visited anyway.
             if _takes_from_elsewhere(item) if item else kind != h5l.TYPE_SOFT:
                 allowed = "in another file: the file must hold all of its data itself"
                 raise InputError(path, name.decode(errors="replace"), None, allowed)

@@ -9,14 +9,15 @@ _NO_LIMIT = 1 << 60
 
 
 def peak_mb(used: resource.struct_rusage) -> float:
-    """The largest resident memory of a process, MB, of what the system tells of it in KiB."""
+    """The largest resident memory of a process, MB; the system reports KiB."""
     return used.ru_maxrss * 1024 / 1e6
 
 
 def available() -> float:
-    """Memory (bytes) that this process can still get; infinite where nothing tells.
+    """Memory (bytes) that this process can still get; infinite if unknown.
 
-    The least of what is free (swap included), what its cgroups and its own limit leave.
+    The minimum of the free memory (swap included) and the rest of the limits of its cgroups and
+    of the process itself.
     """
     return min([float("inf"), *_free(), *_cgroups(), *_own_limit()])
 
@@ -28,7 +29,7 @@ def _free() -> Iterator[float]:
 
 
 def _cgroups() -> Iterator[float]:
-    """What each limit of version 2 or 1 leaves, file cache counted as free."""
+    """The rest of each cgroup limit (version 2 or 1), file cache counted as free."""
     for line in _lines("/proc/self/cgroup"):
         _, controllers, path = line.split(":", 2)
         if controllers == "":
@@ -39,7 +40,7 @@ def _cgroups() -> Iterator[float]:
         else:
             continue
         inner = root / path.lstrip("/")
-        # In a container the path may be that of the host: then its own group is the root.
+        # In a container the path may be that of the host; its own group is then the root.
         for folder in dict.fromkeys([root, inner, *inner.parents]):
             limit, used = (_number(folder / name) for name in names)
             if folder.is_relative_to(root) and limit is not None and limit < _NO_LIMIT:

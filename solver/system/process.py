@@ -1,10 +1,12 @@
-"""A command as a process of its own: pinned to cores, stopped at a limit, and what it took."""
+"""A command in a separate process: pinned to cores, stopped at a limit, its cost measured."""
 
 import os
 import resource
+import signal
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
@@ -13,16 +15,15 @@ from .clock import now, processor_time
 from .memory import peak_mb
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""The variables that tell the libraries how many threads to use."""
+"""The variables that set the number of threads of the libraries."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a process ended: exit status (negative: by that signal), None where it was stopped.
+    """How a process ended: exit status (negative: by that signal), None if stopped after `limit` s.
 
-    That is after `limit` seconds. `output` is what it printed, `complaint` what it wrote to its
-    standard error; wall and processor seconds of it and its children, and the largest resident
-    memory of any of them, MB.
+    `output` and `complaint` are its standard output and error; `wall` and `cpu` are seconds,
+    children included; `peak_memory_mb` is the largest resident memory of any of them.
     """
 
     status: int | None
@@ -35,14 +36,14 @@ class Ended:
 
     @property
     def used(self) -> dict[str, float]:
-        """What it took, as `used_since` tells it."""
+        """Its cost, as returned by `used_since`."""
         return {"wall": self.wall, "cpu": self.cpu, "peak_memory_mb": self.peak_memory_mb}
 
     @property
     def reason(self) -> str:
-        """How it died and its last words, or that it was stopped; not for one that ended well.
+        """The exit status with the last line, or the time limit; only for a process that failed.
 
-        Last words are those on standard error, if any: the two streams have no common order.
+        The last line is that of standard error, if any: the two streams have no common order.
         """
         if self.status is None:
             return f"no end within {self.limit:g} s"
@@ -52,7 +53,7 @@ class Ended:
 
 
 def used_since(started: float) -> dict[str, float]:
-    """What this process took: wall seconds since `started`, processor seconds, peak memory, MB."""
+    """Cost of this process: wall seconds since `started`, processor seconds, peak memory (MB)."""
     return {
         "wall": now() - started,
         "cpu": processor_time(),
@@ -61,32 +62,34 @@ def used_since(started: float) -> dict[str, float]:
 
 
 def cores_for(threads: int) -> list[int]:
-    """The cores that a process of so many threads is pinned to: fewer where there are not as many.
+    """The cores to which a process of `threads` threads is pinned: fewer on a smaller machine.
 
-    The last ones: what else the machine does begins with the first.
+    These are the last cores; other work of the machine starts on the first.
     """
     return sorted(os.sched_getaffinity(0))[-threads:]
 
 
 def run_apart(
     command: Sequence[str],
-    cores: Sequence[int],
+    cores: Sequence[int] | None,
     limit: float,
     memory: float = float("inf"),
     folder: Path | None = None,
 ) -> Ended:
     """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
 
-    `memory` (bytes) is the most that it may ask for, `folder` where it runs if not here. It reads
-    nothing; what it prints is kept.
+    Without `cores` it has one thread, on any of them. `memory` (bytes) is the most that it may ask
+    for, `folder` where it runs if not here. Its standard input is empty; its output is kept. What
+    it started ends with it.
     """
 
     def prepare() -> None:
-        os.sched_setaffinity(0, cores)
+        if cores is not None:
+            os.sched_setaffinity(0, cores)
         if memory < float("inf"):
             resource.setrlimit(resource.RLIMIT_DATA, (int(memory), int(memory)))
 
-    threads = dict.fromkeys(THREADS, str(len(cores)))
+    threads = dict.fromkeys(THREADS, str(1 if cores is None else len(cores)))
     with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as complaint:
         started = now()
         process = subprocess.Popen(
@@ -97,22 +100,21 @@ def run_apart(
             stdout=output,
             stderr=complaint,
             preexec_fn=prepare,  # noqa: PLW1509 -- it calls the system alone
+            process_group=0,
         )
         over = Event()
 
         def stop() -> None:
             over.set()
-            process.kill()
+            _kill_group(process.pid)
 
         timer = Timer(limit, stop)
         timer.start()
         try:
             _, status, used = os.wait4(process.pid, 0)
-        except BaseException:
-            process.kill()
-            raise
         finally:
             timer.cancel()
+            _kill_group(process.pid)
         wall = now() - started
         process.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)
@@ -121,3 +123,9 @@ def run_apart(
     cpu = used.ru_utime + used.ru_stime
     ending = None if over.is_set() else process.returncode
     return Ended(ending, said, complained, wall, cpu, peak_mb(used), limit)
+
+
+def _kill_group(leader: int) -> None:
+    """End what is left of a group of processes."""
+    with suppress(ProcessLookupError):
+        os.killpg(leader, signal.SIGKILL)

@@ -13,12 +13,23 @@ from contextlib import contextmanager
 from logging.handlers import MemoryHandler
 from threading import Timer, get_ident
 
+from .clock import Clock
 from .package import PACKAGE
 
 OUTCOME = 25
-"""The level of what a solve says of its course, between information and warnings."""
-# A solve that ends sooner tells nothing on a terminal.
+"""The level of the outcomes of a solve, between information and warnings."""
+_LOG = logging.getLogger(__name__)
+# A solve that ends sooner prints no details on a terminal.
 PATIENCE = 2.0
+
+
+@contextmanager
+def stage(clock: Clock, name: str) -> Iterator[None]:
+    """Log a stage of the work when it begins for the first time, and count its time."""
+    if name not in clock.seconds:
+        _LOG.info("%s", name)
+    with clock.stage(name):
+        yield
 
 
 class _Saying(logging.Handler):
@@ -49,9 +60,9 @@ def saying(say: Callable[[str], object]) -> Iterator[None]:
 
 @contextmanager
 def telling(verbose: bool, quiet: bool = False) -> Iterator[None]:
-    """Write details that the solver logs to the standard error: on a terminal, or if `verbose`.
+    """Write the details that the solver logs to standard error: on a terminal, or if `verbose`.
 
-    On a terminal nothing is written before `PATIENCE` seconds are over, then all of it.
+    On a terminal all details are held back for the first `PATIENCE` seconds.
     """
     if quiet or not (verbose or sys.stderr.isatty()):
         yield

@@ -19,7 +19,7 @@ _THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
-    """Provenance of a solve: plain texts and numbers, empty where something is not known.
+    """Provenance of a solve: plain texts and numbers, empty if unknown.
 
     `case` and `mesh` are the files that were read; `mesh` is None where it was made in memory.
     """
@@ -47,7 +47,7 @@ def _version(package: str) -> str:
 
 
 def _command() -> list[str]:
-    """What a user types for the same, also where the batch adds options of Python (warm.py)."""
+    """The command as a user types it, without the options that the batch adds (warm.py)."""
     if Path(sys.argv[0]).name == PROJECT:
         return [PROJECT, *sys.argv[1:]]
     return ["python", *(a for a in sys.orig_argv[1:] if a != "-Es")]
@@ -75,7 +75,7 @@ def _sha256(path: Path | None) -> str:
 
 
 def _cpu() -> str:
-    """The processor's name; Linux tells it in a file only."""
+    """The processor's name; Linux has it in a file only."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,7 +1,7 @@
 """The checks of a solve against its reference: one table, one small function per quantity.
 
-A check compares values with the reference at the places where they live: macro-element centres,
-nodes, or load steps. `error` is the largest deviation over the check's scale: the largest magnitude
+A check compares values with the reference at their own places: macro-element centres, nodes, or
+load steps. `error` is the largest deviation over the check's scale: the largest magnitude
 of the reference, or, where the reference is zero everywhere, the quantity's own measure (load for
 stresses, load / stiffness × size for displacements). A gap is always measured against the block
 size, status, coverage and balance against one. A value that is not a number fails.
@@ -79,7 +79,7 @@ def block_size(solution: Solution) -> float:
 def _load(solution: Solution) -> float:
     """The load; without loads the stress that the displacement would cause, if that is larger.
 
-    Of bodies that merely move the stress itself is round-off.
+    If bodies only move, the stress itself is round-off.
     """
     if solution.case.loads:
         return float(solution.load_scale)
@@ -148,26 +148,33 @@ CHECKS: tuple[Check, ...] = (
 
 
 def run_checks(
-    solution: Solution, accepted: Mapping[str, Accepted] | None = None
+    solution: Solution,
+    accepted: Mapping[str, Accepted] | None = None,
+    samplers: Mapping[str, samples.Sampler] | None = None,
+    allow: Callable[[Check, float], float] = lambda _, tolerance: tolerance,
 ) -> list[CheckResult]:
     """Run every check of the table whose reference the case gives, zone by zone.
 
-    `accepted` maps check titles to the accepted extremes. Raises `InputError` when a reference
-    expression has no finite value at one of the places.
+    `accepted` maps check titles to the accepted extremes. `samplers`, by check, stand for those of
+    the table, and other checks are left out; `allow` makes the tolerance of a check from the
+    case's. Raises `InputError` when a reference expression has no finite value at one of the
+    places.
     """
     accepted = accepted or {}
     exact = solution.case.solution and ExactValues(solution, solution.case.solution)
     results = []
     for check in CHECKS:
         reference: samples.Reference = solution.case.reference.get(check.key) if check.key else 0.0
-        if reference is None:
+        sampler = check.sample if samplers is None else samplers.get(check.name)
+        if reference is None or sampler is None:
             continue
+        tolerance = allow(check, check.tolerance_in(solution.case.tolerance))
         if isinstance(reference, Exact):
             reference = exact
         for zone in solution.zones if check.by_zone else [None]:
-            sample = check.sample(solution, zone, reference)
+            sample = sampler(solution, zone, reference)
             if sample is not None:
-                results.append(_judge(check, solution, zone, sample, accepted))
+                results.append(_judge(check, solution, zone, sample, accepted, tolerance))
     return results
 
 
@@ -177,6 +184,7 @@ def _judge(
     zone: ZoneResult | None,
     sample: samples.Sample,
     accepted: Mapping[str, Accepted],
+    tolerance: float,
 ) -> CheckResult:
     name = zone.name if zone else None
     magnitude = float(np.abs(sample.reference).max(initial=0.0))
@@ -193,7 +201,6 @@ def _judge(
         extremes, where = (value, value), "no place at all"
     old = accepted.get(f"{check.name} {name}" if name else check.name)
     regression = None if old is None else _compare(extremes, old, scale, check.accepted)
-    tolerance = check.tolerance_in(solution.case.tolerance)
     return CheckResult(
         name=check.name,
         alias=check.alias,
@@ -231,7 +238,7 @@ def _compare(
 
 
 def _over(deviation: float, scale: float) -> float:
-    """The deviation over the scale; with no scale at all only no deviation is none."""
+    """The deviation over the scale; with a scale of zero, 0 only for no deviation."""
     if scale == 0:
         return 0.0 if deviation == 0 else float("inf") if deviation > 0 else float("nan")
     return float(deviation / scale)

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from ..simulation.solution import Solution
 
 NOT_VERIFIED = "not verified: the case gives no reference"
-# What `Case.as_solved` is told.
+# The arguments of `Case.as_solved`.
 Told = tuple[bool, str | None, str | None]
-# The checks that say how accurate a solve is: their errors are relative to the reference.
+# The checks of accuracy: their errors are relative to the reference.
 ACCURACY = (
     "multiplier",
     "element_pressure",
@@ -42,7 +42,7 @@ ACCURACY = (
     "stress_components",
     "integration_stress",
 )
-# What a verdict takes from a solution as it is.
+# Fields that a verdict copies from a solution.
 _OF_SOLUTION = (
     *("dofs", "macro_elements", "iterations", "linear_solver", "linear_iterations"),
     *(
@@ -65,7 +65,7 @@ def judge(
     provenance: Mapping[str, Any] | None = None,
     sha256: str | None = None,
 ) -> Verdict:
-    """The verdict of a solve that came to its end: `passed` when every check holds.
+    """The verdict of a solve with a result: `passed` when every check holds.
 
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
@@ -115,14 +115,14 @@ def without_result(
 ) -> Verdict:
     """The verdict of a solve that was refused, failed or crashed, for the reason given.
 
-    `case` is the path of the case file where the file itself could not be read; `told` is what
-    `Case.as_solved` was told.
+    `case` is the path of the case file where the file itself could not be read; `told` are the
+    arguments of `Case.as_solved`.
     """
     return Verdict(**_identity(case, told), verdict=word, reason=reason, transient=transient)
 
 
 def _identity(case: Case | Path, told: Told) -> dict[str, Any]:
-    """What singles out a solve, and where its reference comes from."""
+    """The identity of a solve, and the origin of its reference."""
     swapped, hexahedra, recovery = told
     found: dict[str, Any] = {
         "swapped": swapped,

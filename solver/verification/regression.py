@@ -1,7 +1,7 @@
-"""Accepted values: what a solve gave when a person last looked at it, kept under version control.
+"""Accepted values: the last results that a person has reviewed, kept under version control.
 
 They are kept beside the case file, in `regression/JOB.json`, one line a check, apart from the
-reference: a reference says what is right, an accepted value what was computed. Both extremes of a
+reference: a reference is the right value, an accepted value a computed one. Both extremes of a
 check may move by 1e-9 of its scale; a value below 1e-12 of the scale is kept as zero, and digits
 past the twelfth are dropped, so that round-off never shows as a difference.
 """

@@ -19,7 +19,7 @@ from ..simulation.solution import Solution
 from ..system.clock import Clock, processor_time
 from ..system.errors import InputError, MachineError, SolveError, of_machine
 from ..system.files import last_line
-from ..system.progress import OUTCOME
+from ..system.progress import OUTCOME, stage
 from ..system.provenance import gather
 from .checks import run_checks
 from .judge import judge, without_result
@@ -37,7 +37,7 @@ from .verdict import (
 
 # After so many seconds a process that meshes is ended: ten million unknowns take half of that.
 MESHING_SECONDS = 1800
-# The part of the estimated nodes that a mesh has for certain.
+# A mesh has at least this share of the estimated nodes.
 _SURELY = 0.8
 
 _LOG = logging.getLogger(__name__)
@@ -49,7 +49,7 @@ class Job:
 
     `mesh` is a mesh file taken as it is; None means the case's own, its transform applied.
     `refine` multiplies the divisions of the case's recipe. `memory_check`: refused where its memory
-    exceeds the machine's. `everything`: what the scene does not need is done all the same.
+    exceeds the machine's. `everything`: also do the work that the scene does not need.
     """
 
     case: Path
@@ -63,7 +63,7 @@ class Job:
 
     @property
     def told(self) -> tuple[bool, str | None, str | None]:
-        """What `Case.as_solved` is told."""
+        """The arguments of `Case.as_solved`."""
         return self.swapped, self.hexahedra, self.recovery
 
     def of(self, case: Case) -> Case:
@@ -108,8 +108,8 @@ def mesh_of(case: Case, memory_check: bool = True, limited: bool = False) -> mes
 def solve(job: Job, output: Path, verdict_file: Path | None) -> Verdict:
     """Solve, check, write the result; the verdict, also written to `verdict_file` if given.
 
-    Where there is no result, the verdict that says why is written all the same, and the exception
-    goes on: InputError, SolveError, or whatever shows an error of the program.
+    Without a result the verdict gives the reason, and the exception goes on: InputError,
+    SolveError, or any other one for an error of the program.
     """
     case: Case | None = None
     try:
@@ -140,7 +140,7 @@ def solve_checked(
     """
     clock = clock or Clock()
     solution = simulate(case, mesh, options, clock)
-    with clock.stage("checks"):
+    with stage(clock, "checks"):
         solution.errors = errors(solution)
         checks = run_checks(solution, accepted_values(solution) if accepted else {})
     return solution, checks
@@ -187,7 +187,7 @@ def record_refusal(case: Path, verdict_file: Path, reason: str) -> Verdict:
 
 
 def _death(status: int) -> str:
-    """What an exit status says of how a process ended; shells add 128 to a signal's number."""
+    """The meaning of an exit status; shells add 128 to a signal's number."""
     died = f"died with exit status {status}"
     names = {128 + number: number.name for number in signal.Signals}
     if status not in names:
@@ -201,20 +201,20 @@ def _death(status: int) -> str:
 def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
     """The verdict of a solve that comes to its end; `beside` is the path of the verdict."""
     started, clock = processor_time(), Clock()
-    # Better refused now than after the solve.
+    # Refuse before the solve, not after it.
     check_name(output)
     output.parent.mkdir(parents=True, exist_ok=True)
-    with clock.stage("read" if job.mesh or "path" in case.mesh else "mesh"):
+    with stage(clock, "read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check, limited=True)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path)
-    # What was accepted is a result on the case's own mesh.
+    # Accepted values belong to the case's own mesh.
     accepted = job.refine == 1
     options = Options.everything() if job.everything else Options()
     solution, checks = solve_checked(case, mesh, options, accepted, clock)
     solution.cpu_seconds = processor_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
-    with clock.stage("write"):
+    with stage(clock, "write"):
         sha256 = write_result(output, solution, checks, provenance)
     name = os.path.relpath(output, beside.parent)
     return judge(solution, checks, name, provenance, sha256)

@@ -1,8 +1,8 @@
-"""What the checks compare: values of a solve and their reference, at the places where they live.
+"""Samples for the checks: values of a solve and their reference, at the same places.
 
 A reference is a scalar, a sequence (vectors) or a mapping (tensors) of scalars, or `ExactValues`,
 which know the case's exact solution. A sampler is called with the solution, the zone (None for the
-whole solve) and the reference; it gives None where there is nothing to compare.
+whole solve) and the reference; it returns None if there is nothing to compare.
 """
 
 from __future__ import annotations
@@ -15,7 +15,12 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..mechanics.fem import shape_functions, volume_rule
-from ..mechanics.fem.elasticity import lame_parameters, physical_gradients
+from ..mechanics.fem.elasticity import (
+    hoop_values,
+    lame_parameters,
+    physical_gradients,
+    with_hoop,
+)
 from ..mechanics.fem.stress import COMPONENTS
 from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues, deformable
@@ -30,7 +35,7 @@ _CHUNK = 1 << 17
 
 @dataclass(frozen=True)
 class Sample:
-    """Values (n,) and their reference (n,); `place` says in words where the i-th was taken."""
+    """Values (n,) and their reference (n,); `place` names the place of the i-th one."""
 
     values: np.ndarray
     reference: np.ndarray
@@ -70,7 +75,7 @@ def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
 
 
 def status(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
-    """In contact wherever the reference presses; either will do where its contact area ends."""
+    """Closed where the reference presses; either status is right at the edge of contact."""
     found = zone.closed.astype(float)
     expected = (expected_pressure(zone, reference) > 0).astype(float)
     if isinstance(reference, ExactValues):
@@ -93,7 +98,7 @@ def covered_pressure(_: Solution, zone: ZoneResult, reference: Reference) -> Sam
 
 
 def _nodes(solution: Solution) -> np.ndarray:
-    """The nodes at which there is something to compare: those of bodies that are not rigid."""
+    """The nodes of bodies that are not rigid."""
     return np.flatnonzero(deformable(solution))
 
 
@@ -183,14 +188,20 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
             gradient, _ = physical_gradients(points, cells, kind, reference)
             nodal = solution.displacement[cells]
             slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ gradient
+            if solution.case.axisymmetric:
+                hoop, _ = hoop_values(points, cells, kind, reference)
+                slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
+            dim = slope.shape[-1]
             lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
             mean = lame * np.einsum("cqii->cq", slope)
             if mixed is not None:
                 own = mixed[part] @ values.T
                 mean = np.where(np.isnan(own), mean, own)
             tensor = np.zeros((*mean.shape, 3, 3))
-            tensor[..., : kind.dim, : kind.dim] = slope + np.swapaxes(slope, 2, 3)
+            tensor[..., :dim, :dim] = slope + np.swapaxes(slope, 2, 3)
             tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
+            if solution.case.thin:
+                tensor[..., 2, 2] = 0.0
             stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]].reshape(-1, 6)
             owners = (np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
             yield (values @ points[cells]).reshape(-1, kind.dim), stress, *owners
@@ -240,14 +251,14 @@ def norm(name: str) -> Sampler:
 
 
 def balance(solution: Solution, _: None, __: Reference) -> Sample:
-    """Every imbalance, against none."""
+    """Every imbalance; the reference is zero."""
     names = list(solution.balance)
     values = np.array(list(solution.balance.values()), dtype=float)
     return Sample(values, np.zeros(len(values)), lambda i: f"the balance of {names[i]}")
 
 
 def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
-    """Cells and contact faces of the bodies as meshed, against those that the case gives.
+    """Cells and contact faces of the bodies as meshed; the case gives the reference.
 
     Raises `InputError` for a group that is not a body.
     """
@@ -266,7 +277,7 @@ def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
 
 
 def observed(quantity: str) -> Sampler:
-    """Sample what was observed in a zone at every step; pressure grows with the load factor."""
+    """Sample the observations in a zone at every step; pressure grows with the load factor."""
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
         rows = [

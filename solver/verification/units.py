@@ -1,11 +1,11 @@
-"""Units as labels: what a case says its numbers are in. Nothing is computed with them."""
+"""Units as labels of numbers. Nothing is computed with them."""
 
 from collections.abc import Mapping
 
 import h5py
 import numpy as np
 
-# What kind of quantity each field of a result is.
+# The kind of quantity of each field of a result.
 _KINDS = {
     "Points": "length",
     "centre": "length",
@@ -23,8 +23,8 @@ _KINDS = {
 def label_fields(grid: h5py.Group, contact: h5py.Group, units: Mapping[str, str]) -> None:
     """Give the fields in both groups of a result their `unit`.
 
-    `units` maps length and stress to what they are called. VTK shows no attributes, so that the
-    grid lists the units of its fields as the field data `units` as well.
+    `units` maps length and stress to their names. VTK shows no attributes, so the grid also lists
+    the units of its fields as the field data `units`.
     """
 
     def label(name: str, item: h5py.HLObject) -> None:
@@ -38,7 +38,7 @@ def label_fields(grid: h5py.Group, contact: h5py.Group, units: Mapping[str, str]
     listed.clear()
     grid.visititems(label)
     if listed:
-        # VTK reads texts that call themselves ASCII, and dies of others; their bytes may be UTF-8.
+        # VTK crashes on texts that are not declared as ASCII; their bytes may be UTF-8.
         texts = np.array([text.encode() for text in sorted(listed)], dtype=object)
         grid.create_dataset("FieldData/units", data=texts, dtype=h5py.string_dtype("ascii"))
 

@@ -130,13 +130,17 @@ class Body:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """The verdict of one solve; None and empty where it came to no end.
+    """The verdict of one solve; None and empty without a result.
 
     `worst` is the check with the largest relative error, `closest_to_tolerance` the one nearest to
     its tolerance or furthest past it. Pairs are minimum and maximum over all zones; `seconds` has
     wall times by stage and their `total`. `pressure_error_estimate` is relative and in L2: how far
     constant pressures are from a reconstruction. `transient`: the machine is the reason (memory,
     disk, a kill), so that the same solve may succeed another time.
+
+    Of the result of another code: `code`, its version and `settings`; `printed_digits` are the
+    significant ones of its values, where a file has fewer than a number; `not_given` are the checks
+    that it has no values for; `recorded` has date and source of values that were not computed here.
     """
 
     case: str = ""
@@ -187,6 +191,12 @@ class Verdict:
     attainable: float | None = None
     errors: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, str | int] = field(default_factory=dict)
+    code: str | None = None
+    code_version: str = ""
+    settings: dict[str, str] = field(default_factory=dict)
+    printed_digits: int | None = None
+    not_given: list[str] = field(default_factory=list)
+    recorded: dict[str, str] = field(default_factory=dict)
     transient: bool = False
 
     @property
@@ -203,7 +213,9 @@ class Verdict:
         error = f", worst error {self.worst.error:.1e} ({self.worst.name})" if self.worst else ""
         if (self.pressure_error_estimate or 0.0) > _NEGLIGIBLE:
             error += f", constant pressures within {self.pressure_error_estimate:.1e} (estimated)"
-        return f"{line}{error}, {self.seconds['total']:.2f} s"
+        missing = f", not given: {', '.join(self.not_given)}" if self.not_given else ""
+        time = f", {self.seconds['total']:.2f} s" if "total" in self.seconds else ""
+        return f"{line}{error}{missing}{time}"
 
     def plain(self) -> dict[str, Any]:
         """The verdict as plain values for strict JSON, with its digest."""
@@ -232,7 +244,7 @@ def read_verdict(path: str | Path) -> Verdict:
 
 
 def unbound(verdict: Verdict, path: Path) -> str:
-    """What of folder (in `results`) and result is not the verdict's own; empty where both are.
+    """Why folder (in `results`) or result do not belong to the verdict; empty if they do.
 
     Reads the whole result.
     """
@@ -249,7 +261,7 @@ def unbound(verdict: Verdict, path: Path) -> str:
 
 
 def typed(kind: type[T], content: object, where: Path) -> T:
-    """Plain values, as `json.loads` returns them, as verdicts; `InputError` where they are none.
+    """Plain values, as `json.loads` returns them, as typed verdicts; `InputError` otherwise.
 
     Unknown keys are ignored. A key that is missing or null has its default, NaN for a number.
     """
@@ -268,7 +280,7 @@ def _without_nulls(value: Any) -> Any:
 
 
 def to_json(content: Any) -> str:
-    """Strict JSON of plain values, arrays and numbers; what is no finite number becomes null."""
+    """Strict JSON of plain values, arrays and numbers; numbers that are not finite become null."""
     return json.dumps(_strict(content), indent=1, ensure_ascii=False, allow_nan=False)
 
 

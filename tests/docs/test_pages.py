@@ -12,7 +12,7 @@ import pytest
 from solver.case.file import Pick
 from solver.case.solutions import SOLUTIONS
 from solver.case.typed import fields
-from solver.mesh.recipes import _RECIPES
+from solver.mesh.keys import RECIPES
 from solver.report.html import NORMS
 from solver.verification.checks import CHECKS
 from tests.case.test_case import sections
@@ -76,7 +76,7 @@ def test_every_check_solution_and_recipe_is_on_its_page(site):
     for check in CHECKS:
         assert f"`{check.name}`" in (page if check.name in NORMS else table), check.name
     assert all(f"### `{name}`" in tables.solutions() for name in SOLUTIONS)
-    assert all(f"recipe: {name}" in tables.recipes() for name in _RECIPES)
+    assert all(f"recipe: {name}" in tables.recipes() for name in RECIPES)
     assert "perturb: {amplitude" in tables.transforms()
 
 

@@ -47,6 +47,9 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
     "lame/cylinders-two-materials",
     "hydrostatic/tilted-hexa20-tetra10",
 )
+SPHERES = "lame/spheres-hexa20"
+
+DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 # A segment below this share of the largest is round-off of the intersection.
 _SLIVER = 1e-6
@@ -219,17 +222,6 @@ def _template_piece_lost(result: Any) -> Any:
     return replace(result, pieces=result.pieces[1:])
 
 
-class _Alike:
-    """Shape functions with the same value for all nodes."""
-
-    def __init__(self, true: Any):
-        self.true = true
-
-    def both(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        values, slopes = self.true.both(points)
-        return np.full(values.shape, 1 / values.shape[1]), slopes
-
-
 MUTANTS = (
     Mutant("gap-sign", "the initial gap has the wrong sign", CLOSING,
            "solver.mechanics.mortar.operator:integrals",
@@ -238,7 +230,7 @@ MUTANTS = (
            "solver.simulation.scene:gap_operator", changed(lambda o: replace(o, matrix=-o.matrix))),
     Mutant("normal-side", "slave and master faces are turned inward", PLANE,
            "solver.simulation.scene:facets",
-           given(lambda x, kind, nodes, n: (x, kind, nodes[:, ::-1], n))),
+           given(lambda x, kind, nodes, *more: (x, kind, nodes[:, ::-1], *more))),
     Mutant("master-order", "master shape functions are assigned to the next node", TILTED,
            "solver.mechanics.mortar.operator:integrals",
            changed(lambda p: replace(p, vectors=(p.vectors[0], np.roll(p.vectors[1], 1, axis=2))))),
@@ -271,6 +263,9 @@ MUTANTS = (
     Mutant("segment-weight", "one quadrature weight of the segments is 10 % off", TILTED,
            "solver.mechanics.mortar.segments:simplex_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
+    Mutant("segment-arc", "the slopes of arcs in the reference face are 0.1 % too large", SPHERES,
+           "solver.mechanics.mortar.segments:_into_reference",
+           changed(lambda image: lambda *arcs: (image(*arcs)[0], 1.001 * image(*arcs)[1]))),
     Mutant("load-weight", "one quadrature weight of the loads is 10 % off", PLANE,
            "solver.mechanics.fem.loads:face_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
@@ -283,10 +278,11 @@ MUTANTS = (
     Mutant("pressure-sign", "a pressure pulls", PLANE,
            "solver.simulation.attributes:face_forces", changed(lambda force: -force)),
     Mutant("load-side", "a load acts on the opposite side of its faces", TILTED,
-           "solver.mechanics.fem.loads:area_vectors", changed(lambda vectors: -vectors)),
+           "solver.mechanics.fem.loads:surface_vectors",
+           changed(lambda found: (found[0], -found[1]))),
     Mutant("load-mean", "a load is shared equally among the nodes of a face", BENT,
-           "solver.mechanics.fem.loads:shape_functions",
-           lambda true: lambda name: _Alike(true(name))),
+           "solver.mechanics.fem.loads:surface_vectors",
+           changed(lambda found: (np.full(found[0].shape, 1 / found[0].shape[1]), found[1]))),
     Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
            "solver.simulation.scene:gap_operator",
            changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
@@ -303,7 +299,7 @@ MUTANTS = (
     Mutant("stress-bits", "σ_xx is off by 9e-4 of the load at every third node", PLANE,
            "solver.simulation.simulate:nodal_stress", changed(_every_third_off)),
     Mutant("poisson-digits", "ν of the lower block is 0.2991 instead of 0.3", PLANE,
-           "solver.simulation.attributes:Attributes._by_material", _lower_half_softer),
+           "solver.simulation.attributes:Attributes.by_material", _lower_half_softer),
     Mutant("stale-system", "the factored system is that of the first status", CLOSING,
            "solver.simulation.problem:ContactProblem._constrained", _first_system_kept),
     Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,
@@ -318,12 +314,24 @@ MUTANTS = (
     Mutant("support-lost", "a support loses its last node", PLANE,
            "solver.simulation.attributes:Attributes.nodes", changed(lambda nodes: nodes[:-1])),
     Mutant("material-mixed-up", "the materials of the two bodies are exchanged", LAYERS,
-           "solver.simulation.attributes:Attributes._by_material",
+           "solver.simulation.attributes:Attributes.by_material",
            changed(lambda values: {k: v[::-1] for k, v in values.items()})),
     Mutant("origin-forgotten", "expressions see coordinates relative to the middle", VARYING,
            "solver.simulation.attributes:Attributes.__init__",
            lambda true: lambda self, case, mesh, cut, zones, origin: true(
                self, case, mesh, cut, zones, 0 * origin)),
+    Mutant("radius-lost", "segments of axisymmetric faces lack the measure 2πr", DISC,
+           "solver.mechanics.mortar.segments:circumference",
+           changed(lambda around: np.full(around.shape, around.mean()))),
+    Mutant("load-radius-lost", "loads on axisymmetric faces lack the measure 2πr", DISC,
+           "solver.mechanics.fem.loads:surface_vectors",
+           given(lambda points, nodes, kind, places, _: (points, nodes, kind, places, False))),
+    Mutant("hoop-lost", "axisymmetric cells have no hoop strain", DISC,
+           "solver.mechanics.fem.elasticity:hoop_values",
+           changed(lambda found: (0 * found[0], found[1]))),
+    Mutant("hoop-halved", "the hoop strain of axisymmetric cells is half of what it is", RINGS,
+           "solver.mechanics.fem.elasticity:hoop_values",
+           changed(lambda found: (0.5 * found[0], found[1]))),
 )  # fmt: skip
 
 

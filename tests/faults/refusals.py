@@ -16,6 +16,7 @@ _RAISED = {
     "error",
     "_error",
     "_no_result",
+    "_refused",
 }
 
 HEAD = """\

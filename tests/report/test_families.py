@@ -2,8 +2,8 @@
 
 import json
 import re
-import xml.etree.ElementTree as ET
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,11 +12,20 @@ from solver.case.reader import load_case
 from solver.commands.cli import main
 from solver.report import formats, write_report
 from solver.report.families import FILE_NAME, page_name, paragraphs, read_family
-from solver.report.profile import draw_profile
-from solver.simulation.solution import NodalContact
+from solver.report.profile import (
+    CONSTANT,
+    MASTER,
+    MEANS,
+    NODES,
+    RECOVERED,
+    REFERENCE,
+    Arc,
+    draw_profile,
+    mathematics,
+)
+from solver.simulation.solution import NodalContact, RecoveredPressure
 from solver.verification.results import write_result
 from tests import handmade
-from tests.report.test_pictures import SVG, polygons
 from tests.report.test_report import CHECK, Page, verdict
 from tests.report.verdicts import put
 
@@ -128,12 +137,11 @@ def test_pages_of_the_report_are_no_family_s():
 
 def report(folder, verdicts, *families):
     """Write a report of verdicts into the folder; what was logged."""
-    paths, logged = [], []
+    paths = []
     for content in verdicts:
         path = folder / "results" / content["family"] / content["job"] / "verdict.json"
         paths.append(put(path, content))
-    write_report(paths, folder, logged.append, families)
-    return "\n".join(logged)
+    return write_report(paths, folder, families)
 
 
 REFINED = {"reference_kind": "refined", "reference_uncertainty": 2e-3}
@@ -214,44 +222,88 @@ def test_the_cost_of_each_family_is_told(tmp_path):
     assert "2.00 s of processor time" in Page(tmp_path / "summary.html").text
 
 
+def drawn(solution, along=None):
+    """Records of the profile by series, and its axes' titles."""
+    chart = draw_profile(solution, solution.zones[0], "p", "pressure", along)
+    found = {}
+    for record in chart.spec["data"]["values"]:
+        found.setdefault(record["series"], []).append(record)
+    views = [view["layer"][-1]["encoding"] for view in chart.spec["vconcat"]]
+    return found, [view["y"]["title"] for view in views], views[0]["x"]["title"]
+
+
 def test_a_profile_shows_every_macro_element_and_its_deviation(tmp_path):
     solution = handmade.plane(tmp_path)
     solution.zones[0].multiplier[:] = 25.0, 26.0
-    svg = draw_profile(solution, solution.zones[0], "pressure")
-    assert polygons(svg) == 4  # two areas for the pressure, two for the deviation
-    words = {text.text for text in drawn(svg, "text")}
-    assert {"x", "contact pressure", "deviation, over the largest reference"} <= words
-    assert "0.04" in words  # 26 for 25
+    found, titles, x = drawn(solution)
+    steps = [(r["s"], r["end"], r["p"], r["deviation"]) for r in found[CONSTANT]]
+    assert steps == [(0, 25, 25, 0), (25, 50, 26, 0.04)]
+    assert (titles, x) == (["contact pressure", "Δp / max p"], "x")
+    assert {r["p"] for r in found[REFERENCE]} == {25.0}
+    assert {r["p"] for r in found[MASTER]} == {25.0}
 
 
 def test_a_profile_without_a_reference_shows_no_deviation(tmp_path):
     text = handmade.PLANE.replace("  contact_pressure: 25.0\n", "")
-    solution = handmade.plane(tmp_path, text)
-    svg = draw_profile(solution, solution.zones[0], "pressure")
-    assert polygons(svg) == 2
-    assert not any("deviation" in text.text for text in drawn(svg, "text"))
+    found, titles, _ = drawn(handmade.plane(tmp_path, text))
+    assert titles == ["contact pressure"]
+    assert REFERENCE not in found
 
 
-def test_a_profile_in_space_has_a_mark_and_a_cross_for_each_macro_element(tmp_path):
-    solution = handmade.solid(tmp_path)
-    svg = draw_profile(solution, solution.zones[0], "pressure")
-    circles = [p.get("d").count("M") for p in drawn(svg, "path") if "a26 26" in p.get("d")]
-    assert sorted(circles) == [1, 2, 2]  # pressure, deviation, and the legend's
-    assert polygons(svg) == 0
+def test_a_profile_in_space_has_two_marks_for_each_macro_element(tmp_path):
+    found, titles, _ = drawn(handmade.solid(tmp_path))
+    assert {name: len(records) for name, records in found.items()} == {CONSTANT: 2, REFERENCE: 2}
+    assert all("deviation" in record for record in found[CONSTANT])
+    assert len(titles) == 2
 
 
-def test_a_profile_of_multipliers_at_nodes_has_a_dot_for_each(tmp_path):
+def test_a_profile_of_multipliers_at_nodes_has_a_mark_for_each(tmp_path):
     solution = handmade.plane(tmp_path)
     zone = solution.zones[0]
     n = len(zone.slave_nodes)
     zone.nodal = NodalContact(zone.slave_nodes, np.linspace(24.0, 29.0, n), *np.zeros((2, n)))
-    svg = draw_profile(solution, zone, "pressure")
-    dots = [p.get("d").count("M") for p in drawn(svg, "path") if "a18 18" in p.get("d")]
-    assert dots == [n]
-    words = {text.text for text in drawn(svg, "text")}
-    assert "computed at nodes (dots), means of faces" in words
-    assert "30" in words  # the scale holds 29
+    found, _, _ = drawn(solution)
+    assert sorted(r["p"] for r in found[NODES]) == pytest.approx(np.linspace(24.0, 29.0, n))
+    assert len(found[MEANS]) == 2
 
 
-def drawn(svg, tag):
-    return list(ET.fromstring(svg).iter(f"{SVG}{tag}"))
+def test_a_recovered_pressure_is_a_line_within_each_face(tmp_path):
+    """p* = 25 + 3 y with y from −1/2 to 1/2 on each macro-element of 25, three faces each."""
+    solution = handmade.plane(tmp_path)
+    zone = solution.zones[0]
+    zone.closed[:] = True
+    zone.recovered = RecoveredPressure(
+        form="linear",
+        coefficients=np.full((2, 1), 3.0),
+        degree=np.ones(2, dtype=int),
+        centre=zone.centre,
+        axes=np.tile([[[1 / 25, 0.0]]], (2, 1, 1)),
+        spread=np.full((2, 1, 1), 1 / 12),
+        nodes=zone.slave_nodes,
+        at_nodes=np.zeros(len(zone.slave_nodes)),
+    )
+    records = drawn(solution)[0][RECOVERED]
+    assert len({r["face"] for r in records}) == 6
+    for r in records:
+        middle = 12.5 if r["face"] < 3 else 37.5
+        assert r["p"] == pytest.approx(25 + 3 * (r["s"] - middle) / 25, abs=1e-5)
+    assert min(r["p"] for r in records) == pytest.approx(23.5)
+    zone.closed[1] = False
+    assert len({r["face"] for r in drawn(solution)[0][RECOVERED]}) == 3
+
+
+def test_a_curved_interface_is_drawn_over_its_arc_length():
+    """A quarter circle in 90 chords: places on it have the length of the chords before them."""
+    angles = np.radians(np.arange(91))
+    points = 2 * np.column_stack([np.cos(angles), np.sin(angles)])
+    pairs = np.column_stack([np.arange(90), np.arange(1, 91)])
+    zone = SimpleNamespace(faces=[("SEG2", pairs[::-1], np.arange(90))])
+    arc = Arc.of(points, zone)
+    chord = 4 * np.sin(np.radians(0.5))
+    assert arc(points) == pytest.approx(chord * np.arange(91))
+    assert arc((points[:1] + points[1:2]) / 2) == pytest.approx(chord / 2)
+
+
+def test_an_expression_is_shown_as_mathematics():
+    assert mathematics("sqrt(x**2 + y**2)") == "√(x² + y²)"
+    assert mathematics("2*pi*r**12 - (x - 0.5)**2") == "2·π·r^12 − (x − 0.5)²"

@@ -105,7 +105,7 @@ NAMES = [v["job"] for v in BATCH]
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     """The folder of a report of the batch, one verdict unreadable; and what was logged."""
-    folder, logged = tmp_path_factory.mktemp("report"), []
+    folder = tmp_path_factory.mktemp("report")
     paths = []
     for number, content in enumerate(BATCH):
         path = folder / "batch" / "fam" / str(number) / "verdict.json"
@@ -113,8 +113,7 @@ def report(tmp_path_factory):
     broken = folder / "batch" / "fam" / "fam-broken" / "verdict.json"
     broken.parent.mkdir()
     broken.write_text('{"case": ')
-    assert write_report([*paths, broken], folder / "report", logged.append) == 0
-    return folder / "report", "\n".join(logged)
+    return folder / "report", write_report([*paths, broken], folder / "report")
 
 
 class Page(HTMLParser):
@@ -190,11 +189,11 @@ def test_failures_come_first_then_names_in_their_natural_order(report):
 def test_pages_ask_for_nothing_from_outside(report, name):
     folder, _ = report
     page = Page(folder / name)
-    assert not {"link", "img", "iframe", "object"} & set(page.tags)
+    assert not {"link", "iframe", "object"} & set(page.tags)
     # Our own, the script of the charts with a chart, and nothing that a verdict brought in.
     assert page.tags.count("script") == (3 if name == "fam.html" else 1)
-    assert {v for key, v in page.values if key == "src"} <= {"charts.js"}
-    assert (folder / "charts.js").is_file()
+    for source in (v for key, v in page.values if key == "src"):
+        assert (folder / unquote(source)).is_file()
     links = [v for key, v in page.values if key in ("href", "xlink:href")]
     assert links
     for link in links:
@@ -228,19 +227,18 @@ def test_numbers_keep_their_digits_in_csv(report):
 
 def test_a_batch_that_passed_leaves_no_failures(tmp_path):
     path = put(tmp_path / "fam-a" / "verdict.json", verdict("fam-a", "passed"))
-    logged = []
-    write_report([path], tmp_path / "report", logged.append)
+    logged = write_report([path], tmp_path / "report")
     assert (tmp_path / "report" / "failures.txt").read_text() == ""
-    assert logged[0].startswith("The one solve passed.")
+    assert logged.startswith("The one solve passed.")
 
 
 def test_a_solve_without_a_reference_has_its_own_word_and_is_no_failure(tmp_path):
     made = [verdict("fam-a", "passed"), verdict("fam-free", "solved", "not verified: no reference")]
     paths = [put(tmp_path / each["job"] / "verdict.json", each) for each in made]
-    logged, out = [], tmp_path / "report"
-    write_report(paths, out, logged.append)
+    out = tmp_path / "report"
+    logged = write_report(paths, out)
     assert (out / "failures.txt").read_text() == ""
-    assert logged[0].startswith("2 solves: 1 solved, 1 passed.")
+    assert logged.startswith("2 solves: 1 solved, 1 passed.")
     assert '<span class="badge solved">solved</span>' in (out / "fam.html").read_text()
     told = {each["job"]: each for each in json.loads((out / "summary.json").read_text())}
     assert (told["fam-free"]["verdict"], told["fam-free"]["passed"]) == ("solved", False)
@@ -251,7 +249,7 @@ def test_a_solve_without_a_reference_has_its_own_word_and_is_no_failure(tmp_path
 def test_a_damaged_verdict_is_a_row_of_the_report(tmp_path, content):
     path = put(tmp_path / "fam" / "fam-a" / "verdict.json", verdict("fam-a", "passed"))
     path.write_bytes(content)
-    write_report([path], tmp_path / "report", lambda _: None)
+    write_report([path], tmp_path / "report")
     failures = (tmp_path / "report" / "failures.txt").read_text()
     assert failures.startswith("fam-a: crashed: ")
     assert failures.endswith("solve again\n")
@@ -265,7 +263,7 @@ def test_exchanged_verdicts_are_found_out(tmp_path):
     content = one.read_bytes()
     one.write_bytes(two.read_bytes())
     two.write_bytes(content)
-    write_report([one, two], tmp_path / "report", lambda _: None)
+    write_report([one, two], tmp_path / "report")
     failures = (tmp_path / "report" / "failures.txt").read_text()
     assert failures == (
         "fam-a: crashed: the verdict is that of fam/fam-b; solve again\n"
@@ -289,7 +287,5 @@ def test_what_the_solves_of_a_family_left_out():
 
 
 def test_a_batch_of_nothing_is_no_success(tmp_path):
-    logged = []
-    write_report([], tmp_path / "report", logged.append)
-    assert "none at all" in logged[0]
+    assert "none at all" in write_report([], tmp_path / "report")
     assert 'class="outcome bad"' in (tmp_path / "report" / "summary.html").read_text()

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver.case.reader import load_case
 from solver.mechanics.fem.elasticity import Block, largest_strain
 from solver.mesh import generate, transform
 from solver.mesh.catalogue import BY_NAME
@@ -15,10 +16,26 @@ from solver.studies.stability.description import read_sweep
 from solver.studies.stability.states import exact_state
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
-from tests.scenes import POISSON, YOUNG, block_mesh, changed_case
+from tests.scenes import POISSON, YOUNG, block_mesh, changed_case, with_points
 
-SWEEPS = Path(__file__).parents[2] / "cases/stability/sweeps"
+CASES = Path(__file__).parents[2] / "cases"
+SWEEPS, SPHERES = CASES / "stability/sweeps", CASES / "lame/spheres-tetra10.yaml"
 USELESS = 1000.0  # an estimate that exceeds the error by more
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_round_off_of_curved_faces_stays_round_off(swapped):
+    """Nested spheres whose faces share corners and edges: clipping is decided by the last digit."""
+    case = load_case(SPHERES).as_solved(swapped)
+    blocks = ("bottom", [3, 3, 1]), ("top", [2, 2, 1])
+    made = {side: {"cells": "TETRA10", "divisions": n} for side, n in blocks}
+    mesh = generate(case.mesh | made, "test")
+    (exact,) = simulate(case, mesh).zones
+    for seed in range(4):
+        noise = 1e-15 * np.random.default_rng(seed).normal(size=mesh.points.shape)
+        (zone,) = simulate(case, with_points(mesh, mesh.points * (1 + noise))).zones
+        assert zone.coverage == pytest.approx(exact.coverage, abs=1e-11)
+        assert zone.multiplier == pytest.approx(exact.multiplier, rel=1e-11)
 
 
 def error_over_estimate(sweep, mesh, value, young=2000.0, refine=1, state="compression"):

@@ -8,7 +8,6 @@ from vtk.util.numpy_support import vtk_to_numpy
 
 from solver.case.reader import parse_case
 from solver.mesh.catalogue import BY_NAME, cell_type
-from solver.report.plane import draw_plane
 from solver.report.profile import draw_profile
 from solver.report.space import draw_space
 from solver.simulation.simulate import simulate
@@ -112,17 +111,17 @@ def test_units_stand_beside_the_fields(tmp_path):
 def test_without_units_there_are_none(tmp_path):
     write_result(tmp_path / "result.vtkhdf", handmade.plane(tmp_path), [], {})
     assert opened_by_vtk(tmp_path / "result.vtkhdf")[-1] == []
-    assert "[" not in draw_plane(handmade.plane(tmp_path), "")
+    assert "[" not in draw_space(handmade.solid(tmp_path), "")
 
 
 def test_pictures_have_units(tmp_path):
     plane, solid = (labelled(make(tmp_path)) for make in (handmade.plane, handmade.solid))
-    assert ">pressure along interface [N/mm²]<" in draw_plane(plane, "")
-    profile = draw_profile(plane, plane.zones[0], "")
-    assert ">contact pressure [N/mm²]<" in profile
-    assert ">x [mm]<" in profile
+    view = draw_profile(plane, plane.zones[0], "p", "").spec["vconcat"][0]
+    channels = view["layer"][0]["encoding"]
+    assert channels["y"]["title"] == "contact pressure [N/mm²]"
+    assert channels["x"]["title"] == "x [mm]"
     plan = draw_space(solid, "")
-    assert ">interface in plan: pressure on the slave [N/mm²]<" in plan
+    assert ">p on interface [N/mm²]<" in plan
     assert ">x [mm]<" in plan
 
 

@@ -1,6 +1,7 @@
 """A process of its own: how it ended, and what it took."""
 
 import sys
+import time
 
 import pytest
 
@@ -44,3 +45,13 @@ def test_more_memory_than_allowed_is_not_to_be_had():
 @pytest.mark.parametrize("threads", [1, 10_000])
 def test_no_more_cores_than_there_are(threads):
     assert 1 <= len(cores_for(threads)) <= threads
+
+
+def test_what_it_started_ends_with_it(tmp_path):
+    """A child that outlives the limit would write the file."""
+    file = tmp_path / "alive"
+    child = f"import time; time.sleep(1); open({str(file)!r}, 'w')"
+    text = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
+    assert python(text, limit=0.5).status is None
+    time.sleep(1)
+    assert not file.exists()

@@ -191,7 +191,7 @@ def test_half_width_and_peak_are_measured_without_the_exact_ones():
     pressure = 1 - x[:, 0]
     found = [e.measured(x, pressure, x, pressure) for e in (one, replace(one, force=9.0))]
     assert found[0] == found[1]
-    assert found[0][0] == pytest.approx(2 * np.sqrt(1 / 6), rel=1e-4)
+    assert found[0]["half_width"] == pytest.approx(2 * np.sqrt(1 / 6), rel=1e-4)
 
 
 def test_constants_show_order_one_and_exact_means_none(handmade):

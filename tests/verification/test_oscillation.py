@@ -15,11 +15,13 @@ STUDY = read_study(Path(__file__).parents[2] / "cases/study/study.yaml")
 
 
 @pytest.fixture(
-    scope="module", params=["lac", "lac-hexahedra", "uncut", "nodal", "node-to-segment"]
+    scope="module", params=["lac", "lac:hexahedra", "uncut", "nodal", "node-to-segment"]
 )
 def solution(request):
     """The patch test on a slave surface of 6 × 6 squares."""
-    case = STUDY.point(f"patch-3d/hexa8-tetra4/{request.param}/2").case()
+    treatment, _, cut = request.param.partition(":")
+    case = STUDY.point(f"patch-3d/hexa8-tetra4/{treatment}/2").case()
+    case = case.as_solved(False, cut or None)
     return simulate(case, mesh_of(case))
 
 

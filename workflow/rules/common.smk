@@ -1,4 +1,4 @@
-"""What is run: the jobs that the solver lists, and what each of them is made from."""
+"""The jobs that the solver lists, and the inputs of each of them."""
 
 import hashlib
 import json
@@ -31,13 +31,13 @@ RESERVED = "report meshes orders study stability scaling benchmark docs".split()
 
 
 def refuse(line):
-    """End here with one line: nobody who named a wrong setting is helped by a traceback."""
+    """End with one line and no traceback, for a wrong setting."""
     print(line, file=sys.stderr)
     sys.exit(2)
 
 
 def read_config():
-    """Hold the configuration against its schema, which fills in what is not given."""
+    """Validate the configuration by its schema, which also fills in defaults."""
     for key in ("family", "cases", "case"):  # Snakemake reads `case=12` as a number
         if isinstance(config.get(key), (int, float)):
             config[key] = str(config[key])
@@ -60,14 +60,14 @@ def listed(value):
 
 
 read_config()
-# Jobs share their bytecode: to compile the sources anew in each costs a third of a small solve.
+# Jobs share their bytecode: compiling the sources in each costs a third of a small solve.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 VARIANTS = config["variants"] in (True, "true")
 MEMORY_CHECK = "--no-memory-check" * (config["memory_check"] in (False, "false"))
-# Neither PYTHONPATH nor the user's own packages are for these processes.
+# These processes ignore PYTHONPATH and the user's own packages.
 PYTHON = f"{shlex.quote(sys.executable)} -Es"
-# Before a file for what it takes and a command of the solver, which runs in a fork of the run's
-# warm process, where there is one.
+# Followed by a file for its cost and a command of the solver, which runs in a fork of the warm
+# process, if there is one.
 SOLVER = f"{PYTHON} -IS solver/commands/warm.py"
 
 
@@ -77,7 +77,9 @@ def sources(*patterns):
     return sorted(map(str, files))
 
 
-STUDY_PAGES = [f"studies/**/{page}.py" for page in ("page", "figure", "records")]
+STUDY_PAGES = [
+    f"studies/**/{page}.py" for page in ("page", "figure", "records", "first", "gains")
+]
 OF_PAGES = ("report/**/*.*", "studies/**/*.jinja", *STUDY_PAGES)
 REPORT_SOURCES = [f for f in sources(*OF_PAGES) if not f.endswith(".pyc")]
 SOLVER_SOURCES = sorted({*sources("**/*.py", "case/schemas/*")} - {*REPORT_SOURCES})
@@ -86,7 +88,7 @@ MESH_SOURCES = sources("case/**/*.py", "case/schemas/*", "mesh/**/*.py", "system
 
 @cache
 def content_of(file):
-    """The hash of a file's content; nothing where it cannot be read, or would be waited for."""
+    """The hash of a file's content; empty if it is not a regular file or cannot be read."""
     if not os.path.isfile(file):
         return ""
     try:
@@ -98,9 +100,9 @@ def content_of(file):
 
 @cache
 def contents(*files):
-    """What a job is made from, as a parameter: it runs again on a change whatever the clock says.
+    """The hash of a job's inputs, as a parameter: a change runs it again, whatever the dates.
 
-    Snakemake's parameters count for this only where they are made from nothing but wildcards.
+    Snakemake compares parameters only if they depend on wildcards alone.
     """
     told = "".join(f"{file} {content_of(file)}\n" for file in files)
     return hashlib.sha256(told.encode("utf-8", "surrogateescape")).hexdigest()
@@ -112,11 +114,11 @@ MESH_CONTENT = contents(*MESH_SOURCES)
 
 
 def watched(*files):
-    """The user's files as inputs of a job; what they hold is among its parameters, and counts.
+    """The user's files as inputs of a job. Their content is among its parameters and counts.
 
-    Their dates do not: a clock may be wrong. Left out are those that are missing or
-    unreadable, which the solver reports, those of the future, and those whose names Snakemake
-    takes for patterns.
+    Their dates do not count: a clock may be wrong. Left out are files that are missing or
+    unreadable, which the solver reports, files dated in the future, and files whose names
+    Snakemake reads as patterns.
     """
     found = [f for f in files if os.path.isfile(f) and not re.search(r"[{}\n]", f)]
     found = [f for f in found if os.access(f, os.R_OK)]
@@ -124,14 +126,14 @@ def watched(*files):
 
 
 def folder_of(family):
-    """The folder of a family's results: its name, but for what Snakemake takes for a pattern."""
+    """The folder of a family's results: its name without characters of Snakemake's patterns."""
     plain = re.sub(r"[{}\x00-\x1f/]", "_", family)
     return f"{plain}_" if plain in RESERVED else plain
 
 
 def find_jobs():
     """All jobs by folder and name: ours, a folder a family, and those of the configured folders."""
-    # Folders of ours that are measured, not checked, hold no cases beside what describes them.
+    # Folders of studies contain descriptions and templates, no cases of the batch.
     measured = {Path("cases/study"), Path("cases/scaling")}
     ours = sorted({f.parent for f in Path("cases").glob("*/*.yaml")} - measured)
     folders = [*ours, *(Path(f).expanduser() for f in listed(config["cases"]))]
@@ -185,8 +187,8 @@ def verdicts_there(jobs):
 
 
 def is_kept(folder):
-    """Whether a solve's verdict can be kept: it is as it was written, its result is there, and it was
-    not the machine (memory, disk, a kill) that ended the solve."""
+    """Whether a solve's verdict can be kept: it is undamaged, its result exists, and the solve was not
+    ended by the machine (memory, disk, a kill)."""
     from solver.system.errors import InputError
     from solver.verification.verdict import read_verdict
 
@@ -198,18 +200,18 @@ def is_kept(folder):
     return there and not verdict.transient
 
 
-# Without Snakemake's records nobody knows what the results were made from.
+# Without Snakemake's records the inputs of the results are unknown.
 LOST = not any(Path(".snakemake/metadata").glob("*"))
 AGAIN = "results/.again"
 
 
 def again(folder, kept=is_kept):
-    """A further input of a job whose results are there, but cannot be kept: it is never there."""
+    """A further input of a job whose results cannot be kept: a file that never exists."""
     return [AGAIN] if os.path.isdir(folder) and (LOST or not kept(folder)) else []
 
 
 # The wildcards stand for names that exist: no recursion is to be detected in a name that ends in
-# twenty zeros.
+# twenty zeros. This is for such names alone, not for time.
 snakemake.dag.PeriodicityDetector = lambda: type(
     "Never", (), {"is_periodic": lambda *_: None}
 )()
@@ -218,38 +220,38 @@ snakemake.dag.PeriodicityDetector = lambda: type(
 wildcard_constraints:
     family=f"(?!(?:{'|'.join(RESERVED)})/)[^/]+",
     case="[^/]+",
-    job="[^/]+",
+    job="[^/@]+",
 
 
 def has_mesh(folder):
-    """Whether the mesh is there, or was refused because of the case."""
+    """Whether the mesh exists, or was refused because of the case."""
     return any(Path(folder, name).is_file() for name in ("mesh.vtkhdf", "refused"))
 
 
 def mesh_folder(job):
-    """Where the mesh of a recipe lies, in a list; a mesh of the user's is in none of ours."""
+    """The folder of a recipe's mesh, in a list; empty for a mesh of the user."""
     return [f"results/meshes/{job.folder}/{job.case}"] if job.mesh is None else []
 
 
 def mesh_file(job):
-    """The generated mesh, as a path that may be missing; none for a mesh of the user's."""
+    """The path of the generated mesh, which may be missing; empty for a mesh of the user."""
     return "".join(f"{folder}/mesh.vtkhdf" for folder in mesh_folder(job))
 
 
 def files_of(job):
-    """The files that a solve is made from: case, mesh with what it includes, accepted values."""
+    """The input files of a solve: case, mesh with its included files, accepted values."""
     accepted = Path(job.file).parent / "regression" / f"{job.name}.json"
     return [job.file, *(job.mesh or ()), str(accepted)]
 
 
 def options_of(job):
-    """How the command line is told which job of a case this is."""
+    """The options of the command line for this job of a case."""
     cut = f" --hexahedra {job.hexahedra}" if job.hexahedra else ""
     return "--swap" * job.swap + cut
 
 
 def again_for(job):
-    """What `again` gives for a solve or its mesh."""
+    """The result of `again` for a solve or its mesh."""
     return again(results_of(job)) + [
         f for mesh in mesh_folder(job) for f in again(mesh, has_mesh)
     ]
@@ -283,13 +285,13 @@ def level_of(w):
 
 
 def options_of_level(w):
-    """How the command line is told which level of which ladder this is."""
+    """The options of the command line for a level of a ladder."""
     job, _, options = ladders()[w.family, w.job]
     return f"--refine {w.level} {options_of(job)}{options}"
 
 
 def level_folders():
-    """Where the results of all levels lie."""
+    """The result folders of all levels."""
     return [
         f"results/orders/{family}/{name}/{level}"
         for (family, name), (_, levels, _) in ladders().items()

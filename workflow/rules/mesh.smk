@@ -1,8 +1,8 @@
 RECIPES = {(j.folder, j.case): j for j in BATCH.values() if j.mesh is None}
 
 
-# The mesh of a recipe, one for all directions and variants of a case. Where it cannot be made the
-# solve tries once more, and its verdict says why not.
+# The mesh of a recipe, one for all directions and variants of a case. If it cannot be made, the
+# solve tries again, and its verdict gives the reason.
 rule mesh:
     input:
         case=lambda w: watched(RECIPES[w.family, w.case].file),

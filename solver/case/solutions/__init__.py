@@ -23,8 +23,10 @@ from .base import (
     Part,
 )
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
+from .indenter import Indenter
 from .manufactured import Parabola2d, Paraboloid3d
-from .nested import NestedCylinders, NestedSpheres
+from .meridian import Meridian
+from .nested import NestedCylinders, NestedSpheres, NestedTubes
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
 from .uniform import Hydrostatic, UniformCompression
@@ -44,6 +46,7 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     UniformCompression,
     Hydrostatic,
     NestedCylinders,
+    NestedTubes,
     NestedSpheres,
     OvalCylinders,
     Parabola2d,
@@ -51,6 +54,7 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     HertzCylinder,
     HertzSphere,
     HertzApproach,
+    Indenter,
     Waves2d,
     Waves3d,
     PolynomialPressure2d,
@@ -65,6 +69,8 @@ class Known:
     """What a case says already: its file, materials by group, dimension, and single values.
 
     `pressure` and `interference` are None where the case has none, or more than one.
+    `plane_stress`: so is the solution. `axisymmetric`: a solution of three dimensions is seen in
+    one meridian plane.
     """
 
     where: object
@@ -72,6 +78,8 @@ class Known:
     dimension: int
     pressure: float | None = None
     interference: float | None = None
+    axisymmetric: bool = False
+    plane_stress: bool = False
 
 
 def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
@@ -103,7 +111,7 @@ def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
     if solution.dim != known.dimension:
         allowed = f"is for {solution.dim} dimensions; the case has {known.dimension}"
         raise InputError(known.where, key, name, allowed)
-    return solution
+    return Meridian(solution) if known.axisymmetric else solution
 
 
 class _ParameterReader:
@@ -149,7 +157,7 @@ class _ParameterReader:
             young, poisson = (self.number(f"{name}.{k}", given[k]) for k in ("young", "poisson"))
             material = Material(young, poisson)
             if material.young > 0 and -1 < material.poisson < 0.5:
-                return material
+                return material.in_plane_stress() if self.known.plane_stress else material
         elif given is None and (name in groups or _ALL in groups):
             return groups.get(name) or groups[_ALL]
         elif isinstance(given, str) and given in groups:

@@ -73,6 +73,25 @@ class ExactSolution:
         """Where (n,) the contact pressure is smooth: away from the ends of a contact area."""
         return np.ones(len(x), dtype=bool)
 
+    @property
+    def half_width(self) -> float:
+        """Half the width, or the radius, of the contact."""
+        raise self._missing("half_width")
+
+    @property
+    def peak(self) -> float:
+        """The largest contact pressure."""
+        raise self._missing("peak")
+
+    def measured(
+        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
+    ) -> dict[str, float]:
+        """Half-width and peak of a computed pressure, from this alone, as far as they are known.
+
+        Forces (n,) at points x (n, dim), means (m,) of macro-elements at their centres (m, dim).
+        """
+        raise self._missing("half_width")
+
     def level(self, x: np.ndarray) -> np.ndarray:
         """A distance (n,) from the interface, positive on the side of the second part."""
         return np.full(len(x), -1.0)
@@ -99,7 +118,8 @@ class ExactSolution:
 class ElasticSolution(ExactSolution):
     """A solution of linear elasticity, known in the interior too: small strain, isotropic.
 
-    In two dimensions plane strain. Stress follows from `gradient` by Hooke's law.
+    In two dimensions plane strain, or plane stress of thin materials. Stress follows from
+    `gradient` by Hooke's law.
     """
 
     quantities: ClassVar[frozenset[str]] = frozenset(
@@ -124,15 +144,18 @@ class ElasticSolution(ExactSolution):
         return np.zeros((len(x), self.dim))
 
     def hooke(self, gradient: np.ndarray, part: np.ndarray) -> np.ndarray:
-        """Stress (n, 6) of displacement gradients (n, dim, dim) in the materials of the parts."""
+        """Stress (n, 6) of displacement gradients (n, d, d) in the materials of the parts."""
+        dim = gradient.shape[-1]
         lame, shear = (values[part] for values in np.array([lame_of(m) for m in self.materials]).T)
         strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
         stress = np.zeros((len(gradient), 6))
         stress[:, :3] = (lame * np.einsum("nii->n", gradient))[:, None]
-        for i in range(self.dim):
+        for i in range(dim):
             stress[:, i] += 2 * shear * strain[:, i, i]
+        if self.materials[0].thin:
+            stress[:, 2] = 0.0
         stress[:, 3] = 2 * shear * strain[:, 0, 1]
-        if self.dim == 3:
+        if dim == 3:
             stress[:, 4] = 2 * shear * strain[:, 1, 2]
             stress[:, 5] = 2 * shear * strain[:, 0, 2]
         return stress

@@ -68,12 +68,13 @@ class Hertz(ExactSolution):
 
     def measured(
         self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
-    ) -> tuple[float, float] | None:
+    ) -> dict[str, float]:
         """Half-width and peak of the half ellipse of a computed pressure, from this alone.
 
         The mean of ρ² over the forces (n,) at points x (n, dim) is a²/4 in 2D, 2 a²/5 in 3D. Within
         0.8 of that a, p² = p₀² − (p₀/a)² ρ² is a straight line in ρ²: p₀ by least squares over the
-        means (m,) of macro-elements at their centres. None where fewer than three are there.
+        means (m,) of macro-elements at their centres. Neither is known where fewer than three are
+        there.
         """
         whole = force.sum()
         square = force @ self._distance(x) ** 2 / whole if whole > 0 else 0.0
@@ -81,9 +82,9 @@ class Hertz(ExactSolution):
         distance = self._distance(centre)
         inside = distance <= _REGULAR * half_width
         if np.count_nonzero(inside) < 3:
-            return None
+            return {}
         top = np.polyfit(distance[inside] ** 2, mean[inside] ** 2, 1)[1]
-        return half_width, float(np.sqrt(max(top, 0.0)))
+        return {"half_width": half_width, "peak": float(np.sqrt(max(top, 0.0)))}
 
     def level(self, x: np.ndarray) -> np.ndarray:
         """Height above the point of contact."""

@@ -16,8 +16,12 @@ def body_numbers(n_nodes: int, cells: dict[str, np.ndarray]) -> np.ndarray:
     return connected_components(graph, directed=False)[1]
 
 
-def rigid_motions(points: np.ndarray, body: np.ndarray) -> sparse.csc_matrix:
+def rigid_motions(
+    points: np.ndarray, body: np.ndarray, axisymmetric: bool = False
+) -> sparse.csc_matrix:
     """Rigid motions (n_dofs, n_bodies · 3 or 6): translations, then turns about body centres.
+
+    Axisymmetric bodies have one, along the axis.
 
     The largest displacement of each column is one: a slender body is turned about its own axis by a
     larger angle than about others.
@@ -32,6 +36,7 @@ def rigid_motions(points: np.ndarray, body: np.ndarray) -> sparse.csc_matrix:
         size = np.zeros(len(count))
         np.maximum.at(size, body, np.linalg.norm(turn, axis=1))
         fields.append(turn / np.where(size > 0, size, 1.0)[body][:, None])
+    fields = fields[1:2] if axisymmetric else fields
     per_body = len(fields)
     rows = np.tile(np.arange(n * dim), per_body)
     columns = np.concatenate([np.repeat(body * per_body + k, dim) for k in range(per_body)])
@@ -104,6 +109,8 @@ def unheld_motion(
 
 
 def _describe(motion: np.ndarray) -> str:
+    if len(motion) == 1:
+        return "move along y"
     dim = 2 if len(motion) == 3 else 3
     move, turn = motion[:dim], motion[dim:]
     if np.abs(turn).max() > np.abs(move).max():

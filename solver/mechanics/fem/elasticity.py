@@ -1,6 +1,8 @@
 """Linear elasticity over mixed cells: stiffness, internal forces, stress at nodes.
 
 One block per cell type; every degree of freedom belongs to a node (`dof = dim · node + component`).
+Axisymmetric blocks lie in a meridian plane of radius x ≥ 0 and height y: their forces are those on
+whole rings, and their third axis is the circumference, with the hoop strain u_x / x.
 Source: Bathe, Finite Element Procedures, §5.3. Works on arrays alone.
 """
 
@@ -14,6 +16,7 @@ from ...mesh.catalogue import CellType
 from ...system.errors import SolveError
 from . import shape_functions, volume_rule
 from .assembly import CellSum, degrees_of_freedom
+from .faces import circumference
 from .small_matrices import invert
 
 # Bytes of gradients handled at once: small enough to stay in the processor's cache.
@@ -26,7 +29,7 @@ class Block:
     """Cells of one type with their material.
 
     `cells` (n, n_nodes) node numbers; `lame` and `shear` (n,) Lamé's λ and μ, in units of stress
-    (plane strain in 2D); `straight`: all their edges are.
+    (plane strain in 2D); `straight`: all their edges are; `axisymmetric`: sections of rings.
     """
 
     type: CellType
@@ -34,6 +37,7 @@ class Block:
     lame: np.ndarray
     shear: np.ndarray
     straight: bool = True
+    axisymmetric: bool = False
 
     @property
     def rule(self) -> tuple[np.ndarray, np.ndarray]:
@@ -70,6 +74,58 @@ def physical_gradients(
     return np.matmul(dn, inverse), determinant
 
 
+def hoop_values(
+    points: np.ndarray, cells: np.ndarray, kind: CellType, reference: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """N / r (n, q, n_nodes) and 2πr (n, q) at reference points (q, dim) of axisymmetric cells.
+
+    The first makes hoop strains u_r / r of radial displacements at nodes.
+    """
+    values = shape_functions(kind.name).values(reference)
+    place = values @ points[cells]
+    return values / place[..., :1], circumference(place)
+
+
+def with_hoop(slope: np.ndarray, strain: np.ndarray) -> np.ndarray:
+    """Displacement gradients (n, q, 2, 2) and hoop strains (n, q) as (n, q, 3, 3)."""
+    whole = np.zeros((*strain.shape, 3, 3), dtype=slope.dtype)
+    whole[..., :2, :2], whole[..., 2, 2] = slope, strain
+    return whole
+
+
+@dataclass(frozen=True)
+class _Shapes:
+    """What strains and integrals of n cells are made of at q points.
+
+    `gradient` (n, q, n_nodes, dim); `measure` (n, q) without the weights of quadrature; `hoop` (n,
+    q, n_nodes), N / r of axisymmetric cells.
+    """
+
+    gradient: np.ndarray
+    measure: np.ndarray
+    hoop: np.ndarray | None
+
+    @property
+    def divergence(self) -> np.ndarray:
+        """The divergence (n, q, n_nodes, dim) of each component of displacement at a node."""
+        if self.hoop is None:
+            return self.gradient
+        found = self.gradient.copy()
+        found[..., 0] += self.hoop
+        return found
+
+
+def shapes_in(
+    points: np.ndarray, block: Block, cells: np.ndarray, reference: np.ndarray
+) -> _Shapes:
+    """Those of some cells (n, n_nodes) of a block at reference points (q, dim)."""
+    gradient, measure = physical_gradients(points, cells, block.type, reference)
+    if not block.axisymmetric:
+        return _Shapes(gradient, measure, None)
+    hoop, around = hoop_values(points, cells, block.type, reference)
+    return _Shapes(gradient, measure * around, hoop)
+
+
 def _chunks(block: Block, dim: int) -> Iterator[slice]:
     points, _ = block.rule
     size = len(points) * block.type.n_nodes * dim * 8
@@ -78,33 +134,41 @@ def _chunks(block: Block, dim: int) -> Iterator[slice]:
         yield slice(start, start + step)
 
 
-def _in_the_middle(
-    points: np.ndarray, block: Block
-) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-    """Parts of a block with gradients (n, 1, n_nodes, dim) in the middle of cells, sizes (n,)."""
+def _in_the_middle(points: np.ndarray, block: Block) -> Iterator[tuple[slice, _Shapes, np.ndarray]]:
+    """Parts of a block with what is in the middle (q = 1) of their cells, and sizes (n,)."""
     reference, weights = block.rule
     middle = (weights @ reference / weights.sum())[None]
     for part in _chunks(block, points.shape[1]):
-        gradient, determinant = physical_gradients(points, block.cells[part], block.type, middle)
-        yield part, gradient, determinant[:, 0] * weights.sum()
+        found = shapes_in(points, block, block.cells[part], middle)
+        yield part, found, found.measure[:, 0] * weights.sum()
 
 
 def element_matrices(points: np.ndarray, block: Block, part: slice = _ALL) -> np.ndarray:
     """Stiffness matrices (n, dim · n_nodes, dim · n_nodes) of a part of a block's cells."""
     dim, nodes = points.shape[1], block.type.n_nodes
     reference, weights = block.rule
-    gradient, determinant = physical_gradients(points, block.cells[part], block.type, reference)
-    flat = gradient.reshape(*gradient.shape[:2], nodes * dim)
-    weighted = flat * (weights * determinant)[:, :, None]
-    products = np.matmul(np.swapaxes(weighted, 1, 2), flat)
-    products = products.reshape(-1, nodes, dim, nodes, dim)
+    found = shapes_in(points, block, block.cells[part], reference)
+    measure = weights * found.measure
+    products = _products(found.gradient, measure)
+    volume = products if found.hoop is None else _products(found.divergence, measure)
     shear = block.shear[part, None, None, None, None]
-    stiffness = products * block.lame[part, None, None, None, None]
+    stiffness = volume * block.lame[part, None, None, None, None]
     stiffness += shear * np.swapaxes(products, 2, 4)
     trace = block.shear[part, None, None] * np.einsum("caibi->cab", products)
     for i in range(dim):
         stiffness[:, :, i, :, i] += trace
+    if found.hoop is not None:
+        hoop = _products(found.hoop[..., None], measure)[:, :, 0, :, 0]
+        stiffness[:, :, 0, :, 0] += 2 * block.shear[part, None, None] * hoop
     return stiffness.reshape(-1, nodes * dim, nodes * dim)
+
+
+def _products(values: np.ndarray, measure: np.ndarray) -> np.ndarray:
+    """∫ v vᵀ (n, n_nodes, d, n_nodes, d) of values (n, q, n_nodes, d), measure (n, q)."""
+    flat = values.reshape(*values.shape[:2], -1)
+    weighted = flat * measure[:, :, None]
+    products = np.matmul(np.swapaxes(weighted, 1, 2), flat)
+    return products.reshape(len(values), *values.shape[2:], *values.shape[2:])
 
 
 def stiffness(
@@ -142,10 +206,13 @@ def internal_force(
         reference, weights = block.rule
         for part in _chunks(block, dim):
             cells = block.cells[part]
-            gradient, determinant = physical_gradients(points, cells, block.type, reference)
-            stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
-            stress *= (weights * determinant)[:, :, None, None]
-            nodal = np.einsum("cqaj,cqij->cai", gradient, stress, optimize=True)
+            found = shapes_in(points, block, cells, reference)
+            stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
+            stress *= (weights * found.measure)[:, :, None, None]
+            plane = stress[..., :dim, :dim]
+            nodal = np.einsum("cqaj,cqij->cai", found.gradient, plane, optimize=True)
+            if found.hoop is not None:
+                nodal[..., 0] += np.einsum("cqa,cq->ca", found.hoop, stress[..., 2, 2])
             np.add.at(force, degrees_of_freedom(cells, dim).ravel(), nodal.ravel())
     return force.reshape(n, dim)
 
@@ -180,20 +247,23 @@ def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> 
     largest = np.zeros(len(points))
     displacement = displacement.reshape(-1, *points.shape).sum(axis=0)
     for block in blocks:
-        for part, gradient, volume in _in_the_middle(points, block):
+        for part, found, volume in _in_the_middle(points, block):
             cells = block.cells[part]
-            slope = np.linalg.norm(gradient[:, 0], axis=2)
+            slope = np.linalg.norm(found.gradient[:, 0], axis=2)
             nodal = displacement[cells]
             apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
             stiff = block.lame[part] + 2 * block.shear[part]
             terms = stiff * np.einsum("ca,ca->c", slope, apart)
+            if found.hoop is not None:
+                around = np.abs(found.hoop[:, 0]) * np.abs(nodal[..., 0])
+                terms += stiff * around.sum(axis=1)
             extent = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
             nodal_force = (volume * terms)[:, None] * slope
             np.add.at(force, cells.ravel(), nodal_force.ravel())
             highest = max(highest, float(terms.max(initial=0.0)))
             on_small_faces = terms * extent * slope.max(axis=1)
             slender = max(slender, float(on_small_faces.max(initial=0.0)))
-            stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
+            stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
             norm = np.repeat(np.linalg.norm(stress, axis=(2, 3)), cells.shape[1])
             np.maximum.at(largest, cells.ravel(), norm)
     return Sizes(forces=force, highest=highest, slender=slender, stress=largest)
@@ -208,14 +278,17 @@ def largest_strain(
     """
     strain = rotation = 0.0
     for block in blocks:
-        for part, gradient, _ in _in_the_middle(points, block):
+        for part, found, _ in _in_the_middle(points, block):
             cells = block.cells[part]
             nodal = displacement[cells] - displacement[cells[:, :1]]
-            slope = np.einsum("cai,caj->cij", nodal, gradient[:, 0])
+            slope = np.einsum("cai,caj->cij", nodal, found.gradient[:, 0])
+            if found.hoop is not None:
+                around = np.einsum("ca,ca->c", found.hoop[:, 0], displacement[cells, 0])
+                slope = with_hoop(slope[:, None], around[:, None])[:, 0]
             turned = np.swapaxes(slope, 1, 2)
             size = np.linalg.norm(slope + turned, axis=(1, 2))
             # The largest principal value is at least this share of the norm.
-            near = size >= size.max() / np.sqrt(points.shape[1])
+            near = size >= size.max() / np.sqrt(slope.shape[1])
             principal = np.linalg.eigvalsh((slope + turned)[near]) / 2
             strain = max(strain, float(np.abs(principal).max()))
             angle = np.linalg.norm(slope - turned, axis=(1, 2)) / np.sqrt(8)
@@ -228,23 +301,28 @@ def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
     found = []
     for block in blocks:
         slope = np.empty(block.cells.shape)
-        for part, gradient, _ in _in_the_middle(points, block):
-            slope[part] = np.linalg.norm(gradient[:, 0], axis=2)
+        for part, shapes, _ in _in_the_middle(points, block):
+            slope[part] = np.linalg.norm(shapes.gradient[:, 0], axis=2)
         found.append(slope)
     return found
 
 
 def _stress(
-    gradient: np.ndarray,
+    found: _Shapes,
     displacement: np.ndarray,
     cells: np.ndarray,
     lame: np.ndarray,
     shear: np.ndarray,
 ) -> np.ndarray:
-    """In-plane or 3D stress tensors (n, q, dim, dim) in cells (n, n_nodes)."""
+    """In-plane or 3D stress tensors (n, q, dim, dim) in cells (n, n_nodes).
+
+    Those of axisymmetric cells are 3D, the third axis the circumference.
+    """
     nodal = displacement.reshape(-1, *displacement.shape[-2:])[:, cells]
     difference = (nodal - nodal[:, :, :1]).sum(axis=0)
-    slope = np.einsum("cai,cqaj->cqij", difference, gradient, optimize=True)
+    slope = np.einsum("cai,cqaj->cqij", difference, found.gradient, optimize=True)
+    if found.hoop is not None:
+        slope = with_hoop(slope, np.einsum("cqa,ca->cq", found.hoop, nodal[..., 0].sum(axis=0)))
     stress = shear[:, None, None, None] * (slope + np.swapaxes(slope, 2, 3))
     pressure = lame[:, None] * np.einsum("cqii->cq", slope)
     for i in range(slope.shape[-1]):
@@ -256,6 +334,8 @@ def nodal_stress(
     points: np.ndarray, blocks: list[Block], displacement: np.ndarray, extended: bool = False
 ) -> np.ndarray:
     """Stress (n_nodes, 6) as xx, yy, zz, xy, yz, xz, the mean over the cells around each node.
+
+    Of axisymmetric cells zz is the hoop stress.
 
     In each cell the stress at the points of a low-order rule is fitted by the linear shape
     functions of its vertices (least squares) and read at its nodes; gradients at a node itself
@@ -269,8 +349,8 @@ def nodal_stress(
         fit = _extrapolation(block.type, reference)
         for part in _chunks(block, points.shape[1]):
             cells = block.cells[part]
-            gradient, _ = physical_gradients(points, cells, block.type, reference)
-            stress = _stress(gradient, displacement, cells, block.lame[part], block.shear[part])
+            found = shapes_in(points, block, cells, reference)
+            stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
             full = _voigt(stress, block.lame[part], block.shear[part])
             nodal = np.einsum("aq,cqs->cas", fit, full, optimize=True)
             places = 6 * cells[:, :, None] + np.arange(6)

@@ -164,13 +164,40 @@ def area_vectors(points: np.ndarray, nodes: np.ndarray, tangents: np.ndarray) ->
     return np.cross(slope[:, :, 0], slope[:, :, 1])
 
 
+def circumference(places: np.ndarray) -> np.ndarray:
+    """2πr (…,) at places (…, 2) of a meridian plane, whose first coordinate is the radius r.
+
+    >>> circumference(np.array([[0.5, 7.0]])) == np.pi
+    array([ True])
+    """
+    return 2 * np.pi * places[..., 0]
+
+
+def surface_vectors(
+    points: np.ndarray,
+    nodes: np.ndarray,
+    face_type: str,
+    reference: np.ndarray,
+    axisymmetric: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (q, n_nodes) at reference points, and outward n dS (n, q, dim) there.
+
+    `axisymmetric`: dS is the area of a whole ring, 2πr times the length in the meridian plane.
+    """
+    values, tangents = shape_functions(face_type).both(reference)
+    vectors = area_vectors(points, nodes, tangents)
+    if axisymmetric:
+        vectors = vectors * circumference(values @ points[nodes])[..., None]
+    return values, vectors
+
+
 def face_integrals(
-    points: np.ndarray, nodes: np.ndarray, face_type: str
+    points: np.ndarray, nodes: np.ndarray, face_type: str, axisymmetric: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """∫ N_a n dS over each face (n, n_nodes, dim), and ∫ n dS (n, dim)."""
     reference, weights = face_rule(face_type)
-    values, tangents = shape_functions(face_type).both(reference)
-    vectors = area_vectors(points, nodes, tangents) * weights[:, None]
+    values, vectors = surface_vectors(points, nodes, face_type, reference, axisymmetric)
+    vectors = vectors * weights[:, None]
     return np.einsum("qa,fqd->fad", values, vectors), vectors.sum(axis=1)
 
 
@@ -207,7 +234,9 @@ class SurfacePoints:
 
 
 def surface_points(
-    points: np.ndarray, faces: Sequence[tuple[str, np.ndarray, np.ndarray]]
+    points: np.ndarray,
+    faces: Sequence[tuple[str, np.ndarray, np.ndarray]],
+    axisymmetric: bool = False,
 ) -> SurfacePoints:
     """Points all over a slave surface: (type, nodes, macro-element) by block."""
     place, weight, macro = [], [], []
@@ -217,6 +246,8 @@ def surface_points(
         values, slopes = shape_functions(kind.name).both(reference)
         measure = np.linalg.norm(area_vectors(points, nodes, slopes), axis=2) * weights
         where = np.einsum("qa,fad->fqd", values, points[nodes], optimize=True)
+        if axisymmetric:
+            measure *= circumference(where)
         place.append(where.reshape(-1, points.shape[1]))
         weight.append(measure.ravel())
         macro.append(np.repeat(owner, len(weights)))

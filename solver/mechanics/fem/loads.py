@@ -6,7 +6,7 @@ import numpy as np
 
 from ...system.errors import SolveError
 from . import face_rule, shape_functions, volume_rule
-from .faces import area_vectors
+from .faces import circumference, surface_vectors
 from .small_matrices import invert
 from .stress import traction
 
@@ -15,16 +15,21 @@ Field = Callable[[np.ndarray], np.ndarray]
 
 
 def face_forces(
-    points: np.ndarray, nodes: np.ndarray, face_type: str, value: Field, pressure: bool
+    points: np.ndarray,
+    nodes: np.ndarray,
+    face_type: str,
+    value: Field,
+    pressure: bool,
+    axisymmetric: bool = False,
 ) -> np.ndarray:
     """Forces (n_points, dim) on faces (n, n_nodes) turned outward.
 
     `value` gives a pressure (stress, positive inwards) or, where `pressure` is False, the traction
-    vector (stress).
+    vector (stress). `axisymmetric`: the forces are those on whole rings.
     """
     reference, weights = face_rule(face_type)
-    values, slopes = shape_functions(face_type).both(reference)
-    vectors = area_vectors(points, nodes, slopes) * weights[:, None]
+    values, vectors = surface_vectors(points, nodes, face_type, reference, axisymmetric)
+    vectors = vectors * weights[:, None]
     given = _at(points, nodes, values, value)
     if pressure:
         vectors = -vectors * given[..., None]
@@ -34,15 +39,20 @@ def face_forces(
 
 
 def stress_forces(
-    points: np.ndarray, nodes: np.ndarray, face_type: str, stress: Field, pressure: bool
+    points: np.ndarray,
+    nodes: np.ndarray,
+    face_type: str,
+    stress: Field,
+    pressure: bool,
+    axisymmetric: bool = False,
 ) -> np.ndarray:
     """Forces (n_points, dim) of a stress field (n, 6) on faces (n, n_nodes) turned outward.
 
     The traction is σ·n; where `pressure` is True, only its part along n.
     """
     reference, weights = face_rule(face_type)
-    values, slopes = shape_functions(face_type).both(reference)
-    vectors = area_vectors(points, nodes, slopes) * weights[:, None]
+    values, vectors = surface_vectors(points, nodes, face_type, reference, axisymmetric)
+    vectors = vectors * weights[:, None]
     given = _at(points, nodes, values, stress)
     flat = vectors.reshape(-1, vectors.shape[-1])
     force = traction(given.reshape(len(flat), 6), flat)
@@ -52,7 +62,13 @@ def stress_forces(
     return _gather(points, nodes, np.einsum("qa,fqd->fad", values, force.reshape(vectors.shape)))
 
 
-def body_forces(points: np.ndarray, cells: np.ndarray, cell_type: str, value: Field) -> np.ndarray:
+def body_forces(
+    points: np.ndarray,
+    cells: np.ndarray,
+    cell_type: str,
+    value: Field,
+    axisymmetric: bool = False,
+) -> np.ndarray:
     """Forces (n_points, dim) of a force per volume, given as a vector field, on cells."""
     reference, weights = volume_rule(cell_type)
     values, slopes = shape_functions(cell_type).both(reference)
@@ -61,6 +77,8 @@ def body_forces(points: np.ndarray, cells: np.ndarray, cell_type: str, value: Fi
     determinant, _ = invert(jacobian)
     if (determinant <= 0).any():
         raise SolveError(f"{cell_type} cells under a body force are inverted or degenerate")
+    if axisymmetric:
+        determinant = determinant * circumference(values @ corner)
     force = _at(points, cells, values, value) * (determinant * weights)[..., None]
     return _gather(points, cells, np.einsum("qa,cqd->cad", values, force))
 

@@ -28,7 +28,7 @@ from scipy import sparse
 
 from . import shape_functions
 from .assembly import degrees_of_freedom
-from .elasticity import Block, physical_gradients
+from .elasticity import Block, shapes_in
 
 AUTOMATIC_ABOVE = 0.499
 """Poisson's ratio above which the mixed form is taken where a case does not choose."""
@@ -42,7 +42,8 @@ class _Cells:
 
     `cells` (n, n_nodes); `rows` (n,) their places among all cells of that type; `unknowns` (n, k)
     the numbers of what s is made of in each; `flux` (n, k, n_nodes, dim) the integrals of q ∂N/∂x;
-    `at_nodes` (n, n_nodes, k) the values of the q at the nodes.
+    `at_nodes` (n, n_nodes, k) the values of the q at the nodes. `common` (dim,): the directions in
+    which a displacement common to all nodes has no divergence.
     """
 
     name: str
@@ -51,6 +52,7 @@ class _Cells:
     unknowns: np.ndarray
     flux: np.ndarray
     at_nodes: np.ndarray
+    common: np.ndarray
 
 
 class MeanStress:
@@ -97,7 +99,7 @@ class MeanStress:
         defect = self.compliance * stress
         for part in self._parts:
             nodal = deformation[:, part.cells]
-            difference = (nodal - nodal[:, :, :1]).sum(axis=0)
+            difference = (nodal - nodal[:, :, :1] * part.common).sum(axis=0)
             opened = np.einsum("ckai,cai->ck", part.flux, difference, optimize=True)
             defect -= np.bincount(part.unknowns.ravel(), opened.ravel(), minlength=self.size)
         return defect
@@ -196,7 +198,10 @@ def _mean_stress(
     cells, compliance = [], np.zeros(size)
     for (block, rows, _), unknowns in zip(parts, numbers, strict=True):
         flux, at_nodes, weight = _integrals(points, block)
-        cells.append(_Cells(block.type.name, block.cells, rows, unknowns, flux, at_nodes))
+        common = np.ones(dim)
+        common[: int(block.axisymmetric)] = 0.0
+        name = block.type.name
+        cells.append(_Cells(name, block.cells, rows, unknowns, flux, at_nodes, common))
         soft = weight / block.lame[:, None]
         compliance += np.bincount(unknowns.ravel(), soft.ravel(), minlength=size)
     return MeanStress(cells, compliance, n_nodes, dim)
@@ -242,12 +247,12 @@ def _chunk(
     points: np.ndarray, block: Block, cells: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     reference, weights = block.rule
-    gradient, determinant = physical_gradients(points, cells, block.type, reference)
-    measure = determinant * weights
+    found = shapes_in(points, block, cells, reference)
+    measure = found.measure * weights
     places = np.concatenate([reference, block.type.nodes])
     values = _functions(points, block, cells, places, measure)
     inside, at_nodes = values[:, : len(weights)], values[:, len(weights) :]
-    flux = np.einsum("cq,cqk,cqai->ckai", measure, inside, gradient, optimize=True)
+    flux = np.einsum("cq,cqk,cqai->ckai", measure, inside, found.divergence, optimize=True)
     once = np.ones_like(inside) if block.type.name in _AT_VERTICES else inside
     return flux, at_nodes, np.einsum("cq,cqk,cqk->ck", measure, inside, once, optimize=True)
 

@@ -18,7 +18,7 @@ from .krylov import EPSILON
 
 # A step leaves about 1/w of a violation; the factor loses as many digits, which refinement returns.
 _WEIGHT = 1e4
-# The smallest eigenvalue of Ĝ D⁻¹ Ĝᵀ, of diagonal one: below it constraints nearly depend on others.
+# The smallest eigenvalue of Ĝ D⁻¹ Ĝᵀ, of diagonal one: constraints below it nearly depend.
 _LEAST = 1e-3
 _MOST_STEPS = 12
 # A step that leaves more than this of the violation has reached round-off.

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..fem import face_rule, shape_functions
-from .facets import Facets, surface_vectors
+from ..fem import face_rule
+from .facets import Facets, measured
 from .multipliers import Multipliers
 from .segments import Segments
 
@@ -127,6 +127,5 @@ def shape_integrals(block: Facets) -> np.ndarray:
     [[1.0, 1.0]]
     """
     reference, weights = face_rule(block.type.name)
-    values, slopes = shape_functions(block.type.name).both(reference)
-    vectors = surface_vectors(block, slopes)
+    values, vectors = measured(block, reference)
     return np.einsum("q,qa,fqd,fd->fa", weights, values, vectors, block.normal, optimize=True)

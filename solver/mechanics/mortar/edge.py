@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from ..fem.faces import circumference
+
 # A macro-element is covered as a whole but for round-off.
 _WHOLE = 1 - 1e-6
 # How far from the edge found the true one is, in lengths of the last closed macro-element.
@@ -30,7 +32,8 @@ class Edges:
     `position` (e, 2): where contact ends; `lower`, `upper` (e, 2): places on its inner and outer
     side that it is between; `macro` (e,): the last closed macro-element; `better` (e,): whether the
     form of the pressure finds the position. Elsewhere that is the end of the last closed
-    macro-element. `lengths` (e, 3): contact beyond that end, up to the three places.
+    macro-element. `lengths` (e, 3): contact beyond that end, up to the three places, of
+    axisymmetric bodies as areas.
     """
 
     position: np.ndarray
@@ -64,6 +67,7 @@ def contact_edges(
     coverage: np.ndarray,
     mean: np.ndarray,
     closed: np.ndarray,
+    axisymmetric: bool = False,
 ) -> Edges:
     """The edges between closed and open ones of m macro-elements in 2D.
 
@@ -104,7 +108,10 @@ def contact_edges(
     backwards = (points[outer] - points[inner]) / length[last][:, None]
     forwards = (points[far] - points[outer]) / length[opened][:, None]
     along = np.where(lengths[..., None] < 0, backwards[:, None], forwards[:, None])
-    position, lower, upper = (points[outer][:, None] + lengths[..., None] * along).swapaxes(0, 1)
+    places = points[outer][:, None] + lengths[..., None] * along
+    if axisymmetric:
+        lengths = lengths * circumference((points[outer][:, None] + places) / 2)
+    position, lower, upper = places.swapaxes(0, 1)
     return Edges(
         position=position, lower=lower, upper=upper, macro=last, better=better, lengths=lengths
     )

@@ -7,7 +7,7 @@ import numpy as np
 from ...mesh.catalogue import CellType
 from ...system.errors import SolveError
 from ..fem import shape_functions
-from ..fem.faces import area_vectors, nodal_normals
+from ..fem.faces import area_vectors, nodal_normals, surface_vectors
 from ..fem.small_matrices import invert
 
 # Below these shares of a face's size, its bending and the skew of its map are round-off.
@@ -29,7 +29,8 @@ class Facets:
     (n, dim − 1, dim) completing it to a right-handed frame; `flat` (n,): planar; `straight` (n,):
     planar with straight edges; `affine` (n,): straight, and the image of the reference face under
     an affine map; `directions` (n, n_nodes, dim): the unit normals along which a slave face meets
-    its master, at its nodes. None: those of the face itself.
+    its master, at its nodes. None: those of the face itself. `axisymmetric`: they are sections of
+    rings about the axis x = 0, and integrals over them are those over the rings.
     """
 
     type: CellType
@@ -44,6 +45,7 @@ class Facets:
     straight: np.ndarray
     affine: np.ndarray
     directions: np.ndarray | None = None
+    axisymmetric: bool = False
 
 
 def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]:
@@ -65,7 +67,13 @@ def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]
     return [replace(block, directions=normals[block.nodes]) for block in blocks]
 
 
-def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.ndarray) -> Facets:
+def facets(
+    points: np.ndarray,
+    kind: CellType,
+    nodes: np.ndarray,
+    number: np.ndarray,
+    axisymmetric: bool = False,
+) -> Facets:
     """Faces of one type from points (n_points, dim) and node numbers (n, n_nodes).
 
     Raises SolveError for faces of no size, as beside a node that lies beyond all measure.
@@ -99,6 +107,7 @@ def facets(points: np.ndarray, kind: CellType, nodes: np.ndarray, number: np.nda
         flat=flat,
         straight=straight,
         affine=affine,
+        axisymmetric=axisymmetric,
     )
 
 
@@ -139,17 +148,18 @@ def _shape(
     return flat, straight, straight & (skew <= _AFFINE * radius)
 
 
-def surface_vectors(block: Facets, slopes: np.ndarray) -> np.ndarray:
-    """Outward normal × surface measure (n, q, dim) at points with reference gradients `slopes`.
+def measured(block: Facets, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (q, n_nodes) at reference points, and outward n dS (n, q, dim) there.
 
-    The edge from (2, 0) to (0, 0):
+    The edge from (2, 0) to (0, 0), in its middle:
 
-    >>> surface_vectors(slave, np.array([[[-1.0], [1.0]]])).tolist()
-    [[[0.0, 2.0]]]
+    >>> values, vectors = measured(slave, np.array([[0.5]]))
+    >>> values.tolist(), vectors.tolist()
+    ([[0.5, 0.5]], [[[0.0, 2.0]]])
     """
     n, n_nodes, dim = block.corner.shape
-    nodes = np.arange(n * n_nodes).reshape(n, n_nodes)
-    return area_vectors(block.corner.reshape(-1, dim), nodes, slopes)
+    nodes, points = np.arange(n * n_nodes).reshape(n, n_nodes), block.corner.reshape(-1, dim)
+    return surface_vectors(points, nodes, block.type.name, reference, block.axisymmetric)
 
 
 def project_along(

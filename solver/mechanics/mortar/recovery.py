@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from ..fem.faces import circumference
 from .facets import tangents_of
 from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
@@ -56,7 +57,10 @@ def moments(found: Sequence[Segments], surface: Surface) -> Moments:
     covered = np.where(measure > 0, measure, 1.0)
     shift = first / covered[:, None]
     spread = second / covered[:, None, None] - shift[:, :, None] * shift[:, None]
-    size = np.where(measure > 0, measure, surface.area) ** (1 / (dim - 1))
+    size = np.where(measure > 0, measure, surface.area)
+    if found and found[0].slave.faces.axisymmetric:
+        size = size / circumference(surface.centre + shift)
+    size = size ** (1 / (dim - 1))
     axes = tangents_of(surface.normal) / size[:, None, None]
     own = np.einsum("nsd,nde,nte->nst", axes, spread, axes)
     local = Local(centre=surface.centre + shift, axes=axes, spread=own)

@@ -13,10 +13,6 @@ from typing import Self
 
 import numpy as np
 
-from ..fem import simplex_rule
-from ..fem.gauss import gauss_rule
-from .clipping import triangles
-
 # Edges whose middle is off the chord by less than this share of it are straight.
 _BENT = 1e-13
 # Halvings after which an interval within [0, 1] is as short as rounding allows.
@@ -51,11 +47,6 @@ class Regions:
         following = np.arange(1, self.start.shape[1] + 1)
         following = np.where(following < self.count[:, None], following, 0)
         return np.take_along_axis(self.start, following[..., None], axis=1)
-
-    @property
-    def middle(self) -> np.ndarray:
-        """The middles of the arcs (n, v, 2)."""
-        return (self.start + self.end) / 2 + self.bulge
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +150,6 @@ def clip_by(regions: Regions, curves: Curves) -> Regions:
 
 
 Parts = list[tuple[np.ndarray, Regions]]
-Pieces = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def clip_to_face(regions: Regions, corner: np.ndarray, bulge: np.ndarray) -> Parts:
@@ -255,65 +245,6 @@ def _boundary(
         if len(rows):
             caps.append((rows, [line.reversed(), parabola]))
     return [*lines, *dents], caps
-
-
-def quadrature(regions: Regions, degree: int) -> list[Pieces]:
-    """Points on fans of triangles that make up the regions, for polynomials of a degree.
-
-    Region numbers (s,), points (s, q, 2) and weights (s, q); of triangles, where the rule is exact,
-    and of those with a bent side, where it is exact for degree 2 and has no fewer points.
-    The region under the parabola 4 t (1 − t) has the area 2/3:
-
-    >>> cap = Regions(start=np.array([[[1.0, 0.0], [0.0, 0.0]]]), count=np.array([2]),
-    ...               bulge=np.array([[[0.0, 1.0], [0.0, 0.0]]]))
-    >>> round(sum(float(weight.sum()) for _, _, weight in quadrature(cap, 1)), 15)
-    0.666666666666667
-    """
-    bent = (regions.bulge.any(axis=2) & regions.used).any(axis=1)
-    which = np.flatnonzero(~bent)
-    polygon, corner, area = triangles(regions.start[which], regions.count[which])
-    reference, weights = simplex_rule(2, degree)
-    barycentric = np.column_stack([1 - reference.sum(axis=1), reference])
-    points = np.einsum("qk,skt->sqt", barycentric, corner)
-    pieces = [(which[polygon], points, 2 * area[:, None] * weights)]
-    which = np.flatnonzero(bent)
-    if len(which):
-        fans = _fans(regions.of(which), degree)
-        pieces += [(which[arc], points, weights) for arc, points, weights in fans]
-    return pieces
-
-
-def _fans(regions: Regions, degree: int) -> list[Pieces]:
-    """The same of regions with bent arcs, around a corner, between straight arcs if there is one.
-
-    Signs are kept: the fans of regions that are not convex then still sum to them.
-    """
-    curved = regions.bulge.any(axis=2) & regions.used
-    n, before = np.arange(len(curved)), np.roll(curved, 1, axis=1)
-    before[:, 0] = curved[n, regions.count - 1]
-    neighbours = np.where(regions.used, curved.astype(int) + before, 3)
-    middle = regions.start[n, neighbours.argmin(axis=1)]
-    which, arc = np.nonzero(regions.used)
-    first, last = regions.start[which, arc] - middle[which], regions.end[which, arc] - middle[which]
-    bulge = regions.bulge[which, arc]
-    bent = bulge.any(axis=1)
-    straight = ~bent & (_cross(first, last) != 0)
-    reference, weights = simplex_rule(2, degree)
-    corner = np.stack([first[straight], last[straight]], axis=1)
-    points = middle[which[straight]][:, None] + np.einsum("qk,skd->sqd", reference, corner)
-    pieces = [(which[straight], points, _cross(first, last)[straight, None] * weights)]
-    if bent.any():
-        reference, weights = gauss_rule("TRIA3", degree // 2 + 2)
-        radius = 1 - reference[:, 1]
-        t = reference[:, 0] / radius
-        shapes = np.stack([1 - t, t, 4 * t * (1 - t)])
-        slopes = np.stack([-np.ones_like(t), np.ones_like(t), 4 - 8 * t])
-        nodes = np.stack([first[bent], last[bent], bulge[bent]], axis=1)
-        rim = np.einsum("kq,skd->sqd", shapes, nodes)
-        measure = _cross(rim, np.einsum("kq,skd->sqd", slopes, nodes)) * weights
-        points = middle[which[bent]][:, None] + radius[:, None] * rim
-        pieces.append((which[bent], points, measure))
-    return pieces
 
 
 def joined(parts: Sequence[Regions]) -> Regions:

@@ -19,8 +19,11 @@ from typing import Self
 import numpy as np
 
 from ..fem import mortar_degree, shape_functions, simplex_rule
+from ..fem.faces import circumference
+from ..fem.small_matrices import invert
 from .clipping import clip, overlap
 from .facets import Facets, project_along
+from .fans import Image, Pieces, quadrature
 from .pairing import (
     Outlines,
     Pairs,
@@ -30,11 +33,9 @@ from .pairing import (
 )
 from .regions import (
     Parts,
-    Pieces,
     Regions,
     clip_to_face,
     joined,
-    quadrature,
     without_face,
 )
 
@@ -76,8 +77,9 @@ class Side:
 class Segments:
     """Segments between the slave faces of one block and the master faces of one block.
 
-    At each of q points: `weight` (s, q) surface measure × quadrature weight, `normal` (s, q, dim)
-    the slave's unit normal and `gap` (s, q) the distance along it, positive when open.
+    At each of q points: `weight` (s, q) surface measure (of axisymmetric faces that of rings) ×
+    quadrature weight, `normal` (s, q, dim) the slave's unit normal and `gap` (s, q) the distance
+    along it, positive when open.
     """
 
     slave: Side
@@ -186,6 +188,8 @@ def _degree(pairs: Pairs) -> int:
     degree = max(mortar_degree(kind.name) for kind in kinds)
     affine = pairs.slave.affine[pairs.i].all() and pairs.outline.affine[pairs.j].all()
     plain = affine and pairs.slave.directions is None
+    # The radius of a ring is one more degree.
+    degree += pairs.slave.axisymmetric
     return degree if plain else degree + _BENT_DEGREES
 
 
@@ -206,12 +210,12 @@ def _areas(pairs: Pairs, behind: Behind, degree: int, curved: bool) -> list[Piec
         faces = subject[which], bulge[which]
         cut = _bent(pairs.of(which), slave, faces, _among(behind, which, len(special)))
         parts += [(which[k], regions) for k, regions in cut]
-    if curved:
-        parts = [(which, _in_reference(pairs.of(which), regions)) for which, regions in parts]
     return [
         (which[number], points, weight)
         for which, regions in parts
-        for number, points, weight in quadrature(regions, degree)
+        for number, points, weight in quadrature(
+            regions, degree, _into_reference(pairs.of(which)) if curved else None
+        )
     ]
 
 
@@ -232,24 +236,23 @@ def _bent(
     return [(np.concatenate([which for which, _ in parts]), joined([part for _, part in parts]))]
 
 
-def _in_reference(pairs: Pairs, regions: Regions) -> Regions:
-    """The same regions in the reference faces of the slaves, where their functions are polynomials.
+def _into_reference(pairs: Pairs) -> Image:
+    """The map of places in the slaves' planes into their reference faces, of slopes as well."""
 
-    Arcs become parabolas through the places of their ends and middles: edges of the slave its
-    reference edges, and edges that two masters share one curve.
-    """
-    start = np.where(regions.used[..., None], regions.start, regions.start[:, :1])
-    middle = np.where(regions.used[..., None], regions.middle, start)
-    slave, i, v = pairs.slave, pairs.i, start.shape[1]
-    points = np.einsum("sat,std->sad", np.hstack([start, middle]), slave.tangents[i])
-    direction = slave.normal[i][:, None]
-    place, _ = project_along(slave.type, pairs.corner, points, direction)
-    mapped = Regions(start=place[:, :v], bulge=np.zeros_like(start), count=regions.count)
-    chord = mapped.end - mapped.start
-    bulge = place[:, v:] - mapped.start - chord / 2
-    sideways = np.abs(chord[..., 0] * bulge[..., 1] - chord[..., 1] * bulge[..., 0])
-    bent = regions.used & (sideways > _STRAIGHT * np.linalg.norm(chord, axis=2))
-    return replace(mapped, bulge=np.where(bent[..., None], bulge, 0.0))
+    def image(
+        which: np.ndarray, points: np.ndarray, slopes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        slave, some = pairs.slave, pairs.of(which)
+        tangents, corner = slave.tangents[some.i], some.corner
+        direction = slave.normal[some.i][:, None]
+        targets = np.einsum("sqt,std->sqd", points, tangents)
+        place, _ = project_along(slave.type, corner, targets, direction)
+        gradients = shape_functions(slave.type.name).gradients(place)
+        across = seen_along(corner, tangents)
+        _, inverse = invert(np.einsum("sat,sqar->sqtr", across, gradients))
+        return place, np.einsum("sqrt,sqt->sqr", inverse, slopes)
+
+    return image
 
 
 def _layers(behind: Behind, count: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -320,6 +323,8 @@ def _with_master(pairs: Pairs, pieces: Pieces, reach: float, curved: bool) -> It
         )
         points = points + height[..., None] * normal
         values = shape_functions(kind.name).values(place)
+    if slave.axisymmetric:
+        weight = weight * circumference(points + slave.centre[i][:, None])
     if slave.directions is not None:
         between = np.einsum("sqa,sad->sqd", values, slave.directions[i])
         normal = between / np.linalg.norm(between, axis=-1, keepdims=True)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..fem import face_rule, shape_functions
+from ..fem import face_rule
 from ..fem.quadrature import Rule
-from .facets import Facets, surface_vectors
+from .facets import Facets, measured
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +53,7 @@ def sampled(block: Facets, rule: Rule) -> Samples:
     ([[2.0]], [[0.5, 0.5]], [[[0.0, 1.0]]])
     """
     places, weights = rule
-    values, slopes = shape_functions(block.type.name).both(places)
-    vectors = surface_vectors(block, slopes)
+    values, vectors = measured(block, places)
     measure = np.linalg.norm(vectors, axis=2)
     if block.directions is not None:
         vectors = np.einsum("qa,fad->fqd", values, block.directions)

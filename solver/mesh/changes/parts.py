@@ -3,23 +3,23 @@
 import meshio
 import numpy as np
 
-from ..keys import Keys
+from ...case.typed import FieldError
 from .perturb import stepped
 
 
-def cells_of(mesh: meshio.Mesh, keys: Keys, key: str) -> list[np.ndarray]:
-    """The numbers of the cells, block by block, of the group named under a key."""
-    group = keys.text(key)
+def cells_of(mesh: meshio.Mesh, group: str, key: str = "group") -> list[np.ndarray]:
+    """The numbers of the cells, block by block, of a group. FieldError names the `key`."""
     if group not in mesh.cell_sets:
-        raise keys.refuse(key, group, f"no such group; there are {', '.join(mesh.cell_sets)}")
+        problem = f"no such group; there are {', '.join(mesh.cell_sets)}"
+        raise FieldError((key,), problem, value=group)
     none = np.empty(0, dtype=int)
     return [none if i is None else np.asarray(i, dtype=int) for i in mesh.cell_sets[group]]
 
 
-def nodes_of(mesh: meshio.Mesh, keys: Keys) -> np.ndarray:
-    """Which nodes (n,) belong to the cells of the group under the key `group`."""
+def nodes_of(mesh: meshio.Mesh, group: str) -> np.ndarray:
+    """Which nodes (n,) belong to the cells of a group."""
     chosen = np.zeros(len(mesh.points), dtype=bool)
-    for block, numbers in zip(mesh.cells, cells_of(mesh, keys, "group"), strict=True):
+    for block, numbers in zip(mesh.cells, cells_of(mesh, group), strict=True):
         chosen[block.data[numbers].ravel()] = True
     return chosen
 

@@ -20,8 +20,10 @@ from typing import Any
 import meshio
 import numpy as np
 
-from ...system.errors import InputError
-from ..keys import LARGEST, Keys
+from ...case.file import Perturbation, Pick, Renumbering, Rotation, Shift, Transform, Turn
+from ...case.typed import FieldError, read_as
+from ...system.errors import InputError, key_path
+from ..keys import LARGEST
 from . import parts
 from .perturb import perturbed
 
@@ -31,9 +33,13 @@ def transform(mesh: meshio.Mesh, spec: Mapping[str, Any], where: str) -> meshio.
 
     `where` names the case file in the InputError that an unknown key or a wrong value raises.
     """
-    keys = Keys(spec, where, "transform")
+    given = read_as(Transform, dict(spec), where, "transform")
     for key in spec:
-        mesh = _STEPS[keys.known(key, _STEPS)](mesh, key, keys)
+        try:
+            mesh = _STEPS[key](mesh, getattr(given, key))
+        except FieldError as fault:
+            path = key_path(("transform", key, *fault.keys))
+            raise InputError(where, path, fault.value, fault.problem) from None
     if not (np.abs(mesh.points) <= LARGEST).all():
         raise InputError(where, "transform", None, f"moves nodes farther than {LARGEST:g}")
     return mesh
@@ -43,30 +49,39 @@ def _moved(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
     return meshio.Mesh(points, mesh.cells, cell_sets=mesh.cell_sets, point_sets=mesh.point_sets)
 
 
-def _scale(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
-    return _moved(mesh, mesh.points * keys.numbers(key, 1)[0])
+def _vector(mesh: meshio.Mesh, values: tuple[float, ...], *keys: str) -> np.ndarray:
+    """Values as a vector (dim,) of the mesh's dimension."""
+    dim = mesh.points.shape[1]
+    if len(values) != dim:
+        raise FieldError(keys, f"must be a list of {dim} numbers", value=list(values))
+    return np.array(values)
 
 
-def _stretch(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
-    return _moved(mesh, mesh.points * keys.numbers(key, mesh.points.shape[1]))
+def _scale(mesh: meshio.Mesh, factor: float) -> meshio.Mesh:
+    return _moved(mesh, mesh.points * factor)
 
 
-def _translate(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
-    return _moved(mesh, mesh.points + keys.vector(key, mesh.points.shape[1]))
+def _stretch(mesh: meshio.Mesh, factors: tuple[float, ...]) -> meshio.Mesh:
+    return _moved(mesh, mesh.points * _vector(mesh, factors))
 
 
-def _rotate(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
+def _translate(mesh: meshio.Mesh, by: tuple[float, ...]) -> meshio.Mesh:
+    return _moved(mesh, mesh.points + _vector(mesh, by))
+
+
+def _rotate(mesh: meshio.Mesh, turn: float | Rotation) -> meshio.Mesh:
     if mesh.points.shape[1] == 2:
-        cos, sin = _cos_sin(keys.number(key))
+        if isinstance(turn, Rotation):
+            raise FieldError((), "must be a number in 2D: the angle in degrees")
+        cos, sin = _cos_sin(turn)
         return _moved(mesh, mesh.points @ np.array([[cos, sin], [-sin, cos]]))
-    section = keys.section(key, "{axis: [x, y, z], angle: degrees}")
-    axis = np.array(section.vector("axis", 3))
-    length = np.linalg.norm(axis)
+    if not isinstance(turn, Rotation):
+        raise FieldError((), "must be {axis: [x, y, z], angle: degrees} in 3D", value=turn)
+    length = np.linalg.norm(turn.axis)
     if length == 0:
-        raise section.refuse("axis", axis.tolist(), "must not be zero")
-    cos, sin = _cos_sin(section.number("angle"))
-    section.finish()
-    axis /= length
+        raise FieldError(("axis",), "must not be zero", value=list(turn.axis))
+    cos, sin = _cos_sin(turn.angle)
+    axis = np.array(turn.axis) / length
     # Rodrigues' formula.
     across = np.cross(axis, mesh.points)
     along = np.outer(mesh.points @ axis, axis)
@@ -82,10 +97,8 @@ def _cos_sin(degrees: float) -> tuple[float, float]:
     return cos, sin
 
 
-def _renumber(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
-    section = keys.one_or_section(key, "seed")
-    rng = np.random.default_rng(section.integers("seed", 1, least=0)[0])
-    section.finish()
+def _renumber(mesh: meshio.Mesh, seed: int | Renumbering) -> meshio.Mesh:
+    rng = np.random.default_rng(seed.seed if isinstance(seed, Renumbering) else seed)
     order = rng.permutation(len(mesh.points))
     new = np.argsort(order)
     orders = [rng.permutation(len(block.data)) for block in mesh.cells]
@@ -100,54 +113,42 @@ def _renumber(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
     )
 
 
-def _perturb(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
-    section = keys.one_or_section(key, "amplitude")
-    amplitude = section.numbers("amplitude", 1)[0]
-    seed = section.integers("seed", 1, [0], least=0)[0]
-    chosen = parts.nodes_of(mesh, section) if section.given("group") else None
-    section.finish()
-    points = perturbed(mesh, amplitude, seed, chosen)
+def _perturb(mesh: meshio.Mesh, given: float | Perturbation) -> meshio.Mesh:
+    full = given if isinstance(given, Perturbation) else Perturbation(given)
+    chosen = None if full.group is None else parts.nodes_of(mesh, full.group)
+    points = perturbed(mesh, full.amplitude, full.seed, chosen)
     if points is None:
-        raise section.refuse("amplitude", amplitude, "folds cells over: must be smaller")
+        problem = "folds cells over: must be smaller"
+        raise FieldError(("amplitude",), problem, value=full.amplitude)
     return _moved(mesh, points)
 
 
-def _shift(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
-    section = keys.section(key, "{group: name, by: vector}")
-    chosen, by = parts.nodes_of(mesh, section), section.vector("by", mesh.points.shape[1])
-    section.finish()
-    return _moved(mesh, mesh.points + chosen[:, None] * np.array(by))
+def _shift(mesh: meshio.Mesh, shift: Shift) -> meshio.Mesh:
+    chosen, by = parts.nodes_of(mesh, shift.group), _vector(mesh, shift.by, "by")
+    return _moved(mesh, mesh.points + chosen[:, None] * by)
 
 
-def _turn(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
-    section = keys.section(key, "{group: name, angle: degrees}")
-    chosen, angle = parts.nodes_of(mesh, section), section.number("angle")
-    section.finish()
-    points = parts.turned(mesh, chosen, np.radians(angle))
+def _turn(mesh: meshio.Mesh, turn: Turn) -> meshio.Mesh:
+    chosen = parts.nodes_of(mesh, turn.group)
+    points = parts.turned(mesh, chosen, np.radians(turn.angle))
     if points is None:
-        raise section.refuse("angle", angle, "folds cells over: must be smaller")
+        raise FieldError(("angle",), "folds cells over: must be smaller", value=turn.angle)
     return _moved(mesh, points)
 
 
-def _pick(mesh: meshio.Mesh, key: str, keys: Keys) -> meshio.Mesh:
-    for section in keys.sections(key, "{from: group, low: vector, high: vector, name: new group}"):
-        mesh = _picked(mesh, section)
+def _pick(mesh: meshio.Mesh, given: Pick | tuple[Pick, ...]) -> meshio.Mesh:
+    for pick in (given,) if isinstance(given, Pick) else given:
+        members = parts.cells_of(mesh, pick.source, "from")
+        low, high = _vector(mesh, pick.low, "low"), _vector(mesh, pick.high, "high")
+        inside, outside = parts.picked(mesh, members, low, high)
+        sets = {**mesh.cell_sets, pick.name: inside}
+        if pick.rest is not None:
+            sets[pick.rest] = outside
+        mesh = meshio.Mesh(mesh.points, mesh.cells, cell_sets=sets, point_sets=mesh.point_sets)
     return mesh
 
 
-def _picked(mesh: meshio.Mesh, section: Keys) -> meshio.Mesh:
-    members = parts.cells_of(mesh, section, "from")
-    low, high = (np.array(section.vector(k, mesh.points.shape[1])) for k in ("low", "high"))
-    inside, outside = parts.picked(mesh, members, low, high)
-    sets = {section.text("name"): inside}
-    if section.given("rest"):
-        sets[section.text("rest")] = outside
-    section.finish()
-    sets = {**mesh.cell_sets, **sets}
-    return meshio.Mesh(mesh.points, mesh.cells, cell_sets=sets, point_sets=mesh.point_sets)
-
-
-_STEPS: dict[str, Callable[[meshio.Mesh, str, Keys], meshio.Mesh]] = {
+_STEPS: dict[str, Callable[[meshio.Mesh, Any], meshio.Mesh]] = {
     "scale": _scale,
     "stretch": _stretch,
     "rotate": _rotate,

@@ -23,7 +23,7 @@ _LINES = {
     "T2D2": "SEG2", "T3D2": "SEG2", "B21": "SEG2", "B31": "SEG2", "R2D2": "SEG2",
     "T2D3": "SEG3", "T3D3": "SEG3", "B22": "SEG3", "B32": "SEG3",
 }  # fmt: skip
-# Node orders are the catalogue's, but that lines have their middle node between their ends.
+# Node orders are those of the catalogue, except that lines have their middle node second.
 _MIDDLE_SECOND = [0, 2, 1]
 _PLANE = re.compile(r"(?:CPE|CPS|CAX|M3D|SFM3D|R3D|DS|STRI|S)(\d)")
 # Corners of the faces S1, S2, … of each shape, counted from 1.
@@ -35,7 +35,7 @@ FACES = {
     "PENTA": ["123", "465", "1452", "2563", "3641"],
     "HEXA": ["1234", "5876", "1562", "2673", "3784", "4851"],
 }
-# These make or place nodes and cells in ways that are not followed here.
+# Keywords that make or place nodes and cells in ways not supported here.
 _REFUSED = ("NGEN", "NCOPY", "NFILL", "ELGEN", "ELCOPY", "NMAP", "SYSTEM")
 
 
@@ -99,7 +99,7 @@ def _keywords(path: Path) -> Iterator[tuple[str, _Options, _Lines]]:
 
 
 class _Deck:
-    """What the keywords say, gathered; Abaqus takes the names of sets for one in any case."""
+    """The content of all keywords; Abaqus ignores the case of names."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -191,7 +191,7 @@ class _Deck:
                 members += [int(field)] if field.isdigit() else sets[field.upper()]
 
     def mesh(self) -> meshio.Mesh:
-        """All that was taken: cells of a type in one block, the faces of surfaces after them."""
+        """The mesh: cells of a type in one block, the faces of surfaces after them."""
         names: dict[int, set[str]] = defaultdict(set)
         for name, members in self.cell_sets.items():
             for number in members:

@@ -1,6 +1,6 @@
-"""Readers of foreign files in a process of their own: what kills them does not kill the solve.
+"""Readers of foreign files in a separate process: a crash of the reader does not end the solve.
 
-gmsh and HDF5 are libraries in C++ and C that some damaged files bring down, or keep busy for ever.
+Some damaged files crash gmsh and HDF5, which are C++ and C libraries, or never end.
 """
 
 import os
@@ -21,7 +21,7 @@ Reader = Callable[[Path], meshio.Mesh]
 
 
 def read_here(reader: Reader, path: Path) -> meshio.Mesh:
-    """What `reader(path)` gives; raises InputError for whatever exception it ends with."""
+    """The result of `reader(path)`; any exception becomes an InputError."""
     mesh, refusal = _attempt(reader, path)
     if mesh is None:
         raise InputError(*refusal)
@@ -29,7 +29,7 @@ def read_here(reader: Reader, path: Path) -> meshio.Mesh:
 
 
 def read_apart(reader: Reader, path: Path) -> meshio.Mesh:
-    """What `reader(path)` gives; raises InputError for whatever keeps it from an end."""
+    """The result of `reader(path)`; any failure becomes an InputError."""
     inward, outward = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # threads: none holds a lock here
@@ -51,7 +51,7 @@ def read_apart(reader: Reader, path: Path) -> meshio.Mesh:
 
 
 def _answer(reader: Reader, path: Path, outward: int) -> None:
-    """Write the mesh or the refusal, and end the process without any of its parent's endings."""
+    """Write the mesh or the refusal; end the process without the exit handlers of its parent."""
     allowed_time = _SECONDS + _SECONDS_PER_MB * path.stat().st_size / 1e6
     signal.setitimer(signal.ITIMER_PROF, allowed_time)  # its signal ends the process
     signal.signal(signal.SIGPROF, signal.SIG_DFL)

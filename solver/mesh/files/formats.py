@@ -30,7 +30,7 @@ _READERS = {
 
 
 def read(path: Path) -> meshio.Mesh:
-    """The mesh of a file, tidied. Raises InputError for whatever keeps it from being read."""
+    """The mesh of a file, tidied. Raises InputError for any file that cannot be read."""
     suffix = path.suffix.lower()
     if suffix not in _READERS:
         raise InputError(path, "extension", path.suffix, f"allowed: {', '.join(_READERS)}")

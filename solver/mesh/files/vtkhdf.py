@@ -30,7 +30,7 @@ def write_grid(
     """Write the grid into `group` (named VTKHDF for ParaView), its groups beside it.
 
     point_data (n_points, …) and cell_data (n_cells, …), cells counted block after block. Points of
-    a 2D mesh get z = 0; the attribute `Dimension` tells.
+    a 2D mesh get z = 0; the attribute `Dimension` has the dimension.
     """
     group.attrs["Version"] = np.array([2, 0], dtype=np.int64)
     grid = b"UnstructuredGrid"

@@ -26,75 +26,59 @@ import gmsh
 import meshio
 import numpy as np
 
-from ..catalogue import BY_NAME, CellType
-from ..keys import Keys
+from ..catalogue import BY_NAME
+from ..keys import BlockKeys, BlocksKeys, Recipe, each
 from .gmsh_session import current_model, session
 from .sides import side_name
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
 _ALGORITHMS = {"frontal": 6, "delaunay": 5, "meshadapt": 1}
-_CELLS = [name for name, cell in BY_NAME.items() if cell.dim > 1]
 
 
-def blocks(keys: Keys) -> meshio.Mesh:
+def blocks(recipe: BlocksKeys) -> meshio.Mesh:
     """Both blocks, which share no nodes."""
-    mesh = stacked(keys, None)
-    keys.finish()
-    return mesh
+    return stacked(recipe, each(recipe.size, recipe.dim, "size"))
 
 
-def stacked(keys: Keys, size: float | None) -> meshio.Mesh:
-    """Both blocks, each of edge `size`, or of the key `size`; the caller finishes the keys."""
-    sections = {name: keys.section(name) for name in ("bottom", "top")}
-    types = {name: BY_NAME[section.choice("cells", _CELLS)] for name, section in sections.items()}
-    dim = types["bottom"].dim
-    if types["top"].dim != dim:
-        raise keys.refuse("top.cells", types["top"].name, f"must be of dimension {dim} as bottom")
-    edges = np.array(keys.numbers("size", dim) if size is None else [size] * dim)
-    refine = keys.integers("refine", 1, [1])[0]
-    return _joined([_block(n, types[n], edges, sections[n], refine) for n in sections])
+def stacked(recipe: Recipe, size: list[float] | None = None) -> meshio.Mesh:
+    """Both blocks, each of a `size` along each axis, by default of edge 1."""
+    edges = np.array(size or [1.0] * recipe.dim)
+    both = {"bottom": recipe.bottom, "top": recipe.top}
+    return _joined([_block(name, keys, edges, recipe.refine) for name, keys in both.items()])
 
 
-def _block(name: str, cell: CellType, size: np.ndarray, keys: Keys, refine: int) -> meshio.Mesh:
+def _block(name: str, keys: BlockKeys, size: np.ndarray, refine: int) -> meshio.Mesh:
+    cell = BY_NAME[keys.cells]
     origin = np.zeros(cell.dim)
     if name == "bottom":
         origin[-1] = -size[-1]
     if cell.name.startswith(("PENTA", "PYRA")):
         from .hybrid import cube
 
-        return cube(name, cell, origin, size, keys, refine)
-    return _Block(name, cell, origin, size, keys, refine).mesh()
+        return cube(name, keys, origin, size, refine)
+    return _Block(name, keys, origin, size, refine).mesh()
 
 
 class _Block:
     """One block: a rectangle or a box, its corners and sides those of QUAD4 or HEXA8."""
 
     def __init__(
-        self,
-        name: str,
-        cell: CellType,
-        origin: np.ndarray,
-        size: np.ndarray,
-        keys: Keys,
-        refine: int,
+        self, name: str, keys: BlockKeys, origin: np.ndarray, size: np.ndarray, refine: int
     ):
-        self.name, self.cell, self.origin, self.size = name, cell, origin, size
+        self.cell = cell = BY_NAME[keys.cells]
+        self.name, self.origin, self.size = name, origin, size
         self.solid = BY_NAME["QUAD4" if cell.dim == 2 else "HEXA8"]
         self.regular = cell.name.startswith(("QUAD", "HEXA"))
-        self.divisions = [refine * n for n in keys.integers("divisions", cell.dim)]
+        self.divisions = [refine * n for n in each(keys.divisions, cell.dim, "divisions")]
         self.far = self.divisions[:-1]
-        options: dict[str, float] = {}
+        if keys.far is not None:
+            self.far = [refine * n for n in each(keys.far, cell.dim - 1, "far")]
+        self.options: dict[str, float] = {}
         if not self.regular:
-            if keys.given("far"):
-                self.far = [refine * n for n in keys.integers("far", cell.dim - 1)]
-            options["Mesh__Algorithm"] = _ALGORITHMS[
-                keys.choice("algorithm", _ALGORITHMS, "frontal")
-            ]
-            if keys.given("inner"):
-                options["Mesh__MeshSizeExtendFromBoundary"] = 0
-                options["Mesh__MeshSizeMax"] = keys.numbers("inner", 1)[0] / refine
-        self.options = options
-        keys.finish()
+            self.options["Mesh__Algorithm"] = _ALGORITHMS[keys.algorithm or "frontal"]
+        if keys.inner is not None:
+            self.options["Mesh__MeshSizeExtendFromBoundary"] = 0
+            self.options["Mesh__MeshSizeMax"] = keys.inner / refine
 
     def mesh(self) -> meshio.Mesh:
         """The block's mesh, with its groups."""

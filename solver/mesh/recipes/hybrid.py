@@ -19,7 +19,7 @@ import meshio
 import numpy as np
 
 from ..catalogue import BY_NAME, CellType
-from ..keys import Keys
+from ..keys import BlockKeys, each
 from .gmsh_session import current_model, number_of, session
 from .sides import side_name
 
@@ -29,12 +29,11 @@ _LYING = [(0, 1, 5, 3, 2, 6), (0, 5, 4, 3, 6, 7)]
 
 
 def cube(
-    name: str, cell: CellType, origin: np.ndarray, size: np.ndarray, keys: Keys, refine: int = 1
+    name: str, keys: BlockKeys, origin: np.ndarray, size: np.ndarray, refine: int
 ) -> meshio.Mesh:
     """The block `name` of PENTA or PYRA cells, with its groups; `refine` multiplies divisions."""
-    contact = keys.choice("contact", sorted({face.type for face in cell.faces}))
-    divisions = refine * np.array(keys.integers("divisions", 3, [1, 1, 1]))
-    keys.finish()
+    cell, contact = BY_NAME[keys.cells], keys.contact or ""
+    divisions = refine * np.array(each(keys.divisions or 1, 3, "divisions"))
     on_triangles = contact.startswith("TRIA")
     if cell.name.startswith("PYRA"):
         at_top = on_triangles == (name == "bottom")

@@ -35,8 +35,19 @@ from collections.abc import Callable
 import meshio
 import numpy as np
 
+from ...case.typed import FieldError
 from ..catalogue import cell_type
-from ..keys import Keys
+from ..changes.parts import nodes_of
+from ..keys import (
+    HertzKeys,
+    ParabolaKeys,
+    PunchKeys,
+    Recipe,
+    RingsKeys,
+    ShellsKeys,
+    WavyKeys,
+    each,
+)
 from .blocks import stacked
 
 # Nodes as near as this share of the side to the place where it is divided lie on it.
@@ -51,82 +62,65 @@ _SHAPES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 }
 
 
-def rings(keys: Keys) -> meshio.Mesh:
+def rings(recipe: RingsKeys) -> meshio.Mesh:
     """A quarter of two nested tubes, plane."""
-    radii = _radii(keys)
-    mesh = _flat(keys, 2)
 
     def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
         angle = np.pi / 2 * x[:, 0]
         direction = np.stack([np.sin(angle), np.cos(angle)], axis=1)
         # the straight sides stay on the axes to the bit
         direction[x[:, 0] == 1, 1] = 0.0
-        return _radius(height, radii)[:, None] * direction
+        return _radius(height, recipe.radii)[:, None] * direction
 
-    return _bent(mesh, bend)
+    return _bent(_unit(recipe), bend)
 
 
-def shells(keys: Keys) -> meshio.Mesh:
+def shells(recipe: ShellsKeys) -> meshio.Mesh:
     """A sector of two nested spheres, between four planes through the centre."""
-    radii = _radii(keys)
-    mesh = _flat(keys, 3)
 
     def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
         # Equal angles, so that mid-edge nodes come to lie near the middle of their arc.
         direction = np.column_stack([np.tan(np.pi / 4 * x[:, :2]), np.ones(len(x))])
         direction /= np.linalg.norm(direction, axis=1)[:, None]
-        return _radius(height, radii)[:, None] * direction
+        return _radius(height, recipe.radii)[:, None] * direction
 
-    return _bent(mesh, bend)
+    return _bent(_unit(recipe), bend)
 
 
-def wavy(keys: Keys) -> meshio.Mesh:
+def wavy(recipe: WavyKeys) -> meshio.Mesh:
     """Two blocks whose interface is tilted, kinked, curved or warped; all other sides are plane."""
-    shape = _SHAPES[keys.choice("shape", _SHAPES)]
-    rise = keys.number("height")
-    if not abs(rise) < 0.5:
-        raise keys.refuse("height", rise, "must lie between −0.5 and 0.5 (blocks of edge 1)")
-    mesh = _flat(keys)
+    shape = _SHAPES[recipe.shape]
 
     def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
-        lift = rise * shape(x[:, 0], _y(x)) * (1 - np.abs(height))
+        lift = recipe.height * shape(x[:, 0], _y(x)) * (1 - np.abs(height))
         return np.column_stack([x[:, :-1], height + lift])
 
-    return _bent(mesh, bend)
+    return _bent(_unit(recipe), bend)
 
 
-def parabola(keys: Keys) -> meshio.Mesh:
+def parabola(recipe: ParabolaKeys) -> meshio.Mesh:
     """A block above a parabolic die; their distance is the initial gap."""
-    depth = keys.number("height")
-    mesh = _flat(keys)
+    mesh = _unit(recipe)
 
     def bend(x: np.ndarray, height: np.ndarray) -> np.ndarray:
         sag = (x[:, 0] - 0.5) ** 2 + (0 if x.shape[1] == 2 else (_y(x) - 0.5) ** 2)
-        return np.column_stack([x[:, :-1], height - depth * sag * (1 + height)])
+        return np.column_stack([x[:, :-1], height - recipe.height * sag * (1 + height)])
 
-    top = _nodes(mesh, "top")
-    return _bent(mesh, bend, ~top)
+    return _bent(mesh, bend, ~nodes_of(mesh, "top"))
 
 
-def hertz(keys: Keys) -> meshio.Mesh:
+def hertz(recipe: HertzKeys) -> meshio.Mesh:
     """A parabolic body on a flat one, their cells even around the point of contact."""
-    radius, size, core = (keys.numbers(key, 1)[0] for key in ("radius", "size", "core"))
-    share = keys.numbers("share", 1)[0]
-    if not core / size < share < 1:
-        raise keys.refuse("share", share, f"must lie between core / size = {core / size:g} and 1")
-    mesh = _flat(keys)
+    mesh, size = _unit(recipe), recipe.size
     x = mesh.points
-    largest = 2 * radius / (x.shape[1] - 1)
-    if not size < largest:
-        raise keys.refuse("size", size, f"must be smaller than {largest:g}, or it folds")
-    graded = np.sign(x) * _graded(np.abs(x), size, core, share)
+    graded = np.sign(x) * _graded(np.abs(x), size, recipe.core, recipe.share)
     mesh.points = _straightened(graded, mesh.cells)
 
     def risen(x: np.ndarray, height: np.ndarray) -> np.ndarray:
-        rise = (x[:, :-1] ** 2).sum(axis=1) / (2 * radius)
+        rise = (x[:, :-1] ** 2).sum(axis=1) / (2 * recipe.radius)
         return np.column_stack([x[:, :-1], height + rise * (1 - height / size)])
 
-    return _bent(mesh, risen, _nodes(mesh, "top"))
+    return _bent(mesh, risen, nodes_of(mesh, "top"))
 
 
 def _graded(x: np.ndarray, size: float, core: float, share: float) -> np.ndarray:
@@ -144,27 +138,22 @@ def _graded(x: np.ndarray, size: float, core: float, share: float) -> np.ndarray
     return np.where(x <= share, x / share * core, grown)
 
 
-def punch(keys: Keys) -> meshio.Mesh:
+def punch(recipe: PunchKeys) -> meshio.Mesh:
     """Two straight blocks of their own sizes, with a gap or an overlap, the upper top divided."""
-    mesh = _unit(keys)
-    dim = mesh.points.shape[1]
-    bottom, top = (np.array(keys.numbers(key, dim)) for key in ("bottom_size", "top_size"))
-    gap = keys.number("gap") if keys.given("gap") else 0.0
-    loaded = keys.numbers("loaded", 1, 1.0)[0]
-    if loaded > 1:
-        raise keys.refuse("loaded", loaded, "must be a share of the side, at most 1")
-    keys.finish()
-    upper = _nodes(mesh, "top")
+    mesh, dim = _unit(recipe), recipe.dim
+    bottom = np.array(each(recipe.bottom_size, dim, "bottom_size"))
+    top = np.array(each(recipe.top_size, dim, "top_size"))
+    upper = nodes_of(mesh, "top")
     placed = _bent(
         _bent(mesh, lambda x, _: x * bottom, ~upper),
-        lambda x, _: x * top + gap * (np.arange(dim) == dim - 1),
+        lambda x, _: x * top + recipe.gap * (np.arange(dim) == dim - 1),
         upper,
     )
-    placed.cell_sets |= _divided(mesh, loaded, keys)
+    placed.cell_sets |= _divided(mesh, recipe.loaded)
     return placed
 
 
-def _divided(mesh: meshio.Mesh, share: float, keys: Keys) -> dict[str, list[np.ndarray]]:
+def _divided(mesh: meshio.Mesh, share: float) -> dict[str, list[np.ndarray]]:
     """The sides `press_left` and `press_right` of the position x = `share`, without empty ones."""
     left, right = [], []
     for block, ids in zip(mesh.cells, mesh.cell_sets["press"], strict=True):
@@ -172,7 +161,8 @@ def _divided(mesh: meshio.Mesh, share: float, keys: Keys) -> dict[str, list[np.n
         x = mesh.points[block.data[members], 0] - share
         low, high = x.max(axis=1, initial=-1) <= _ON, x.min(axis=1, initial=1) >= -_ON
         if not (low | high).all():
-            raise keys.refuse("loaded", share, "must be a share at which faces of press end")
+            problem = "must be a share at which faces of press end"
+            raise FieldError(("loaded",), problem, value=share)
         left.append(members[low])
         right.append(members[high])
     sides = {"press_left": left, "press_right": right}
@@ -182,18 +172,10 @@ def _divided(mesh: meshio.Mesh, share: float, keys: Keys) -> dict[str, list[np.n
 Bend = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def _unit(keys: Keys) -> meshio.Mesh:
-    """The two blocks of edge 1, with as many coordinates as dimensions; keys may be left."""
-    mesh = stacked(keys, 1.0)
-    mesh.points = mesh.points[:, : 3 if "symy" in mesh.cell_sets else 2]
-    return mesh
-
-
-def _flat(keys: Keys, dim: int | None = None) -> meshio.Mesh:
-    mesh = _unit(keys)
-    keys.finish()
-    if dim and mesh.points.shape[1] != dim:
-        raise keys.refuse("bottom.cells", None, f"must be a cell type of {dim}D")
+def _unit(recipe: Recipe) -> meshio.Mesh:
+    """The two blocks of edge 1, with as many coordinates as dimensions."""
+    mesh = stacked(recipe)
+    mesh.points = mesh.points[:, : recipe.dim]
     return mesh
 
 
@@ -213,26 +195,11 @@ def _straightened(points: np.ndarray, cells: list[meshio.CellBlock]) -> np.ndarr
     return points
 
 
-def _nodes(mesh: meshio.Mesh, group: str) -> np.ndarray:
-    """Which nodes (n,) belong to the cells of a group."""
-    mask = np.zeros(len(mesh.points), dtype=bool)
-    for block, members in zip(mesh.cells, mesh.cell_sets[group], strict=True):
-        mask[block.data[np.asarray(members, dtype=int)].ravel()] = True
-    return mask
-
-
 def _y(x: np.ndarray) -> np.ndarray:
     return x[:, 1] if x.shape[1] == 3 else np.zeros(len(x))
 
 
-def _radii(keys: Keys) -> list[float]:
-    radii = keys.numbers("radii", 3)
-    if not radii[0] < radii[1] < radii[2]:
-        raise keys.refuse("radii", radii, "must increase: bore, interface, rim")
-    return radii
-
-
-def _radius(height: np.ndarray, radii: list[float]) -> np.ndarray:
+def _radius(height: np.ndarray, radii: tuple[float, float, float]) -> np.ndarray:
     bore, interface, rim = radii
     inner, outer = interface - bore, rim - interface
     return interface + height * np.where(height < 0, inner, outer)

@@ -19,7 +19,7 @@
     const width = place.clientWidth - 38; // beside the menu
     spec.config.legend.columns = Math.max(1, Math.floor(width / 170));
     if (spec.width) { spec.width = width; spec.autosize = { type: "fit-x", contains: "padding" }; }
-    for (const part of spec.vconcat ?? []) part.width = width - 80;
+    for (const part of spec.vconcat ?? []) part.width = width - 70;
     return spec;
   };
   const draw = async (place) => {

@@ -1,40 +1,36 @@
 """The benchmark as data: `benchmark.yaml`.
 
-    title: Benchmark
-    threads: 2                    # that every process may use, fewer where there are not as many
-    limit: 300                    # seconds that a process may take
-    scaling: scaling.yaml         # whose series the meshes are
-    comparisons:                  # the same mesh, solved in several ways; ratios to the first one
-      - title: Linear solver in space
-        series: hexa8
-        size: 1.0e+5              # unknowns at least
-        repetitions: 1            # after the first solve, in one process; 0: the first one counts
-        ways:
-          - {title: as chosen}
-          - {title: CHOLMOD, solver: cholmod}        # the linear solver
-          - {title: without MKL, free: true}         # free software alone
-          - {title: not cut, treatment: uncut}       # of the interface
-          - {title: no cures, cures: false}          # see `solver.simulation.options`
-          - {title: nothing left out, everything: true}   # see `solver.simulation.options`
-          - {title: CalculiX, program: calculix}     # another code
-    batch: {title: …, most: 2, cases: [case.yaml]}   # in one warm process, and one by one
-    quick: {size: 1000}           # of every mesh, for a first look
-
-`most` is the number of seconds that all cases of the batch together should not exceed.
+title: Benchmark
+threads: 2                    # that every process may use, fewer where there are not as many
+limit: 300                    # seconds that a process may take
+scaling: scaling.yaml         # whose series the meshes are
+comparisons:                  # the same mesh, solved in several ways; ratios to the first one
+- title: Linear solver in space
+series: hexa8
+size: 1.0e+5              # unknowns at least
+repetitions: 1            # after the first solve, in one process; 0: the first one counts
+ways:
+- {title: as chosen}
+- {title: CHOLMOD, solver: cholmod}        # the linear solver
+- {title: without MKL, free: true}         # free software alone
+- {title: not cut, treatment: uncut}       # of the interface
+- {title: no cures, cures: false}          # see `solver.simulation.options`
+- {title: nothing left out, everything: true}   # see `solver.simulation.options`
+- {title: CalculiX, program: calculix}     # another code
+quick: {size: 1000}           # of every mesh, for a first look
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from msgspec import Meta
+from msgspec import Meta, structs
 
 from ...case.typed import Section, Text, read_as
 from ...case.yaml import read_mapping
 from ...system.errors import InputError, hint
 from .. import QUICK
 from ..keys import Count, Seconds, Unknowns
-from ..scaling.description import ScalingPoint, read_scaling
+from ..scaling.description import read_scaling
 
 
 class Way(Section, frozen=True):
@@ -49,7 +45,9 @@ class Way(Section, frozen=True):
     program: Literal["", "calculix"] = ""
 
 
-class _Comparison(Section, frozen=True):
+class WayComparison(Section, frozen=True):
+    """One mesh of a series of the scaling family, solved in several ways."""
+
     title: Text
     series: Text
     size: Unknowns
@@ -57,69 +55,30 @@ class _Comparison(Section, frozen=True):
     ways: Annotated[tuple[Way, ...], Meta(min_length=1)]
 
 
-class WarmBatch(Section, frozen=True):
-    """Cases solved in one process and in one each; `most` seconds are the goal."""
-
-    title: Text
-    most: Seconds
-    cases: Annotated[tuple[Path, ...], Meta(min_length=1)]
-
-
 class _QuickBenchmark(Section, frozen=True):
     size: Unknowns
 
 
-class BenchmarkFile(Section, frozen=True):
+class Benchmark(Section, frozen=True):
     """The keys of `benchmark.yaml`."""
 
     title: Text
     threads: Count
     limit: Seconds
     scaling: Path
-    comparisons: tuple[_Comparison, ...]
-    batch: WarmBatch
-    quick: _QuickBenchmark
-
-
-@dataclass(frozen=True)
-class WayComparison:
-    """One mesh, solved in several ways."""
-
-    title: str
-    point: ScalingPoint
-    repetitions: int
-    ways: tuple[Way, ...]
-
-
-@dataclass(frozen=True)
-class Benchmark:
-    """All of it."""
-
-    path: Path
-    title: str
-    threads: int
-    limit: float
     comparisons: tuple[WayComparison, ...]
-    batch: WarmBatch
+    quick: _QuickBenchmark
 
 
 def read_benchmark(path: Path, size: str) -> Benchmark:
     """The benchmark in a file, or its quick version; InputError says what is refused."""
-    content = read_as(BenchmarkFile, read_mapping(path), path)
-    small = int(content.quick.size) if size == QUICK else None
-    known = {series.name: series for series in read_scaling(content.scaling).series}
-    comparisons = []
+    content = read_as(Benchmark, read_mapping(path), path)
+    known = {series.name for series in read_scaling(content.scaling).series}
     for i, item in enumerate(content.comparisons):
         if item.series not in known:
             problem = f"no such series; {hint(item.series, known)}"
             raise InputError(path, f"comparisons[{i}].series", item.series, problem)
-        point = ScalingPoint(known[item.series], small or int(item.size))
-        comparisons.append(WayComparison(item.title, point, item.repetitions, item.ways))
-    return Benchmark(
-        path=path,
-        title=content.title,
-        threads=content.threads,
-        limit=content.limit,
-        comparisons=tuple(comparisons),
-        batch=content.batch,
-    )
+    if size != QUICK:
+        return content
+    small = (structs.replace(each, size=content.quick.size) for each in content.comparisons)
+    return structs.replace(content, comparisons=tuple(small))

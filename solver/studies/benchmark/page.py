@@ -1,7 +1,7 @@
 """The benchmark's record as text: tables of ratios."""
 
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from ..points import SOLVED, Record
 
@@ -16,15 +16,9 @@ def as_text(record: Record) -> str:
         f"{record['title']}: {machine['cpu']}, {record['threads']} threads, {machine['time_utc']}\n"
         f"load of the machine before the start: {record['load']:g}; times: processor seconds"
     )
-    parts = [head, *map(_printed, tables(record)), f"benchmark took {record['whole']:.0f} s"]
+    tables = map(compared, record["comparisons"])
+    parts = [head, *map(_printed, tables), f"benchmark took {record['whole']:.0f} s"]
     return "\n\n".join(parts)
-
-
-def tables(record: Record) -> Iterator[TextTable]:
-    """A table for each comparison, for the batch, and for the program's start."""
-    yield from map(compared, record["comparisons"])
-    yield batched(record["batch"])
-    yield started(record["start"])
 
 
 def _printed(table: TextTable) -> str:
@@ -70,28 +64,4 @@ def _way(way: Record, ratio: float | None) -> list[str]:
         f"{way['process']['peak_memory_mb'] / 1000:.2f} GB",
         "pressure error " + (f"< {resolved:.0e}" if error < resolved else f"{error:.1e}"),
         way["linear_solver"] + (f", {iterations} iterations" if iterations else ""),
-    ]
-
-
-def batched(batch: Record) -> TextTable:
-    """Cases in a process each beside the same in one process, cold and warm."""
-    each = sum(process["cpu"] for process in batch["each"])
-    together = batch["together"]
-    rows = [["a process each", f"{each:.2f} s", "×1.00"]]
-    if together["outcome"] != SOLVED:
-        rows.append(["one process", f"{together['outcome']}: {together['reason']}"])
-    else:
-        second = together["passes"][1]["cpu"]
-        cold, goal = together["process"]["cpu"] - second, f"goal: under {batch['most']:g} s"
-        rows.append(["one process", f"{cold:.2f} s", f"×{cold / each:.2f}"])
-        rows.append(["one warm process", f"{second:.2f} s", f"×{second / each:.2f}", goal])
-    return f"{batch['title']}: from mesh file to verdict", rows
-
-
-def started(start: Record) -> TextTable:
-    """What the smallest uses of the program take."""
-    plane = start["plane"]
-    return "The program's own start", [
-        ["--help", f"{start['help']['cpu']:.2f} s", "goal: under 0.3 s"],
-        ["a plane case", f"{plane['cpu']:.2f} s", "goal: under 1.1 s", plane["case"]],
     ]

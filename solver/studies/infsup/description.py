@@ -83,7 +83,7 @@ class InfSupLadder:
 
     @property
     def verdict(self) -> str:
-        """What the levels tell, in words."""
+        """The outcome of the levels in words."""
         if self.reason:
             return self.reason
         if self.constants[-1] < ZERO:
@@ -107,7 +107,7 @@ class InfSupLadder:
 
     @property
     def levels_off(self) -> bool:
-        """Whether β_h stays above zero, as far as these levels tell."""
+        """Whether β_h stays above zero, by these levels."""
         return not self.reason and bool(self.order <= LEVEL)
 
 

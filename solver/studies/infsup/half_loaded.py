@@ -8,7 +8,7 @@ controlled; without the cut it is of the order of the pressure itself.
 """
 
 import json
-from collections.abc import Callable
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,9 @@ from ...case.reader import parse_case
 from ...mesh import generate
 from ...simulation.problem import ContactProblem
 from ...simulation.scene import build_scene
+from ...system.progress import OUTCOME
+
+_LOG = logging.getLogger(__name__)
 
 PRESSURE, FACES, COARSER = 25.0, 64, 4
 CELLS = {"TRIA3": True, "QUAD4": True, "TRIA6": False, "QUAD8": False, "QUAD9": False}
@@ -45,16 +48,15 @@ class PressureProfile:
         return float(np.abs(np.diff(self.pressure, 2)).max())
 
 
-def profiles(
-    faces: int = FACES, log: Callable[[str], Any] = lambda _: None
-) -> list[PressureProfile]:
+def profiles(faces: int = FACES) -> list[PressureProfile]:
     """All cells, cut and uncut, bilateral and opening, on so many slave faces."""
     found = []
     for cells, has_cut in CELLS.items():
         for cut in (True, False) if has_cut else (True,):
             pair = profile_pair(cells, cut, faces)
             shown = " and ".join(f"{profile.oscillation:.2f}" for profile in pair)
-            log(f"half-loaded block, {cells}{'' if cut else ', uncut'}: {shown}")
+            uncut = "" if cut else ", uncut"
+            _LOG.log(OUTCOME, "half-loaded block, %s%s: %s", cells, uncut, shown)
             found += pair
     return found
 

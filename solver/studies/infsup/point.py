@@ -1,7 +1,7 @@
 """The inf-sup test on ladders of meshes: two unit blocks, and β_h level by level."""
 
 import json
-from collections.abc import Callable
+import logging
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,19 +13,22 @@ from ...mesh import generate
 from ...mesh.catalogue import BY_NAME
 from ...simulation.scene import build_scene
 from ...system.errors import InputError, SolveError
+from ...system.progress import OUTCOME
 from .constant import inf_sup_constant
 from .description import InfSupLadder, read_ladders
 from .half_loaded import FACES, profiles
 from .records import write_record
 
+_LOG = logging.getLogger(__name__)
 
-def measure(description: Path, output: Path, quick: bool, log: Callable[[str], Any]) -> None:
+
+def measure(description: Path, output: Path, quick: bool) -> None:
     """Run all ladders of a file and the half-loaded block, and write the record."""
-    ladders = [run(ladder, log) for ladder in read_ladders(description, quick)]
-    write_record(output, ladders, profiles(FACES // 2 if quick else FACES, log))
+    ladders = [run(ladder) for ladder in read_ladders(description, quick)]
+    write_record(output, ladders, profiles(FACES // 2 if quick else FACES))
 
 
-def run(ladder: InfSupLadder, log: Callable[[str], Any]) -> InfSupLadder:
+def run(ladder: InfSupLadder) -> InfSupLadder:
     """Fill in every level; where one fails, its reason is kept and the rest left out."""
     for n in ladder.levels:
         try:
@@ -34,7 +37,7 @@ def run(ladder: InfSupLadder, log: Callable[[str], Any]) -> InfSupLadder:
             ladder.reason = str(error)
             break
     shown = " ".join(f"{constant:.3f}" for constant in ladder.constants)
-    log(f"{ladder.name}: {shown or ladder.reason}")
+    _LOG.log(OUTCOME, "%s: %s", ladder.name, shown or ladder.reason)
     return ladder
 
 

@@ -8,6 +8,7 @@
       quadratic: {pressure_max: [0.5, 1.0]}
     reference_code: {name: code_aster, version: …, remark: …}
     shortfalls: why some slopes stay below theory, where they do
+    smooth: true                  # a smooth pressure: goals of recovery are shown (`gains.GOALS`)
     ladders:
       - {case: tria3.yaml, reference_code: {displacement_l2: 1.998, pressure_l2: 1.041}}
       - {case: press-fit.yaml, problem: press fit}    # has plots of its own
@@ -71,8 +72,8 @@ class LaddersFile(Section, frozen=True):
     """The keys of `orders.yaml`.
 
     `least` and `theory` go by degree and error; `theory` holds only what differs from
-    `theory.THEORY`. `shortfalls` says why slopes stay below theory. Where `title` or `description`
-    is empty, `family.yaml` has it.
+    `theory.THEORY`. `shortfalls` says why slopes stay below theory; `smooth`: the pressure is, so
+    that the goals of recovery apply. Where `title` or `description` is empty, `family.yaml` has it.
     """
 
     levels: Counts
@@ -80,6 +81,7 @@ class LaddersFile(Section, frozen=True):
     title: str = ""
     description: str = ""
     shortfalls: str = ""
+    smooth: bool = False
     least: dict[Degree, Slopes] = field(default_factory=dict)
     theory: dict[Degree, dict[ErrorName, _Orders]] = field(default_factory=dict)
     reference_code: ReferenceCode = ReferenceCode()

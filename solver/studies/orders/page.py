@@ -1,54 +1,61 @@
 """The page of orders of convergence, its tables for machines, and what was not reached."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ...mesh.catalogue import BY_NAME
+from ...report.charts import write_script
 from ...report.families import FILE_NAME, read_family
 from ...report.html import render
 from ...report.tables import as_csv
 from ...system.files import write_text
 from ..fits import LAST
 from .description import LadderFamily
-from .figure import draw_key, draw_panel
+from .figure import draw_panel
+from .gains import Gain, gains
 from .records import ERRORS, Curve, groups, read_curves, shown_errors
 
-PAGE, SLOPES, POINTS, FAILURES = (
+CELLS = list(BY_NAME)
+PAGE, SLOPES, POINTS, GAINS, FAILURES = (
     "orders.html",
     "orders.csv",
     "orders-points.csv",
+    "orders-recovery.csv",
     "orders-failures.txt",
 )
 
 
-def write_orders(
-    families: Sequence[LadderFamily], results: Path, folder: Path, log: Callable[[str], Any] = print
-) -> None:
+def write_orders(families: Sequence[LadderFamily], results: Path, folder: Path) -> str:
     """Write the page, the tables and the failures of the ladders into `folder`.
 
-    `results` holds a folder a family, a ladder, a level, each with its verdict. Logs one line for
-    each level without a result and each slope that is not reached.
+    `results` holds a folder a family, a ladder, a level, each with its verdict. Returns a line for
+    each level without a result and each slope that is not reached, and the outcome.
     """
     curves = {family.name: read_curves(family, results) for family in families}
     every = [curve for members in curves.values() for curve in members]
     complaints = [line for curve in every for line in curve.complaints]
+    found = [gain for members in curves.values() for gain in gains(members)]
+    found.sort(key=lambda gain: (CELLS.index(gain.cells), gain.form))
     page = render(
         Path(__file__).with_name("page.html.jinja"),
+        charts=True,
         title="Orders of convergence",
         sections=[_section(family, curves[family.name]) for family in families],
+        gains=found,
         outcome=outcome(every),
         good=bool(families) and not complaints,
         complaints=complaints,
         names=ERRORS,
         last=LAST,
-        key=draw_key,
     )
     failures = "".join(f"{line}\n" for line in complaints)
-    slopes, points = as_csv(_slope_rows(every)), as_csv(_point_rows(every))
-    contents = {PAGE: page, SLOPES: slopes, POINTS: points, FAILURES: failures}
+    tables = {SLOPES: _slope_rows(every), POINTS: _point_rows(every), GAINS: _gain_rows(found)}
+    contents = {PAGE: page, FAILURES: failures} | {k: as_csv(rows) for k, rows in tables.items()}
     for name, content in contents.items():
         write_text(folder / name, content)
-    log(f"{failures}{outcome(every)} Report: {folder / PAGE}")
+    write_script(folder)
+    return f"{failures}{outcome(every)} Report: {folder / PAGE}"
 
 
 def outcome(curves: Sequence[Curve]) -> str:
@@ -65,10 +72,10 @@ def outcome(curves: Sequence[Curve]) -> str:
 def _section(family: LadderFamily, curves: Sequence[Curve]) -> dict[str, Any]:
     """One family: its words, and its panels and tables by group."""
     described = read_family(family.folder / FILE_NAME)
-    parts = []
+    parts: list[dict[str, Any]] = []
     for title, members in groups(curves).items():
         shown = shown_errors(members)
-        panels = [draw_panel(error, members) for error in shown]
+        panels = [draw_panel(f"{family.name}-{len(parts)}", error, members) for error in shown]
         parts.append({"title": title, "curves": members, "errors": shown, "panels": panels})
     return {
         "family": family,
@@ -120,4 +127,26 @@ def _point_rows(curves: Sequence[Curve]) -> list[dict[str, Any]]:
         }
         for curve in curves
         for row in curve.rows
+    ]
+
+
+def _gain_rows(found: Sequence[Gain]) -> list[dict[str, Any]]:
+    """One row for each ladder with recovery: what it gains, and the goals."""
+    return [
+        {
+            "family": gain.curve.family.name,
+            "ladder": gain.curve.name,
+            "cells": gain.pair,
+            "recovery": gain.form,
+            "macro_elements": gain.faces,
+            "error": gain.error,
+            "order": gain.order,
+            "gain": gain.gain,
+            "stress_order": gain.stress_order,
+            "order_goal": gain.goal.order,
+            "gain_goal": gain.goal.gain,
+            "stress_order_goal": gain.stress_goal,
+            "reached": all(gain.marks.values()) if gain.marks else None,
+        }
+        for gain in found
     ]

@@ -100,7 +100,7 @@ class Curve:
         return is_rounding(*self.errors(error))
 
     def theory(self, error: str) -> Order:
-        """What theory says of the slope."""
+        """The order of the slope by theory."""
         own = self.family.theory.get(self.degree, {}).get(error)
         known = Order(*own) if own else THEORY.get(self.degree, {}).get(error, UNKNOWN)
         best = RECOVERED.get((self.ladder.recovery or "none", self.degree))

@@ -1,4 +1,4 @@
-"""What theory says of orders of convergence.
+"""Orders of convergence by theory.
 
 The LAC method on cells of degree one or two has a multiplier that is constant on each macro-element
 (Drouet, Hild, Numer. Math. 136 (2017) 467–502): the error of the displacement in H1 falls with

@@ -1,11 +1,12 @@
 """The page of numerical stability, its table for machines, and which points do not hold."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ...report import formats
+from ...report.charts import write_script
 from ...report.html import render
 from ...report.tables import as_csv
 from ...system.errors import InputError
@@ -13,7 +14,7 @@ from ...system.files import write_text
 from ..infsup.page import sections
 from ..infsup.records import InfSupRecord, failures
 from ..points import Record
-from .figure import anchor, draw_key, draw_map
+from .figure import COLORS, anchor, draw_map
 
 PAGE, TABLE, FAILURES = ".html", ".csv", "-failures.txt"
 MEASURES = {
@@ -46,13 +47,12 @@ def write_stability(
     records: Sequence[Record],
     folder: Path,
     quick: bool,
-    log: Callable[[str], Any] = print,
     theory: InfSupRecord | None = None,
-) -> None:
+) -> str:
     """Write the page, the table and the failures of the sweeps into `folder`.
 
     They are called stability…, or stability-quick… for the quick version. `theory` adds the inf-sup
-    test and the half-loaded block.
+    test and the half-loaded block. Returns the failures and the outcome.
     """
     stem = "stability-quick" if quick else "stability"
     lines = [line for record in records for line in complaints(record)]
@@ -64,7 +64,8 @@ def write_stability(
     }
     for name, content in contents.items():
         write_text(folder / f"{stem}{name}", content)
-    log("".join(f"{line}\n" for line in lines) + f"{outcome(records)} Page: {folder / stem}{PAGE}")
+    write_script(folder)
+    return contents[FAILURES] + f"{outcome(records)} Page: {folder / stem}{PAGE}"
 
 
 def complaints(record: Record) -> list[str]:
@@ -94,6 +95,7 @@ def _to_html(
 ) -> str:
     return render(
         Path(__file__).with_name("page.html.jinja"),
+        charts=True,
         title="Numerical stability",
         records=records,
         quick=quick,
@@ -102,8 +104,8 @@ def _to_html(
         complaints=lines,
         theory=sections(theory) if theory else "",
         table=f"stability{'-quick' * quick}{TABLE}",
-        map=draw_map(records),
-        key=draw_key(),
+        maps=[draw_map(record) for record in records],
+        shades=COLORS,
         anchor=anchor,
         measures=MEASURES,
         seconds=sum(record["cpu_seconds"] for record in records),

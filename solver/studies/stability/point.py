@@ -9,7 +9,7 @@ its errors: there it must only know what it does not know.
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -38,7 +38,6 @@ GOAL, FLOORS = 1e-10, 20.0
 """What a point has to reach: the first, or so many times its floor."""
 SMALL = 1500
 """Unknowns up to which all eigenvalues of the system are found."""
-Log = Callable[[str], Any]
 
 
 @lru_cache(maxsize=8)
@@ -55,7 +54,7 @@ class _Point:
     label: str
 
 
-def run_sweep(sweep: Sweep, output: Path, log: Log) -> dict[str, Any]:
+def run_sweep(sweep: Sweep, output: Path) -> dict[str, Any]:
     """Solve all points of a sweep in this process and write the record, whole or not at all."""
     started = time.process_time()
     points = [_record(point) for point in _points(sweep)]
@@ -69,8 +68,6 @@ def run_sweep(sweep: Sweep, output: Path, log: Log) -> dict[str, Any]:
         "cpu_seconds": time.process_time() - started,
     }
     write_text(output, to_json(record) + "\n")
-    held = sum(point["holds"] for point in points)
-    log(f"{sweep.name}: {held} of {len(points)} points hold, {record['cpu_seconds']:.1f} s")
     return record
 
 
@@ -152,7 +149,7 @@ def _measured(point: _Point, safeguards: Safeguards) -> dict[str, Any]:
 def _known(
     problem: ContactProblem, raw: meshio.Mesh, mesh: meshio.Mesh, state: State
 ) -> dict[str, Any]:
-    """What the exact answer says of the point, and what the system solved is like."""
+    """The floors of the exact answer, and properties of the system that is solved."""
     pressure, stress = floor(problem, raw, mesh, state)
     known: dict[str, Any] = {"floor_pressure": pressure, "floor_stress": stress}
     system = problem.system

@@ -10,6 +10,7 @@
         title: LAC cut into hexahedra
         zone: {treatment: lac, hexahedra: hexahedra}
         slaves: [HEXA8, HEXA20]
+        problems: [patch-2d]      # and only in these problems
     problems:
       - name: patch-2d
         title: Patch test
@@ -63,12 +64,17 @@ Pair = Annotated[tuple[Cell, Cell], Meta(description="a list of two cell types: 
 
 
 class StudyTreatment(Section, frozen=True):
-    """A way to treat the interface; `slaves` are the only slave cells that it is for, if any."""
+    """A way to treat the interface; `slaves`, `problems`: the only ones that it is for, if any."""
 
     name: Name
     title: Text
     zone: Annotated[dict[str, Any], Meta(description="what is set in the contact of a case")]
     slaves: Annotated[tuple[Cell, ...], ONCE] = ()
+    problems: Annotated[tuple[Name, ...], ONCE] = ()
+
+    def is_for(self, problem: str, slave: str) -> bool:
+        """Whether it is measured in that problem on those slave cells."""
+        return problem in (self.problems or [problem]) and slave in (self.slaves or [slave])
 
 
 class Reference(Section, frozen=True):
@@ -204,6 +210,9 @@ class StudyFile(Section, frozen=True):
         refuse_twins("treatments", self.treatments)
         refuse_twins("problems", self.problems)
         problems, treatments = _by_name(self.problems), _by_name(self.treatments)
+        for i, treatment in enumerate(self.treatments):
+            for name in treatment.problems:
+                refuse_unknown(("treatments", i, "problems"), name, "problem", problems)
         for i, item in enumerate(self.linear_solvers):
             key = ("linear_solvers", i)
             refuse_unknown((*key, "problem"), item.problem, "problem", problems)
@@ -229,7 +238,7 @@ class Study(PointStudy):
             for problem in self.problems
             for slave, master in problem.pairs
             for treatment in self.treatments
-            if not treatment.slaves or slave in treatment.slaves
+            if treatment.is_for(problem.name, slave)
         ]
         problems, treatments = _by_name(self.problems), _by_name(self.treatments)
         curves += [(problems[p], s, m, treatments[t], solver) for p, s, m, t, solver in self.varied]

@@ -1,15 +1,17 @@
-"""The page itself, its figures as files, and the table for machines."""
+"""The page itself, and the table for machines."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ...report import stages
+from ...report.charts import write_script
 from ...report.html import NORMS, render
 from ...report.tables import as_csv
 from ...system.files import write_text
 from ..points import REFUSED, SOLVED, disturbed, facts, outcome, page_name
 from ..timing import TOTAL, spread
+from . import first
 from .description import AUTO, Problem, Study
 from .figure import LIMIT, Looks, draw_figure, draw_note
 from .records import (
@@ -29,22 +31,18 @@ from .records import (
 _OVERVIEW = ("pressure_l2", "pressure_means", "displacement_l2", "stress_l2")
 
 
-def write_study(
-    study: Study, results: Path, folder: Path, log: Callable[[str], Any] = print
-) -> None:
-    """Write the page, its table and its figures into `folder`; `results` holds the records.
+def write_study(study: Study, results: Path, folder: Path) -> str:
+    """Write the page and its table into `folder`; `results` holds the records.
 
-    Logs one line: what was measured, and where the page is.
+    Returns one line: what was measured, and where the page is.
     """
     points, name = read_points(study, results), page_name("study", study.size)
     sections = [_section(problem, points) for problem in study.problems]
     solvers = _linear_solvers(study, points)
-    for section in (*sections, *solvers):
-        for part in section["panels"]:
-            write_text(folder / name / part["file"], part["figure"])
+    write_script(folder)
     write_text(folder / f"{name}.csv", as_csv(rows(points)))
     write_text(folder / f"{name}.html", _to_html(study, points, name, sections, solvers))
-    log(f"{outcome(points)} Page: {folder / name}.html")
+    return f"{outcome(points)} Page: {folder / name}.html"
 
 
 def rows(points: Sequence[TimedSolve]) -> list[dict[str, Any]]:
@@ -100,11 +98,24 @@ def _shown(problem: Problem, found: Sequence[LevelLine], prefix: str = "") -> di
 def _part(panel: Panel, looks: Looks, prefix: str) -> dict[str, Any]:
     return {
         "panel": panel,
-        "file": f"{prefix}{panel.name}.svg",
-        "figure": draw_figure(panel, looks),
+        "id": f"{prefix}{panel.name}",
+        "charts": draw_figure(panel, looks, prefix),
         "note": draw_note(panel),
         "quickest": {target: panel.quickest(target) for target in TARGETS},
     }
+
+
+def _firsts(
+    sections: Sequence[dict[str, Any]],
+) -> list[tuple[str, str, str, dict[float, first.First]]]:
+    """Problem, pair and error, and who is first to each accuracy; see `first`."""
+    return [
+        (section["problem"].title, pair, part["panel"].error, found)
+        for section in sections
+        for part in section["panels"]
+        if part["panel"].error in _OVERVIEW
+        for pair, found in first.firsts(part["panel"]).items()
+    ]
 
 
 def _linear_solvers(study: Study, points: Sequence[TimedSolve]) -> list[dict[str, Any]]:
@@ -132,8 +143,11 @@ def _to_html(
     sections: Sequence[dict[str, Any]],
     solvers: Sequence[dict[str, Any]],
 ) -> str:
+    found = _firsts(sections)
+    words = [one.word for row in found for one in row[3].values()]
     return render(
         Path(__file__).with_name("page.html.jinja"),
+        charts=True,
         title=study.title + f" ({study.size})" * (name != "study"),
         name=name,
         sections=sections,
@@ -145,6 +159,10 @@ def _to_html(
         disturbed=disturbed(points),
         repetitions=study.repetitions,
         targets=TARGETS,
+        firsts=found,
+        first_targets=first.TARGETS,
+        won=sum(word in (first.OURS, first.TIED) for word in words),
+        decided=sum(word != first.NONE for word in words),
         tie=f"{100 * (TIE - 1):.0f} %",
         limit=LIMIT,
         errors=NORMS,

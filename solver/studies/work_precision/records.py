@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ...mechanics.linear.backends import BACKENDS
-from ...report.axes import EPSILON
+from ...report.charts import EPSILON
 from ..fits import ROUND_OFF, Fit, fit_order
 from ..points import MeasuredPoint, read_record
 from ..timing import TOTAL, Spread, medians, spread
@@ -36,21 +36,26 @@ class TimedSolve(MeasuredPoint):
 
     point: StudyPoint
 
+    @property
+    def _kind(self) -> str:
+        """Processor time on one core, which other work on the machine hardly changes; else wall."""
+        return "cpu" if self.record["threads"] == 1 else "wall"
+
     @cached_property
     def time(self) -> Spread:
+        """Time of a warm solve, seconds: processor time where it has one core."""
+        return spread(self.record["times"][TOTAL][self._kind])
+
+    @cached_property
+    def wall(self) -> Spread:
         """Wall time of a warm solve, seconds."""
         return spread(self.record["times"][TOTAL]["wall"])
 
     @cached_property
-    def cpu(self) -> Spread:
-        """Processor time of a warm solve, seconds."""
-        return spread(self.record["times"][TOTAL]["cpu"])
-
-    @cached_property
     def stages(self) -> dict[str, float]:
-        """Median wall time by stage."""
+        """Median time by stage."""
         times = {k: v for k, v in self.record["times"].items() if k != TOTAL}
-        return medians(times, "wall")
+        return medians(times, self._kind)
 
     def error(self, name: str) -> float | None:
         """An error against the exact solution; None if there is no such solution."""
@@ -171,7 +176,7 @@ def shown(error: float) -> float:
 def read_points(study: Study, folder: Path) -> list[TimedSolve]:
     """All points of a study with their records in `folder`; one without a record says so."""
     files = ((p, folder / f"{p.name}.json") for p in study.points)
-    return [TimedSolve(read_record(file, "errors", "times"), p) for p, file in files]
+    return [TimedSolve(read_record(file, "errors", "times", "threads"), p) for p, file in files]
 
 
 def lines(points: Iterable[TimedSolve]) -> list[LevelLine]:

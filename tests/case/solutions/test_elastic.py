@@ -6,7 +6,8 @@ import pytest
 from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, ParameterError
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
-from solver.case.solutions.nested import NestedCylinders, NestedSpheres
+from solver.case.solutions.meridian import Meridian
+from solver.case.solutions.nested import NestedCylinders, NestedSpheres, NestedTubes
 from solver.case.solutions.oval import OvalCylinders
 from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
@@ -18,8 +19,9 @@ RADII = (20.0, 30.0, 40.0)
 WAVE = {"amplitude": 0.01, "mean_pressure": 60.0}
 
 
-def nested(cls, inner=SOFT, outer=HARD, pressure=25.0, interference=0.01):
-    return cls(radii=RADII, inner=inner, outer=outer, pressure=pressure, interference=interference)
+def nested(cls, inner=SOFT, outer=HARD, pressure=25.0, interference=0.01, **more):
+    given = {"pressure": pressure, "interference": interference} | more
+    return cls(radii=RADII, inner=inner, outer=outer, **given)
 
 
 ALL = [
@@ -28,6 +30,8 @@ ALL = [
     Hydrostatic(pressure=25.0, material=SOFT, dim=2),
     Hydrostatic(pressure=25.0, material=SOFT, dim=3),
     nested(NestedCylinders),
+    nested(NestedCylinders, spin=0.002),
+    nested(NestedTubes, spin=0.002),
     nested(NestedSpheres),
     OvalCylinders(radii=RADII, inner=SOFT, outer=HARD, pressure=25.0, interference=0.01, wave=3.0),
     Parabola2d(material=Material(3.0, 0.0)),
@@ -51,7 +55,8 @@ def points_of(solution: ElasticSolution, part: int) -> np.ndarray:
     if isinstance(solution, NestedCylinders):
         low, high = RADII[part : part + 2]
         radius = random.uniform(low, high, (20, 1))
-        return x / np.linalg.norm(x, axis=1, keepdims=True) * radius
+        x[:, : solution.around] *= radius / _radius(solution, x)
+        return x
     if isinstance(solution, UniformCompression):
         x[:, -1] += 1.0 if part else -1.0
     if isinstance(solution, (Waves2d, PolynomialPressure2d)):
@@ -59,12 +64,16 @@ def points_of(solution: ElasticSolution, part: int) -> np.ndarray:
     return x
 
 
+def _radius(solution: NestedCylinders, x: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(x[:, : solution.around], axis=1, keepdims=True)
+
+
 def interface_of(solution: ElasticSolution) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, dim) of the interface and its normals there, out of the first part."""
     x = np.random.default_rng(5).uniform(0.1, 0.9, (20, solution.dim))
     if isinstance(solution, NestedCylinders):
-        normal = x / np.linalg.norm(x, axis=1, keepdims=True)
-        return RADII[1] * normal, normal
+        normal = x / _radius(solution, x) * (np.arange(solution.dim) < solution.around)
+        return RADII[1] * x / _radius(solution, x), normal
     if isinstance(solution, Hydrostatic):  # any surface will do
         return x, x / np.linalg.norm(x, axis=1, keepdims=True)
     x[:, -1] = getattr(solution, "interface", 0.0)
@@ -298,3 +307,37 @@ def test_a_wave_of_pressure_leaves_bore_and_outside_as_they_have_to_be():
     outside = traction(solution.stress(RADII[2] * normal, 1), normal)
     along = outside[:, 0] * normal[:, 1] - outside[:, 1] * normal[:, 0]
     np.testing.assert_allclose(along, 0.0, atol=1e-11)
+
+
+def test_rotation_loosens_a_shrink_fit_at_a_known_speed():
+    """Radii 20, 30, 40, E 2000, ν 0.3, δ 0.02: p falls linearly in ρω² and is lost at 1.4245e-3."""
+    found = [
+        nested(NestedTubes, SOFT, SOFT, 0.0, 0.02, spin=s).contact_pressure(np.ones((1, 3)))[0]
+        for s in (0.0, 1e-3, 1.42450e-3, 1.42451e-3)
+    ]
+    assert found[0] == pytest.approx(0.237416904, rel=1e-8)
+    assert found[1] == pytest.approx(0.237416904 - 0.1666667, rel=1e-6)
+    assert found[2] == pytest.approx(0.0, abs=1e-6)
+    assert found[2] > found[3] == 0
+    lost = nested(NestedTubes, SOFT, SOFT, 0.0, 0.02, spin=2e-3)
+    assert lost.gap(np.ones((1, 3)))[0] > 0
+
+
+def test_a_solution_in_its_meridian_plane():
+    """The axes r, z, θ of a sphere: its hoop strain is u_r / r, its stress that in space."""
+    whole = nested(NestedSpheres)
+    plane, x = Meridian(whole), np.array([[15.0, 20.0], [30.0, 10.0]])
+    space = np.array([[15.0, 0.0, 20.0], [30.0, 0.0, 10.0]])
+    assert plane.displacement(x) == pytest.approx(whole.displacement(space)[:, [0, 2]])
+    hoop = plane.displacement(x)[:, 0] / x[:, 0]
+    assert plane.gradient(x)[:, 2, 2] == pytest.approx(hoop)
+    stress = whole.stress(space)
+    assert plane.stress(x) == pytest.approx(stress[:, [0, 2, 1, 5, 4, 3]])
+    assert plane.contact_pressure(x) == pytest.approx(whole.contact_pressure(space))
+    assert plane.level(x) == pytest.approx(whole.level(space))
+    assert plane.materials == whole.materials
+
+
+def test_spheres_do_not_rotate():
+    with pytest.raises(ParameterError, match="spheres do not rotate"):
+        nested(NestedSpheres, spin=0.1)

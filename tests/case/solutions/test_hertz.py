@@ -70,8 +70,9 @@ def test_the_half_ellipse_is_found_again_in_its_values():
     x = np.c_[CYLINDER.half_width * np.cos(angle), np.zeros(11)]
     pressure = 1.02 * CYLINDER.contact_pressure(x)
     found = CYLINDER.measured(x, np.sin(angle) ** 2, x, pressure)
-    assert found == pytest.approx((CYLINDER.half_width, 1.02 * CYLINDER.peak), rel=1e-12)
-    assert CYLINDER.measured(x, np.sin(angle) ** 2, x[:2], pressure[:2]) is None  # too few
+    expected = {"half_width": CYLINDER.half_width, "peak": 1.02 * CYLINDER.peak}
+    assert found == pytest.approx(expected, rel=1e-12)
+    assert CYLINDER.measured(x, np.sin(angle) ** 2, x[:2], pressure[:2]) == {}  # too few
 
 
 def test_the_interior_is_not_offered():

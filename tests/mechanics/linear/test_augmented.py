@@ -18,7 +18,7 @@ def springs(count, stiffness=1.0, held=True):
 
 
 def overlapping(count):
-    """Hats of weights 1, 4, 1 on one chain follow the same on the other: no unknown is one's own."""
+    """Weighted means of neighbours on one chain equal those on the other: unknowns are shared."""
     hats = sparse.diags([1.0, 4.0, 1.0], [-1, 0, 1], shape=(count, count)).tocsr()[::3]
     hats = hats + sparse.diags([1.0], [2], shape=(count, count)).tocsr()[::3]
     return sparse.hstack([hats, -hats]).tocsr()

@@ -7,9 +7,10 @@ import pytest
 
 from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.gauss import gauss_rule
-from solver.mechanics.mortar.facets import facets, surface_vectors
+from solver.mechanics.mortar.facets import facets, measured
+from solver.mechanics.mortar.fans import quadrature
 from solver.mechanics.mortar.operator import LAC, gap_operator
-from solver.mechanics.mortar.regions import Regions, clip_to_face, quadrature, without_face
+from solver.mechanics.mortar.regions import Regions, clip_to_face, without_face
 from solver.mechanics.mortar.segments import intersect
 from solver.mesh.catalogue import BY_NAME
 
@@ -109,8 +110,7 @@ def test_segments_of_a_warped_face_sum_to_it(kind):
     assert {segments.master.index for segments in found} == {0, 1, 2, 3}
     summed = sum(np.einsum("sq,sqd,sqa->ad", s.weight, s.normal, s.slave.values) for s in found)
     reference, weights = gauss_rule(BY_NAME[kind].skeleton, 8)
-    values, slopes = shape_functions(kind).both(reference)
-    vectors = surface_vectors(lower, slopes)[0]
+    values, [vectors] = measured(lower, reference)
     exact = np.einsum("q,qa,qd->ad", weights, values, vectors)
     assert summed == pytest.approx(exact, abs=1e-13)
 
@@ -152,6 +152,31 @@ def test_points_of_a_sliver_stay_near_it():
     for _, points, weights in quadrature(Regions(start=start + noise, bulge=bulge, count=count), 2):
         assert np.abs(weights.sum(axis=1)).max(initial=0.0) < 0.1
         assert ((points > -0.01) & (points < [1.01, 0.31])).all()
+
+
+def test_the_image_of_a_region_does_not_depend_on_where_its_arcs_are_cut():
+    """The unit square under (x e^(y/10), y e^(x/10)), also with a spike of no width.
+
+    With I = ∫ e^(t/10) dt and K = ∫ t e^(t/10) dt over (0, 1), its area is I² − (K/10)².
+    """
+
+    def image(_, place, slope):
+        (x, y), (dx, dy) = np.moveaxis(place, -1, 0), np.moveaxis(slope, -1, 0)
+        a, b = np.exp(x / 10), np.exp(y / 10)
+        return (
+            np.stack([x * b, y * a], axis=-1),
+            np.stack([dx * b + x * b * dy / 10, dy * a + y * a * dx / 10], axis=-1),
+        )
+
+    e = np.exp(0.1)
+    area = (10 * (e - 1)) ** 2 - ((100 - 90 * e) / 10) ** 2
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    spiked = [(0, 0), (1, 0), (0.5, 0.75), (0.75, 0.375), (1, 0), (1, 0.4), (1, 1), (0, 1)]
+    for chain in (square, spiked):
+        start = np.array([chain], dtype=float)
+        region = Regions(start=start, bulge=0 * start, count=np.array([len(chain)]))
+        found = sum(weight.sum() for _, _, weight in quadrature(region, 8, image))
+        assert found == pytest.approx(area, rel=1e-14)
 
 
 def edges(slave, masters):

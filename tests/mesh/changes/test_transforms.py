@@ -153,15 +153,19 @@ def test_renumber_is_the_same_mesh_in_another_order(name):
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ({"mirror": 1}, "transform.mirror: unknown key; allowed: "),
-        ({"skale": 1}, "transform.skale: unknown key (did you mean scale?); allowed: "),
+        ({"mirror": 1}, "transform.mirror = 1: unknown key; allowed: "),
+        ({"skale": 1}, "transform.skale = 1: unknown key; did you mean scale? (allowed: "),
         ({"scale": 0}, "transform.scale = 0: must be a positive number"),
-        ({"stretch": [1, -1]}, "transform.stretch = [1, -1]: must be a positive number, or a list"),
-        ({"translate": 3}, "transform.translate = 3: must be a list of 2 numbers"),
-        ({"translate": [1, 2, 3]}, "transform.translate = [1, 2, 3]: must be a list of 2 numbers"),
-        ({"rotate": "x"}, "transform.rotate = 'x': must be a number"),
-        ({"renumber": -1}, "transform.renumber.seed = -1: must be a whole number from 0 to 100000"),
-        ({"perturb": {"seed": 1}}, "transform.perturb.amplitude: must be a positive number"),
+        ({"stretch": [1, -1]}, "transform.stretch[1] = -1: must be a positive number"),
+        ({"translate": 3}, "transform.translate = 3: must be a list of two (plane) or three"),
+        (
+            {"translate": [1, 2, 3]},
+            "transform.translate = [1.0, 2.0, 3.0]: must be a list of 2 numbers",
+        ),
+        ({"rotate": "x"}, "transform.rotate = 'x': must be an angle in degrees (2D), or"),
+        ({"rotate": {"axis": [0, 0, 1], "angle": 3}}, "transform.rotate: must be a number in 2D"),
+        ({"renumber": -1}, "transform.renumber = -1: must be a seed (a whole number"),
+        ({"perturb": {"seed": 1}}, "transform.perturb.amplitude: this key is needed"),
         ({"perturb": 5.0}, "transform.perturb.amplitude = 5.0: folds cells over: must be smaller"),
     ],
 )
@@ -174,9 +178,9 @@ def test_refusals(spec, message):
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        (30, "transform.rotate = 30: must be {axis: [x, y, z], angle: degrees}"),
+        (30, "transform.rotate = 30.0: must be {axis: [x, y, z], angle: degrees}"),
         ({"axis": [0, 0, 0], "angle": 3}, "transform.rotate.axis = [0.0, 0.0, 0.0]: must not be"),
-        ({"axis": [0, 0, 1]}, "transform.rotate.angle: must be a number"),
+        ({"axis": [0, 0, 1]}, "transform.rotate.angle: this key is needed"),
     ],
 )
 def test_refused_rotations_in_3d(value, message):

@@ -1,6 +1,6 @@
 """The benchmark's arithmetic: ratios; what is said of a way without a solve."""
 
-from solver.studies.benchmark.page import as_text, batched, compared, ratios, seconds
+from solver.studies.benchmark.page import as_text, compared, ratios, seconds
 
 PROCESS = {"wall": 9.0, "cpu": 8.0, "peak_memory_mb": 1500.0}
 
@@ -52,24 +52,7 @@ def test_a_comparison_in_lines():
     ]
 
 
-def test_the_batch_in_lines():
-    each = [{"case": "a", "cpu": 1.5}, {"case": "b", "cpu": 2.5}]
-    passes = [{"cpu": 1.5, "wall": 1.0}, {"cpu": 1.0, "wall": 1.0}]
-    together = {"outcome": "solved", "process": {"cpu": 3.0}, "passes": passes}
-    batch = {"title": "T", "most": 2.0, "each": each, "together": together}
-    # The process less its second pass: what it would have taken without.
-    assert batched(batch)[1] == [
-        ["a process each", "4.00 s", "×1.00"],
-        ["one process", "2.00 s", "×0.50"],
-        ["one warm process", "1.00 s", "×0.25", "goal: under 2 s"],
-    ]
-    lost = {"outcome": "crashed", "reason": "out of luck"}
-    assert batched(batch | {"together": lost})[1][1] == ["one process", "crashed: out of luck"]
-
-
 def test_the_whole_record_as_text():
-    each = [{"case": "a", "cpu": 1.5}]
-    lost = {"outcome": "crashed", "reason": "out of luck"}
     record = {
         "title": "Ratios",
         "machine": {"cpu": "a cpu", "time_utc": "2026"},
@@ -77,8 +60,6 @@ def test_the_whole_record_as_text():
         "load": 0.5,
         "whole": 9,
         "comparisons": [{"title": "T", "series": "S", "repetitions": 0, "ways": [way("a"), LOST]}],
-        "batch": {"title": "B", "most": 2.0, "each": each, "together": lost},
-        "start": {"help": {"cpu": 0.25}, "plane": {"cpu": 1.0, "case": "c.yaml"}},
     }
     lines = as_text(record).splitlines()
     assert lines[0] == "Ratios: a cpu, 2 threads, 2026"

@@ -17,7 +17,7 @@ FILE = ROOT / "cases/scaling/benchmark.yaml"
 
 @pytest.fixture
 def content():
-    """The project's benchmark with two plane comparisons and one case."""
+    """The project's benchmark with one plane comparison."""
     content = yaml.safe_load(FILE.read_text())
     content["scaling"] = str(FILE.with_name("scaling.yaml"))
     ways = [
@@ -29,7 +29,6 @@ def content():
     ]
     one = {"title": "Ways", "series": "quad4", "size": 500, "repetitions": 1, "ways": ways}
     content["comparisons"] = [one]
-    content["batch"]["cases"] = [str(ROOT / "cases/ssnp170/c.yaml")]
     content["threads"] = 1
     return content
 
@@ -61,9 +60,6 @@ def test_the_whole_of_it(file, tmp_path, capsys):
         assert ways[name]["pressure_max"] < 1e-10
         assert len(ways[name]["times"]["total"]["cpu"]) == 1
         assert ways[name]["process"]["cpu"] > 0
-    assert [len(one) for one in record["batch"]["together"]["passes"]] == [2, 2]
-    assert record["start"]["help"]["status"] == 0
-    assert record["start"]["plane"]["status"] == 0
     said = capsys.readouterr().out
     assert "Ways (QUAD4, " in said
 
@@ -71,9 +67,7 @@ def test_the_whole_of_it(file, tmp_path, capsys):
 def test_the_projects_own_is_valid_and_has_a_quick_version():
     full, quick = (read_benchmark(FILE, size) for size in ("full", "quick"))
     assert len(full.comparisons) == len(quick.comparisons) > 5
-    assert {c.point.size for c in quick.comparisons} == {1000}
-    assert all(case.is_file() for case in full.batch.cases)
-    assert len(full.batch.cases) == 6
+    assert {c.size for c in quick.comparisons} == {1000}
 
 
 @pytest.mark.parametrize(
@@ -83,7 +77,6 @@ def test_the_projects_own_is_valid_and_has_a_quick_version():
             lambda c: c["comparisons"][0].update(series="quad5"),
             r"comparisons\[0\].series .* no such",
         ),
-        (lambda c: c["batch"].update(cases=["no.yaml"]), r"batch.cases\[0\] .* no such file"),
         (lambda c: c["comparisons"][0].update(repetitions=-1), "must be a whole number, 0 to 100"),
     ],
 )

@@ -75,7 +75,7 @@ def test_the_order_is_the_power_of_the_face_size():
 def test_a_small_run_from_file_to_page(tmp_path):
     path, record = tmp_path / "infsup.yaml", tmp_path / "record.json"
     path.write_text(SMALL)
-    ladders = [run(each, lambda _: None) for each in read_ladders(path) if each.dim == 2]
+    ladders = [run(each) for each in read_ladders(path) if each.dim == 2]
     kinds = {each.kind: each for each in ladders if each.clamped}
     assert kinds["QUAD4", True].levels_off
     assert kinds["QUAD9", True].levels_off
@@ -95,7 +95,7 @@ def test_a_small_run_from_file_to_page(tmp_path):
 def test_solid_cells_run_too(tmp_path):
     path = tmp_path / "infsup.yaml"
     path.write_text(SMALL)
-    cut, uncut = (run(each, lambda _: None) for each in read_ladders(path, quick=True)[-2:])
+    cut, uncut = (run(each) for each in read_ladders(path, quick=True)[-2:])
     assert (cut.way, uncut.way) == ("hexahedra", "uncut")
     assert cut.constants[-1] > 0.4 > 0.3 > uncut.constants[-1] > 0
 
@@ -112,6 +112,6 @@ def test_what_does_not_hold_is_told(tmp_path):
     assert "order 1.00" in lines[0]
     assert "gmsh cannot make it" in lines[1]
     assert "oscillates by 2.00" in lines[2]
-    write_page(record, tmp_path, lambda _: None)
+    write_page(record, tmp_path)
     assert (tmp_path / "infsup-failures.txt").read_text().count("\n") == 3
     assert all(line.split(":")[0] in sections(record) for line in lines)

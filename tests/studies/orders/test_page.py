@@ -12,6 +12,7 @@ from solver.studies.orders import page as orders
 from solver.studies.orders.description import read_ladders
 from solver.studies.orders.page import write_orders
 from solver.studies.orders.records import groups, read_curves
+from tests.report.test_charts import specifications
 from tests.report.verdicts import put as write
 
 LADDERS = """
@@ -70,10 +71,7 @@ def results(tmp_path):
 
 @pytest.fixture
 def page(family, results, tmp_path):
-    said = []
-    write_orders([family], results, tmp_path, said.append)
-    assert len(said) == 1
-    return said[0]
+    return write_orders([family], results, tmp_path)
 
 
 def read(path):
@@ -118,7 +116,7 @@ def test_where_no_slope_is_asked_for_none_is_counted(family, results):
 
 
 def test_a_ladder_never_solved_is_missed(family, tmp_path):
-    write_orders([family], tmp_path / "nothing", tmp_path, lambda line: None)
+    write_orders([family], tmp_path / "nothing", tmp_path)
     failures = (tmp_path / orders.FAILURES).read_text()
     assert "powers/tria3: level 1, 2, 4, 8: not solved\n" in failures
     assert failures.count("not solved") == 3
@@ -183,21 +181,26 @@ def test_the_page_is_whole_and_escaped(page, tmp_path):
     counter = Counter()
     counter.feed(text)
     assert counter.open == []
-    # Two errors in 2D, one in 3D, and a key for each ladder.
-    assert counter.drawings == 3 + 4
+    charts = specifications(text)
+    assert list(charts) == [
+        *("powers-0-displacement_l2", "powers-0-pressure_l2"),
+        "powers-1-displacement_l2",
+    ]
+    rows = charts["powers-0-displacement_l2"]["data"]["values"]
+    found = {r["h"]: r["error"] for r in rows if r["series"] == "TRIA3"}
+    assert found == pytest.approx({1 / (4 * n): n**-1.5 for n in (1, 2, 4, 8)})
 
 
 class Counter(HTMLParser):
-    """Elements still open among those whose end has to be written, and drawings."""
+    """Elements still open among those whose end has to be written."""
 
-    WATCHED = ("svg", "section", "div", "table", "ul", "header", "p", "strong", "a")
+    WATCHED = ("section", "div", "table", "ul", "header", "p", "strong", "a")
 
     def __init__(self):
         super().__init__()
-        self.open, self.drawings = [], 0
+        self.open = []
 
     def handle_starttag(self, tag, attrs):
-        self.drawings += tag == "svg"
         if tag in self.WATCHED:
             self.open.append(tag)
 
@@ -215,13 +218,13 @@ def test_slopes_below_theory_are_told_with_the_reason_where_it_is_known(family, 
         if curve.below_theory(error)
     ]
     assert below == [("tria3", "displacement_l2")]
-    write_orders([family], results, tmp_path, lambda line: None)
+    write_orders([family], results, tmp_path)
     text = (tmp_path / orders.PAGE).read_text()
     assert "1 slopes (▽) are below theory by more than their spread." in text
     assert "The reason is not known." in text
     path = tmp_path / "cases" / "powers" / "orders.yaml"
     path.write_text(LADDERS + "shortfalls: Few <levels>.\n")
-    write_orders([read_ladders(path)], results, tmp_path, lambda line: None)
+    write_orders([read_ladders(path)], results, tmp_path)
     assert "Few &lt;levels&gt;.</p>" in (tmp_path / orders.PAGE).read_text()
 
 

@@ -11,6 +11,7 @@ from msgspec import structs
 from solver.studies.scaling.description import read_scaling
 from solver.studies.scaling.page import write_scaling
 from solver.studies.scaling.records import OTHER, failures, reached, read_series
+from tests.report.test_charts import specifications
 
 ROOT = Path(__file__).parents[3]
 
@@ -95,16 +96,19 @@ def test_an_exponent_of_small_sizes_answers_no_goal(scaling, results):
 
 
 def test_the_page_says_what_the_records_do(scaling, results, tmp_path):
-    logged = []
-    write_scaling(scaling, results, tmp_path / "page", logged.append)
+    logged = write_scaling(scaling, results, tmp_path / "page")
     page = (tmp_path / "page" / "scaling.html").read_text()
     assert "9 of 10 points are measured. 1 have no solve" in page
     assert "memory: &lt;more&gt; &amp; more" in page
     assert "<more>" not in page
     assert "<td class=n>1,000,000</td>" in page
     assert "1.30" in page
-    assert page.count("<svg") > 8
-    assert logged[-1].endswith("scaling.html")
+    charts = specifications(page)
+    solved = [line for line in read_series(scaling, results) if line.solved]
+    assert len(charts) == 3 * len({line.series.dim for line in solved}) + 1 + len(solved)
+    whole = charts["3D-processor-time-of-the-whole-process-s"]["data"]["values"]
+    assert {(r["series"], r["size"]) for r in whole} >= {("HEXA8", 10_000), ("HEXA8", 1_000_000)}
+    assert logged.endswith("scaling.html")
     with (tmp_path / "page" / "scaling.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == len(scaling.points)
@@ -124,7 +128,7 @@ def test_points_whose_checks_fail_are_listed(scaling, results):
 
 
 def test_a_family_without_any_record_still_has_a_page(scaling, tmp_path):
-    write_scaling(scaling, tmp_path / "nothing", tmp_path, lambda line: None)
+    write_scaling(scaling, tmp_path / "nothing", tmp_path)
     page = (tmp_path / "scaling.html").read_text()
     assert "not measured" in page
     assert "These sizes answer no goal" in page

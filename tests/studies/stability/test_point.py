@@ -16,7 +16,7 @@ SWEEPS = Path(__file__).resolve().parents[3] / "cases" / "stability" / "sweeps"
 
 def run(name, tmp_path, **changes):
     sweep = replace(read_sweep(SWEEPS / f"{name}.yaml", quick=True), **changes)
-    record = run_sweep(sweep, tmp_path / "record.json", lambda line: None)
+    record = run_sweep(sweep, tmp_path / "record.json")
     assert json.loads((tmp_path / "record.json").read_text())["sweep"] == name
     return record["points"]
 

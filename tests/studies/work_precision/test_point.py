@@ -7,12 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from solver.case.reader import parse_case
+from solver.case.yaml import read_mapping
 from solver.commands.cli import main
+from solver.simulation.simulate import simulate
 from solver.studies import points as measuring
 from solver.studies.work_precision.description import read_study
 from solver.studies.work_precision.point import measure_point
 from solver.system.clock import SOLVING
-from solver.system.errors import InputError
+from solver.system.errors import InputError, SolveError
+from solver.verification.run import mesh_of
 
 ROOT = Path(__file__).parents[3]
 STUDY = """
@@ -95,6 +99,17 @@ def test_more_threads_than_there_are_cores_are_refused(study, tmp_path):
 
 
 def test_a_reference_is_asked_for_where_there_is_no_exact_solution(tmp_path, capsys):
-    command = ["study", "point", "cases/study/study.yaml", "half-loaded/tria3-quad4/lac/1"]
+    command = ["study", "point", "cases/study/study.yaml", "half-loaded/quad4-tria3/lac/1"]
     assert main([*command, "-o", str(tmp_path / "record.json")]) == 2
     assert "half-loaded has no exact solution" in capsys.readouterr().err
+
+
+def test_node_to_segment_in_two_passes_has_no_solution_with_multipliers():
+    """Why the study has one pass: two hold both surfaces straight, with dependent constraints."""
+    path = Path("cases/study/templates/patch-2d.yaml")
+    content = read_mapping(path)
+    first = content["contact"][0] | {"name": "first", "treatment": "node_to_segment"}
+    second = first | {"name": "second", "slave": first["master"], "master": first["slave"]}
+    case = parse_case(json.dumps(content | {"contact": [first, second]}), path)
+    with pytest.raises(SolveError, match="may depend on one another"):
+        simulate(case, mesh_of(case))

@@ -1,0 +1,323 @@
+"""A foreign result beside its case: what is given, sampled for the checks of our own solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..case.expressions import evaluate
+from ..case.rules import ERRORS
+from ..mechanics.fem.stress import COMPONENTS, normal_stress
+from ..simulation.exact import ExactValues
+from ..simulation.solution import Solution, ZoneResult
+from ..system.errors import InputError
+from ..verification import samples
+from ..verification.checks import CHECKS, Check
+from ..verification.norms import errors
+from ..verification.samples import Reference, Sample
+from ..verification.verdict import CheckResult
+from .contact import SurfaceValues, surfaces
+from .faults import fault, summed_up
+from .model import Model
+from .placing import Placed, Placer, flattened
+
+if TYPE_CHECKING:
+    import meshio
+
+    from ..case.model import Case
+    from .foreign import ForeignResult
+
+# Forces agree within this share: between nodes a pressure is interpolated.
+FORCES = 0.05
+_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A result placed on the model of its case; `placed` holds its fields by name."""
+
+    model: Model
+    foreign: ForeignResult
+    placed: dict[str, Placed]
+    pressures_by_zone: list[SurfaceValues]
+    gaps_by_zone: list[SurfaceValues]
+
+    @classmethod
+    def of(cls, case: Case, foreign: ForeignResult, mesh: meshio.Mesh) -> Compared:
+        """The comparison; raises InputError where result and case do not belong together."""
+        where = f"{case.name}@{foreign.code}"
+        if foreign.step is not None and abs(foreign.step - case.steps[-1]) > _STEP:
+            allowed = f"the result must be that of load factor {case.steps[-1]:g}"
+            raise InputError(where, "step", foreign.step, allowed)
+        foreign = flattened(foreign, mesh.points.shape[1], where)
+        model = Model.of(case, mesh)
+        placer = Placer(model, foreign, where)
+        names = ("displacement", "stress", "pressure", "gap")
+        fields = {n: f for n in names if (f := getattr(foreign, n)) is not None}
+        if not fields and not foreign.forces:
+            raise InputError(where, "fields", None, "the result gives nothing to check")
+        placed = {name: placer.place(field, name) for name, field in fields.items()}
+        found = [
+            surfaces(model, placed[name], where, name) if name in placed else []
+            for name in ("pressure", "gap")
+        ]
+        return cls(model, foreign, placed, *found)
+
+    @cached_property
+    def solution(self) -> Solution:
+        """A solution of the case with all values that are known everywhere on its mesh."""
+        frame, count = self.model.solution, len(self.model.points)
+        needed = ~self.model.rigid[self.model.body]
+        known: dict[str, Any] = {}
+        for name in ("displacement", "stress"):
+            values = self.placed[name].nodal(count) if name in self.placed else None
+            if values is not None and np.isfinite(values[needed]).all():
+                known[name] = np.where(np.isfinite(values), values, 0.0)
+        if (stress := known.get("stress")) is not None:
+            known["nodal_normal_stress"] = normal_stress(stress, self.model.direction)
+        by_zone = {surface.zone.name: surface.zone for surface in self.pressures_by_zone}
+        zones = [by_zone.get(zone.name, zone) for zone in frame.zones]
+        solution = replace(frame, zones=zones, **known)
+        solution.balance = self._balance()
+        solution.errors = self._norms(solution)
+        return solution
+
+    def _norms(self, solution: Solution) -> dict[str, float]:
+        """Errors against the exact solution, those that the result gives enough for."""
+        whole = bool(solution.zones) and all(
+            np.isfinite(zone.multiplier).all() for zone in solution.zones
+        )
+        found = errors(solution if whole else replace(solution, zones=[]))
+        means = any(surface.kind == "face" for surface in self.pressures_by_zone)
+        if means and any(zone.recovery != "none" for zone in self.model.case.zones):
+            # The case asks for more than means, which the result does not give.
+            found = {n: v for n, v in found.items() if n not in ("pressure_l2", "pressure_max")}
+        return {name: value for name, value in found.items() if np.isfinite(value)}
+
+    def _balance(self) -> dict[str, float]:
+        """How far contact forces are from what balances the loads, relative, by zone."""
+        found = {}
+        for scene, frame in zip(self.model.scene.zones, self.model.solution.zones, strict=True):
+            wanted, scale = self.model.contact_force(scene)
+            force = self._force(frame)
+            known = np.isfinite(wanted)
+            if force is not None and known.any() and scale > 0:
+                off = np.abs(force[known] - wanted[known]).max()
+                self._forces.append((force[known], wanted[known]))
+                found[f"zone {frame.name}: force"] = float(off / scale)
+        return found
+
+    def _force(self, zone: ZoneResult) -> np.ndarray | None:
+        if zone.name in self.foreign.forces:
+            return np.asarray(self.foreign.forces[zone.name], dtype=float)[: self.model.dim]
+        surface = next((s for s in self.pressures_by_zone if s.zone.name == zone.name), None)
+        return None if surface is None else surface.force(self.model)
+
+    # What the checks sample
+
+    @cached_property
+    def _samples(self) -> dict[str, tuple[Sample, tuple[str, ...]]]:
+        """The samples that the checks took, with the names of their components."""
+        return {}
+
+    @cached_property
+    def _forces(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Contact forces by zone, and those that balance the loads."""
+        return []
+
+    @cached_property
+    def samplers(self) -> dict[str, samples.Sampler]:
+        """By check, what samples it; checks of what is not given are missing."""
+        found: dict[str, samples.Sampler] = {}
+        if "displacement" in self.placed:
+            found["displacement"] = self._displacement
+        if "stress" in self.placed:
+            found |= {
+                "nodal_stress": self._nodal_stress,
+                "stress_components": self._stress_components,
+                "surface_stress_slave": self._surface_stress("slave"),
+                "surface_stress_master": self._surface_stress("master"),
+            }
+        for name, quantity, given in (
+            ("multiplier", "pressure", self.pressures_by_zone),
+            ("element_gap", "gap", self.gaps_by_zone),
+        ):
+            if given:
+                found[name] = self._of_surfaces(quantity, given)
+        if self.solution.balance:
+            found["balance"] = samples.balance
+        wanted = self.solution.errors.keys() & ERRORS.keys()
+        found |= {name: samples.norm(name) for name in sorted(wanted)}
+        return {name: self._kept(name, sampler) for name, sampler in found.items()}
+
+    def _kept(self, name: str, sampler: samples.Sampler) -> samples.Sampler:
+        def sample(solution: Solution, zone: Any, reference: Reference) -> Sample | None:
+            taken = sampler(solution, zone, reference)
+            if taken is not None and len(taken.values):
+                places = self.placed.get(name.removesuffix("_components"))
+                count = len(taken.values) // len(places.places) if places else 1
+                names = tuple("xyz"[:count])
+                if name == "stress_components":
+                    given = reference if isinstance(reference, dict) else COMPONENTS
+                    names = tuple(given)
+                self._samples[name] = taken, names if count > 1 else ()
+            return taken
+
+        return sample
+
+    def _deformable(self, name: str) -> Placed:
+        placed = self.placed[name]
+        rigid = np.append(self.model.rigid, False)  # the body -1 is unknown
+        return placed.at(~rigid[placed.body])
+
+    def _part(self, placed: Placed) -> Any:
+        """The part of the exact solution at places; None, by place, where a body is not known."""
+        known = placed.body >= 0
+        exact = self.model.case.solution
+        if exact is None or known.all():
+            return self.model.part[placed.body]
+        by_place = np.array(exact.part_of(placed.places, None))
+        return np.where(known, self.model.part[placed.body], by_place)
+
+    def _displacement(self, _: Solution, __: None, reference: Reference) -> Sample:
+        placed, axes = self._deformable("displacement"), "xyz"[: self.model.dim]
+        if isinstance(reference, ExactValues):
+            field = reference.exact.displacement(placed.places, self._part(placed))
+            expected = dict(zip(axes, field.T, strict=True))
+        else:
+            expected = {
+                axis: evaluate(value, placed.places)
+                for axis, value in zip(axes, reference, strict=True)
+            }
+        return _by_component(placed, axes, expected)
+
+    def _stress_components(self, _: Solution, __: None, reference: Reference) -> Sample:
+        placed = self._deformable("stress")
+        if isinstance(reference, ExactValues):
+            field = reference.exact.stress(placed.places, self._part(placed))
+            expected = dict(zip(COMPONENTS, field.T, strict=True))
+        else:
+            expected = {n: evaluate(value, placed.places) for n, value in reference.items()}
+        return _by_component(placed, COMPONENTS, expected)
+
+    def _along(self, placed: Placed, directions: np.ndarray, reference: Reference) -> Sample:
+        """Stress along directions (dim,) or (k, dim) beside that of the reference."""
+        if isinstance(reference, ExactValues):
+            field = reference.exact.stress(placed.places, self._part(placed))
+            expected = normal_stress(field, directions)
+        else:
+            expected = evaluate(reference, placed.places)
+        return Sample(normal_stress(placed.values, directions), expected, _place(placed))
+
+    def _nodal_stress(self, _: Solution, __: None, reference: Reference) -> Sample:
+        return self._along(self._deformable("stress"), self.model.direction, reference)
+
+    def _surface_stress(self, side: str) -> samples.Sampler:
+        def sample(_: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+            placed = self._deformable("stress")
+            placed = placed.at(np.isin(placed.node, getattr(zone, f"{side}_nodes")))
+            if not len(placed.places):
+                return None
+            normals = self.model.normals(zone, side)[placed.node]
+            return self._along(placed, normals, reference)
+
+        return sample
+
+    @staticmethod
+    def _of_surfaces(quantity: str, given: Sequence[SurfaceValues]) -> samples.Sampler:
+        def sample(_: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+            mine = next((s for s in given if s.zone.name == zone.name), None)
+            return None if mine is None else mine.sample(reference, quantity)
+
+        return sample
+
+    # What the verdict says
+
+    @staticmethod
+    def tolerance(check: Check, own: float) -> float:
+        """The tolerance of a check for another code.
+
+        A case may ask more than the defaults, where that is what our method reaches; other codes
+        are held to the defaults.
+        """
+        if check.name == "balance":
+            return FORCES
+        return max(own, check.tolerance_in({}))
+
+    def faults(self, failed: Sequence[CheckResult]) -> str:
+        """What may be wrong, by the checks that failed; empty where nothing simple is."""
+        found = {}
+        for check in failed:
+            sample, names = self._samples.get(check.name, (None, ()))
+            if check.name == "balance":
+                forces, wanted = (np.concatenate(each) for each in zip(*self._forces, strict=True))
+                sample = Sample(forces, wanted, "zone {}".format)
+            if sample is not None and (told := fault(sample, names)):
+                found[check.name] = told
+        return summed_up(found)
+
+    def not_given(self, ran: Sequence[str]) -> list[str]:
+        """The checks that the case asks for, and the result has no values for."""
+        case = self.model.case
+        asked = [
+            check.name
+            for check in CHECKS
+            if (check.key in case.reference if check.key else check.name == "balance")
+            or (check.norm == "error" and check.name in case.tolerance)
+        ]
+        observed = not case.observe
+        return [n for n in asked if n not in ran and not (observed and n.startswith("observ"))]
+
+    def unchecked(self, ran: Sequence[str]) -> list[str]:
+        """The fields that are given, and that no check of the case compares."""
+        of_field = {
+            "displacement": ("displacement", "displacement_l2", "displacement_h1"),
+            "stress": ("nodal_stress", "stress_components", "stress_max"),
+            "pressure": ("multiplier", "balance", *(n for n in ERRORS if n.startswith("press"))),
+            "gap": ("element_gap",),
+        }
+        return [name for name in self.placed if not {*of_field[name]} & {*ran}]
+
+    def extremes(self, name: str) -> list[float | None] | None:
+        """Minimum and maximum of a quantity, over all places; None where it is not given."""
+        if name == "normal_stress":
+            if "stress" not in self.placed:
+                return None
+            values = normal_stress(self._deformable("stress").values, self.model.direction)
+        else:
+            given = self.pressures_by_zone if name == "pressure" else self.gaps_by_zone
+            if not given:
+                return None
+            values = np.concatenate([surface.placed.values for surface in given])
+        return [float(values.min()), float(values.max())]
+
+    def pressures(self) -> np.ndarray | None:
+        """Place and pressure (k, dim + 1) on all slave surfaces; None where it is not given."""
+        if not self.pressures_by_zone:
+            return None
+        return np.concatenate(
+            [np.column_stack([s.placed.places, s.placed.values]) for s in self.pressures_by_zone]
+        )
+
+
+def _place(placed: Placed) -> Callable[[int], str]:
+    def told(i: int) -> str:
+        if placed.node[i] >= 0:
+            return f"node {placed.node[i]}"
+        return f"({', '.join(f'{x:.6g}' for x in placed.places[i])})"
+
+    return told
+
+
+def _by_component(placed: Placed, names: Sequence[str], expected: dict[str, np.ndarray]) -> Sample:
+    """The expected components one after the other."""
+    listed, count, place = list(expected), len(placed.places), _place(placed)
+    return Sample(
+        np.concatenate([placed.values[:, list(names).index(name)] for name in listed]),
+        np.concatenate([expected[name] for name in listed]),
+        lambda i: f"{place(i % count)} ({listed[i // count]})",
+    )

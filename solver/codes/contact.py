@@ -1,0 +1,183 @@
+"""Contact pressures and gaps of a foreign result, brought to the slave surfaces of the case."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..case.expressions import evaluate
+from ..mechanics.fem.faces import FACE_POINTS, surface_points, surface_vectors
+from ..mechanics.fem.gauss import gauss_rule
+from ..mesh.catalogue import cell_type
+from ..simulation.exact import ExactValues, computed_pressure
+from ..simulation.solution import NodalContact, ZoneResult
+from ..system.errors import InputError
+from ..verification.samples import Reference, Sample, expected_pressure
+from .model import Model
+from .placing import NEAR, Placed
+
+# A value below this share of the largest is none: files print zeros in this way.
+_NOTHING = 1e-9
+# How far from the faces of the case, over their size, a curved surface of another mesh may be.
+_SAGITTA = 0.02
+
+
+@dataclass(frozen=True)
+class SurfaceValues:
+    """What a result gives of one zone: values by node, by face or by point of its slave surface.
+
+    `zone` has the geometry and, where values are at nodes or faces, the pressures. `kind` is node,
+    face or point; `numbers` (k,) are those of nodes or faces.
+    """
+
+    zone: ZoneResult
+    kind: str
+    placed: Placed
+    numbers: np.ndarray
+
+    @property
+    def whole(self) -> bool:
+        """Whether the pressure is known on all of the surface."""
+        return bool(np.isfinite(self.zone.multiplier).all())
+
+    def place(self, i: int) -> str:
+        """Where the i-th value is, in words."""
+        if self.kind == "point":
+            return f"({', '.join(f'{x:.6g}' for x in self.placed.places[i])})"
+        return f"{self.kind} {self.numbers[i]}"
+
+    def sample(self, reference: Reference, quantity: str) -> Sample:
+        """The values beside the reference: its means over faces, else what it is at the places."""
+        if isinstance(reference, ExactValues):
+            if self.kind == "face":
+                means = getattr(reference, quantity)(self.zone)
+                return Sample(self.placed.values, means[self.numbers], self.place)
+            exact = reference.exact
+            field = exact.contact_pressure if quantity == "pressure" else exact.gap
+            return Sample(self.placed.values, field(self.placed.places), self.place)
+        if self.kind == "face" and quantity == "pressure":
+            expected = expected_pressure(self.zone, reference)[self.numbers]
+            return Sample(self.placed.values, expected, self.place)
+        return Sample(self.placed.values, evaluate(reference, self.placed.places), self.place)
+
+    def force(self, model: Model) -> np.ndarray | None:
+        """The force (dim,) of the pressure on the slave; None where no area is known."""
+        if self.whole:
+            return -_integral(model.points, self.zone, model.case.axisymmetric)
+        if self.kind != "point" or self.placed.area is None:
+            return None
+        near = cKDTree(self.zone.centre).query(self.placed.places)[1]
+        weight = self.placed.values * self.placed.area
+        return -np.einsum("k,kd->d", weight, self.zone.normal[near])
+
+
+def surfaces(model: Model, placed: Placed, where: object, name: str) -> list[SurfaceValues]:
+    """The values of a pressure or gap by zone; those on no slave surface are left out.
+
+    Raises InputError where they are on the master surfaces alone.
+    """
+    owner = _zones_of(model, placed)
+    _refuse_exchanged(model, placed, owner, where, name)
+    found = []
+    for number, zone in enumerate(model.solution.zones):
+        mine = placed.at(owner == number)
+        if not len(mine.places):
+            continue
+        tolerance = NEAR * model.length
+        far, face = cKDTree(zone.centre).query(mine.places)
+        each = len(np.unique(face)) == len(face) == len(zone.centre)
+        apart, node = cKDTree(model.points[zone.slave_nodes]).query(mine.places)
+        if not placed.numbered and each and (far < tolerance).all():
+            found.append(_at_faces(zone, mine, face, name))
+        elif (apart < tolerance).all():
+            found.append(_at_nodes(model, zone, mine, zone.slave_nodes[node], name))
+        else:
+            found.append(SurfaceValues(zone, "point", mine, np.arange(len(mine.places))))
+    return found
+
+
+def _zones_of(model: Model, placed: Placed) -> np.ndarray:
+    """The zone (k,) whose slave surface each place is on, -1 for none."""
+    owner = np.full(len(placed.places), -1)
+    for number, zone in enumerate(model.solution.zones):
+        nodes = zone.slave_nodes
+        mine = (placed.body < 0) | np.isin(placed.body, model.body[nodes])
+        at_nodes, near = np.isin(placed.node, nodes), _is_on(model, zone, placed.places)
+        if not placed.numbered:  # a place may be at a node of the other side by chance
+            owner[at_nodes | near] = number
+        else:
+            owner[mine & np.where(placed.node >= 0, at_nodes, near)] = number
+    return owner
+
+
+def _is_on(model: Model, zone: ZoneResult, places: np.ndarray) -> np.ndarray:
+    """Which places (k,) are on a slave surface, by their distance from its faces."""
+    at = surface_points(model.points, zone.faces)
+    near = cKDTree(at.place).query(places)[1]
+    face = at.macro[near]
+    size = model.face_size(zone)[face]
+    offset = places - at.place[near]
+    across = np.abs(np.einsum("kd,kd->k", offset, zone.normal[face]))
+    return (across < _SAGITTA * size) & (np.linalg.norm(offset, axis=1) < size)
+
+
+def _refuse_exchanged(
+    model: Model, placed: Placed, owner: np.ndarray, where: object, name: str
+) -> None:
+    """Refuse values that are on the master side alone."""
+    size = np.abs(placed.values)
+    if size[owner >= 0].max(initial=0.0) > _NOTHING * size.max() or (owner >= 0).all():
+        return
+    masters = [zone.master_nodes for zone in model.solution.zones]
+    if name == "pressure" and np.isin(placed.node[size > 0], np.concatenate(masters)).any():
+        problem = "is on the master surface: slave and master are exchanged (option --swap)"
+        raise InputError(where, name, None, problem)
+    if not (owner >= 0).any():
+        raise InputError(where, name, None, "no value of it is on a slave surface")
+
+
+def _at_nodes(
+    model: Model, zone: ZoneResult, placed: Placed, nodes: np.ndarray, name: str
+) -> SurfaceValues:
+    """Values at slave nodes; with all vertices known, pressures on the whole surface."""
+    count = np.bincount(nodes, minlength=len(model.points))
+    mean = np.bincount(nodes, placed.values, len(model.points)) / np.maximum(count, 1)
+    vertices = np.unique(
+        np.concatenate([f[:, : cell_type(kind).n_vertices].ravel() for kind, f, _ in zone.faces])
+    )
+    surface = SurfaceValues(zone, "node", placed, nodes)
+    if name != "pressure" or not count[vertices].all():
+        return surface
+    known = zone.slave_nodes if count[zone.slave_nodes].all() else vertices
+    nothing = np.zeros(len(known))
+    nodal = NodalContact(known, mean[known], nothing, mean[known] > 0)
+    filled = replace(zone, nodal=nodal)
+    at = surface_points(model.points, zone.faces, model.case.axisymmetric)
+    means = at.means(computed_pressure(model.points, filled))
+    filled = replace(filled, multiplier=means, gap=np.zeros(len(means)), closed=means > 0)
+    return replace(surface, zone=filled)
+
+
+def _at_faces(zone: ZoneResult, placed: Placed, faces: np.ndarray, name: str) -> SurfaceValues:
+    """Values at the centres of all slave faces: their means."""
+    surface = SurfaceValues(zone, "face", placed, faces)
+    if name != "pressure":
+        return surface
+    values = np.empty(len(zone.centre))
+    values[faces] = placed.values
+    filled = replace(zone, multiplier=values, gap=np.zeros(len(values)), closed=values > 0)
+    return replace(surface, zone=filled)
+
+
+def _integral(points: np.ndarray, zone: ZoneResult, axisymmetric: bool) -> np.ndarray:
+    """∫ p n dS (dim,) over a slave surface."""
+    pressure, start, total = computed_pressure(points, zone), 0, np.zeros(points.shape[1])
+    for name, nodes, _ in zone.faces:
+        reference, weights = gauss_rule(name, FACE_POINTS)
+        _, vectors = surface_vectors(points, nodes, name, reference, axisymmetric)
+        flat = (vectors * weights[:, None]).reshape(-1, points.shape[1])
+        total += pressure[start : start + len(flat)] @ flat
+        start += len(flat)
+    return total

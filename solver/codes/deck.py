@@ -1,0 +1,161 @@
+"""What every code is given: a case on its mesh, all values evaluated."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import meshio
+import numpy as np
+
+from ..case.material import Material
+from ..case.model import Case, Load, Zone
+from ..mechanics.fem.faces import FaceBlock, volume_cells
+from ..mechanics.mortar.cut import cut
+from ..simulation.attributes import Attributes, faces_of
+from ..simulation.groups import check_groups, named_parts
+from .layer import as_layer
+
+# What the cells of a rigid body are made of; all their nodes are held.
+_RIGID = Material(1.0, 0.0)
+
+
+class UnsupportedError(Exception):
+    """A code has no way to express something; the text names it and says why."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairedFaces:
+    """One contact zone with its faces, turned outward."""
+
+    zone: Zone
+    slave: list[FaceBlock]
+    master: list[FaceBlock]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Deck:
+    """A case as solved on its mesh: nodes (n, dim), cells by type, values at the last load step.
+
+    `material` holds each cell's number (m,) in `materials`, by type. `held` (n, dim) are the
+    displacements given to nodes, NaN where they are free. `pressures`: faces, turned outward, and
+    the constant pressure on them. `forces` (n, dim) are the consistent nodal forces of all other
+    loads, `all_forces` those of the pressures too. `plane`: how many of the nodes are those of the
+    plane mesh under one layer of cells; 0 where the deck is the mesh itself.
+    """
+
+    case: Case
+    points: np.ndarray
+    cells: dict[str, np.ndarray]
+    materials: list[Material]
+    material: dict[str, np.ndarray]
+    held: np.ndarray
+    pressures: list[tuple[list[FaceBlock], float]]
+    forces: np.ndarray
+    all_forces: np.ndarray
+    pairs: list[PairedFaces]
+    plane: int = 0
+
+    @property
+    def starts(self) -> dict[str, int]:
+        """The number of the first cell of each type, all cells counted from 1."""
+        counts = np.cumsum([1, *map(len, self.cells.values())])
+        return dict(zip(self.cells, counts.tolist(), strict=False))
+
+    @property
+    def softest(self) -> float:
+        """The smallest Young's modulus of a deformable body."""
+        return min(m.young for m in self.case.materials.values())
+
+    def of_plane_strain(self, stress: np.ndarray) -> np.ndarray:
+        """Stress (n, 6) at all nodes from xx, yy, xy (n, 3): zz = ν (xx + yy), the others zero.
+
+        At a node between materials ν is that of one of them.
+        """
+        poisson = np.zeros(len(self.points))
+        of = np.array([material.poisson for material in self.materials])
+        for name, cells in self.cells.items():
+            poisson[cells] = of[self.material[name]][:, None]
+        found = np.zeros((len(stress), 6))
+        found[:, [0, 1, 3]] = stress
+        found[:, 2] = poisson * (stress[:, 0] + stress[:, 1])
+        return found
+
+    def fixed(self) -> Iterator[tuple[int, int, float]]:
+        """Node and axis, both from 0, and value of each displacement that is given."""
+        nodes, axes = np.nonzero(~np.isnan(self.held))
+        values = self.held[nodes, axes]
+        yield from zip(nodes.tolist(), axes.tolist(), values.tolist(), strict=True)
+
+    def loaded(self) -> Iterator[tuple[int, int, float]]:
+        """Node and axis, both from 0, and value of each force on a node; round-off is none."""
+        least = 1e-14 * np.abs(self.forces).max(initial=0.0)
+        nodes, axes = np.nonzero(np.abs(self.forces) > least)
+        values = self.forces[nodes, axes]
+        yield from zip(nodes.tolist(), axes.tolist(), values.tolist(), strict=True)
+
+
+def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
+    """The deck of a case on its mesh; `layer`: a plane one as one layer of cells in space.
+
+    Raises InputError where case and mesh do not fit, UnsupportedError for what no code is given:
+    supports across the axes, an initial gap that varies, axisymmetric bodies.
+    """
+    check_groups(case, mesh)
+    mesh, _ = named_parts(case, mesh)
+    _refuse(case)
+    plane = len(mesh.points) if layer and mesh.points.shape[1] == 2 else 0
+    if plane:
+        case, mesh = as_layer(case, mesh)
+    cells = volume_cells(mesh)
+    whole = cut(mesh.points, cells, [], [], [], [])
+    others = tuple(load for load in case.loads if not _is_constant(load))
+    origin = np.zeros(mesh.points.shape[1])
+    given = Attributes(replace(case, loads=others), mesh, whole, [], origin)
+    materials = [*case.materials.values(), _RIGID]
+    numbers = given.by_material(lambda m: float(materials.index(m)), len(materials) - 1.0)
+    factor = case.steps[-1]
+    return Deck(
+        case=case,
+        points=mesh.points,
+        cells=cells,
+        materials=materials,
+        material={name: found.astype(int) for name, found in numbers.items()},
+        held=factor * _held(given, mesh),
+        pressures=[
+            (faces_of(mesh, load.group, case, f"loads[{i}].group"), factor * load.value)
+            for i, load in enumerate(case.loads)
+            if isinstance(load.value, float) and _is_constant(load)
+        ],
+        forces=factor * given.forces(),
+        all_forces=factor * Attributes(case, mesh, whole, [], origin).forces(),
+        pairs=[
+            PairedFaces(
+                zone=zone,
+                slave=faces_of(mesh, zone.slave, case, case.zone_key(i, "slave")),
+                master=faces_of(mesh, zone.master, case, case.zone_key(i, "master")),
+            )
+            for i, zone in enumerate(case.zones)
+        ],
+        plane=plane,
+    )
+
+
+def _is_constant(load: Load) -> bool:
+    """Whether a load is a pressure that is the same everywhere, which codes take as one."""
+    return load.kind == "pressure" and isinstance(load.value, float)
+
+
+def _refuse(case: Case) -> None:
+    if case.plane == "axisymmetric":
+        raise UnsupportedError("axisymmetric bodies: not written for other codes")
+    for zone in case.zones:
+        if zone.clearance is not None and not isinstance(zone.clearance, float):
+            raise UnsupportedError("initial gap given as an expression: the codes take a number")
+
+
+def _held(given: Attributes, mesh: meshio.Mesh) -> np.ndarray:
+    free = given.supports()
+    if free.selection is None:
+        raise UnsupportedError("support across the axes of the coordinates: not written for codes")
+    held = free.offset.copy()
+    held[free.selection] = np.nan
+    return held.reshape(mesh.points.shape)

@@ -1,0 +1,1 @@
+"""Files of results: what each holds, and which of it is what."""

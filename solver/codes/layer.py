@@ -1,0 +1,111 @@
+"""A plane problem as one layer of cells in space, its displacement along z fixed: plane strain.
+
+Codes whose contact works in space alone solve plane cases in this way. The nodes of the plane mesh
+keep their numbers in the lower face of the layer.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import meshio
+import numpy as np
+
+from ..case.model import Case, Load, Support
+from ..case.solutions import ExactSolution
+from ..case.solutions.base import Part
+from ..mesh.catalogue import BY_MESHIO, BY_NAME, CellType
+
+LAYER = "whole layer"
+# The cell of one layer over each plane one.
+_OVER = {
+    "SEG2": "QUAD4", "SEG3": "QUAD8", "TRIA3": "PENTA6", "TRIA6": "PENTA15",
+    "QUAD4": "HEXA8", "QUAD8": "HEXA20", "QUAD9": "HEXA27",
+}  # fmt: skip
+
+
+def as_layer(case: Case, mesh: meshio.Mesh) -> tuple[Case, meshio.Mesh]:
+    """The plane case and its mesh (n, 2) as a case in space; loads are those per unit of depth.
+
+    The layer is about as thick as a cell is wide.
+    """
+    n = len(mesh.points)
+    cells = [(b.type, b.data) for b in mesh.cells]
+    count = sum(len(data) for name, data in cells if BY_MESHIO[name].dim == 2)
+    thickness = float(np.sqrt(np.ptp(mesh.points, axis=0).prod() / count))
+    raised = [(_over(name).meshio, _raise(BY_MESHIO[name], data, n)) for name, data in cells]
+    used = np.zeros(3 * n, dtype=bool)
+    used[: 2 * n] = True
+    for name, data in raised:
+        if BY_MESHIO[name].dim == 3:
+            used[data.ravel()] = True
+    number = np.cumsum(used) - 1
+    # Lower face, upper face, and the nodes half way between them.
+    heights = np.repeat([0.0, thickness, thickness / 2], n)
+    points = np.column_stack([np.tile(mesh.points, (3, 1)), heights])[used]
+    volumes = [BY_MESHIO[name].dim == 3 for name, _ in raised]
+    whole = [np.arange(len(data) * v) for (_, data), v in zip(raised, volumes, strict=True)]
+    layer = meshio.Mesh(
+        points,
+        [(name, number[data]) for name, data in raised],
+        cell_sets={**mesh.cell_sets, LAYER: whole},
+        point_sets={g: np.concatenate([p, p + n]) for g, p in mesh.point_sets.items()},
+    )
+    return _in_space(case), layer
+
+
+def _in_space(case: Case) -> Case:
+    held = (*case.supports, Support(LAYER, {"z": 0.0}))
+    solution = case.solution and _Plane(case.solution)
+    loads = tuple(map(_lifted, case.loads))
+    return replace(case, plane=None, supports=held, loads=loads, solution=solution)
+
+
+def _lifted(load: Load) -> Load:
+    return replace(load, value=(*load.value, 0.0)) if isinstance(load.value, tuple) else load
+
+
+class _Plane(ExactSolution):
+    """A plane solution at points in space."""
+
+    def __init__(self, plane: ExactSolution):
+        self.plane = plane
+
+    def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        return np.pad(self.plane.displacement(x[:, :2], part), ((0, 0), (0, 1)))
+
+    def body_force(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        return np.pad(self.plane.body_force(x[:, :2], part), ((0, 0), (0, 1)))
+
+    def stress(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        return self.plane.stress(x[:, :2], part)
+
+    def body_part(self, nodes: np.ndarray) -> int:
+        return self.plane.body_part(nodes[:, :2])
+
+
+def _over(meshio_name: str) -> CellType:
+    return BY_NAME[_OVER[BY_MESHIO[meshio_name].name]]
+
+
+def _raise(kind: CellType, data: np.ndarray, n: int) -> np.ndarray:
+    """The cells over plane ones (m, nodes); node i is in the faces as i and n + i, else 2 n + i."""
+    columns = [data[:, node] + n * level for node, level in _columns(kind.name)]
+    return np.stack(columns, axis=1)
+
+
+@cache
+def _columns(name: str) -> list[tuple[int, int]]:
+    """For each node of the raised cell: the plane cell's node, and 0 below, 1 above, 2 between."""
+    plane, raised = BY_NAME[name], BY_NAME[_OVER[name]]
+    own = {frozenset(owners): i for i, owners in enumerate(plane.owners)}
+    if plane.dim == 1:
+        # Around the face: along the line, up, back, down.
+        corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    else:
+        corners = [(i % plane.n_vertices, i // plane.n_vertices) for i in range(raised.n_vertices)]
+    found = []
+    for owners in raised.owners:
+        below = frozenset(corners[i][0] for i in owners)
+        levels = {corners[i][1] for i in owners}
+        found.append((own[below], levels.pop() if len(levels) == 1 else 2))
+    return found

@@ -1,0 +1,196 @@
+"""A case on its own mesh, uncut: what results of other codes are compared on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import meshio
+import numpy as np
+
+from ..case.model import Case
+from ..mechanics.fem.faces import FaceBlock, nodal_normals, surface_points
+from ..simulation.exact import ExactValues
+from ..simulation.naming import body_infos
+from ..simulation.scene import Scene, ZoneScene, build_scene
+from ..simulation.solution import Solution, ZoneResult
+
+
+@dataclass(frozen=True)
+class Model:
+    """The case, its mesh, and the scene that our solver would solve.
+
+    Nodes are those of the mesh; the cut of slave cells only appends nodes to them.
+    """
+
+    case: Case
+    mesh: meshio.Mesh
+    scene: Scene = field(repr=False)
+
+    @classmethod
+    def of(cls, case: Case, mesh: meshio.Mesh) -> Model:
+        """The model of a case; raises InputError where case and mesh do not fit."""
+        return cls(case, mesh, build_scene(case, mesh))
+
+    @property
+    def points(self) -> np.ndarray:
+        """Nodes (n, dim)."""
+        return self.mesh.points
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return int(self.points.shape[1])
+
+    @cached_property
+    def length(self) -> float:
+        """The largest extent."""
+        return float(np.ptp(self.points, axis=0).max())
+
+    @cached_property
+    def body(self) -> np.ndarray:
+        """The body (n,) of each node."""
+        return self.scene.body[: len(self.points)]
+
+    @cached_property
+    def direction(self) -> np.ndarray:
+        """The direction (dim,) of contact: the mean normal of the first zone's slave surface."""
+        if not self.scene.zones:
+            return np.eye(self.dim)[-1]
+        surface = self.scene.zones[0].operator.surface
+        mean = surface.area @ surface.normal
+        return mean / np.linalg.norm(mean)
+
+    @cached_property
+    def solution(self) -> Solution:
+        """The frame of a solution on this mesh: geometry and scales, and not one value."""
+        volumes = [i for i, block in enumerate(self.mesh.cells) if block.dim == self.dim]
+        sets = {name: [of[i] for i in volumes] for name, of in self.mesh.cell_sets.items()}
+        cells = [(self.mesh.cells[i].type, self.mesh.cells[i].data) for i in volumes]
+        n = len(self.points)
+        loads = [abs(load.value) for load in self.case.loads if isinstance(load.value, float)]
+        return Solution(
+            case=self.case,
+            mesh=meshio.Mesh(self.points, cells, cell_sets=sets),
+            displacement=np.full((n, self.dim), np.nan),
+            stress=np.full((n, 6), np.nan),
+            body=self.body,
+            bodies=body_infos(self.scene),
+            zones=[self._zone(zone) for zone in self.scene.zones],
+            nodal_normal_stress=np.full(n, np.nan),
+            balance={},
+            steps=[],
+            length=self.length,
+            load_scale=max(loads, default=0.0) or self._largest_reference,
+            dofs=int(self.points.size),
+            macro_elements=sum(zone.count for zone in self.scene.zones),
+            iterations=0,
+            linear_solver="",
+            plan=[],
+        )
+
+    @property
+    def _largest_reference(self) -> float:
+        """The scale of stress without loads: the largest pressure of the reference, else 1."""
+        values = [self.reference_pressure(zone) for zone in self.scene.zones]
+        return max((float(v.max(initial=0.0)) for v in values if v is not None), default=0.0) or 1.0
+
+    def reference_pressure(self, zone: ZoneScene) -> np.ndarray | None:
+        """The reference's pressure (m,) at the centres of the slave faces; None without one."""
+        from ..case.expressions import evaluate
+
+        given, exact = self.case.reference.get("contact_pressure"), self.case.solution
+        centre = zone.operator.surface.centre + self.scene.origin
+        if exact is not None and "contact_pressure" in exact.quantities:
+            return exact.contact_pressure(centre)
+        return None if given is None else evaluate(given, centre)  # type: ignore[arg-type]
+
+    def _zone(self, zone: ZoneScene) -> ZoneResult:
+        surface, m = zone.operator.surface, zone.count
+        slave, master = (
+            np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
+            for blocks in (zone.slave_faces, zone.master_faces)
+        )
+        none = np.full(m, np.nan)
+        return ZoneResult(
+            name=zone.zone.name,
+            faces=[(b.type.name, b.nodes, b.number) for b in zone.slave_faces],
+            master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
+            centre=surface.centre + self.scene.origin,
+            normal=surface.normal,
+            area=surface.area,
+            multiplier=none,
+            gap=none,
+            closed=np.zeros(m, dtype=bool),
+            coverage=surface.covered / surface.area,
+            stress_slave=np.full(len(slave), np.nan),
+            stress_master=np.full(len(master), np.nan),
+            slave_nodes=slave,
+            master_nodes=master,
+        )
+
+    def normals(self, zone: ZoneResult, side: str) -> np.ndarray:
+        """Unit normals (n, dim) at the nodes of one side, zero elsewhere."""
+        faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
+        return nodal_normals(self.points, list(faces))
+
+    def face_size(self, zone: ZoneResult) -> np.ndarray:
+        """How wide the slave faces (m,) of a zone are."""
+        at = surface_points(self.points, zone.faces)
+        return np.bincount(at.macro, at.weight) ** (1 / (self.dim - 1))
+
+    @cached_property
+    def rigid(self) -> np.ndarray:
+        """Which bodies are rigid."""
+        from ..simulation.exact import deformable
+
+        found = np.ones(int(self.body.max()) + 1, dtype=bool)
+        found[self.body[deformable(self.solution)]] = False
+        return found
+
+    @cached_property
+    def part(self) -> np.ndarray:
+        """The part of the exact solution that each body is."""
+        exact = self.case.solution
+        if exact is None:
+            return np.zeros(int(self.body.max()) + 1, dtype=int)
+        values = ExactValues(self.solution, exact).part
+        first = np.unique(self.body, return_index=True)[1]
+        return values[first]
+
+    def contact_force(self, zone: ZoneScene) -> tuple[np.ndarray, np.ndarray]:
+        """The force (dim,) on the slave that the loads ask for, NaN along axes where supports act.
+
+        Contact balances the loads on the slave's body, or on the master's, along each axis that no
+        support holds there, where that body is in one zone only.
+        """
+        force = np.full(self.dim, np.nan)
+        scale = np.abs(self.scene.force).sum(axis=0).max(initial=0.0)
+        for blocks, sign in ((zone.slave_faces, -1.0), (zone.master_faces, 1.0)):
+            body = self._alone(blocks, zone)
+            if body is None:
+                continue
+            mine = self.scene.body == body
+            basis = self.scene.free.basis
+            # A ring does not move across its axis.
+            axes = [1] if self.case.axisymmetric else range(self.dim)
+            for axis in (axis for axis in axes if np.isnan(force[axis])):
+                motion = np.zeros(self.scene.points.shape)
+                motion[mine, axis] = 1.0
+                left = motion.ravel() - basis @ (basis.T @ motion.ravel())
+                if np.abs(left).max() < 1e-9:
+                    force[axis] = sign * self.scene.force[mine, axis].sum()
+        return force, scale
+
+    def _alone(self, blocks: Sequence[FaceBlock], zone: ZoneScene) -> int | None:
+        """The one body of these faces, if it is in no other zone."""
+        bodies = {int(b) for block in blocks for b in np.unique(self.scene.body[block.nodes])}
+        others = {
+            int(b)
+            for other in self.scene.zones
+            if other is not zone
+            for block in (*other.slave_faces, *other.master_faces)
+            for b in np.unique(self.scene.body[block.nodes])
+        }
+        return bodies.pop() if len(bodies) == 1 and not bodies & others else None

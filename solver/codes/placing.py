@@ -1,0 +1,253 @@
+"""Where the values of a foreign result are on the case: nodes, bodies, or what is wrong with them.
+
+Places are compared with the nodes of the case. Where all agree, values belong to nodes; where only
+the extents do, the result is on a mesh of its own. Anything else is refused by what would make the
+places agree: another unit of length, a mirror image, exchanged axes, a shift, a deformed mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..mechanics.fem.bodies import body_numbers
+from ..mesh.catalogue import BY_MESHIO
+from ..system.errors import InputError
+from .foreign import Field, ForeignResult
+from .model import Model
+
+# Places agree within this share of the model's length: files give six digits at times.
+NEAR = 2e-5
+# Extents of another mesh agree within this share: curved faces are polygons there.
+_ALIKE = 2e-2
+# Values at points reach over at least this share of the extents.
+_REACH = 0.5
+# So many places may be at one node: the layers of a plane case.
+_LAYERS = 4
+# Fewer places may be at nodes by chance.
+_FEW = 12
+CONTACT = ("pressure", "gap")
+UNITS = {1e3: "10³", 1e-3: "10⁻³", 1e6: "10⁶", 1e-6: "10⁻⁶", 1e9: "10⁹", 1e-9: "10⁻⁹"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placed:
+    """Values (k, …) at places (k, dim) of the case; `area` (k,) of each place or None.
+
+    `numbered`: the result says itself which nodes of its mesh the places are. `node` (k,) of the
+    case's mesh and `body` (k,) are -1 where there is none, or unknown because two bodies touch
+    there.
+    """
+
+    places: np.ndarray
+    values: np.ndarray
+    node: np.ndarray
+    body: np.ndarray
+    numbered: bool
+    area: np.ndarray | None = None
+
+    def at(self, chosen: np.ndarray) -> Placed:
+        """The chosen places, by mask or number."""
+        area = None if self.area is None else self.area[chosen]
+        named = ("places", "values", "node", "body")
+        return Placed(
+            **{n: getattr(self, n)[chosen] for n in named}, numbered=self.numbered, area=area
+        )
+
+    def nodal(self, count: int) -> np.ndarray:
+        """The values (count, …) by node, means of several; NaN where a node has none."""
+        known = self.node >= 0
+        total = np.zeros((count, *self.values.shape[1:]))
+        np.add.at(total, self.node[known], self.values[known])
+        times = np.bincount(self.node[known], minlength=count).astype(float)
+        times[times == 0] = np.nan
+        return total / times.reshape(-1, *[1] * (total.ndim - 1))
+
+
+class Placer:
+    """Places the fields of one result on the model; raises InputError for what does not fit."""
+
+    def __init__(self, model: Model, foreign: ForeignResult, where: object):
+        self.model, self.foreign, self.where = model, foreign, where
+        self.tree = cKDTree(model.points)
+        self.near = NEAR * model.length
+        low, high = model.points.min(axis=0), model.points.max(axis=0)
+        self.low, self.high = low, high
+        mesh = foreign.mesh
+        if mesh is not None and not any(BY_MESHIO[b.type].dim >= model.dim for b in mesh.cells):
+            mesh = None
+        self.points = None if mesh is None else self._flat(mesh.points, "mesh")
+        if mesh is None or self.points is None:
+            return
+        self._refuse_elsewhere(self.points, "mesh", whole=True)
+        cells = {str(i): block.data for i, block in enumerate(mesh.cells)}
+        own = body_numbers(len(mesh.points), cells)
+        used = np.unique(np.concatenate([c.ravel() for c in cells.values()]))
+        self.body = np.full(len(own), -1)
+        for number in np.unique(own[used]):
+            mine = used[own[used] == number]
+            self.body[mine] = self._body_of(self.points[mine])
+        missing = np.setdiff1d(model.body, self.body)
+        if len(missing):
+            name = model.solution.bodies[int(missing[0])].name
+            raise self._refused("mesh", f"nothing of it is where the case has the body {name}")
+
+    def place(self, field: Field, name: str) -> Placed:
+        """The values of a field on the case; NaN values are left out."""
+        places = self._flat(field.places, name)
+        known = np.isfinite(field.values.reshape(len(places), -1)).all(axis=1)
+        if not known.any():
+            raise self._refused(name, "no value of it is a finite number")
+        values, area = field.values[known], None if field.area is None else field.area[known]
+        places = places[known]
+        numbered = field.nodes is not None and self.points is not None
+        if numbered:
+            body = self.body[np.asarray(field.nodes)[known]]
+        else:
+            self._refuse_elsewhere(places, name, whole=name not in CONTACT)
+            body = np.full(len(places), -1)
+        node = self._nodes(places, body)
+        # A table of all nodes in their order tells the sides of the interface apart.
+        numbered = numbered or np.array_equal(node, np.arange(len(self.model.points)))
+        body = np.where(node >= 0, self.model.body[node], body)
+        return Placed(
+            places=places, values=values, node=node, body=body, numbered=numbered, area=area
+        )
+
+    def _flat(self, points: np.ndarray, name: str) -> np.ndarray:
+        """Places in the case's dimension; those of a plane case may have any z."""
+        points = np.asarray(points, dtype=float)
+        if not np.isfinite(points).all():
+            raise self._refused(name, "coordinates that are not finite numbers")
+        if points.shape[1] < self.model.dim:
+            raise self._refused(name, "its places have two coordinates; the case has three")
+        return points[:, : self.model.dim]
+
+    def _nodes(self, places: np.ndarray, body: np.ndarray) -> np.ndarray:
+        """The node (k,) at each place in its body; -1 for none and for one of several."""
+        points = self.model.points
+        if len(places) == len(points) and (np.abs(places - points) < self.near).all():
+            return np.arange(len(points))  # the same nodes in the same order
+        found = np.full(len(places), -1)
+        for number in np.unique(self.model.body):
+            mine = np.flatnonzero(self.model.body == number)
+            distance, near = cKDTree(points[mine]).query(places, distance_upper_bound=self.near)
+            here = np.isfinite(distance) & ((body == number) | (body < 0))
+            both = here & (found >= 0)
+            found[here] = mine[near[here]]
+            found[both] = -2
+        return np.where(found == -2, -1, found)
+
+    def _body_of(self, points: np.ndarray) -> int:
+        """The body of the case that a body of the result is, by its extents."""
+        model, extents = self.model, (points.min(axis=0), points.max(axis=0))
+        off = []
+        for number in range(int(model.body.max()) + 1):
+            mine = model.points[model.body == number]
+            sides = (mine.min(axis=0), mine.max(axis=0))
+            off.append(max(np.abs(a - b).max() for a, b in zip(extents, sides, strict=True)))
+        if min(off) > _ALIKE * model.length:
+            low, high = (_listed(side) for side in extents)
+            raise self._refused("mesh", f"the case has no body from {low} to {high}")
+        return int(np.argmin(off))
+
+    def _refuse_elsewhere(self, places: np.ndarray, name: str, whole: bool) -> None:
+        """Refuse places that are not the case's, by what would make them so."""
+        if self._all_near(places) or (not whole and self._at_faces(places)):
+            return
+        for told, moved in self._hypotheses(places) if len(places) >= _FEW else ():
+            if self._all_near(moved):
+                raise self._refused(name, told)
+        low, high = places.min(axis=0), places.max(axis=0)
+        reach, size = high - low, self.high - self.low
+        ratio = float(reach.max() / size.max())
+        for factor, text in UNITS.items():
+            if abs(ratio / factor - 1) < 2 * _ALIKE:
+                raise self._refused(name, f"lengths are {text} times the case's: another unit?")
+        slack = _ALIKE * self.model.length
+        outside = (low < self.low - slack).any() or (high > self.high + slack).any()
+        short = (reach < _REACH * size - slack).any() if whole else self._misses_contact(places)
+        if outside or short:
+            told = f"it is from {_listed(low)} to {_listed(high)}"
+            told += f"; the case is from {_listed(self.low)} to {_listed(self.high)}"
+            raise self._refused(name, told)
+
+    def _at_faces(self, places: np.ndarray) -> bool:
+        """Whether all places are centres of slave faces."""
+        zones = self.model.solution.zones
+        distance = cKDTree(np.concatenate([z.centre for z in zones])).query(places)[0]
+        return bool((distance < self.near).all())
+
+    def _misses_contact(self, places: np.ndarray) -> bool:
+        """Whether places of the interface do not reach over the part of it that is pressed."""
+        pressed = []
+        for zone in self.model.scene.zones:
+            centre = zone.operator.surface.centre + self.model.scene.origin
+            pressure = self.model.reference_pressure(zone)
+            pressed.append(centre if pressure is None else centre[pressure > 0])
+        wanted = np.ptp(np.concatenate(pressed), axis=0)
+        return bool((np.ptp(places, axis=0) < _REACH * wanted - _ALIKE * self.model.length).any())
+
+    def _all_near(self, places: np.ndarray) -> bool:
+        """Whether all places are at nodes, and not many of them at few nodes."""
+        distance, node = self.tree.query(places, distance_upper_bound=self.near)
+        distinct = len(np.unique(node))
+        return bool(np.isfinite(distance).all()) and _LAYERS * distinct >= len(places)
+
+    def _hypotheses(self, places: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        """What may be wrong with places, and where they would be without that."""
+        axes = "xyz"[: self.model.dim]
+        moved = self.foreign.displacement
+        if moved is not None and len(moved.places) == len(places):
+            told = "coordinates are those of the deformed mesh; the undeformed ones are needed"
+            yield told, places - moved.values[:, : self.model.dim]
+        for factor, text in UNITS.items():
+            yield f"lengths are {text} times the case's: another unit?", places / factor
+        low, high = places.min(axis=0), places.max(axis=0)
+        for i, axis in enumerate(axes):
+            image = places.copy()
+            image[:, i] = self.low[i] + high[i] - places[:, i]
+            yield f"the mesh is mirrored in {axis}{self._swaps(i)}", image
+        shift = self.low - low
+        yield f"the mesh is shifted by {_listed(-shift)}", places + shift
+        for order in permutations(range(len(axes))):
+            turned = places[:, order]
+            named = ", ".join(axes[i] for i in order)
+            yield f"axes are exchanged: the case's {', '.join(axes)} are its {named}", turned
+            yield (
+                f"axes are exchanged and shifted: the case's {', '.join(axes)} are its {named}",
+                turned + self.low - turned.min(axis=0),
+            )
+
+    def _swaps(self, axis: int) -> str:
+        """A remark, where a mirror image puts each body in another one's place."""
+        along = np.abs(self.model.direction)
+        return ": its bodies are swapped" if along[axis] > 0.9 else ""
+
+    def _refused(self, key: str, problem: str) -> InputError:
+        return InputError(self.where, key, None, problem)
+
+
+def _listed(values: np.ndarray) -> str:
+    return f"({', '.join(f'{v:.6g}' for v in values)})"
+
+
+def flattened(foreign: ForeignResult, dim: int, where: object) -> ForeignResult:
+    """A result of a plane case that was solved as a layer of cells, in the plane.
+
+    Raises InputError where the layer moves across the plane or its values differ over the
+    thickness.
+    """
+    moved = foreign.displacement
+    if dim == 3 or moved is None or moved.values.shape[1] == 2:
+        return foreign
+    size = float(np.nanmax(np.abs(moved.values)))
+    across = float(np.nanmax(np.abs(moved.values[:, 2]), initial=0.0))
+    if across > _ALIKE * size:
+        problem = f"moves by {across:.3g} across the plane: the case is one of plane strain"
+        raise InputError(where, "displacement", None, problem)
+    return replace(foreign, displacement=replace(moved, values=moved.values[:, :2]))

@@ -1,0 +1,65 @@
+"""The codes by name: those that are written here, and a user's own in a folder of its own."""
+
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol
+
+from ..system.errors import InputError, hint
+from .deck import Deck
+from .foreign import ForeignResult
+from .own import own_code
+
+# Module and class; each is imported where it is asked for.
+_CODES = {
+    "calculix": (".calculix", "CalculiX"),
+    "kratos": (".kratos", "Kratos"),
+    "plain": (".plain", "Plain"),
+}
+
+
+class Code(Protocol):
+    """One code: writes its input, says what to run, reads what came of it.
+
+    `name` is its name in `<case>@<name>`. `layer`: a plane case is given to it as one layer of
+    cells in space. `settings` are shown beside its results. `install`: how it is installed.
+    `gave_up`: a regular expression that its output matches where the solve does not converge.
+    """
+
+    name: str
+    layer: bool
+    install: str
+    gave_up: str
+
+    @property
+    def settings(self) -> Mapping[str, str]:
+        """What it is asked to do, to be shown."""
+
+    def version(self) -> str:
+        """The version; empty where it is not installed."""
+
+    def write(self, deck: Deck, folder: Path) -> None:
+        """Write the input into `folder`; UnsupportedError for what the code has not."""
+
+    def command(self, folder: Path) -> Sequence[str]:
+        """What to run in `folder`."""
+
+    def read(self, deck: Deck, folder: Path) -> ForeignResult:
+        """The fields at the end; SolveError where there are none."""
+
+
+def names() -> list[str]:
+    """The names of the codes that are written here."""
+    return list(_CODES)
+
+
+def find(name: str) -> Code:
+    """The code of a name, or in a folder of the user's; InputError for one that there is not."""
+    if "/" in name or Path(name).is_dir():
+        own: Code = own_code(Path(name), find)
+        return own
+    if name not in _CODES:
+        raise InputError("--code", "name", name, f"unknown; {hint(name, _CODES)}")
+    module, kind = _CODES[name]
+    code: Code = getattr(import_module(module, __package__), kind)()
+    return code

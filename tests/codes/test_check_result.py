@@ -1,0 +1,267 @@
+"""`check-result`: results of other codes, right ones and planted faults."""
+
+import json
+
+import meshio
+import numpy as np
+import pytest
+
+from solver.case.reader import load_case
+from solver.codes.foreign import Field, ForeignResult
+from solver.codes.verdicts import check_foreign
+from solver.commands.cli import main
+from solver.system.errors import InputError
+from solver.verification.verdict import read_verdict
+from tests.codes import results
+
+CASE = str(results.ROOT / "cases/ssnp170/a.yaml")
+
+
+@pytest.fixture
+def check(tmp_path, capsys):
+    """Writes an answer as VTU and checks it: exit status and what is said."""
+
+    def run(answer, *options, case=CASE):
+        file = results.write_vtu(answer, tmp_path / "result.vtu")
+        status = main(["check-result", case, str(file), *options])
+        said = capsys.readouterr()
+        return status, said.out + said.err
+
+    return run
+
+
+def test_an_exact_answer_passes_every_check_that_it_gives_values_for(check, tmp_path):
+    status, said = check(results.patch(), "-o", str(tmp_path / "results"), "--code", "mine")
+    assert status == 0, said
+    folder = tmp_path / "results/ssnp170/ssnp170-a@mine"
+    verdict = read_verdict(folder / "verdict.json")
+    assert (verdict.verdict, verdict.code, verdict.job) == ("passed", "mine", "ssnp170-a@mine")
+    ran = {check.name for check in verdict.checks}
+    assert ran == {
+        *("multiplier", "nodal_stress", "surface_stress_slave", "surface_stress_master"),
+        *("displacement", "stress_components", "balance"),
+    }
+    assert set(verdict.not_given) == {
+        *("element_pressure", "element_gap", "element_status", "coverage", "covered_pressure"),
+        "integration_stress",
+    }
+    assert all(check.error < 1e-12 for check in verdict.checks)
+    assert verdict.pressure == [25.0, 25.0]
+    rows = np.loadtxt(folder / "pressure.csv", delimiter=",", skiprows=1)
+    assert len(rows) == 18
+    assert np.allclose(rows[:, 1:], [0.0, 25.0], atol=1e-12)
+    assert (folder / "result.vtkhdf").is_file()
+
+
+@pytest.mark.parametrize("case", ["ssnp170/c", "ssnp170/k"])
+def test_other_meshes_of_the_family(check, case):
+    status, said = check(results.patch(case), case=str(results.ROOT / f"cases/{case}.yaml"))
+    assert status == 0, said
+
+
+FAULTS = {
+    "pressure sign": (
+        lambda a: a.changed(pressure=-a.pressure),
+        1,
+        "multiplier, balance: values have the opposite sign",
+    ),
+    "pressure in Pa": (
+        lambda a: a.changed(pressure=1e6 * a.pressure),
+        1,
+        "values are 10⁶ times the reference: another unit?",
+    ),
+    "stress in kPa": (
+        lambda a: a.changed(stress=1e3 * a.stress),
+        1,
+        "values are 10³ times the reference: another unit?",
+    ),
+    "stress positive in compression": (
+        lambda a: a.changed(stress=-a.stress),
+        1,
+        "values have the opposite sign",
+    ),
+    "displacement in m": (
+        lambda a: a.changed(displacement=1e-3 * a.displacement),
+        1,
+        "displacement: values are 10⁻³ times the reference: another unit?",
+    ),
+    "half of the load": (
+        lambda a: a.changed(
+            pressure=0.5 * a.pressure, stress=0.5 * a.stress, displacement=0.5 * a.displacement
+        ),
+        1,
+        "values are half of the reference: an earlier load step?",
+    ),
+    "one component": (
+        lambda a: a.changed(displacement=a.displacement * [-1, 1]),
+        1,
+        "components with the opposite sign: x",
+    ),
+    "order of components": (
+        lambda a: a.changed(stress=a.stress[:, [0, 2, 1, 3, 4, 5]]),
+        1,
+        "components are in another order: zz in place of yy",
+    ),
+    "nothing solved": (
+        lambda a: a.changed(displacement=0 * a.displacement),
+        1,
+        "displacement: all values are zero",
+    ),
+    "one wrong node": (
+        lambda a: a.changed(stress=a.stress + 0.1 * np.eye(len(a.stress), 6, -7)),
+        1,
+        "failed: nodal_stress: -24.9 at node 8",
+    ),
+    "mesh in m": (lambda a: a.changed(points=1e-3 * a.points), 2, "lengths are 10⁻³ times"),
+    "mirrored": (lambda a: a.changed(points=a.points * [-1, 1]), 2, "the mesh is mirrored in x"),
+    "bodies swapped": (
+        lambda a: a.changed(points=a.points * [1, -1]),
+        2,
+        "the mesh is mirrored in y: its bodies are swapped",
+    ),
+    "axes": (lambda a: a.changed(points=a.points[:, ::-1]), 2, "x, y are its y, x"),
+    "shifted": (lambda a: a.changed(points=a.points + 7), 2, "the mesh is shifted by (7, 7)"),
+    "deformed": (
+        lambda a: a.changed(points=a.points + a.displacement),
+        2,
+        "coordinates are those of the deformed mesh",
+    ),
+    "longer": (lambda a: a.changed(points=a.points * [1.3, 1]), 2, "the case is from (0, -50)"),
+    "not finite": (
+        lambda a: a.changed(displacement=np.full_like(a.displacement, np.nan)),
+        2,
+        "no value of it is a finite number",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_planted_fault_is_named(check, fault):
+    plant, status, told = FAULTS[fault]
+    found, said = check(plant(results.patch()))
+    assert found == status, said
+    assert told in said
+    if status == 2:
+        assert said.count("\n") == 1
+
+
+def test_pressure_of_the_other_direction(check):
+    status, said = check(results.patch(), "--swap")
+    assert status == 2
+    assert "slave and master are exchanged (option --swap)" in said
+
+
+def test_another_mesh_is_checked_at_its_own_nodes(check):
+    answer = results.patch("ssnp170/c")  # QUAD4 in place of TRIA3
+    status, said = check(answer)
+    assert status == 0, said
+    status, said = check(answer.changed(displacement=1.01 * answer.displacement))
+    assert (status, "displacement: values" not in said) == (1, True), said
+    missing = answer.changed(cells=[(kind, cells[:144]) for kind, cells in answer.cells])
+    status, said = check(missing)
+    assert (status, "where the case has the body top" in said) == (2, True), said
+
+
+def test_forces_are_compared_with_the_loads_where_there_is_no_reference(tmp_path, capsys):
+    text = (results.ROOT / "cases/ssnp170/a.yaml").read_text(encoding="utf-8")
+    kept = text[: text.index("reference:")]
+    case = tmp_path / "plain.yaml"
+    case.write_text(kept, encoding="utf-8")
+    answer = results.patch()
+    file = results.write_vtu(answer, tmp_path / "right.vtu")
+    assert main(["check-result", str(case), str(file)]) == 0
+    assert "solved" in capsys.readouterr().out
+    wrong = results.write_vtu(answer.changed(pressure=-1e3 * answer.pressure), tmp_path / "off.vtu")
+    assert main(["check-result", str(case), str(wrong)]) == 1
+    said = capsys.readouterr().out
+    assert (
+        "balance: values are 10³ times the reference: another unit, and the opposite sign?" in said
+    )
+
+
+def foreign(**given):
+    return ForeignResult(code="mine", **given)
+
+
+def test_a_force_by_zone_is_enough(tmp_path):
+    mesh, case = results.mesh_and_case("ssnp170/a")
+    right = check_foreign(case, foreign(forces={"interface": np.array([0.0, -1250.0])}), mesh)
+    assert [c.name for c in right.checks if c.passed] == ["balance"]
+    wrong = check_foreign(case, foreign(forces={"interface": np.array([0.0, -625.0])}), mesh)
+    assert "values are half of the reference" in wrong.reason
+
+
+def test_another_load_factor_is_refused():
+    mesh, case = results.mesh_and_case("ssnp170/a")
+    answer = results.patch()
+    given = Field(places=answer.points, values=answer.displacement)
+    with pytest.raises(InputError, match=r"step = 0\.5: the result must be that of load factor 1"):
+        check_foreign(case, foreign(displacement=given, step=0.5), mesh)
+    with pytest.raises(InputError, match="the result gives nothing to check"):
+        check_foreign(case, foreign(), mesh)
+
+
+def test_a_layer_that_moves_across_the_plane_is_refused(tmp_path, capsys):
+    answer = results.patch()
+    moved = np.column_stack([answer.displacement, np.full(len(answer.points), 0.3)])
+    file = results.write_vtu(answer.changed(displacement=moved), tmp_path / "result.vtu")
+    assert main(["check-result", CASE, str(file)]) == 2
+    assert "the case is one of plane strain" in capsys.readouterr().err
+
+
+def test_hertz_is_checked_by_its_norms(tmp_path):
+    """Half-width and peak of an exact pressure on the faces: errors of the mesh alone."""
+    mesh, case = results.mesh_and_case("hertz/cylinder-quad4")
+    slave = results.slave_nodes(mesh, case)
+    place = mesh.points[slave]
+    exact = case.solution.contact_pressure(place)
+    good = check_foreign(case, foreign(pressure=Field(places=place, values=exact)), mesh)
+    assert good.errors["half_width"] < 0.01
+    assert good.errors["peak"] < 0.01
+    wide = np.where(np.abs(place[:, 0]) < 2.0, exact.max() / 3, 0.0)
+    bad = check_foreign(case, foreign(pressure=Field(places=place, values=wide)), mesh)
+    assert bad.verdict == "failed"
+
+
+def test_json_is_the_verdict(check):
+    status, said = check(results.patch(), "--json")
+    assert status == 0
+    assert json.loads(said)["code"] == "other"
+
+
+def test_a_case_without_a_mesh_that_fits_is_refused(check, tmp_path):
+    other = load_case(results.ROOT / "cases/ssnp170/k.yaml")
+    status, said = check(results.patch(), case=str(other.path))
+    assert status == 2
+    assert "its places have two coordinates; the case has three" in said
+
+
+def test_results_with_cell_data(tmp_path, capsys):
+    """Pressure on faces, stress at the centres of cells."""
+    mesh, case = results.mesh_and_case("ssnp170/a")
+    line = next(i for i, block in enumerate(mesh.cells) if block.type == "line")
+    faces = mesh.cells[line].data[mesh.cell_sets[case.zones[0].slave][line]]
+    answer = results.patch()
+    count = sum(len(cells) for _, cells in answer.cells)
+    stress = np.tile([0.0, -25.0, -7.5, 0.0, 0.0, 0.0], (count, 1))
+    data = {
+        "stress": [stress, np.full((len(faces), 6), np.nan)],
+        "pressure": [np.full(count, np.nan), np.full(len(faces), 25.0)],
+    }
+    points = np.pad(answer.points, ((0, 0), (0, 1)))
+    full = meshio.Mesh(points, [*answer.cells, ("line", faces)], cell_data=data)
+    meshio.vtu.write(tmp_path / "cells.vtu", full)
+    assert main(["check-result", CASE, str(tmp_path / "cells.vtu")]) == 0
+    assert "multiplier" in capsys.readouterr().out
+
+
+def test_a_ring_presses_with_all_of_its_circumference():
+    """25 on a disc: π R² times it; moved along its radius a ring is no rigid motion."""
+    mesh, case = results.mesh_and_case("axisymmetric/disc-quad4-tria6")
+    slave = mesh.points[results.slave_nodes(mesh, case)]
+    load = -25.0 * np.pi * slave[:, 0].max() ** 2
+    given = {case.zones[0].name: np.array([0.0, load])}
+    assert check_foreign(case, foreign(forces=given), mesh).checks[0].error < 1e-12
+    pressure = Field(places=slave, values=np.full(len(slave), 25.0))
+    checks = {c.name: c for c in check_foreign(case, foreign(pressure=pressure), mesh).checks}
+    assert checks["balance"].error < 1e-12

@@ -1,0 +1,155 @@
+"""Axisymmetric bodies: the patch test on discs and rings, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.case.reader import parse_case
+from solver.mechanics.mortar import segments
+from solver.mesh import transform
+from solver.simulation.simulate import simulate
+from solver.system.errors import InputError
+from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, with_points
+
+PLANE = ["TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9"]
+CASE = """\
+name: patch
+mesh: {recipe: blocks, size: 1.0}
+plane: axisymmetric
+materials: {all: {young: 2000.0, poisson: 0.3}}
+supports:
+  - {group: base, fix: [y]}
+loads: [{group: press, pressure: 25.0}]
+contact: [{name: interface, slave: bottom_contact, master: top_contact}]
+"""
+HELD = "  - {group: symx, fix: [x]}\n  - {group: farx, fix: [x]}\n"
+
+
+def case(zone="", held=False, **changes):
+    text = CASE.replace("top_contact", f"top_contact{zone}")
+    text = text.replace("fix: [y]}\n", "fix: [y]}\n" + HELD * held)
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    return parse_case(text, Path("patch.yaml"))
+
+
+def mesh(bottom, top, radius, bent=False):
+    """Two blocks of height 1 between radii `radius` and `radius` + 1, their inner nodes moved."""
+    found = block_mesh(bottom, top, (4, 3))
+    x = found.points
+    move = 0.02 * bent * np.random.default_rng(0).uniform(-1, 1, x.shape)
+    for axis, levels in ((0, (0, 1)), (1, (-1, 0, 1))):
+        move[np.isin(x[:, axis].round(9), levels), axis] = 0.0
+    return transform(with_points(found, x + move), {"translate": [radius, 0.0]}, "test")
+
+
+def errors(solution, held, poisson=POISSON):
+    """Errors of the uniform state: σ_zz = −p, free or held (ε_rr = ε_θθ = 0) across the axis."""
+    x, zone = solution.mesh.points, solution.zones[0]
+    lateral, axial = poisson * PRESSURE / YOUNG, -PRESSURE / YOUNG
+    across = 0.0
+    if held:
+        across = -PRESSURE * poisson / (1 - poisson)
+        lateral, axial = 0.0, axial * (1 - 2 * poisson * poisson / (1 - poisson))
+    exact = np.c_[lateral * x[:, 0], axial * (x[:, 1] + 1)]
+    stress = np.array([across, -PRESSURE, across, 0, 0, 0])
+    return {
+        "pressure": np.abs(zone.multiplier / PRESSURE - 1).max(),
+        "stress": np.abs(solution.stress - stress).max() / PRESSURE,
+        "displacement": np.abs(solution.displacement - exact).max() * YOUNG / PRESSURE,
+        "coverage": np.abs(zone.coverage - 1).max(),
+        "balance": max(solution.balance.values()),
+    }
+
+
+@pytest.mark.parametrize("top", PLANE)
+@pytest.mark.parametrize("bottom", PLANE)
+def test_patch(bottom, top):
+    """Both slaves, a disc and a ring, free and held across the axis, cells straight and bent."""
+    i = PLANE.index(bottom) + PLANE.index(top)
+    for swapped in (False, True):
+        radius, held, bent = (0.0, 0.4)[(i + swapped) % 2], bool(i % 2), i % 3 == 0
+        found = simulate(case(held=held).as_solved(swapped), mesh(bottom, top, radius, bent))
+        assert max(errors(found, held).values()) < 1e-12
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.4, 1000.0])
+@pytest.mark.parametrize(
+    "zone",
+    [
+        ", treatment: uncut",
+        ", treatment: nodal",
+        ", normal: nodal",
+        ", recovery: linear",
+        ", recovery: quadratic",
+    ],
+)
+def test_patch_of_treatments_that_are_exact(zone, radius):
+    found = simulate(case(zone), mesh("QUAD9", "TRIA6", radius))
+    assert max(errors(found, False).values()) < (1e-11 if radius > 1 else 1e-12)
+
+
+def test_patch_with_dual_multipliers():
+    found = simulate(case(", treatment: nodal_dual"), mesh("QUAD4", "TRIA3", 0.0))
+    assert max(errors(found, False).values()) < 1e-12
+
+
+@pytest.mark.parametrize("cells", PLANE)
+def test_patch_in_mixed_form(cells):
+    nearly = case(held=cells == "TRIA6", **{"poisson: 0.3": "poisson: 0.4999, form: mixed"})
+    found = errors(simulate(nearly, mesh(cells, "QUAD8", 0.0)), cells == "TRIA6", 0.4999)
+    assert max(found.values()) < 1e-12
+
+
+def test_forces_are_those_of_the_whole_circle():
+    """A disc of radius 1 under 25: its contact force is 25 π, its area π."""
+    zone = simulate(case(), mesh("QUAD4", "QUAD8", 0.0)).zones[0]
+    assert zone.area.sum() == pytest.approx(np.pi)
+    assert zone.resultants.area[0] == pytest.approx(np.pi)
+    assert zone.resultants.force == pytest.approx([0, -25 * np.pi], abs=1e-12)
+    assert not zone.resultants.moment.any()
+
+
+def test_one_circumference_for_all_of_a_segment_is_no_patch(monkeypatch):
+    def mean(x):
+        return np.tile(2 * np.pi * x[..., 0].mean(axis=1)[:, None], (1, x.shape[1]))
+
+    monkeypatch.setattr(segments, "circumference", mean)
+    found = errors(simulate(case(), mesh("QUAD4", "TRIA3", 0.0)), False)
+    assert found["stress"] > 1e-3
+
+
+def test_points_on_the_axis_stay_there():
+    """The upper block is held along the axis alone: its radius is kept by the axis itself."""
+    found = simulate(case(), mesh("QUAD4", "TRIA6", 0.0))
+    assert not found.displacement[found.mesh.points[:, 0] == 0, 0].any()
+
+
+def test_a_body_free_along_the_axis_is_refused():
+    loose = case(**{"base, fix: [y]": "base, fix: [x]"})
+    with pytest.raises(InputError, match=r"free motion \(move along y\)"):
+        simulate(loose, mesh("QUAD4", "QUAD4", 0.4))
+
+
+def test_refusals_on_and_beyond_the_axis():
+    given = mesh("QUAD4", "QUAD8", 0.0)
+    left = with_points(given, given.points - [0.5, 0.0])
+    with pytest.raises(
+        InputError, match=r"plane = 'axisymmetric': .* nodes have a negative radius"
+    ):
+        simulate(case(), left)
+    pushed = case(held=True, **{"symx, fix: [x]": "symx, fix: {x: 0.1}"})
+    with pytest.raises(InputError, match=r"supports\[1\].*another displacement .*the axis"):
+        simulate(pushed, given)
+    with pytest.raises(InputError, match="faces lie on the axis: they have no area"):
+        simulate(
+            case(**{"slave: bottom_contact": "slave: symx", "master: top": "master: bottom"}), given
+        )
+    with pytest.raises(InputError, match=r"node_to_segment.*faces SEG3 that end on the axis"):
+        simulate(case(", treatment: node_to_segment").as_solved(True), given)
+
+
+def test_a_plane_mesh_needs_to_say_what_it_is():
+    with pytest.raises(InputError, match=r"this key is needed \(strain, stress or axisymmetric\)"):
+        simulate(case(**{"plane: axisymmetric\n": ""}), mesh("QUAD4", "QUAD8", 0.0))

@@ -1,0 +1,75 @@
+# Other codes on the same cases: one run makes a folder beside that of our own solve, with a verdict
+# whatever became of it.
+
+
+@cache
+def codes_to_run():
+    """The codes by name: those configured, else all that are installed."""
+    from solver.codes.registry import find, names
+    from solver.system.errors import InputError
+
+    chosen = listed(config["codes"])
+    try:
+        found = {find(code).name: code for code in chosen or names()}
+    except InputError as error:
+        refuse(error)
+    if chosen:
+        return found
+    return {name: code for name, code in found.items() if version_of(code)}
+
+
+@cache
+def version_of(code):
+    from solver.codes.registry import find
+
+    return find(code).version()
+
+
+def sources_of(code):
+    """The files of a user's own code; none of one of ours, which are among the solver's."""
+    return sorted(str(f) for f in Path(code).rglob("*") if f.is_file())
+
+
+def foreign_runs():
+    """The folders of all runs of other codes: both directions, the case's own cut."""
+    jobs = [job for job in RUN.values() if not job.hexahedra and not job.refusal]
+    return [f"{results_of(job)}@{code}" for code in codes_to_run() for job in jobs]
+
+
+rule run_code:
+    input:
+        case=lambda w: watched(*files_of(BATCH[w.family, w.job])),
+        mesh=lambda w: mesh_folder(BATCH[w.family, w.job]),
+    output:
+        directory("results/{family}/{job}@{code}"),
+    log:
+        "results/{family}/{job}@{code}/run.log",
+    wildcard_constraints:
+        code="[^/@]+",
+    params:
+        file=lambda w: BATCH[w.family, w.job].file,
+        mesh=lambda w: shlex.quote(mesh_file(BATCH[w.family, w.job])),
+        code=lambda w: codes_to_run()[w.code],
+        options=lambda w: options_of(BATCH[w.family, w.job]),
+        content=lambda w: contents(
+            *files_of(BATCH[w.family, w.job]), *sources_of(codes_to_run()[w.code])
+        )
+        + SOLVER_CONTENT
+        + version_of(codes_to_run()[w.code]),
+    message:
+        "{wildcards.code}: {wildcards.job}"
+    shell:
+        "set -- {params.file:q} {params.options};"
+        ' if test -e {params.mesh}; then set -- "$@" --mesh {params.mesh}; fi;'
+        ' {SOLVER} {output:q}/benchmark run "$@" --code {params.code:q} -o {output:q} > {log:q} 2>&1'
+        " || test -s {output:q}/verdict.json"
+
+
+# The report of everything that is there: our own solves and those of other codes.
+rule bench:
+    input:
+        lambda w: foreign_runs(),
+    message:
+        "report of all codes"
+    shell:
+        "{PYTHON} -m solver report --results results -o results/report"
