@@ -2,8 +2,8 @@
 
 Nodes count from 0, axes are 0, 1, 2. `points`: coordinates; `cells`: nodes by type, in the order of
 VTK; `material`: by type, the place of each cell's material in `materials`; `held`: [node, axis,
-displacement]; `forces`: [node, axis, force], all loads; `contact`: pairs with the nodes of slave and
-master faces by type, turned outward, and the initial gap (null: as meshed).
+displacement]; `forces`: [node, axis, force], all loads; `contact`: pairs with the nodes of slave
+and master faces by type, turned outward, and the initial gap (null: as meshed).
 """
 
 import json

@@ -29,6 +29,7 @@ from ..system.progress import stage
 from .attributes import Attributes, CutZone, faces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .options import LEAN, Options
+from .selections import with_groups
 
 # Slave and master faces of each zone.
 Surfaces: TypeAlias = list[tuple[list[FaceBlock], list[FaceBlock]]]
@@ -147,6 +148,7 @@ def build_scene(
 ) -> Scene:
     """The discrete problem of a case; raises InputError where case and mesh do not fit."""
     clock, safeguards = clock or Clock(), options.safeguards
+    mesh = with_groups(case, mesh)
     check_groups(case, mesh)
     mesh, unnamed = named_parts(case, mesh)
     origin = mesh.points.mean(axis=0) * safeguards.local_coordinates
