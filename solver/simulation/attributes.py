@@ -204,6 +204,21 @@ class Attributes:
                 values[name][mask] = value(materials[group])
         return values
 
+    def materials_behind(self, faces: Sequence[FaceBlock]) -> list[np.ndarray]:
+        """A number (n,) of the material of the cell behind each face as meshed, by block.
+
+        Equal materials have the same number, cells of rigid bodies −1.
+        """
+        materials = self.case.materials
+        number = {material: i for i, material in enumerate(materials.values())}
+        start = number[materials[ALL]] if ALL in materials else -1
+        found = [np.full(len(block.owner), start) for block in faces]
+        for group in (g for g in materials if g != ALL):
+            mask = self.whole_cell_mask(group)
+            for values, block in zip(found, faces, strict=True):
+                values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
+        return found
+
     def supports(self) -> FreeMotion:
         """The motion that supports and rigid bodies leave free."""
         fixed = dict(self._fixed())
