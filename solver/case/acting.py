@@ -91,12 +91,10 @@ class SupportKeys(Section, frozen=True):
       foundation), force per displacement at nodes
     """
 
-    fix: (
-        Annotated[
-            _Fixed | _Imposed, Meta(description=_FIX, extra_json_schema={"uniqueItems": True})
-        ]
-        | None
-    ) = None
+    fix: Annotated[
+        _Fixed | _Imposed | None,
+        Meta(description=_FIX, extra_json_schema={"uniqueItems": True}),
+    ] = None
     spring: _Springs | None = None
     group: Groups | None = None
     at: Vector | None = None
