@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
+from ..mechanics.fem.faces import outer_faces
 from ..mesh.catalogue import cell_type
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import BLUE, INK, MUTED, PAPER
-from .geometry import boundary_faces, macro_edges, normals, outlines
+from .geometry import macro_edges, normals, outlines
 from .layout import (
     Frame,
     Placement,
@@ -74,7 +75,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     distance = {k: float((points[solution.body == k] @ eye).mean()) for k in numbers}
     faces = [
         (outlines(points, kind, nodes), solution.body[nodes[:, 0]])
-        for kind, nodes in boundary_faces(solution.mesh)
+        for kind, nodes in outer_faces(solution.mesh)
     ]
     for number in sorted(numbers, key=distance.__getitem__):
         body = solution.bodies[number]

@@ -1,4 +1,4 @@
-"""What a case gives to groups of the mesh, on the cut mesh: materials, supports, loads."""
+"""Materials, supports and loads of a case on the groups of the cut mesh."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -111,6 +111,8 @@ class Attributes:
     def nodes(self, group: str, key: str) -> np.ndarray:
         """All nodes of a group: of its volume cells, faces, edges and points."""
         dim = self.points.shape[1]
+        if group == ALL:
+            return np.arange(len(self.points))
         parts = [np.asarray(self.mesh.point_sets.get(group, []), dtype=int)]
         if group in self.mesh.cell_sets:
             mask = self.cell_mask(group)
@@ -200,8 +202,23 @@ class Attributes:
                 values[name][mask] = value(materials[group])
         return values
 
+    def materials_behind(self, faces: Sequence[FaceBlock]) -> list[np.ndarray]:
+        """A number (n,) of the material of the cell behind each face as meshed, by block.
+
+        Equal materials have the same number, cells of rigid bodies −1.
+        """
+        materials = self.case.materials
+        number = {material: i for i, material in enumerate(materials.values())}
+        start = number[materials[ALL]] if ALL in materials else -1
+        found = [np.full(len(block.owner), start) for block in faces]
+        for group in (g for g in materials if g != ALL):
+            mask = self.whole_cell_mask(group)
+            for values, block in zip(found, faces, strict=True):
+                values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
+        return found
+
     def supports(self) -> FreeMotion:
-        """What supports and rigid bodies leave free."""
+        """The motion that supports and rigid bodies leave free."""
         fixed = dict(self._fixed())
         self._refuse_moved(fixed)
         dim = self.points.shape[1]
@@ -222,7 +239,7 @@ class Attributes:
             raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:
-        """What supports hold, by the key of the case file."""
+        """The displacements fixed by supports, by key of the case file."""
         for i, support in enumerate(self.case.supports):
             nodes = self.nodes(support.group, f"supports[{i}].group")
             for direction, value in support.fix.items():
@@ -268,6 +285,9 @@ class Attributes:
 
     def _force(self, load: Load, key: str) -> np.ndarray:
         total = np.zeros_like(self.points)
+        if load.kind == "force":
+            assert isinstance(load.value, tuple)
+            return self._share(load, key)[:, None] * self.field(load.value)(self.points[:1])
         for name, nodes in self._loaded(load, key):
             if isinstance(load.value, Exact):
                 for part, mine in self.by_part(nodes):
@@ -279,6 +299,19 @@ class Attributes:
                 pressure, field = load.kind == "pressure", self.field(load.value)
                 total += face_forces(self.points, nodes, name, field, pressure, self.axisymmetric)
         return total
+
+    def _share(self, load: Load, key: str) -> np.ndarray:
+        """The share (n,) of a whole force that acts on each node; the sum is one."""
+        share = np.zeros(len(self.points))
+        if load.group in self.mesh.point_sets:
+            nodes = np.asarray(self.mesh.point_sets[load.group], dtype=int)
+            share[nodes] = 1 / len(nodes)
+            return share
+        along = self.field((1.0, *[0.0] * (self.points.shape[1] - 1)))
+        for name, nodes in self.faces(load.group, key):
+            force = face_forces(self.points, nodes, name, along, False, self.axisymmetric)
+            share += force[:, 0]
+        return share / share.sum()
 
     def _loaded(self, load: Load, key: str) -> list[tuple[str, np.ndarray]]:
         """The cells or faces that a load acts on: (type, nodes)."""

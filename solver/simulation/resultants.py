@@ -1,10 +1,10 @@
-"""What contact comes to in a zone: where it ends, its area, its force and moment."""
+"""Resultants of contact in a zone: edge, area, force and moment."""
 
 import numpy as np
 
 from ..mechanics.fem.faces import circumference
 from ..mechanics.mortar.edge import Edges, contact_edges
-from ..mechanics.mortar.recovery import vertex_neighbours
+from ..mechanics.mortar.reconstruction import vertex_neighbours
 from .problem import Equilibrium
 from .recovery import RecoveredZone
 from .scene import Scene, ZoneScene

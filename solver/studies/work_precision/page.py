@@ -115,6 +115,7 @@ def _firsts(
         for part in section["panels"]
         if part["panel"].error in _OVERVIEW
         for pair, found in first.firsts(part["panel"]).items()
+        if any(one.solve for one in found.values())
     ]
 
 
@@ -156,7 +157,8 @@ def _to_html(
         good=all(m.record["outcome"] in (SOLVED, REFUSED) for m in points),
         failures=failures(points),
         facts=facts(points),
-        disturbed=disturbed(points),
+        disturbed=0 if study.threads == 1 else disturbed(points),
+        busy=disturbed(points),
         repetitions=study.repetitions,
         targets=TARGETS,
         firsts=found,

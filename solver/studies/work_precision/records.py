@@ -126,7 +126,7 @@ class Panel:
 
     @property
     def uncertainty(self) -> float | None:
-        """How far the reference may be off in this error; None where it is exact."""
+        """The possible error of the reference; None if it is exact."""
         reference = self.problem.reference
         return reference.uncertainty.get(self.error) if reference else None
 
