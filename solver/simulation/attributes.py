@@ -25,7 +25,15 @@ from ..mechanics.fem.faces import (
 from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
 from ..mechanics.fem.springs import at_nodes, foundation
-from ..mechanics.fem.supports import SAME, Fixed, FreeMotion, SupportClashError, free_motion
+from ..mechanics.fem.supports import (
+    SAME,
+    Fixed,
+    FreeMotion,
+    SupportClashError,
+    TieError,
+    free_motion,
+    tied,
+)
 from ..mechanics.mortar.cut import CutMesh, SubFaces
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
@@ -233,12 +241,27 @@ class Attributes:
             for name, axis in zip("xyz", np.eye(dim), strict=False):
                 directions = np.tile(axis, (len(nodes), 1))
                 fixed[f"bodies.{group}.{name}"] = Fixed(nodes, directions, np.zeros(len(nodes)))
+        ties = dict(self._ties())
         try:
-            return free_motion(len(self.points), dim, list(fixed.values()))
+            return tied(free_motion(len(self.points), dim, list(fixed.values())), [*ties.values()])
+        except TieError as error:
+            raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
         except SupportClashError as clash:
             key = list(fixed)[clash.number]
             told = " (on the axis x is fixed)" if len(on_axis) else ""
             raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
+
+    def _ties(self) -> Iterator[tuple[str, np.ndarray]]:
+        """The degrees of freedom of nodes that move as one, by key of the case file."""
+        dim = self.points.shape[1]
+        body = body_numbers(len(self.points), self.cut.cells)
+        for i, support in enumerate(self.case.supports):
+            for direction in support.together:
+                nodes = self.nodes(support.group, f"supports[{i}].group")
+                if np.ptp(body[nodes]):
+                    allowed = "its nodes belong to several bodies; only one body is tied"
+                    raise InputError(self.case.path, f"supports[{i}].group", support.group, allowed)
+                yield f"supports[{i}].together.{direction}", dim * nodes + "xyz".index(direction)
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:
         """The displacements fixed by supports, by key of the case file."""
