@@ -2,9 +2,11 @@
 
 import base64
 import json
+import os
 import re
 import shutil
 import subprocess
+import tempfile
 import time
 import urllib.request
 from contextlib import contextmanager
@@ -82,7 +84,12 @@ class Browser:
 def browser():
     """A browser, ended with its driver."""
     command = [DRIVER, "--port=0", "--log-level=WARNING"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as driver:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, text=True, env=os.environ | {"TMPDIR": folder}
+        ) as driver,
+    ):
         try:
             port = next(
                 m[1]

@@ -1,4 +1,4 @@
-"""What is asked: the case file, its model, its rules and the exact solutions it can name."""
+"""The input: the case file, its model, its rules and the exact solutions it can name."""
 
 
 def job_name(

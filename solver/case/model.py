@@ -1,4 +1,4 @@
-"""What a case is, as typed objects: supports, loads, contact zones, references."""
+"""A case as typed objects: supports, loads, contact zones, references."""
 
 from dataclasses import dataclass, field, replace
 from enum import Enum

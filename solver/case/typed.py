@@ -44,7 +44,7 @@ AnySection = TypeVar("AnySection", bound="Section")
 
 
 class FieldError(ValueError):
-    """What is wrong with a value of a section, and the keys that lead to it in there."""
+    """A fault of a value in a section, with the keys that lead to the value."""
 
     def __init__(self, keys: Keys, problem: str, value: object = None):
         self.keys, self.problem, self.value = keys, problem, value
@@ -146,7 +146,7 @@ def json_schema(kind: type[Section], **alternatives: Collection[type[Section]]) 
 
 
 def titles_of(kind: type[Section]) -> dict[str, str]:
-    """What each key of a class is, from the lines `key: title` of its docstring."""
+    """The titles of a class's keys, from the lines `key: title` of its docstring."""
     return _headed(getdoc(kind) or "")[1]
 
 
@@ -164,7 +164,7 @@ def fields(kind: type[Section]) -> dict[str, Any]:
 
 
 def described(kind: Any) -> str:
-    """What a type allows, in words."""
+    """The values that a type allows, in words."""
     if said := _description(kind):
         return said
     kind = _bare(kind)
@@ -187,7 +187,7 @@ def is_section(kind: Any) -> bool:
 
 
 def _description(kind: Any) -> str:
-    """What the `Meta` of a type says, also of a type that may be left out."""
+    """The description in the `Meta` of a type, also of a type that may be left out."""
     if get_origin(kind) is Annotated:
         said = (getattr(meta, "description", None) for meta in reversed(kind.__metadata__))
         return next(filter(None, said), "") or _description(kind.__origin__)

@@ -65,7 +65,7 @@ class SurfaceValues:
     def force(self, model: Model) -> np.ndarray | None:
         """The force (dim,) of the pressure on the slave; None where no area is known."""
         if self.whole:
-            return -_integral(model.points, self.zone, model.case.axisymmetric)
+            return pressure_force(model.points, self.zone, model.case.axisymmetric)
         if self.kind != "point" or self.placed.area is None:
             return None
         near = cKDTree(self.zone.centre).query(self.placed.places)[1]
@@ -171,13 +171,13 @@ def _at_faces(zone: ZoneResult, placed: Placed, faces: np.ndarray, name: str) ->
     return replace(surface, zone=filled)
 
 
-def _integral(points: np.ndarray, zone: ZoneResult, axisymmetric: bool) -> np.ndarray:
-    """∫ p n dS (dim,) over a slave surface."""
+def pressure_force(points: np.ndarray, zone: ZoneResult, axisymmetric: bool) -> np.ndarray:
+    """The force (dim,) of a pressure on the slave: −∫ p n dS over its surface."""
     pressure, start, total = computed_pressure(points, zone), 0, np.zeros(points.shape[1])
     for name, nodes, _ in zone.faces:
         reference, weights = gauss_rule(name, FACE_POINTS)
         _, vectors = surface_vectors(points, nodes, name, reference, axisymmetric)
         flat = (vectors * weights[:, None]).reshape(-1, points.shape[1])
-        total += pressure[start : start + len(flat)] @ flat
+        total -= pressure[start : start + len(flat)] @ flat
         start += len(flat)
     return total

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -38,9 +39,9 @@ UNITS = {1e3: "10³", 1e-3: "10⁻³", 1e6: "10⁶", 1e-6: "10⁻⁶", 1e9: "10�
 class Placed:
     """Values (k, …) at places (k, dim) of the case; `area` (k,) of each place or None.
 
-    `numbered`: the result says itself which nodes of its mesh the places are. `node` (k,) of the
-    case's mesh and `body` (k,) are -1 where there is none, or unknown because two bodies touch
-    there.
+    `own` (k,) are nodes of the result's own mesh. `numbered`: the result says itself which nodes
+    the places are. `node` (k,) of the case's mesh and `body` (k,) are -1 where there is none, or
+    unknown because two bodies touch there.
     """
 
     places: np.ndarray
@@ -49,14 +50,16 @@ class Placed:
     body: np.ndarray
     numbered: bool
     area: np.ndarray | None = None
+    own: np.ndarray | None = None
 
     def at(self, chosen: np.ndarray) -> Placed:
         """The chosen places, by mask or number."""
-        area = None if self.area is None else self.area[chosen]
-        named = ("places", "values", "node", "body")
-        return Placed(
-            **{n: getattr(self, n)[chosen] for n in named}, numbered=self.numbered, area=area
-        )
+        named = ("places", "values", "node", "body", "area", "own")
+        arrays = {name: getattr(self, name) for name in named}
+        parts: dict[str, Any] = {
+            name: None if a is None else a[chosen] for name, a in arrays.items()
+        }
+        return replace(self, **parts)
 
     def nodal(self, count: int) -> np.ndarray:
         """The values (count, …) by node, means of several; NaN where a node has none."""
@@ -104,9 +107,10 @@ class Placer:
             raise self._refused(name, "no value of it is a finite number")
         values, area = field.values[known], None if field.area is None else field.area[known]
         places = places[known]
-        numbered = field.nodes is not None and self.points is not None
+        numbered, own = field.nodes is not None and self.points is not None, None
         if numbered:
-            body = self.body[np.asarray(field.nodes)[known]]
+            own = np.asarray(field.nodes)[known]
+            body = self.body[own]
         else:
             self._refuse_elsewhere(places, name, whole=name not in CONTACT)
             body = np.full(len(places), -1)
@@ -115,7 +119,13 @@ class Placer:
         numbered = numbered or np.array_equal(node, np.arange(len(self.model.points)))
         body = np.where(node >= 0, self.model.body[node], body)
         return Placed(
-            places=places, values=values, node=node, body=body, numbered=numbered, area=area
+            places=places,
+            values=values,
+            node=node,
+            body=body,
+            numbered=numbered,
+            area=area,
+            own=own,
         )
 
     def _flat(self, points: np.ndarray, name: str) -> np.ndarray:

@@ -8,11 +8,13 @@ from typing import Protocol
 from ..system.errors import InputError, hint
 from .deck import Deck
 from .foreign import ForeignResult
+from .own import own_code
 
 # Module and class; each is imported where it is asked for.
 _CODES = {
     "calculix": (".calculix", "CalculiX"),
     "kratos": (".kratos", "Kratos"),
+    "plain": (".plain", "Plain"),
 }
 
 
@@ -52,7 +54,10 @@ def names() -> list[str]:
 
 
 def find(name: str) -> Code:
-    """The code of a name. Raises InputError for an unknown one."""
+    """The code of a name, or in a folder of the user's; InputError for one that there is not."""
+    if "/" in name or Path(name).is_dir():
+        own: Code = own_code(Path(name), find)
+        return own
     if name not in _CODES:
         raise InputError("--code", "name", name, f"unknown; {hint(name, _CODES)}")
     module, kind = _CODES[name]

@@ -164,7 +164,7 @@ class _Version(argparse.Action):
 
 
 def _add_job(command: argparse.ArgumentParser) -> None:
-    """What singles out one solve: case, mesh, direction, variant."""
+    """Add the arguments that identify a solve: case, mesh, direction, variant."""
     command.add_argument("case", type=Path, metavar="CASE.yaml")
     command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, used unchanged")
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
@@ -308,6 +308,10 @@ def _validate_one(path: Path, with_mesh: bool) -> None:
 
     case = load_case(path)
     check_mesh_file(case)
+    if "recipe" in case.mesh:
+        from ..mesh.recipes import read_recipe
+
+        read_recipe(case.mesh, path)
     if with_mesh:
         from ..simulation.groups import check_groups
         from ..verification.run import mesh_of

@@ -50,7 +50,7 @@ class Listed:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What no two jobs share."""
+        """The unique key of a job."""
         return self.family, self.name
 
 

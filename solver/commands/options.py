@@ -1,4 +1,4 @@
-"""What several commands of the program have in common."""
+"""The common parts of several commands."""
 
 import argparse
 import os

@@ -15,6 +15,7 @@ FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
     "benchmark": "..studies.benchmark.description:Benchmark",
     "case": "..case.file:CaseFile",
+    "code": "..codes.own:OwnCodeFile",
     "family": "..report.families:FamilyFile",
     "infsup": "..studies.infsup.description:InfSupFile",
     "ladders": "..studies.orders.description:LaddersFile",

@@ -42,7 +42,7 @@ def _sized(
 
 
 def _quick(command: argparse.ArgumentParser, what: str) -> None:
-    """What a command takes that measures many points in one process."""
+    """Add the arguments of commands that measure many points in one process."""
     _output(command, RECORD)
     command.add_argument("--quick", action="store_true", help=what)
     add_threads(command)

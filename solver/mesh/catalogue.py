@@ -76,7 +76,7 @@ class CellType:
 
 @dataclass(frozen=True)
 class _Shape:
-    """What the types of one shape share: vertices, edges, faces and mirror image of vertices."""
+    """The common part of the types of one shape: vertices, edges, faces, mirrored vertices."""
 
     vertices: tuple[tuple[float, ...], ...]
     edges: tuple[tuple[int, int], ...]

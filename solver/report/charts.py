@@ -7,8 +7,9 @@ Interactive Graphics, IEEE TVCG 23 (2017) 341–350.
 """
 
 import json
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,12 @@ CROSS = "M-1,-1L1,1M1,-1L-1,1"
 SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
 # The values of a mark under the pointer: powers of ten as 1.2e-10.
 _FORMAT = ".4~g"
+# Labels of a logarithmic axis: powers of ten, on less than so many times also 2 and 5 of them.
+_FEW = 300.0
+_DECADES = (
+    "indexof([1], round(datum.value / pow(10, floor(log(datum.value) / LN10 + 1e-9)))) < 0 ? '' : "
+    "format(datum.value, datum.value >= 0.01 && datum.value < 10000 ? '~g' : '.0e')"
+)
 
 Spec = dict[str, Any]
 Record = Mapping[str, Any]
@@ -69,6 +76,13 @@ class Axis:
     domain: tuple[float, float] | None = None
     zero: bool = False
 
+    def over(self, records: Sequence[Record]) -> "Axis":
+        """The axis with a range for logarithms that holds all records."""
+        values = [record[self.field] for record in records if record[self.field] is not None]
+        if not self.log or self.domain or not values:
+            return self
+        return replace(self, domain=(min(values) / 1.2, max(values) * 1.2))
+
     def channel(self, **more: Any) -> Spec:
         """The channel of an encoding."""
         scale: Spec = {"zero": self.zero, "nice": False, "padding": 8}
@@ -76,8 +90,9 @@ class Axis:
             scale = {"type": "log", "nice": False, "padding": 8}
         if self.domain:
             scale |= {"domain": list(self.domain), "padding": 0}
-        labels = "datum.value >= 0.01 && datum.value < 10000 ? '~g' : '.0e'" if self.log else "'~g'"
-        axis = {"labelExpr": f"format(datum.value, {labels})"}
+        axis: Spec = {"labelExpr": _DECADES if self.log else "format(datum.value, '~g')"}
+        if self.log and self.domain and self.domain[1] < _FEW * self.domain[0]:
+            axis["labelExpr"] = _DECADES.replace("[1]", "[1, 2, 5]")
         return {
             "field": self.field,
             "type": "quantitative",
@@ -109,7 +124,7 @@ class Chart:
             '<script type="application/json">{}</script><div class=drawn></div><p class=none>The '
             "chart “{}” needs JavaScript and the file {} beside this page.</p></div>"
         ).format(
-            self.name,
+            re.sub(r"[^\w*-]+", "-", self.name),
             self.title,
             self.width,
             Markup(spec.replace("<", "\\u003c")),
@@ -166,7 +181,8 @@ def series_chart(
     lines: bool = True,
     tips: Mapping[str, str] | None = None,
     layers: Sequence[Spec] = (),
-    size: str = "",
+    marks: int = 45,
+    order: str = "",
     span: tuple[str, str] | None = None,
     width: int = 560,
     height: int = 260,
@@ -174,31 +190,31 @@ def series_chart(
     """Records by their `series` as marks, joined by lines, in the looks of these series.
 
     `tips` maps fields to their titles under the pointer, besides series, x and y; a `url` in a
-    record makes its mark a link. `layers` are drawn below. `size` names the field that marks grow
-    with, `span` the fields of a range across a mark.
+    record makes its mark a link. `layers` are drawn below. `marks` is their area in pixels; they
+    grow with the field `order`, by which lines go instead of by x. `span` names the fields of a
+    range across a mark. Where a value of y is None, a line is broken.
     """
+    x, y = x.over(records), y.over(records)
     shared = {"x": x.channel(), "y": y.channel()} | series(looks)
     shape, dash = shared.pop("shape"), shared.pop("strokeDash")
     titles = {"series": "series", x.field: x.title, y.field: y.title, **(tips or {})}
-    marks: Spec = {"shape": shape, "tooltip": tooltip(records, titles)}
-    if size:
-        marks["size"] = {
-            "field": size,
-            "type": "quantitative",
-            "legend": None,
-            "scale": {"range": [25, 130]},
-        }
+    of_marks: Spec = {"shape": shape, "tooltip": tooltip(records, titles)}
+    sequence: Spec = {}
+    if order:
+        rank = {"field": order, "type": "quantitative"}
+        sequence = {"order": rank}
+        of_marks["size"] = rank | {"legend": None, "scale": {"range": [marks / 2, 3 * marks]}}
     if any("url" in record for record in records):
-        marks["href"] = {"field": "url"}
+        of_marks["href"] = {"field": "url"}
     drawn: list[Spec] = [*layers]
     if lines:
         line = {"type": "line", "strokeWidth": 1.8}
-        drawn.append({"mark": line, "encoding": shared | {"strokeDash": dash}})
+        drawn.append({"mark": line, "encoding": shared | {"strokeDash": dash} | sequence})
     if span:
         ends = {"x": x.channel(field=span[0]), "x2": {"field": span[1]}}
         drawn.append({"mark": "rule", "encoding": shared | ends})
-    point = {"type": "point", "filled": not lines, "size": 45, "strokeWidth": 1.8}
-    drawn.append({"mark": point, "encoding": shared | marks, "params": interaction()})
+    point = {"type": "point", "filled": not lines, "size": marks, "strokeWidth": 1.8}
+    drawn.append({"mark": point, "encoding": shared | of_marks, "params": interaction()})
     spec = {"data": {"values": list(records)}, "width": width, "height": height, "layer": drawn}
     return Chart(name, title, spec, width)
 
@@ -237,15 +253,19 @@ def tooltip(records: Sequence[Record], titles: Mapping[str, str]) -> list[Spec]:
     return found
 
 
-def level(value: float, label: str, color: str, dashes: Sequence[float] = ()) -> Spec:
-    """A line across the chart at a value of y, with its label above."""
+def level(
+    value: float, label: str, color: str, dashes: Sequence[float] = (), left: bool = False
+) -> Spec:
+    """A line across the chart at a value of y, its label above, at the right or left end."""
     place = {"y": {"datum": value}, "color": {"value": color}}
-    words = {"type": "text", "text": label, "align": "right", "dx": -3, "dy": -6}
+    words = {"type": "text", "text": label, "dy": -6}
+    words |= {"align": "left", "dx": 3} if left else {"align": "right", "dx": -3}
+    end = 0 if left else "width"
     return {
         "data": {"values": [{}]},
         "layer": [
             {"mark": {"type": "rule", "strokeDash": list(dashes)}, "encoding": place},
-            {"mark": words, "encoding": place | {"x": {"value": "width"}}},
+            {"mark": words, "encoding": place | {"x": {"value": end}}},
         ],
     }
 

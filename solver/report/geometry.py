@@ -1,11 +1,10 @@
-"""What a picture draws of a mesh: cell outlines, boundary faces, outlines of macro-elements."""
+"""What a picture draws of a mesh: cell outlines, outlines of macro-elements, normals."""
 
 from collections.abc import Iterable, Iterator
 
 import meshio
 import numpy as np
 
-from ..mechanics.fem.faces import corner_sets
 from ..mesh.catalogue import cell_type
 
 
@@ -25,24 +24,6 @@ def plane_cells(points: np.ndarray, mesh: meshio.Mesh) -> Iterator[tuple[np.ndar
     for block in mesh.cells:
         if block.dim == 2 and len(block.data):
             yield outlines(points, block.type, block.data), block.data[:, 0]
-
-
-def boundary_faces(mesh: meshio.Mesh) -> Iterator[tuple[str, np.ndarray]]:
-    """The faces that belong to one cell of a 3D mesh only, turned outward: (type, (n, nodes))."""
-    by_type: dict[str, list[np.ndarray]] = {}
-    for block in mesh.cells:
-        if block.dim == 3:
-            for face in cell_type(block.type).faces:
-                by_type.setdefault(face.type, []).append(block.data[:, list(face.nodes)])
-    faces = {kind: np.concatenate(parts) for kind, parts in by_type.items()}
-    corners = [nodes[:, : cell_type(kind).n_vertices] for kind, nodes in faces.items()]
-    keys = corner_sets(corners)
-    _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-    alone = counts[inverse.ravel()] == 1
-    start = 0
-    for kind, nodes in faces.items():
-        yield kind, nodes[alone[start : start + len(nodes)]]
-        start += len(nodes)
 
 
 def macro_edges(faces: Iterable[tuple[str, np.ndarray, np.ndarray]]) -> np.ndarray:

@@ -5,7 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..simulation.solution import BodyInfo, Solution, ZoneResult
-from .svg import BLUE, MUTED, ORANGE, PAPER, mixed
+from .charts import BLUE, MUTED, ORANGE, PAPER
+from .svg import mixed
 
 Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
 # A picture of the contact shows this share of its extent around it.

@@ -4,9 +4,10 @@ import numpy as np
 from markupsafe import Markup
 
 from ..simulation.solution import Solution
+from .charts import BLUE, MUTED, PAPER
 from .geometry import plane_cells
 from .layout import Placement, apart, edge_color, fit, pressed_box, tint
-from .svg import BLUE, MUTED, PAPER, Drawing, mixed
+from .svg import Drawing, mixed
 
 WIDTH, HEIGHT = 760, 330
 # Where the contact is more than this share of the model, it is not enlarged.

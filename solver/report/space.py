@@ -5,10 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
+from ..mechanics.fem.faces import outer_faces
 from ..mesh.catalogue import cell_type
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
-from .geometry import boundary_faces, macro_edges, normals, outlines
+from .charts import BLUE, INK, MUTED, PAPER
+from .geometry import macro_edges, normals, outlines
 from .layout import (
     Frame,
     Placement,
@@ -21,7 +23,7 @@ from .layout import (
     tint,
 )
 from .profile import expected
-from .svg import BLUE, INK, MUTED, PAPER, Drawing, mixed
+from .svg import Drawing, mixed
 
 WIDTH, HEIGHT = 960, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
@@ -73,7 +75,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     distance = {k: float((points[solution.body == k] @ eye).mean()) for k in numbers}
     faces = [
         (outlines(points, kind, nodes), solution.body[nodes[:, 0]])
-        for kind, nodes in boundary_faces(solution.mesh)
+        for kind, nodes in outer_faces(solution.mesh)
     ]
     for number in sorted(numbers, key=distance.__getitem__):
         body = solution.bodies[number]

@@ -1,7 +1,6 @@
 """Drawings as SVG text: integer tenths of a pixel, many polygons in one path, all text escaped.
 
-Written directly rather than through a plotting library: a picture of a thousand faces costs some
-milliseconds and kilobytes, and needs no library where there is nothing to draw.
+For pictures of meshes alone: a thousand faces cost some milliseconds and kilobytes.
 """
 
 from collections.abc import Iterator
@@ -10,9 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 from markupsafe import Markup, escape
 
-INK, MUTED, RULE, PAPER = "#1f2933", "#66727f", "#cfd6dd", "#ffffff"
-# Colours that the colour-blind tell apart (Okabe and Ito).
-BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "#aa5588"
+from .charts import INK
 
 Style = str | float | tuple[float, ...]
 
@@ -40,26 +37,10 @@ class Drawing:
         """Add a path whose data are in tenths of a pixel."""
         self._parts.append(f'<path d="{data}"{_attributes(style)}/>')
 
-    def line(self, x1: float, y1: float, x2: float, y2: float, **style: Style) -> None:
-        """Add one straight line."""
-        self.path(self._data(np.array([[[x1, y1], [x2, y2]]]), closed=False), **style)
-
     def rectangle(self, x: float, y: float, width: float, height: float, **style: Style) -> None:
         """Add an upright rectangle, (x, y) its upper left corner."""
         corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
         self.path(self._data(np.array([corners])), **style)
-
-    def circles(self, centres: np.ndarray, radius: float, **style: Style) -> None:
-        """Add circles at (n, 2)."""
-        r = round(radius * 10)
-        arcs = f"m-{r} 0a{r} {r} 0 1 0 {2 * r} 0a{r} {r} 0 1 0-{2 * r} 0"
-        self.path("".join(f"M{x} {y}{arcs}" for x, y in _tenths(centres)), **style)
-
-    def crosses(self, centres: np.ndarray, radius: float, **style: Style) -> None:
-        """Add diagonal crosses at (n, 2)."""
-        r = round(radius * 10)
-        strokes = f"m-{r}-{r}l{2 * r} {2 * r}m0-{2 * r}l-{2 * r} {2 * r}"
-        self.path("".join(f"M{x} {y}{strokes}" for x, y in _tenths(centres)), **style)
 
     @contextmanager
     def clipped(self, x: float, y: float, width: float, height: float) -> Iterator[None]:
@@ -78,24 +59,14 @@ class Drawing:
         anchor: str = "start",
         size: float = 11,
         color: str = INK,
-        turn: float = 0,
         weight: str = "",
     ) -> None:
         """Add one line of text with its baseline at y; `anchor` start, middle or end."""
-        turned = f' transform="rotate({turn:g} {x * 10:.0f} {y * 10:.0f})"' if turn else ""
         bold = f' font-weight="{weight}"' if weight else ""
         self._parts.append(
             f'<text x="{x * 10:.0f}" y="{y * 10:.0f}" font-size="{size * 10:g}" fill="{color}"'
-            f' text-anchor="{anchor}"{turned}{bold}>{escape(content)}</text>'
+            f' text-anchor="{anchor}"{bold}>{escape(content)}</text>'
         )
-
-    def open_link(self, target: str, tip: str) -> None:
-        """What follows, until `close_link`, links to `target` and says `tip` under the pointer."""
-        self._parts.append(f'<a href="{escape(target)}"><title>{escape(tip)}</title>')
-
-    def close_link(self) -> None:
-        """End the link."""
-        self._parts.append("</a>")
 
     def svg(self) -> Markup:
         """The drawing as one SVG element that stands alone and fits into a page."""
@@ -115,10 +86,6 @@ def _attributes(style: dict[str, Style]) -> str:
         if key in style:
             style[key] = " ".join(f"{10 * length:g}" for length in np.atleast_1d(style[key]))
     return "".join(f' {key.replace("_", "-")}="{escape(value)}"' for key, value in style.items())
-
-
-def _tenths(points: np.ndarray) -> list[list[int]]:
-    return np.rint(np.asarray(points, dtype=float).reshape(-1, 2) * 10).astype(int).tolist()
 
 
 def mixed(color: str, other: str, share: float) -> str:

@@ -1,4 +1,4 @@
-"""What a solve can know of its own accuracy: digits lost to rounding, strains that are not small.
+"""The accuracy of a solve by its own estimate: digits lost to rounding, strains that are large.
 
 Each term of `Accuracy` is a size at which something is rounded, times the unit of rounding, turned
 into a pressure by what it acts on; it is relative to the largest pressure:
@@ -112,7 +112,7 @@ def pressure_of_gaps(gaps: sparse.csr_matrix, noise: np.ndarray, stiffness: np.n
 
 @dataclass(frozen=True)
 class Roughness:
-    """What rounded coordinates do to a scene's mesh.
+    """The effect of rounded coordinates on a scene's mesh.
 
     `strain`: the largest error of a strain, over the strain. `tilt` (n,): by what angle the contact
     faces around each node may be turned. `turned` (n,): the same for the directions of supports,
@@ -144,7 +144,7 @@ class Roughness:
 
 
 def roughness(scene: Scene) -> Roughness:
-    """How rough rounded coordinates make the mesh of a scene."""
+    """The roughness of a scene's mesh by rounded coordinates."""
     points, dim = scene.points, scene.points.shape[1]
     steep = steepness(points, scene.blocks)
     around, tilt, turned = np.zeros((3, len(points)))

@@ -1,4 +1,4 @@
-"""What a case gives to groups of the mesh, on the cut mesh: materials, supports, loads."""
+"""Materials, supports and loads of a case on the groups of the cut mesh."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -201,7 +201,7 @@ class Attributes:
         return values
 
     def supports(self) -> FreeMotion:
-        """What supports and rigid bodies leave free."""
+        """The motion that supports and rigid bodies leave free."""
         fixed = dict(self._fixed())
         self._refuse_moved(fixed)
         dim = self.points.shape[1]
@@ -222,7 +222,7 @@ class Attributes:
             raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:
-        """What supports hold, by the key of the case file."""
+        """The displacements fixed by supports, by key of the case file."""
         for i, support in enumerate(self.case.supports):
             nodes = self.nodes(support.group, f"supports[{i}].group")
             for direction, value in support.fix.items():

@@ -97,7 +97,7 @@ def free_motion(
     constraints: ContactConstraints,
     closed: np.ndarray,
 ) -> str:
-    """What moves freely with `closed` (k,) multipliers, in words; empty where nothing does.
+    """The free motion with `closed` (k,) multipliers, in words; empty if there is none.
 
     `motions` (n_dofs, r): the rigid motions of all bodies.
     """

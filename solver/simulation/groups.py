@@ -124,7 +124,7 @@ class _Groups:
         return np.unique(np.concatenate(touched))
 
     def shared(self, one: list[np.ndarray], other: list[np.ndarray]) -> int:
-        """How many cells of the two selections stand on the same nodes."""
+        """The number of cells of the two selections with the same nodes."""
         count = 0
         for block, *parts in zip(self.mesh.cells, one, other, strict=True):
             first, second = (np.unique(np.sort(block.data[p], axis=1), axis=0) for p in parts)
@@ -156,7 +156,7 @@ class _Groups:
             raise self.error("materials", shown, f"{allowed}; name their group, or `{ALL}`")
 
     def covering(self, key: str, groups: Iterable[str]) -> np.ndarray:
-        """How many of the groups hold each volume cell."""
+        """The number of these groups that contain each volume cell."""
         counts = [np.zeros(len(block.data), dtype=int) for block in self.mesh.cells]
         for group in groups:
             parts = self.cells(f"{key}.{group}", group, self.dim)

@@ -51,7 +51,7 @@ class ContactIterate:
 
     @cached_property
     def sizes(self) -> Sizes:
-        """How large its stresses are, and the terms that they are summed from."""
+        """The size of its stresses, and of the terms that they are summed from."""
         return sizes(self.scene.points, self.scene.blocks, self.deformation)
 
     @property

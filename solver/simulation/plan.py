@@ -23,7 +23,7 @@ _ROUNDING = 1e-10
 
 
 def decided(problem: ContactProblem) -> Iterator[Line]:
-    """What the scene alone decides, before the solve, in the order of the work."""
+    """The lines that the scene alone decides, before the solve, in the order of the work."""
     scene = problem.scene
     if scene.options.shortcuts == Options.everything().shortcuts:
         yield Line("everything is done", "as asked for by --everything, needed or not")
@@ -86,7 +86,7 @@ def _zone(zone: ZoneScene, scene: Scene, inactive: np.ndarray) -> Iterator[Line]
 
 
 def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Line]:
-    """What the solve found not to be needed, and what solved it."""
+    """The lines of the solve: work that was not needed, and the linear solver."""
     scene = problem.scene
     if scene.zones and len(states) > 1:
         why = "displacements are small: all load factors share them"
@@ -102,7 +102,7 @@ def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Li
 
 
 def estimated(solution: Solution) -> Iterator[Line]:
-    """How far constant pressures are from the exact one, as a reconstruction shows it."""
+    """The estimated error of constant pressures, by a reconstruction."""
     for zone in solution.zones:
         error = zone.relative_pressure_error
         if error is not None and error > _ROUNDING:

@@ -1,4 +1,4 @@
-"""What contact comes to in a zone: where it ends, its area, its force and moment."""
+"""Resultants of contact in a zone: edge, area, force and moment."""
 
 import numpy as np
 

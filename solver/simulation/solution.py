@@ -248,7 +248,7 @@ class Solution:
 
     @property
     def hexahedra(self) -> str | None:
-        """How slave hexahedra were cut, where the case was overruled."""
+        """The cut of slave hexahedra, if it overrides that of the case."""
         return self.case.hexahedra
 
     @property

@@ -77,12 +77,12 @@ class MeasuredPoint:
 
 
 def ended(outcome: str, reason: str) -> dict[str, str]:
-    """How a point ended, as a part of its record."""
+    """The outcome of a point, as a part of its record."""
     return {"outcome": outcome, "reason": reason}
 
 
 def surroundings(cores: Sequence[int]) -> dict[str, Any]:
-    """What a point that begins now runs on, as a part of its record."""
+    """The cores and load of the machine now, as a part of a record."""
     return {"threads": len(cores), "cores": list(cores), "load": round(os.getloadavg()[0], 2)}
 
 
@@ -109,7 +109,7 @@ def measure_apart(
     cores: Sequence[int],
     limit: float,
 ) -> dict[str, Any]:
-    """What a function of a module finds for `job` in a new process, with outcome and reason.
+    """The result of a function for `job` in a new process, with outcome and reason.
 
     The process writes it to `output`. Its libraries read the number of threads when they are
     loaded, and peak memory is the process's own: hence a process for each point. In the job, the
@@ -139,7 +139,7 @@ def _work(task: Mapping[str, Any]) -> None:
 
 
 def announcement(study: PointStudy, folder: Path, pending: Collection[str]) -> str:
-    """What is about to be measured and how long it will take; records are in `folder`."""
+    """The number of points to be measured, and their time; records are in `folder`."""
     model = {point.name: point.seconds for point in study.points}
     if not pending:
         return f"{study.title}: all {len(model)} points are measured."
@@ -183,14 +183,14 @@ def page_name(name: str, size: str) -> str:
 
 
 def outcome(points: Sequence[MeasuredPoint]) -> str:
-    """How many points have a solve."""
+    """The number of points with a solve."""
     lost = sum(not m.solved for m in points)
     text = f"{len(points) - lost} of {len(points)} points are measured."
     return text + (f" {lost} have no solve, each with its reason." if lost else "")
 
 
 def disturbed(points: Sequence[MeasuredPoint]) -> int:
-    """How many points began while other work kept the machine busy."""
+    """The number of points that began on a busy machine."""
     return sum(m.solved and m.record["load"] > m.record["threads"] + _BUSY for m in points)
 
 

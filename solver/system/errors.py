@@ -33,7 +33,7 @@ class SolveError(Exception):
 
 
 def of_machine(error: Exception) -> str:
-    """What the machine lacks, memory or a usable file, in one line; empty for other errors."""
+    """One line for an error of the machine (memory, a file that cannot be used); else empty."""
     said = " ".join(str(error).split())
     if isinstance(error, MemoryError) or _is_unmapped(error):
         return f"out of memory: {said or 'none left'}"

@@ -10,7 +10,7 @@ from pathlib import Path
 PROJECT = "mortarcheck"
 PACKAGE = __name__.partition(".")[0]
 PROGRAM = PROJECT if PACKAGE == PROJECT else f"python -m {PACKAGE}"
-"""How a user starts the program."""
+"""The command that starts the program."""
 COMMAND = [sys.executable, "-m", PACKAGE]
 """The program as a process of its own."""
 _SOURCES = Path(__file__).parents[2]

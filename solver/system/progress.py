@@ -1,4 +1,4 @@
-"""What a solve reports while it works, by the standard library's logging.
+"""The progress of a solve, by the standard library's logging.
 
 Modules log to the logger of their own name: outcomes at the level `OUTCOME`, which `saying` hands
 to a function, and details (each stage, each solution and its residual) as information, which

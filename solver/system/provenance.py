@@ -1,4 +1,4 @@
-"""Where a result came from: versions, revision, hashes of its inputs, machine and time."""
+"""The provenance of a result: versions, revision, hashes of its inputs, machine and time."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _KEYS = {"minimum", "maximum"}
 
 
 def regression_file(solution: Solution) -> Path:
-    """Where the accepted values of a solve lie."""
+    """The file of a solve's accepted values."""
     return solution.case.path.parent / "regression" / f"{solution.job}.json"
 
 

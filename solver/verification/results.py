@@ -69,7 +69,7 @@ _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 @dataclass
 class Result:
-    """What a result file gives back: the solution, where it came from, and the file's hash."""
+    """The content of a result file: the solution, its provenance, and the file's hash."""
 
     solution: Solution
     provenance: dict[str, Any]

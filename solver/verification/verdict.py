@@ -33,7 +33,7 @@ _NEGLIGIBLE = 1e-10
 
 @dataclass(frozen=True, kw_only=True)
 class Regression:
-    """How far a check's extremes lie from the accepted ones, over the check's scale."""
+    """The distance of a check's extremes from the accepted ones, over the check's scale."""
 
     minimum: float = math.nan
     maximum: float = math.nan

@@ -18,6 +18,7 @@ CASES = Path(__file__).parents[2] / "cases"
 FILES = {
     "benchmark": "scaling/benchmark.yaml",
     "case": "ssnp170/[a-e].yaml",
+    "code": "../docs/examples/toy/code.yaml",
     "family": "*/family.yaml",
     "infsup": "stability/infsup/*.yaml",
     "ladders": "*/orders.yaml",

@@ -1,6 +1,7 @@
 """Charts: what a specification holds, what a page embeds, and what a browser makes of it."""
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from urllib.parse import unquote
 
@@ -29,6 +30,13 @@ RECORDS = [
 LOOKS = {"one </script>": Look(BLUE), "two": Look(ORANGE, "square", (6, 3))}
 
 
+def specifications(html):
+    """The specifications of a page's charts, by their anchors."""
+    found = re.findall(r'<div class=chart id="([^"]+)".*?json">(.*?)</script>', html, re.DOTALL)
+    assert len(found) == len(dict(found))
+    return {name: json.loads(text) for name, text in found}
+
+
 def chart():
     x, y = Axis("x", "size", log=True), Axis("y", "error", log=True)
     layers = [floor_band(100), level(1e-4, "limit", ORANGE), *slopes(RECORDS, "x", "y", [1, 2])]
@@ -47,8 +55,7 @@ def test_a_chart_is_its_records():
 
 def test_a_page_holds_the_specification_and_says_what_it_needs():
     html = str(chart().__html__())
-    text = html.partition('json">')[2].partition("</script>")[0]
-    assert json.loads(text) == json.loads(json.dumps(chart().spec))
+    assert specifications(html) == {"a": json.loads(json.dumps(chart().spec))}
     assert f"needs JavaScript and the file {SCRIPT} beside this page" in html
 
 

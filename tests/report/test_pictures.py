@@ -7,13 +7,15 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.report.geometry import boundary_faces, macro_edges, normals, outlines
+from solver.mechanics.fem.faces import outer_faces
+from solver.report.charts import BLUE, ORANGE
+from solver.report.geometry import macro_edges, normals, outlines
 from solver.report.layout import pressed_box
 from solver.report.pictures import picture
 from solver.report.plane import draw_plane
 from solver.report.rows import Row
 from solver.report.space import DEVIATION, draw_space, shade
-from solver.report.svg import BLUE, ORANGE, Drawing, mixed
+from solver.report.svg import Drawing, mixed
 from solver.verification.results import write_result
 from tests import handmade
 from tests.report.verdicts import record
@@ -66,7 +68,7 @@ def test_boundary_of_two_cubes_on_each_other():
     points = np.array(layers, dtype=float)
     cubes = np.array([[0, 1, 2, 3, 4, 5, 6, 7], [4, 5, 6, 7, 8, 9, 10, 11]])
     mesh = meshio.Mesh(points, [("hexahedron", cubes)])
-    [(kind, faces)] = boundary_faces(mesh)
+    [(kind, faces)] = outer_faces(mesh)
     assert kind == "QUAD4"
     assert len(faces) == 10
     centre = points[faces].mean(axis=1)

@@ -66,7 +66,7 @@ _ALL, _RIGID = "all", "rigid"
 
 @dataclass(frozen=True)
 class Known:
-    """What a case says already: its file, materials by group, dimension, and single values.
+    """Values known from the case: its file, materials by group, dimension, and single values.
 
     `pressure` and `interference` are None where the case has none, or more than one.
     `plane_stress`: so is the solution. `axisymmetric`: a solution of three dimensions is seen in

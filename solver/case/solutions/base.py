@@ -1,4 +1,4 @@
-"""What an exact solution is: documented parameters, and fields that can be asked for anywhere.
+"""Exact solutions: documented parameters, and fields that can be evaluated at any point.
 
 A solution may have several parts (the inner and the outer cylinder) with formulas of their own. Its
 fields take the part of each point, since a point of the interface belongs to both and a node of a

@@ -20,7 +20,7 @@ _REGULAR = 0.8
 
 @dataclass(frozen=True, kw_only=True)
 class Hertz(ExactSolution):
-    """What all of them share: half an ellipse of pressure over the contact area."""
+    """The common part: half an ellipse of pressure over the contact area."""
 
     parts: ClassVar[tuple[str, ...]] = ("lower", "upper")
     quantities: ClassVar[frozenset[str]] = frozenset({"contact_pressure", "half_width", "peak"})

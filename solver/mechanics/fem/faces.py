@@ -1,6 +1,6 @@
 """Faces of a group on the boundary of the bodies: owner cell, outward orientation, geometry."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import meshio
@@ -89,6 +89,22 @@ def corner_sets(faces: list[np.ndarray]) -> np.ndarray:
     for row, face in zip(rows, faces, strict=True):
         row[:, : face.shape[1]] = np.sort(face, axis=1)
     return np.concatenate(rows) if rows else np.empty((0, 4), dtype=int)
+
+
+def outer_faces(mesh: meshio.Mesh) -> Iterator[tuple[str, np.ndarray]]:
+    """The faces that belong to one cell only, turned outward: (type, (n, nodes))."""
+    by_type: dict[str, list[np.ndarray]] = {}
+    for name, cells in volume_cells(mesh).items():
+        for face in cell_type(name).faces:
+            by_type.setdefault(face.type, []).append(cells[:, list(face.nodes)])
+    faces = {kind: np.concatenate(parts) for kind, parts in by_type.items()}
+    keys = corner_sets([nodes[:, : cell_type(kind).n_vertices] for kind, nodes in faces.items()])
+    _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    alone = counts[inverse.ravel()] == 1
+    start = 0
+    for kind, nodes in faces.items():
+        yield kind, nodes[alone[start : start + len(nodes)]]
+        start += len(nodes)
 
 
 def _candidate_sides(mesh: meshio.Mesh, marked: np.ndarray) -> list[_Side]:

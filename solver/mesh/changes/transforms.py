@@ -1,4 +1,4 @@
-"""What a case file's `transform:` does to a mesh: keys applied in the order in which they stand.
+"""The key `transform:` of a case file: changes of the mesh, applied in the order of the keys.
 
 scale: 1.0e-3                       # by one positive number
 stretch: [1, 1, 10]                 # by one along each axis

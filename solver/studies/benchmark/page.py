@@ -28,7 +28,7 @@ def _printed(table: TextTable) -> str:
 
 
 def seconds(way: Record, kind: str = "cpu") -> float | None:
-    """What a way took: the median of its warm repetitions, else its whole process."""
+    """The time of a way: the median of its warm repetitions, else that of its whole process."""
     if way["outcome"] != SOLVED:
         return None
     times = way["times"].get("total")

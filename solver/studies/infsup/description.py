@@ -76,7 +76,7 @@ class InfSupLadder:
 
     @property
     def way(self) -> str:
-        """How the cells are cut, in a word."""
+        """The kind of cut in a word."""
         if not self.cut:
             return "uncut"
         return self.hexahedra or ("yes" if self.needs_cut else "not needed")

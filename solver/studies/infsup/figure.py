@@ -1,68 +1,61 @@
-"""Plots of the inf-sup constants level by level, and of the half-loaded block's pressure."""
+"""Charts of the inf-sup constants level by level, and of the half-loaded block's pressure."""
 
 from collections.abc import Sequence
 
-import numpy as np
-from markupsafe import Markup
-
-from ...mesh.catalogue import BY_NAME
-from ...report.axes import Scale, draw_axes
-from ...report.marks import look_of
-from ...report.svg import INK, MUTED, ORANGE, Drawing
-from ..plots import PlotLine, draw_lines
+from ...report.charts import INK, ORANGE, Axis, Chart, Look, look_of, series_chart
 from .description import InfSupLadder
 from .half_loaded import CELLS, PressureProfile
 
-WIDTH = 400
-# β_h below is drawn at the foot of the plot.
+# β_h below is drawn at the foot of the chart.
 _RANGE = 0.02, 2.0
-_NOTHING = np.empty(0)
 
 
-def draw_constants(title: str, ladders: Sequence[InfSupLadder]) -> Markup:
+def draw_constants(title: str, ladders: Sequence[InfSupLadder]) -> Chart:
     """β_h against the slave divisions, log–log; without the cut dashed."""
-    lines = [
-        _line(each.kind, np.array(each.levels[: len(each.constants)]), np.array(each.constants))
-        for each in sorted(ladders, key=lambda one: one.cut)
+    ladders = sorted(ladders, key=lambda one: not one.cut)
+    records = [
+        {"series": _name(each.kind), "faces": level, "constant": max(constant, _RANGE[0])}
+        for each in ladders
+        for level, constant in zip(each.levels, each.constants, strict=False)
     ]
-    label = "slave faces along an edge of the interface"
-    full = f"Inf-sup constant by level: {title}"
-    return draw_lines(full, label, f"β_h, {title}", lines, y_range=_RANGE)
+    looks = {}
+    for each in ladders:
+        cells, cut = each.kind
+        look = look_of(cells)
+        looks[_name(each.kind)] = Look(look.color, look.shape, () if cut else (5.0, 3.0))
+    return series_chart(
+        f"infsup-{title}",
+        f"Inf-sup constant by level: {title}",
+        records,
+        Axis("faces", "slave faces along an edge of the interface", log=True),
+        Axis("constant", f"β_h, {title}", log=True, domain=_RANGE),
+        looks,
+        width=460,
+    )
 
 
-def draw_key(kind: tuple[str, bool]) -> Markup:
-    """The line and mark of cells, cut or uncut, for the legend."""
-    return _line(kind, _NOTHING, _NOTHING).key()
-
-
-def _line(kind: tuple[str, bool], levels: np.ndarray, constants: np.ndarray) -> PlotLine:
-    """Marks are hollow on linear cells; lines dashed, and faint, without the cut."""
+def _name(kind: tuple[str, bool]) -> str:
     cells, cut = kind
-    color, mark = look_of(cells)
-    name = cells if cut else f"{cells}, uncut"
-    dashes, width = ((), 1.6) if cut else ((5, 3), 1.0)
-    filled = BY_NAME[cells].order == 2
-    return PlotLine(name, levels, constants, color, mark, dashes, filled, width, sizes=2.8)
+    return cells if cut else f"{cells}, uncut"
 
 
-def draw_profiles(profiles: Sequence[PressureProfile]) -> Markup:
-    """The pressure along the interface: cut and uncut, bilateral left and opening right."""
+def draw_profiles(profiles: Sequence[PressureProfile]) -> list[Chart]:
+    """The pressure along the interface, cut and uncut: of bilateral contact, and that opens."""
     cells = profiles[0].cells
-    drawing = Drawing(2 * WIDTH, 260, f"Pressure under a half-loaded block, {cells}")
-    values = np.concatenate([profile.pressure for profile in profiles])
-    low, high = min(-0.2, values.min() - 0.1), max(1.4, values.max() + 0.1)
-    names = {True: "with the cut" if CELLS[cells] else "needs no cut", False: "without"}
-    colors = {True: INK, False: ORANGE}
-    for cut in {profile.cut for profile in profiles}:
-        drawing.text(WIDTH - 30, 66 - 16 * cut, names[cut], "end", color=colors[cut])
-    for k, what in enumerate(("bilateral", "opening")):
-        left = 52 + k * WIDTH
-        x, y = Scale(0, 2, left, left + WIDTH - 70), Scale(low, high, 214, 34)
-        draw_axes(drawing, x, y, "x", f"p / 25, {cells}, {what}")
-        for profile in sorted(profiles, key=lambda one: one.cut):
-            if profile.bilateral is (what == "bilateral"):
-                at = np.array(profile.place), np.array(profile.pressure)
-                width = 1.6 if profile.cut else 1.0
-                PlotLine(what, *at, colors[profile.cut], width=width, sizes=0.0).draw(drawing, x, y)
-    drawing.line(WIDTH - 4, 34, WIDTH - 4, 214, stroke=MUTED, stroke_width=0.4)
-    return drawing.svg()
+    looks = {"with the cut" if CELLS[cells] else "needs no cut": Look(INK)}
+    looks |= {"without": Look(ORANGE, "square", (5.0, 3.0))} if CELLS[cells] else {}
+    charts = []
+    for what in ("bilateral", "opening"):
+        records = [
+            {"series": next(iter(looks)) if profile.cut else "without", "x": x, "p": p}
+            for profile in profiles
+            if profile.bilateral is (what == "bilateral")
+            for x, p in zip(profile.place, profile.pressure, strict=True)
+        ]
+        title = f"Pressure under a half-loaded block, {cells}, {what}"
+        name = f"half-loaded-{cells}-{what}"
+        if not records:
+            continue
+        x, y = Axis("x", "x"), Axis("p", f"p / 25, {cells}, {what}", zero=True)
+        charts.append(series_chart(name, title, records, x, y, looks, marks=12, width=460))
+    return charts

@@ -9,11 +9,12 @@ from typing import Any
 
 from markupsafe import Markup
 
+from ...report.charts import write_script
 from ...report.html import render
 from ...report.tables import as_csv
 from ...system.files import write_text
 from .description import LEVEL, InfSupLadder
-from .figure import draw_constants, draw_key, draw_profiles
+from .figure import draw_constants, draw_profiles
 from .half_loaded import COARSER
 from .records import OSCILLATION, InfSupRecord, failures
 
@@ -28,9 +29,8 @@ def sections(record: InfSupRecord) -> Markup:
         render(
             Path(__file__).with_name("sections.html.jinja"),
             panels=[draw_constants(*panel) for panel in _grouped(ladders, _panel).items()],
-            keys=[(kind, draw_key(kind)) for kind in dict.fromkeys(each.kind for each in ladders)],
             tables=_grouped(ladders, lambda ladder: tuple(ladder.levels)),
-            profiles=[draw_profiles(members) for members in by_cells.values()],
+            profiles=[one for members in by_cells.values() for one in draw_profiles(members)],
             oscillations={
                 cells: {(p.cut, p.bilateral): p.oscillation for p in members}
                 for cells, members in by_cells.items()
@@ -49,6 +49,7 @@ def write_page(record: InfSupRecord, folder: Path) -> str:
     complaints = failures(record)
     page = render(
         Path(__file__).with_name("page.html.jinja"),
+        charts=True,
         title="Stability of the contact pressure",
         good=not complaints,
         outcome=f"{len(complaints)} do not hold."
@@ -57,6 +58,7 @@ def write_page(record: InfSupRecord, folder: Path) -> str:
         sections=sections(record),
     )
     write_text(folder / PAGE, page)
+    write_script(folder)
     write_text(folder / TABLE, as_csv(_rows(record[0])))
     write_text(folder / FAILURES, "".join(f"{line}\n" for line in complaints))
     return "\n".join([*complaints, f"Report: {folder / PAGE}"])

@@ -31,7 +31,7 @@ def read_record(path: Path) -> InfSupRecord:
 
 
 def failures(record: InfSupRecord) -> list[str]:
-    """Where the method with the cut does not hold, a line each."""
+    """The failures of the method with the cut, a line each."""
     ladders, profiles = record
     lines = [
         f"{ladder.name}: {ladder.reason or f'β_h falls with order {ladder.order:.2f}'}"

@@ -2,43 +2,49 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from markupsafe import Markup
-
-from ...report.axes import EPSILON
-from ...report.marks import LOOKS, look_of
-from ...report.svg import INK
-from ..plots import PlotLine, draw_lines
+from ...report.charts import (
+    CROSS,
+    EPSILON,
+    INK,
+    LOOKS,
+    Axis,
+    Chart,
+    Look,
+    look_of,
+    series_chart,
+    slopes,
+)
 from .records import ERRORS, Curve
 
 # QUAD9 and HEXA27 have a look of their own here, beside QUAD8 and HEXA20.
-_LOOKS = {"QUAD9": (INK, "cross"), "HEXA27": (INK, "cross"), **LOOKS}
+_LOOKS = {"QUAD9": Look(INK, CROSS), "HEXA27": Look(INK, CROSS), **LOOKS}
 
 
-def draw_panel(error: str, curves: Sequence[Curve]) -> Markup:
+def draw_panel(name: str, error: str, curves: Sequence[Curve]) -> Chart:
     """One error of all curves, with the orders that theory knows drawn beside."""
-    lines = [_line(curve, *curve.errors(error)) for curve in curves]
+    records = [
+        {"series": curve.label, "h": size, "error": max(value, EPSILON / 4)}
+        for curve in curves
+        for size, value in zip(*curve.errors(error), strict=True)
+    ]
+    found = {record["series"] for record in records}
     known = [curve.theory(error) for curve in curves]
     orders = {order for theory in known for order in (theory.least, theory.best) if order}
-    return draw_lines(
+    return series_chart(
+        f"{name}-{error}",
         f"Error of {ERRORS[error]}, against macro-element size",
-        "macro-element / interface",
-        f"relative error: {ERRORS[error]}",
-        [line for line in lines if len(line.x)],
-        sorted(orders) or [1.0, 2.0],
+        records,
+        Axis("h", "macro-element / interface", log=True),
+        Axis("error", f"relative error: {ERRORS[error]}", log=True),
+        {curve.label: _look(curve) for curve in curves if curve.label in found},
+        layers=slopes(records, "h", "error", sorted(orders) or [1.0, 2.0]),
+        width=460,
     )
 
 
-def draw_key(curve: Curve) -> Markup:
-    """The line and mark of a curve, for the legend."""
-    return _line(curve, np.empty(0), np.empty(0)).key()
-
-
-def _line(curve: Curve, sizes: np.ndarray, errors: np.ndarray) -> PlotLine:
-    """Linear cells dashed with hollow marks, quadratic ones solid; a variant is dotted."""
-    color, mark = look_of(curve.slave_cells[0].name, _LOOKS)
-    linear = curve.degree == "linear"
+def _look(curve: Curve) -> Look:
+    """Linear cells dashed, quadratic ones solid; a variant is dotted."""
+    look = look_of(curve.slave_cells[0].name, _LOOKS)
     variant = curve.ladder.hexahedra or curve.ladder.recovery or curve.ladder.label
-    dashes: tuple[float, ...] = (1.5, 3) if variant else (6, 3) if linear else ()
-    errors = np.maximum(errors, EPSILON / 4)
-    return PlotLine(curve.label, sizes, errors, color, mark, dashes, filled=not linear)
+    dashes = (1.5, 3.0) if variant else (6.0, 3.0) if curve.degree == "linear" else ()
+    return Look(look.color, look.shape, dashes)

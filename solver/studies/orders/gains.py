@@ -21,7 +21,7 @@ class GainGoal:
     gain: float | None = None
 
 
-# By form of the recovery and cells of the slave: goals of smooth problems on about 40 faces in 2D.
+# By form of the recovery and cells of the slave: goals of smooth problems, in 2D on `_FACES` faces.
 GOALS: Mapping[tuple[str, str], GainGoal] = (
     {("automatic", cells): GainGoal(2.8, 400) for cells in ("TRIA6", "QUAD9")}
     | {("automatic", "QUAD8"): GainGoal(2.2, 300)}
@@ -33,6 +33,7 @@ GOALS: Mapping[tuple[str, str], GainGoal] = (
     }
 )
 _STRESS_GOAL = 1.8
+_FACES = 40
 
 
 @dataclass(frozen=True)
@@ -88,12 +89,9 @@ class Gain:
 
     @cached_property
     def goal(self) -> GainGoal:
-        """Goals are set for smooth pressures alone."""
-        return (
-            GOALS.get((self.form, self.cells), GainGoal())
-            if self.curve.family.smooth
-            else GainGoal()
-        )
+        """Goals are set for smooth pressures alone, and in 2D for ladders that are fine enough."""
+        judged = self.curve.family.smooth and (self.curve.dim == 3 or self.faces >= _FACES)
+        return GOALS.get((self.form, self.cells), GainGoal()) if judged else GainGoal()
 
     @cached_property
     def stress_goal(self) -> float | None:

@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from ...mesh.catalogue import BY_NAME
+from ...report.charts import write_script
 from ...report.families import FILE_NAME, read_family
 from ...report.html import render
 from ...report.tables import as_csv
 from ...system.files import write_text
 from ..fits import LAST
 from .description import LadderFamily
-from .figure import draw_key, draw_panel
+from .figure import draw_panel
 from .gains import Gain, gains
 from .records import ERRORS, Curve, groups, read_curves, shown_errors
 
@@ -38,6 +39,7 @@ def write_orders(families: Sequence[LadderFamily], results: Path, folder: Path) 
     found.sort(key=lambda gain: (CELLS.index(gain.cells), gain.form))
     page = render(
         Path(__file__).with_name("page.html.jinja"),
+        charts=True,
         title="Orders of convergence",
         sections=[_section(family, curves[family.name]) for family in families],
         gains=found,
@@ -46,13 +48,13 @@ def write_orders(families: Sequence[LadderFamily], results: Path, folder: Path) 
         complaints=complaints,
         names=ERRORS,
         last=LAST,
-        key=draw_key,
     )
     failures = "".join(f"{line}\n" for line in complaints)
     tables = {SLOPES: _slope_rows(every), POINTS: _point_rows(every), GAINS: _gain_rows(found)}
     contents = {PAGE: page, FAILURES: failures} | {k: as_csv(rows) for k, rows in tables.items()}
     for name, content in contents.items():
         write_text(folder / name, content)
+    write_script(folder)
     return f"{failures}{outcome(every)} Report: {folder / PAGE}"
 
 
@@ -70,10 +72,10 @@ def outcome(curves: Sequence[Curve]) -> str:
 def _section(family: LadderFamily, curves: Sequence[Curve]) -> dict[str, Any]:
     """One family: its words, and its panels and tables by group."""
     described = read_family(family.folder / FILE_NAME)
-    parts = []
+    parts: list[dict[str, Any]] = []
     for title, members in groups(curves).items():
         shown = shown_errors(members)
-        panels = [draw_panel(error, members) for error in shown]
+        panels = [draw_panel(f"{family.name}-{len(parts)}", error, members) for error in shown]
         parts.append({"title": title, "curves": members, "errors": shown, "panels": panels})
     return {
         "family": family,

@@ -82,7 +82,7 @@ class SizeSeries(Section, frozen=True, dict=True):
 
     @cached_property
     def template(self) -> dict[str, Any]:
-        """What the case file says."""
+        """The content of the case file."""
         return read_mapping(self.case)
 
     @property

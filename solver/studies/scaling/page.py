@@ -4,15 +4,25 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ...report import formats, stages
+from ...report import stages
+from ...report.charts import (
+    BLUE,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    RED,
+    SHAPES,
+    Axis,
+    Chart,
+    Look,
+    series_chart,
+    slopes,
+    write_script,
+)
 from ...report.html import render
-from ...report.marks import MARKS
-from ...report.svg import BLUE, GREEN, INK, ORANGE, PURPLE, RED
 from ...report.tables import as_csv
 from ...system.files import write_text
-from ..plots import SMALL, PlotLine, draw_bar, draw_lines
 from ..points import disturbed, facts, outcome, page_name
 from .description import Scaling
 from .records import (
@@ -32,6 +42,7 @@ _COLORS = (BLUE, ORANGE, GREEN, PURPLE, INK, RED)
 # The slope of cost in proportion to size.
 _LINEAR = [1.0]
 _SIDES = {3: "3D", 2: "2D"}
+_TIPS = {"memory": "peak memory, GB", "solver": "linear solver"}
 _PLOTS = {
     "cpu": "processor time of the whole process, s",
     "memory": "peak memory, GB",
@@ -43,6 +54,7 @@ def write_scaling(scaling: Scaling, results: Path, folder: Path) -> str:
     """Write page and tables into `folder`; `results` holds the records. Returns the outcome."""
     lines, name = read_series(scaling, results), page_name("scaling", scaling.size)
     write_text(folder / f"{name}.html", _to_html(scaling, lines, name))
+    write_script(folder)
     write_text(folder / f"{name}.csv", as_csv(point_rows(lines)))
     write_text(folder / f"{name}-exponents.csv", as_csv(exponent_rows(lines)))
     goals, points = reached(scaling, lines), [m for line in lines for m in line.points]
@@ -118,6 +130,7 @@ def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
     )
     return render(
         Path(__file__).with_name("page.html.jinja"),
+        charts=True,
         title=scaling.title + f" ({scaling.size})" * (name != "scaling"),
         name=name,
         outcome=f"{outcome(points)} {goals_reached(goals)}",
@@ -128,7 +141,9 @@ def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
         lines=lines,
         stages=colors,
         bars=[
-            (line, _stage_plot(line, colors), _bar(line, colors)) for line in lines if line.solved
+            (line, _stage_chart(line, colors), _shares(line, colors))
+            for line in lines
+            if line.solved
         ],
         failures=lost,
         facts=facts(points),
@@ -138,57 +153,62 @@ def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
     )
 
 
-def _plot_lines(lines: Sequence[SeriesSolves], what: str, over: str) -> list[PlotLine]:
+def _chart(lines: Sequence[SeriesSolves], what: str, over: str, title: str, label: str) -> Chart:
     """A line for each series: a cost, as `ScaledSolve.cost` names it."""
-    found = []
+    records, looks = [], {}
     for number, line in enumerate(lines):
-        color, mark = _COLORS[number % len(_COLORS)], MARKS[number % len(MARKS)]
-        x = np.array([m.record[over] for m in line.solved], dtype=float)
-        y = np.maximum([m.cost(what) for m in line.solved], 1e-3)
-        tips = [_tip(line, m) for m in line.solved]
-        slab = line.series.slab
-        dashes = (5.0, 3.0) if slab else ()
-        found.append(PlotLine(line.series.title, x, y, color, mark, dashes, not slab, tips=tips))
-    return found
+        color, shape = _COLORS[number % len(_COLORS)], SHAPES[number % len(SHAPES)]
+        looks[line.series.title] = Look(color, shape, (5.0, 3.0) if line.series.slab else ())
+        records += [_record(line, m, what, over) for m in line.solved]
+    x = Axis("size", "unknowns" if over == "dofs" else "faces of both sides", log=True)
+    y = Axis("cost", label, log=True)
+    fan = slopes(records, "size", "cost", _LINEAR)
+    return series_chart(title, title, records, x, y, looks, tips=_TIPS, layers=fan, width=460)
 
 
-def _tip(line: SeriesSolves, m: ScaledSolve) -> str:
-    return (
-        f"{line.series.title}: {formats.count(m.record['dofs'])} unknowns, {m.cpu:.3g} s of "
-        f"processor time, {m.memory:.2g} GB, {m.record['linear_solver']}"
-    )
+def _record(line: SeriesSolves, m: ScaledSolve, what: str, over: str) -> dict[str, Any]:
+    return {
+        "series": line.series.title,
+        "size": m.record[over],
+        "cost": max(m.cost(what), 1e-3),
+        "memory": m.memory,
+        "solver": m.record["linear_solver"],
+    }
 
 
 def _section(title: str, lines: Sequence[SeriesSolves], dim: int) -> dict[str, Any]:
     """Time and memory of the series of one dimension."""
     mine = [line for line in lines if line.series.dim == dim and line.solved]
     plots = [
-        draw_lines(f"{title}: {label}", "unknowns", label, _plot_lines(mine, what, "dofs"), _LINEAR)
+        _chart(mine, what, "dofs", f"{title}: {label}", label)
         for what, label in (_PLOTS if mine else {}).items()
     ]
-    keys = [(one.key(), one.name) for one in _plot_lines(mine, "cpu", "dofs")]
-    return {"title": title, "plots": plots, "keys": keys}
+    return {"title": title, "plots": plots}
 
 
-def _pairing(lines: Sequence[SeriesSolves]) -> Any:
+def _pairing(lines: Sequence[SeriesSolves]) -> Chart | str:
     """Pairing and intersection over the faces of both sides, in 3D."""
     mine = [line for line in lines if line.series.dim == 3 and line.solved]
     label = "pairing and intersection, processor time, s"
-    drawn = _plot_lines(mine, "pairing", "faces")
-    return draw_lines(label, "faces of both sides", label, drawn, _LINEAR) if mine else ""
+    return _chart(mine, "pairing", "faces", label, label) if mine else ""
 
 
-def _stage_plot(line: SeriesSolves, colors: dict[str, str]) -> Any:
+def _stage_chart(line: SeriesSolves, colors: dict[str, str]) -> Chart:
     """All stages of a series over its unknowns."""
-    x = np.array([m.record["dofs"] for m in line.solved], dtype=float)
-    drawn = [
-        PlotLine(stage, x, np.maximum([m.cost(stage) for m in line.solved], 1e-3), color)
-        for stage, color in colors.items()
+    records = [
+        {"series": stage, "size": m.record["dofs"], "cost": max(m.cost(stage), 1e-3)}
+        for stage in colors
+        for m in line.solved
     ]
-    return draw_lines(line.series.title, "unknowns", "processor time, s", drawn, _LINEAR, SMALL)
+    title = f"{line.series.title}: stages"
+    x, y = Axis("size", "unknowns", log=True), Axis("cost", "processor time, s", log=True)
+    looks = {stage: Look(color) for stage, color in colors.items()}
+    fan = slopes(records, "size", "cost", _LINEAR)
+    return series_chart(title, title, records, x, y, looks, layers=fan, width=380, height=200)
 
 
-def _bar(line: SeriesSolves, colors: dict[str, str]) -> Any:
-    """The share of each stage in the largest solve."""
-    largest = line.solved[-1]
-    return draw_bar({stage: largest.cost(stage) for stage in colors}, colors)
+def _shares(line: SeriesSolves, colors: dict[str, str]) -> list[tuple[str, str, float]]:
+    """Stage, colour and share in per cent of the largest solve."""
+    costs = {stage: line.solved[-1].cost(stage) for stage in colors}
+    whole = sum(costs.values()) or 1.0
+    return [(stage, colors[stage], 100 * cost / whole) for stage, cost in costs.items()]

@@ -70,7 +70,7 @@ def _line(record: Record) -> str:
 def _solve(
     point: ScalingPoint, folder: Path, cores: list[int], limit: float, memory: float
 ) -> dict[str, Any]:
-    """What the processes found and took; their files are not kept."""
+    """Results and cost of the processes; their files are not kept."""
     case, mesh, verdict = folder / "case.yaml", folder / "mesh.vtkhdf", folder / "verdict.json"
     case.write_text(point.source(), encoding="utf-8")
     meshed = run_apart([*COMMAND, "mesh", str(case), "-o", str(mesh)], cores, limit, memory)

@@ -37,7 +37,7 @@ class ScaledSolve(MeasuredPoint):
         return stages | {OTHER: max(self.cpu - sum(stages.values()), 0.0)}
 
     def work(self, stage: str) -> int:
-        """What a stage grows with: faces of the interface, or unknowns."""
+        """The measure of a stage's work: faces of the interface, or unknowns."""
         return self.record["faces" if stage in BY_FACES else "dofs"]
 
     @property
@@ -46,7 +46,7 @@ class ScaledSolve(MeasuredPoint):
         return self.record["errors"]["pressure_max"]
 
     def cost(self, what: str) -> float:
-        """What a goal asks of one point, or the processor seconds of a stage."""
+        """The quantity of a goal at one point, or the processor seconds of a stage."""
         if what == "wall":
             return self.record["process"]["wall"]
         whole = {"cpu": self.cpu, WHOLE: self.cpu, "memory": self.memory, "pressure": self.pressure}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...report import formats
+from ...report.charts import write_script
 from ...report.html import render
 from ...report.tables import as_csv
 from ...system.errors import InputError
@@ -13,7 +14,7 @@ from ...system.files import write_text
 from ..infsup.page import sections
 from ..infsup.records import InfSupRecord, failures
 from ..points import Record
-from .figure import anchor, draw_key, draw_map
+from .figure import COLORS, anchor, draw_map
 
 PAGE, TABLE, FAILURES = ".html", ".csv", "-failures.txt"
 MEASURES = {
@@ -63,6 +64,7 @@ def write_stability(
     }
     for name, content in contents.items():
         write_text(folder / f"{stem}{name}", content)
+    write_script(folder)
     return contents[FAILURES] + f"{outcome(records)} Page: {folder / stem}{PAGE}"
 
 
@@ -93,6 +95,7 @@ def _to_html(
 ) -> str:
     return render(
         Path(__file__).with_name("page.html.jinja"),
+        charts=True,
         title="Numerical stability",
         records=records,
         quick=quick,
@@ -101,8 +104,8 @@ def _to_html(
         complaints=lines,
         theory=sections(theory) if theory else "",
         table=f"stability{'-quick' * quick}{TABLE}",
-        map=draw_map(records),
-        key=draw_key(),
+        maps=[draw_map(record) for record in records],
+        shades=COLORS,
         anchor=anchor,
         measures=MEASURES,
         seconds=sum(record["cpu_seconds"] for record in records),

@@ -35,7 +35,7 @@ from .floor import floor, stress_error
 from .states import State, exact_state
 
 GOAL, FLOORS = 1e-10, 20.0
-"""What a point has to reach: the first, or so many times its floor."""
+"""A point must reach the first, or this many times its floor."""
 SMALL = 1500
 """Unknowns up to which all eigenvalues of the system are found."""
 
@@ -106,7 +106,7 @@ def _known_to_itself(measured: dict[str, Any]) -> bool:
 
 
 def _attempt(point: _Point, safeguards: Safeguards) -> dict[str, Any]:
-    """What came of the point: measures, or the reason why there are none."""
+    """The measures of the point, or the reason why there are none."""
     try:
         return _measured(point, safeguards)
     except InputError as error:

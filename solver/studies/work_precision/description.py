@@ -106,7 +106,7 @@ class Problem(Section, frozen=True, dict=True):
 
     @cached_property
     def template(self) -> dict[str, Any]:
-        """What the case file says."""
+        """The content of the case file."""
         return read_mapping(self.case)
 
     @property
@@ -125,7 +125,7 @@ class Problem(Section, frozen=True, dict=True):
 
 @dataclass(frozen=True)
 class StudyPoint:
-    """What one measurement is of."""
+    """One measurement."""
 
     problem: Problem
     slave: str

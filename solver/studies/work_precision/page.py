@@ -1,10 +1,11 @@
-"""The page itself, its figures as files, and the table for machines."""
+"""The page itself, and the table for machines."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ...report import stages
+from ...report.charts import write_script
 from ...report.html import NORMS, render
 from ...report.tables import as_csv
 from ...system.files import write_text
@@ -31,16 +32,14 @@ _OVERVIEW = ("pressure_l2", "pressure_means", "displacement_l2", "stress_l2")
 
 
 def write_study(study: Study, results: Path, folder: Path) -> str:
-    """Write the page, its table and its figures into `folder`; `results` holds the records.
+    """Write the page and its table into `folder`; `results` holds the records.
 
     Returns one line: what was measured, and where the page is.
     """
     points, name = read_points(study, results), page_name("study", study.size)
     sections = [_section(problem, points) for problem in study.problems]
     solvers = _linear_solvers(study, points)
-    for section in (*sections, *solvers):
-        for part in section["panels"]:
-            write_text(folder / name / part["file"], part["figure"])
+    write_script(folder)
     write_text(folder / f"{name}.csv", as_csv(rows(points)))
     write_text(folder / f"{name}.html", _to_html(study, points, name, sections, solvers))
     return f"{outcome(points)} Page: {folder / name}.html"
@@ -99,8 +98,8 @@ def _shown(problem: Problem, found: Sequence[LevelLine], prefix: str = "") -> di
 def _part(panel: Panel, looks: Looks, prefix: str) -> dict[str, Any]:
     return {
         "panel": panel,
-        "file": f"{prefix}{panel.name}.svg",
-        "figure": draw_figure(panel, looks),
+        "id": f"{prefix}{panel.name}",
+        "charts": draw_figure(panel, looks, prefix),
         "note": draw_note(panel),
         "quickest": {target: panel.quickest(target) for target in TARGETS},
     }
@@ -116,6 +115,7 @@ def _firsts(
         for part in section["panels"]
         if part["panel"].error in _OVERVIEW
         for pair, found in first.firsts(part["panel"]).items()
+        if any(one.solve for one in found.values())
     ]
 
 
@@ -148,6 +148,7 @@ def _to_html(
     words = [one.word for row in found for one in row[3].values()]
     return render(
         Path(__file__).with_name("page.html.jinja"),
+        charts=True,
         title=study.title + f" ({study.size})" * (name != "study"),
         name=name,
         sections=sections,
@@ -156,7 +157,8 @@ def _to_html(
         good=all(m.record["outcome"] in (SOLVED, REFUSED) for m in points),
         failures=failures(points),
         facts=facts(points),
-        disturbed=disturbed(points),
+        disturbed=0 if study.threads == 1 else disturbed(points),
+        busy=disturbed(points),
         repetitions=study.repetitions,
         targets=TARGETS,
         firsts=found,

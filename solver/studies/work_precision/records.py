@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ...mechanics.linear.backends import BACKENDS
-from ...report.axes import EPSILON
+from ...report.charts import EPSILON
 from ..fits import ROUND_OFF, Fit, fit_order
 from ..points import MeasuredPoint, read_record
 from ..timing import TOTAL, Spread, medians, spread
@@ -126,7 +126,7 @@ class Panel:
 
     @property
     def uncertainty(self) -> float | None:
-        """How far the reference may be off in this error; None where it is exact."""
+        """The possible error of the reference; None if it is exact."""
         reference = self.problem.reference
         return reference.uncertainty.get(self.error) if reference else None
 

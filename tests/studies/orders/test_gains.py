@@ -10,7 +10,7 @@ from tests.studies.orders.test_page import put, read
 
 LADDERS = """
 title: Powers
-levels: [1, 2, 4]
+levels: [1, 5, 10]
 smooth: true
 ladders:
   - {case: quad8.yaml, recovery: none}
@@ -32,7 +32,7 @@ def family(tmp_path):
 def results(tmp_path):
     """Constants of order 1; recovered ones of order 3 and 2, with stress of order 2 and 1."""
     folder = tmp_path / "results" / "powers"
-    for k in (1, 2, 4):
+    for k in (1, 5, 10):
         put(folder / "quad8-none", k, "QUAD8", 2, pressure_l2=0.1 / k, stress_max=1 / k)
         put(folder / "quad8-automatic", k, "QUAD8", 2, pressure_l2=4e-3 / k**3, stress_max=k**-2.0)
         put(folder / "quad8-linear", k, "QUAD8", 2, pressure_l2=2e-3 / k**2, stress_max=1 / k)
@@ -46,9 +46,9 @@ def test_gain_and_order_between_the_last_two_levels(family, results):
         "automatic",
         "QUAD8–QUAD4",
     )
-    assert (automatic.faces, automatic.order) == (16, pytest.approx(3))
-    assert automatic.gain == pytest.approx(0.025 / (4e-3 / 64))
-    assert linear.gain == pytest.approx(200)
+    assert (automatic.faces, automatic.order) == (40, pytest.approx(3))
+    assert automatic.gain == pytest.approx(0.01 / 4e-6)
+    assert linear.gain == pytest.approx(0.01 / 2e-5)
     assert linear.stress_order == pytest.approx(1)
 
 
@@ -65,6 +65,12 @@ def test_the_page_marks_goals_that_are_reached_and_those_that_are_not(family, re
     assert "3.00 ✓" in page
     assert "2.00 ✗" in page
     assert [row["reached"] for row in read(tmp_path / GAINS)] == ["True", "False"]
+
+
+def test_goals_in_2d_are_those_of_forty_faces(family, results, tmp_path):
+    path = family.folder / "orders.yaml"
+    path.write_text(LADDERS.replace("[1, 5, 10]", "[1, 5]"))
+    assert [one.marks for one in gains(read_curves(read_ladders(path), results))] == [{}, {}]
 
 
 def test_other_pressures_have_no_goals(family, results, tmp_path):

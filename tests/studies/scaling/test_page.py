@@ -11,6 +11,7 @@ from msgspec import structs
 from solver.studies.scaling.description import read_scaling
 from solver.studies.scaling.page import write_scaling
 from solver.studies.scaling.records import OTHER, failures, reached, read_series
+from tests.report.test_charts import specifications
 
 ROOT = Path(__file__).parents[3]
 
@@ -102,7 +103,11 @@ def test_the_page_says_what_the_records_do(scaling, results, tmp_path):
     assert "<more>" not in page
     assert "<td class=n>1,000,000</td>" in page
     assert "1.30" in page
-    assert page.count("<svg") > 8
+    charts = specifications(page)
+    solved = [line for line in read_series(scaling, results) if line.solved]
+    assert len(charts) == 3 * len({line.series.dim for line in solved}) + 1 + len(solved)
+    whole = charts["3D-processor-time-of-the-whole-process-s"]["data"]["values"]
+    assert {(r["series"], r["size"]) for r in whole} >= {("HEXA8", 10_000), ("HEXA8", 1_000_000)}
     assert logged.endswith("scaling.html")
     with (tmp_path / "page" / "scaling.csv").open() as stream:
         rows = list(csv.DictReader(stream))

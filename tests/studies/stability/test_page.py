@@ -4,10 +4,11 @@ import re
 
 import pytest
 
-from solver.studies.stability.figure import digits, shade
+from solver.studies.stability.figure import PANELS, digits, shade
 from solver.studies.stability.page import read_records, write_stability
 from solver.system.errors import InputError
 from solver.verification.verdict import to_json
+from tests.report.test_charts import specifications
 
 PAGE, TABLE, FAILURES = (f"stability-quick{end}" for end in (".html", ".csv", "-failures.txt"))
 
@@ -60,10 +61,21 @@ def written(tmp_path):
     return tmp_path, write_stability(records, tmp_path, quick=True)
 
 
+def squares_of(page):
+    """The squares of all maps, a map a sweep."""
+    charts = specifications(page)
+    assert sorted(charts) == ["map-later", "map-pull"]
+    squares = [r for chart in charts.values() for r in chart["data"]["values"]]
+    assert {r["panel"] for r in squares} == set(PANELS.values())
+    framed = [(r["series"], r["value"]) for r in charts["map-pull"]["data"]["values"] if r["frame"]]
+    assert framed == [("2D", "2"), ("3D", "1")]
+    return squares
+
+
 def test_every_point_has_three_squares_that_lead_to_its_row(written):
     folder, _ = written
     page = (folder / PAGE).read_text()
-    squares = re.findall(r'<a href="#([^"]+)">', page)
+    squares = [r["url"].removeprefix("#") for r in squares_of(page)]
     rows = re.findall(r'<tr class="point[^"]*" id="([^"]+)"', page)
     assert len(rows) == len(set(rows)) == 8
     assert sorted(squares) == sorted(rows * 3)
@@ -73,7 +85,7 @@ def test_every_point_has_three_squares_that_lead_to_its_row(written):
 
 def test_squares_say_digits_and_words(written):
     page = (written[0] / PAGE).read_text()
-    texts = re.findall(r"<text[^>]*>([^<]*)</text>", page)
+    texts = [r["text"] for r in squares_of(page)]
     assert texts.count("13") == 2  # 2e-14 leaves 13 digits, in two sweeps
     assert texts.count("4") == 2
     assert texts.count("refused") == 4  # with cures and without
@@ -96,7 +108,7 @@ def test_digits_and_their_shades():
     assert [digits(e) for e in (0.0, 1e-20, 9e-5, 1.0, 7.0, None)] == [16, 16, 4, 0, 0, None]
     shades = [shade(found) for found in range(17)]
     assert len(set(shades)) == 6
-    # Lightness falls with every step, so that the shades tell without their hue.
+    # Lightness falls with every step, so that the shades differ without their hue.
     light = [sum(int(s[i : i + 2], 16) * w for i, w in ((1, 2), (3, 5), (5, 1))) for s in shades]
     assert light == sorted(light, reverse=True)
 

@@ -1,0 +1,80 @@
+"""The evaluated case as one JSON file, `deck.json`: for codes without a format of ours.
+
+Nodes count from 0, axes are 0, 1, 2. `points`: coordinates; `cells`: nodes by type, in the order of
+VTK; `material`: by type, the place of each cell's material in `materials`; `held`: [node, axis,
+displacement]; `forces`: [node, axis, force], all loads; `contact`: pairs with the nodes of slave
+and master faces by type, turned outward, and the initial gap (null: as meshed).
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..mechanics.fem.faces import FaceBlock
+from ..system.errors import SolveError
+from .deck import Deck
+from .foreign import ForeignResult
+
+FILE = "deck.json"
+
+
+class Plain:
+    """Only written: a user's own code reads it."""
+
+    name = "plain"
+    layer = False
+    install = "only written, by export"
+    gave_up = ""
+    settings: Mapping[str, str] = {}
+
+    def version(self) -> str:
+        """There is nothing to run."""
+        return ""
+
+    def write(self, deck: Deck, folder: Path) -> None:
+        """Write `deck.json` into `folder`."""
+        text = json.dumps(content(deck))
+        (folder / FILE).write_text(text, encoding="ascii")
+
+    def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
+        """There is nothing to run."""
+        return []
+
+    def read(self, deck: Deck, folder: Path) -> ForeignResult:  # noqa: ARG002
+        """There is nothing to read."""
+        raise SolveError("its files of results are not named")
+
+
+def content(deck: Deck) -> dict[str, Any]:
+    """What the file holds."""
+    nodes, axes = np.nonzero(deck.all_forces)
+    forces = deck.all_forces[nodes, axes]
+    return {
+        "name": deck.case.name,
+        "points": deck.points.tolist(),
+        "cells": {name: cells.tolist() for name, cells in deck.cells.items()},
+        "materials": [{"young": m.young, "poisson": m.poisson} for m in deck.materials],
+        "material": {name: of.tolist() for name, of in deck.material.items()},
+        "held": list(deck.fixed()),
+        "forces": list(zip(nodes.tolist(), axes.tolist(), forces.tolist(), strict=True)),
+        "contact": [
+            {
+                "name": pair.zone.name,
+                "slave": _faces(pair.slave),
+                "master": _faces(pair.master),
+                "clearance": pair.zone.clearance,
+                "interference": pair.zone.interference,
+            }
+            for pair in deck.pairs
+        ],
+    }
+
+
+def _faces(blocks: Sequence[FaceBlock]) -> dict[str, list[list[int]]]:
+    found: dict[str, list[list[int]]] = {}
+    for block in blocks:
+        found.setdefault(block.type.name, []).extend(block.nodes.tolist())
+    return found
