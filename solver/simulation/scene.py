@@ -13,7 +13,7 @@ from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, surface_points, volume_cells
 from ..mechanics.fem.mixed import MeanStress
-from ..mechanics.fem.supports import FreeMotion
+from ..mechanics.fem.supports import Fixed, FreeMotion
 from ..mechanics.mortar.cut import CutMesh, SubFaces, cut
 from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from ..mechanics.mortar.held import merge_fixed_multipliers
@@ -106,7 +106,8 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `force` (n, dim) and `free.offset` are for load factor 1.
+    up for it. `fixed`: the displacements that are held, by key of the case file. `force` (n, dim)
+    and `free.offset` are for load factor 1.
     """
 
     case: Case
@@ -120,6 +121,7 @@ class Scene:
     body: np.ndarray
     blocks: list[Block]
     mean: MeanStress
+    fixed: dict[str, Fixed]
     free: FreeMotion
     force: np.ndarray
     zones: list[ZoneScene]
@@ -190,6 +192,7 @@ def build_scene(
         body=body,
         blocks=blocks,
         mean=mean,
+        fixed=groups.fixed,
         free=free,
         force=force,
         zones=zones,
