@@ -10,6 +10,7 @@ import operator
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError
@@ -17,12 +18,15 @@ from ..system.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
-MAX_LENGTH = 1000
-MAX_DEPTH = 100
+MAX_LENGTH = 10_000
+MAX_DEPTH = 300
 MAX_EXPONENT = 32.0
 MAX_NUMBER = 1e300
 
-ALLOWED = "a number or an expression of x, y, z, r, pi, sqrt, sin, cos, + - * / **, parentheses"
+ALLOWED = (
+    "a number or an expression of x, y, z, r, pi, sqrt, sin, cos, atan2, abs, min, max, "
+    "+ - * / **, parentheses"
+)
 _COORDINATES = ("x", "y", "z")
 _BINARY: dict[type, Callable] = {
     ast.Add: operator.add,
@@ -30,6 +34,16 @@ _BINARY: dict[type, Callable] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
+}
+# The numpy function of each name, and the least and the largest number of its arguments.
+_FUNCTIONS: dict[str, tuple[str, int, int]] = {
+    "sqrt": ("sqrt", 1, 1),
+    "sin": ("sin", 1, 1),
+    "cos": ("cos", 1, 1),
+    "abs": ("abs", 1, 1),
+    "atan2": ("arctan2", 2, 2),
+    "min": ("minimum", 2, 32),
+    "max": ("maximum", 2, 32),
 }
 _UNARY: dict[type, Callable] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
 
@@ -109,8 +123,10 @@ class Expression:
                 return [left]
             case ast.BinOp(op=op, left=left, right=right) if type(op) in _BINARY:
                 return [left, right]
-            case ast.Call(func=ast.Name(id="sqrt" | "sin" | "cos"), args=[argument], keywords=[]):
-                return [argument]
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
+                _, least, most = _FUNCTIONS[name]
+                if least <= len(args) <= most:
+                    return args
         shown = ast.get_source_segment(self.text.strip(), node) or ""
         shown = f"`{shown}` is not allowed in it; " if len(shown) < 40 else ""
         raise self._error(f"{shown}it must be {ALLOWED}")
@@ -152,6 +168,8 @@ def _value(node: ast.expr, names: dict[str, Any]) -> Any:
             return _UNARY[type(op)](_value(operand, names))
         case ast.BinOp(op=op, left=left, right=right):
             return _BINARY[type(op)](_value(left, names), _value(right, names))
-        case ast.Call(func=ast.Name(id=function), args=[argument]):
-            return getattr(np, function)(_value(argument, names))
+        case ast.Call(func=ast.Name(id=name), args=args):
+            function = getattr(np, _FUNCTIONS[name][0])
+            values = [_value(argument, names) for argument in args]
+            return reduce(function, values) if len(values) > 1 else function(*values)
     raise AssertionError(node)

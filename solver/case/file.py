@@ -4,30 +4,12 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, field
 
+from .acting import LoadKeys, SelectionKeys, SupportKeys
+from .kinds import Group, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
 FORM = "{file: MESH} alone, or {recipe: NAME, …}"
 
-Name = Annotated[
-    str,
-    Meta(
-        pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$(?!\n)",
-        description="a name of letters, digits, `_`, `-` and `.`, 64 at most, starting with a "
-        "letter or digit (in quotes if it is a number)",
-    ),
-]
-_GROUP = "the name of a group of the mesh (in quotes if it is a number)"
-Group = Annotated[str, Meta(min_length=1, max_length=200, description=_GROUP)]
-_UNIT = "the name of a unit, 20 letters, digits, `/`, `*`, `^`, `²` and the like at most"
-Unit = Annotated[str, Meta(pattern=r"^[\w/*^·²³µ%()-]{1,20}$(?!\n)", description=_UNIT)]
-Whole = Annotated[int, Meta(ge=0, lt=2**31, description="a whole number, not negative, below 2^31")]
-_VECTOR = "a list of two (plane) or three numbers"
-Vector = Annotated[tuple[Number, ...], Meta(min_length=2, max_length=3, description=_VECTOR)]
-_SCALAR = "a number or an expression (numbers from -1e30 to 1e30)"
-Scalar = Annotated[Number | Text, Meta(description=_SCALAR)]
-_SCALARS = "a list of two (plane) or three numbers or expressions, or `solution`"
-_Scalars = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
-Scalars = Annotated[_Scalars | Literal["solution"], Meta(description=_SCALARS)]
 Angle = Annotated[Number, Meta(description="an angle in degrees")]
 Poisson = Annotated[
     float, Meta(gt=-1, lt=0.5, description="a number greater than -1 and less than 0.5")
@@ -177,47 +159,6 @@ class MaterialKeys(Section, frozen=True):
             raise FieldError(("poisson",), "must be greater than 0 in the mixed form")
 
 
-_Axis = Literal["x", "y", "z", "normal"]
-_Fixed = Annotated[tuple[_Axis, ...], Meta(min_length=1)]
-_Imposed = Annotated[dict[_Axis, Scalar], Meta(min_length=1)]
-_FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
-
-
-class SupportKeys(Section, frozen=True):
-    """Imposed displacements.
-
-    group: the nodes of this group
-    fix: the components that are fixed or have a value; `normal`: along the normal of the group's
-      faces, a plane of any direction
-    """
-
-    group: Group
-    fix: Annotated[
-        _Fixed | _Imposed, Meta(description=_FIX, extra_json_schema={"uniqueItems": True})
-    ]
-
-
-class LoadKeys(Section, frozen=True):
-    """A load.
-
-    group: the faces of this group or, for a body force, its cells
-    pressure: force per area against the faces, positive inwards
-    traction: force per area, as a vector
-    body_force: force per volume, as a vector
-    """
-
-    group: Group
-    pressure: Scalar | None = None
-    traction: Scalars | None = None
-    body_force: Scalars | None = None
-
-    def __post_init__(self) -> None:
-        given = (self.pressure, self.traction, self.body_force)
-        if sum(value is not None for value in given) != 1:
-            problem = "must be {group, and exactly one of pressure, traction, body_force}"
-            raise FieldError((), problem)
-
-
 class BodyKeys(Section, frozen=True):
     """A body.
 
@@ -243,8 +184,8 @@ class ZoneKeys(Section, frozen=True):
     clearance: the initial gap, which replaces the gap between the meshed faces
     """
 
-    slave: Group
-    master: Group
+    slave: Groups
+    master: Groups
     name: Name = "contact"
     hexahedra: Literal["pyramids", "hexahedra"] = "pyramids"
     treatment: Literal["lac", "uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual"] = (
@@ -380,6 +321,7 @@ class CaseFile(Section, frozen=True):
       y along the axis; only for 2D meshes
     units: the units of the numbers, only labels of fields and pictures
     materials: the material of each group of cells, or of `all`
+    groups: groups that the case makes on the mesh, by name
     supports: imposed displacements
     loads: loads on the bodies
     bodies: further properties of bodies
@@ -403,6 +345,7 @@ class CaseFile(Section, frozen=True):
     transform: Transform | None = None
     plane: Literal["strain", "stress", "axisymmetric"] | None = None
     units: Units | None = None
+    groups: dict[Group, SelectionKeys] = field(default_factory=dict)
     loads: tuple[LoadKeys, ...] = ()
     bodies: dict[Group, BodyKeys] = field(default_factory=dict)
     contact: tuple[ZoneKeys, ...] = ()

@@ -21,8 +21,24 @@ class Exact(Enum):
 EXACT = Exact.VALUE
 Scalar = float | Expression
 Vector = tuple[Scalar, ...]
-LOAD_KINDS = ("pressure", "traction", "body_force")
+LOAD_KINDS = ("pressure", "traction", "body_force", "force")
 SWAPPED = "-swapped"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A group that the case makes on the mesh, under `key` of the file.
+
+    `of`: cells, faces, nodes; or groups, and it is all of them together. `shape`: plane, sphere,
+    box, where or at, with its `values`; only what belongs to the cells of the `groups`, if any.
+    """
+
+    name: str
+    key: str
+    of: str
+    groups: tuple[str, ...] = ()
+    shape: str = ""
+    values: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -108,6 +124,7 @@ class Case:
     tolerance: dict[str, float] = field(default_factory=dict)
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    selections: tuple[Selection, ...] = ()
     swapped: bool = False
     hexahedra: str | None = None
     recovery: str | None = None

@@ -17,7 +17,7 @@ from ..system.files import is_file
 from .expressions import Expression
 from .file import CaseFile
 from .material import Material
-from .model import EXACT, LOAD_KINDS, Case, Load, Observation, Support, Zone
+from .model import EXACT, LOAD_KINDS, Case, Load, Observation, Selection, Support, Zone
 from .rules import check_rules
 from .typed import read_as
 from .yaml import parse_mapping, read_text
@@ -69,6 +69,9 @@ class _Reader:
         self.materials = {
             group: Material(**structs.asdict(keys)) for group, keys in file.materials.items()
         }
+        self.selections: dict[str, Selection] = {}
+        for name in file.groups:
+            self.select(name)
         if file.plane == "stress":
             self.materials = {g: m.in_plane_stress() for g, m in self.materials.items()}
         self.zones = tuple(map(self.zone, range(len(file.contact))))
@@ -110,25 +113,58 @@ class _Reader:
             tolerance={check: value for check, value in tolerance.items() if value is not None},
             counts=self.content.get("counts", {}),
             units=self.content.get("units", {}),
+            selections=tuple(self.selections.values()),
         )
 
+    def select(self, name: str) -> None:
+        """Add a group that the file makes."""
+        item, keys = self.file.groups[name], ("groups", name)
+        within = () if item.within is None else item.within
+        shape = next(s for s in ("plane", "sphere", "box", "where") if getattr(item, s))
+        given = getattr(item, shape)
+        values = (self.value(*keys, shape),) if shape == "where" else tuple(structs.astuple(given))
+        self.selections[name] = Selection(
+            name,
+            key_path(keys),
+            item.of,
+            (within,) if isinstance(within, str) else within,
+            shape,
+            values,
+        )
+
+    def group(self, keys: tuple[str | int, ...], given: Any, at: Any = None) -> str:
+        """The name of a group, of a list of them, or of the node at a point."""
+        if isinstance(given, str):
+            return given
+        if given is not None and len(given) == 1:
+            return str(given[0])
+        if given is not None:
+            made = Selection("+".join(given), key_path(keys), "groups", given)
+        else:
+            name = f"({', '.join(f'{x:g}' for x in at)})"
+            made = Selection(name, key_path((*keys[:-1], "at")), "nodes", (), "at", at)
+        return self.selections.setdefault(made.name, made).name
+
     def support(self, index: int) -> Support:
-        item = self.file.supports[index]
+        item, keys = self.file.supports[index], ("supports", index)
+        group = self.group((*keys, "group"), item.group, item.at)
         if isinstance(item.fix, tuple):
-            return Support(item.group, dict.fromkeys(item.fix, 0.0))
-        keys = ("supports", index, "fix")
-        return Support(item.group, {axis: self.value_or_exact(*keys, axis) for axis in item.fix})
+            return Support(group, dict.fromkeys(item.fix, 0.0))
+        return Support(group, {a: self.value_or_exact(*keys, "fix", a) for a in item.fix})
 
     def zone(self, index: int) -> Zone:
         keys = structs.asdict(self.file.contact[index])
         if keys["clearance"] is not None:
             keys["clearance"] = self.value("contact", index, "clearance")
+        for side in ("slave", "master"):
+            keys[side] = self.group(("contact", index, side), keys[side])
         return Zone(**keys)
 
     def load(self, index: int) -> Load:
-        item = self.file.loads[index]
+        item, keys = self.file.loads[index], ("loads", index)
         kind = next(kind for kind in LOAD_KINDS if getattr(item, kind) is not None)
-        return Load(item.group, kind, self.value_or_exact("loads", index, kind))
+        group = self.group((*keys, "group"), item.group, item.at)
+        return Load(group, kind, self.value_or_exact(*keys, kind))
 
     def exact_solution(self) -> ExactSolution | None:
         """The solution that the reference names, made with what the case says already."""

@@ -20,9 +20,10 @@ ERRORS: dict[str, str] = {
     "half_width": "half_width",
     "peak": "peak",
 }
-
-
+# Keys of the reference that need contact.
 _OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area"}
+# The vectors of a selection.
+_PARTS = {"plane": ("point", "normal"), "sphere": ("centre",), "box": ("low", "high")}
 
 
 def check_rules(case: Case) -> None:
@@ -142,11 +143,16 @@ def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
             yield f"loads[{i}].{load.kind}", load.value
     for i, item in enumerate(case.observe):
         yield f"observe[{i}].nearest", item.nearest
+    for made in case.selections:
+        if made.shape == "at":
+            yield made.key, made.values
+        for key, value in zip(_PARTS.get(made.shape, ()), made.values, strict=False):
+            yield f"{made.key}.{made.shape}.{key}", value
     for key, value in case.reference.items():
         if isinstance(value, tuple):
             yield f"reference.{key}", value
         if key == "reaction" and isinstance(value, dict):
-            yield from ((f"reference.reaction.{group}", v) for group, v in value.items())  # type: ignore[misc]
+            yield from ((f"reference.reaction.{group}", v) for group, v in value.items())
 
 
 def _expressions(case: Case) -> Iterable[Expression]:
@@ -155,6 +161,7 @@ def _expressions(case: Case) -> Iterable[Expression]:
     values += [load.value for load in case.loads]
     values += case.reference.values()
     values += [zone.clearance for zone in case.zones]
+    values += [made.values for made in case.selections]
     while values:
         value = values.pop()
         if isinstance(value, Expression):

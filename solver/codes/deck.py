@@ -12,6 +12,7 @@ from ..mechanics.fem.faces import FaceBlock, volume_cells
 from ..mechanics.mortar.cut import cut
 from ..simulation.attributes import Attributes, faces_of
 from ..simulation.groups import check_groups, named_parts
+from ..simulation.selections import with_groups
 from .layer import as_layer
 
 # What the cells of a rigid body are made of; all their nodes are held.
@@ -99,6 +100,7 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
     Raises InputError where case and mesh do not fit, UnsupportedError for what no code is given:
     supports across the axes, an initial gap that varies, axisymmetric bodies.
     """
+    mesh = with_groups(case, mesh)
     check_groups(case, mesh)
     mesh, _ = named_parts(case, mesh)
     _refuse(case)

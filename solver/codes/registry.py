@@ -13,6 +13,7 @@ from .own import own_code
 # Module and class; each is imported where it is asked for.
 _CODES = {
     "calculix": (".calculix", "CalculiX"),
+    "code_aster": (".code_aster", "CodeAster"),
     "kratos": (".kratos", "Kratos"),
     "plain": (".plain", "Plain"),
 }

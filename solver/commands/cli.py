@@ -314,9 +314,10 @@ def _validate_one(path: Path, with_mesh: bool) -> None:
         read_recipe(case.mesh, path)
     if with_mesh:
         from ..simulation.groups import check_groups
+        from ..simulation.selections import with_groups
         from ..verification.run import mesh_of
 
-        check_groups(case, mesh_of(case))
+        check_groups(case, with_groups(case, mesh_of(case)))
 
 
 def _new(options: argparse.Namespace) -> int:

@@ -111,6 +111,8 @@ class Attributes:
     def nodes(self, group: str, key: str) -> np.ndarray:
         """All nodes of a group: of its volume cells, faces, edges and points."""
         dim = self.points.shape[1]
+        if group == ALL:
+            return np.arange(len(self.points))
         parts = [np.asarray(self.mesh.point_sets.get(group, []), dtype=int)]
         if group in self.mesh.cell_sets:
             mask = self.cell_mask(group)
@@ -200,6 +202,21 @@ class Attributes:
                 values[name][mask] = value(materials[group])
         return values
 
+    def materials_behind(self, faces: Sequence[FaceBlock]) -> list[np.ndarray]:
+        """A number (n,) of the material of the cell behind each face as meshed, by block.
+
+        Equal materials have the same number, cells of rigid bodies −1.
+        """
+        materials = self.case.materials
+        number = {material: i for i, material in enumerate(materials.values())}
+        start = number[materials[ALL]] if ALL in materials else -1
+        found = [np.full(len(block.owner), start) for block in faces]
+        for group in (g for g in materials if g != ALL):
+            mask = self.whole_cell_mask(group)
+            for values, block in zip(found, faces, strict=True):
+                values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
+        return found
+
     @cached_property
     def fixed(self) -> dict[str, Fixed]:
         """What the axis, supports and rigid bodies hold, by the key of the case file."""
@@ -273,6 +290,9 @@ class Attributes:
 
     def _force(self, load: Load, key: str) -> np.ndarray:
         total = np.zeros_like(self.points)
+        if load.kind == "force":
+            assert isinstance(load.value, tuple)
+            return self._share(load, key)[:, None] * self.field(load.value)(self.points[:1])
         for name, nodes in self._loaded(load, key):
             if isinstance(load.value, Exact):
                 for part, mine in self.by_part(nodes):
@@ -284,6 +304,19 @@ class Attributes:
                 pressure, field = load.kind == "pressure", self.field(load.value)
                 total += face_forces(self.points, nodes, name, field, pressure, self.axisymmetric)
         return total
+
+    def _share(self, load: Load, key: str) -> np.ndarray:
+        """The share (n,) of a whole force that acts on each node; the sum is one."""
+        share = np.zeros(len(self.points))
+        if load.group in self.mesh.point_sets:
+            nodes = np.asarray(self.mesh.point_sets[load.group], dtype=int)
+            share[nodes] = 1 / len(nodes)
+            return share
+        along = self.field((1.0, *[0.0] * (self.points.shape[1] - 1)))
+        for name, nodes in self.faces(load.group, key):
+            force = face_forces(self.points, nodes, name, along, False, self.axisymmetric)
+            share += force[:, 0]
+        return share / share.sum()
 
     def _loaded(self, load: Load, key: str) -> list[tuple[str, np.ndarray]]:
         """The cells or faces that a load acts on: (type, nodes)."""

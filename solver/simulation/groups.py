@@ -168,6 +168,11 @@ class _Groups:
     def check_supports(self) -> None:
         for i, support in enumerate(self.case.supports):
             key = f"supports[{i}].group"
+            if support.group == ALL:
+                if "normal" in support.fix:
+                    allowed = "normal needs a group of faces; `all` is fixed along x, y and z"
+                    raise self.error(key, ALL, allowed)
+                continue
             self.require(key, support.group)
             if "normal" in support.fix:
                 self.cells(key, support.group, self.dim - 1)
@@ -181,9 +186,24 @@ class _Groups:
             if on_volume and load.group == ALL:
                 chosen = zip(self.mesh.cells, self.block_dims, strict=True)
                 parts = [np.arange(len(block.data) * (dim == self.dim)) for block, dim in chosen]
+            elif load.kind == "force" and load.group in self.mesh.point_sets:
+                self.check_forced(key, load)
+                continue
             else:
                 parts = self.cells(key, load.group, self.dim if on_volume else self.dim - 1)
             self.check_loaded(key, load, parts)
+
+    def check_forced(self, key: str, load: Load) -> None:
+        """A force on nodes: there are some, and none on a rigid body."""
+        nodes = self.mesh.point_sets[load.group]
+        if not len(nodes):
+            raise self.error(key, load.group, _EMPTY)
+        for rigid in sorted(self.case.rigid):
+            lost = np.isin(nodes, self.nodes(self.cells(f"bodies.{rigid}", rigid, self.dim)))
+            if lost.any():
+                allowed = f"{lost.sum()} of its nodes belong to the rigid body {rigid}; "
+                allowed += "a load there does nothing; load a deformable body"
+                raise self.error(key, load.group, allowed)
 
     def check_loaded(self, key: str, load: Load, parts: list[np.ndarray]) -> None:
         """No load on a rigid body, where it would move nothing.

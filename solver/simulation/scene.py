@@ -19,7 +19,8 @@ from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from ..mechanics.mortar.held import merge_fixed_multipliers
 from ..mechanics.mortar.multipliers import constants
 from ..mechanics.mortar.operator import GapOperator, gap_operator
-from ..mechanics.mortar.recovery import FORMS, Asked, automatic, vertex_neighbours
+from ..mechanics.mortar.reconstruction import form_of, vertex_neighbours
+from ..mechanics.mortar.recovery import Asked
 from ..mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from ..mesh.catalogue import BY_NAME
 from ..system.clock import Clock
@@ -28,6 +29,7 @@ from ..system.progress import stage
 from .attributes import Attributes, CutZone, faces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .options import LEAN, Options
+from .selections import with_groups
 
 # Slave and master faces of each zone.
 Surfaces: TypeAlias = list[tuple[list[FaceBlock], list[FaceBlock]]]
@@ -148,6 +150,7 @@ def build_scene(
 ) -> Scene:
     """The discrete problem of a case; raises InputError where case and mesh do not fit."""
     clock, safeguards = clock or Clock(), options.safeguards
+    mesh = with_groups(case, mesh)
     check_groups(case, mesh)
     mesh, unnamed = named_parts(case, mesh)
     origin = mesh.points.mean(axis=0) * safeguards.local_coordinates
@@ -343,22 +346,28 @@ def _operator(
     slaves = [facets(points, f.type, f.nodes, f.macro, around) for f in faces.sub_faces]
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
-    masters = _master_facets(points, master_faces, around)
+    materials = groups.materials_behind(master_faces)
+    masters = _master_facets(points, master_faces, materials, around)
     if not options.shortcuts.quadrature:
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
-    asked = _recovery(zone, faces.slave_faces, count) if scheme.space is constants else None
+    asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
     operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
     return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
 
 
-def _recovery(zone: Zone, slave_faces: list[FaceBlock], count: int) -> Asked:
-    """How a zone's pressure is recovered, and which of its macro-elements share a vertex."""
-    quadratic = all(block.owner_type.order == 2 for block in slave_faces)
-    name = automatic(quadratic) if zone.recovery == "automatic" else zone.recovery
+def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> Asked:
+    """How a zone's pressure is recovered, and which of its macro-elements may be neighbours."""
+    count = sum(len(block.nodes) for block in slave_faces)
+    order = min(block.owner_type.order for block in slave_faces)
+    corners = min(block.type.n_vertices for block in slave_faces)
     vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
-    return Asked(FORMS[name], vertex_neighbours(vertices, count))
+    material = np.zeros(count, dtype=int)
+    for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
+        material[block.number] = number
+    form = form_of(zone.recovery, order, corners)
+    return Asked(form, vertex_neighbours(vertices, count), material)
 
 
 def _as_bent(block: Facets) -> Facets:
@@ -386,10 +395,14 @@ def _initial_gaps(
     return initial - zone.interference * operator.covered
 
 
-def _master_facets(points: np.ndarray, faces: list[FaceBlock], around: bool) -> list[Facets]:
-    """Master faces, those of one type together whatever cell is behind them."""
+def _master_facets(
+    points: np.ndarray, faces: list[FaceBlock], materials: list[np.ndarray], around: bool
+) -> list[Facets]:
+    """Master faces, those of one type together whatever cell is behind them, by material (n,)."""
     merged = []
     for name in dict.fromkeys(block.type.name for block in faces):
-        nodes = np.concatenate([block.nodes for block in faces if block.type.name == name])
-        merged.append(facets(points, BY_NAME[name], nodes, np.arange(len(nodes)), around))
+        alike = [i for i, block in enumerate(faces) if block.type.name == name]
+        nodes = np.concatenate([faces[i].nodes for i in alike])
+        number = np.concatenate([materials[i] for i in alike])
+        merged.append(facets(points, BY_NAME[name], nodes, number, around))
     return merged

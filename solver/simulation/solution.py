@@ -65,10 +65,10 @@ class NodalContact:
 class RecoveredPressure:
     """A pressure p* = p + Σ c ψ by macro-element (m,), recovered from the constants p.
 
-    `form`: linear, quadratic or smooth (see `mechanics.mortar.recovery`); `coefficients` c (m, k),
-    `degree` (m,) of the polynomials; `centre`, `axes`, `spread` are those of the local coordinates
-    that ψ is written in. `nodes` (n,) of the slave surface and `at_nodes` (n,), the mean there of
-    p* on the faces around.
+    `form`: linear, quadratic or smooth (`mechanics.mortar.reconstruction`); `coefficients` c
+    (m, k), `degree` (m,) of the polynomials; `centre`, `axes`, `spread` are those of the local
+    coordinates that ψ is written in. `nodes` (n,) of the slave surface and `at_nodes` (n,), the
+    mean there of p* on the faces around.
     """
 
     form: str
@@ -82,7 +82,7 @@ class RecoveredPressure:
 
     def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
         """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
-        from ..mechanics.mortar.recovery import FORMS, Local
+        from ..mechanics.mortar.reconstruction import FORMS, Local
 
         local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
         psi = local.shapes(macro, places, FORMS[self.form])

@@ -256,9 +256,9 @@ REFUSED = [
     ),
     (
         "loads: [{group: Top, pressure: 1, traction: [0, 0, 1]}]",
-        "must be {group, and exactly one of pressure, traction, body_force}",
+        "must be {group, and exactly one of pressure, traction, body_force, force}",
     ),
-    ("loads: [{pressure: 1}]", "loads[0].group: this key is needed"),
+    ("loads: [{pressure: 1}]", "must be {group} with its load, or {at, force}"),
     ("loads: [{group: Top, pressure: true}]", "loads[0].pressure = True: must be a number or"),
     ("loads: [{group: Top, pressure: [1]}]", "loads[0].pressure = [1]: must be a number or an"),
     ("loads: [{group: Top, traction: 1}]", "loads[0].traction = 1: must be a list of two (plane)"),

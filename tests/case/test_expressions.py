@@ -27,6 +27,9 @@ X, Y, Z = POINTS.T
         ("r", np.sqrt(X**2 + Y**2 + Z**2)),
         ("sin(pi*x) + cos(y)", np.sin(np.pi * X) + np.cos(Y)),
         ("  sqrt((x - 1)**2)", abs(X - 1)),
+        ("abs(x - y)", np.where(X > Y, X - Y, Y - X)),
+        ("min(x, y) + max(x, y, z)", np.minimum(X, Y) + np.array([2.0, 4.0, 1.0])),
+        ("atan2(y, -x)", [math.pi - math.atan(4), math.pi - math.atan(1 / 12), 0.75 * math.pi]),
     ],
 )
 def test_values_are_those_of_numpy(text, expected):
@@ -63,6 +66,12 @@ def test_equal_by_text_and_survives_pickling():
         "sin",
         "sin()",
         "sin(x, y)",
+        "abs(x, y)",
+        "min(x)",
+        "max()",
+        "max(*x)",
+        "atan2(x)",
+        "atan2(x, y, z)",
         "sin(*x)",
         "sin(x=1)",
         "pi(x)",
@@ -111,6 +120,13 @@ def test_length_and_depth_are_limited():
     with pytest.raises(InputError, match=f"nested deeper than {MAX_DEPTH} levels"):
         Expression("-" * MAX_DEPTH + "x")
     assert Expression("-" * (MAX_DEPTH - 1) + "1")(POINTS).tolist() == [-1.0] * 3
+
+
+def test_a_long_sum_has_its_value():
+    text = "+".join(["(0.5 * sin(x) / cos(x))"] * (MAX_DEPTH - 10))
+    assert 1000 < len(text) < MAX_LENGTH
+    there = pickle.loads(pickle.dumps(Expression(text)))
+    np.testing.assert_allclose(there(POINTS), (MAX_DEPTH - 10) / 2 * np.tan(X), rtol=1e-13)
 
 
 @pytest.mark.parametrize("text", ["1/(x - 3)", "sqrt(-x)", "1/(pi - pi)", "(1e200*x)**2"])

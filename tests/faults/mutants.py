@@ -47,7 +47,7 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
     "lame/cylinders-two-materials",
     "hydrostatic/tilted-hexa20-tetra10",
 )
-SPHERES = "lame/spheres-hexa20"
+SPHERES, FORCES = "lame/spheres-hexa20", "loads/selected-groups"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -283,6 +283,10 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared equally among the nodes of a face", BENT,
            "solver.mechanics.fem.loads:surface_vectors",
            changed(lambda found: (np.full(found[0].shape, 1 / found[0].shape[1]), found[1]))),
+    Mutant("force-share", "a force on a group is 1 % too large", FORCES,
+           "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
+    Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
+           "solver.simulation.selections:_within", changed(np.ones_like)),
     Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
            "solver.simulation.scene:gap_operator",
            changed(lambda o: replace(o, matrix=0.97 * o.matrix))),

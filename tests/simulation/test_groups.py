@@ -108,7 +108,11 @@ MISFITS = [
     ("name: two\n", "name: two\nbodies: {lower: {rigid: true}}\n", "contact[0].slave = 'bottom_co"),
     ("name: two\n", "name: two\nbodies: {press: {rigid: true}}\n", "bodies.press = 'press': holds"),
     # dimension
-    ("plane: strain\n", "", "plane: this key is needed (strain): the mesh is plane"),
+    (
+        "plane: strain\n",
+        "",
+        "plane: this key is needed (strain, stress or axisymmetric): the mesh is plane",
+    ),
 ]
 
 

@@ -1,0 +1,124 @@
+"""The keys of a case file for what acts on the bodies: supports, loads, and groups for them."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from .kinds import Groups, Scalar, Scalars, Vector
+from .typed import FieldError, Positive, Section, Text
+
+
+class PlaneKeys(Section, frozen=True):
+    """A plane; a straight line in 2D.
+
+    point: a point of it
+    normal: its normal, of any length
+    """
+
+    point: Vector
+    normal: Vector
+
+    def __post_init__(self) -> None:
+        if not any(self.normal):
+            raise FieldError(("normal",), "must have a direction")
+
+
+class SphereKeys(Section, frozen=True):
+    """The surface of a sphere; a circle in 2D.
+
+    centre: its centre
+    radius: its radius
+    """
+
+    centre: Vector
+    radius: Positive
+
+
+class BoxKeys(Section, frozen=True):
+    """All that is in a box along the axes.
+
+    low: its lowest corner
+    high: its highest corner
+    """
+
+    low: Vector
+    high: Vector
+
+
+class SelectionKeys(Section, frozen=True):
+    """A group made by the case: members all of whose nodes are there.
+
+    of: volume cells, faces on the outside of bodies, or nodes
+    within: only what belongs to the cells of these groups
+    plane: those on a plane
+    sphere: those on a sphere
+    box: those in a box
+    where: those where an expression is not negative
+    """
+
+    of: Literal["cells", "faces", "nodes"] = "faces"
+    within: Groups | None = None
+    plane: PlaneKeys | None = None
+    sphere: SphereKeys | None = None
+    box: BoxKeys | None = None
+    where: Text | None = None
+
+    def __post_init__(self) -> None:
+        given = (self.plane, self.sphere, self.box, self.where)
+        if sum(value is not None for value in given) != 1:
+            problem = "must be {of, within, and exactly one of plane, sphere, box, where}"
+            raise FieldError((), problem)
+
+
+_Axis = Literal["x", "y", "z", "normal"]
+_Fixed = Annotated[tuple[_Axis, ...], Meta(min_length=1)]
+_Imposed = Annotated[dict[_Axis, Scalar], Meta(min_length=1)]
+_FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
+
+
+class SupportKeys(Section, frozen=True):
+    """Imposed displacements.
+
+    group: the nodes of this group, or of `all`
+    at: the node at this point
+    fix: the components that are fixed or have a value; `normal`: along the normal of the group's
+      faces, a plane of any direction
+    """
+
+    fix: Annotated[
+        _Fixed | _Imposed, Meta(description=_FIX, extra_json_schema={"uniqueItems": True})
+    ]
+    group: Groups | None = None
+    at: Vector | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.group is None) == (self.at is None):
+            raise FieldError((), "must be {fix, and exactly one of group, at}")
+
+
+class LoadKeys(Section, frozen=True):
+    """A load.
+
+    group: the faces of this group or, for a body force, its cells
+    at: the node at this point, for a force
+    pressure: force per area against the faces, positive inwards
+    traction: force per area, as a vector
+    body_force: force per volume, as a vector
+    force: the whole force, as a vector: distributed evenly over the area of faces, or over nodes
+    """
+
+    group: Groups | None = None
+    at: Vector | None = None
+    pressure: Scalar | None = None
+    traction: Scalars | None = None
+    body_force: Scalars | None = None
+    force: Vector | None = None
+
+    def __post_init__(self) -> None:
+        given = (self.pressure, self.traction, self.body_force, self.force)
+        if sum(value is not None for value in given) != 1:
+            problem = "must be {group, and exactly one of pressure, traction, body_force, force}"
+            raise FieldError((), problem)
+        if (self.group is None) == (self.at is None) or (self.at and self.force is None):
+            raise FieldError((), "must be {group} with its load, or {at, force}")

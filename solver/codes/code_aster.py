@@ -1,0 +1,199 @@
+"""code_aster: mesh (MED) and command files of a case, for version 15 or later. Only written here.
+
+`lac.comm` uses the LAC method, `continue.comm` the standard continuous formulation (documentation
+U4.44.11 for DEFI_CONTACT, U4.23.02 for CREA_MAILLAGE). Both write `result.med`.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from ..mechanics.fem.faces import FaceBlock
+from ..mesh.catalogue import BY_NAME
+from ..system.errors import SolveError
+from .deck import Deck, UnsupportedError
+from .foreign import ForeignResult
+
+_MESH = "mesh.med"
+# Face centres of HEXA27 have an order of their own; all cells are mirrored (see `mesh.files.med`).
+_HEXA27 = [*range(20), 24, 22, 21, 23, 20, 25, 26]
+# More different values of imposed displacements than these are no boundary condition of a group.
+_VALUES = 12
+
+
+class CodeAster:
+    """Only written: it is in no package that could be installed."""
+
+    name = "code_aster"
+    layer = False
+    install = "in no package: export its input, run it, then check-result"
+    gave_up = ""
+    settings: Mapping[str, str] = {"contact": "LAC, or continuous formulation"}
+
+    def version(self) -> str:
+        """There is nothing to run."""
+        return ""
+
+    def write(self, deck: Deck, folder: Path) -> None:
+        """Write the mesh and both command files; UnsupportedError for what is not written."""
+        _refuse(deck)
+        held = _held(deck)
+        write_med(deck, held, folder / _MESH)
+        for name, lac in (("lac", True), ("continue", False)):
+            (folder / f"{name}.comm").write_text(_commands(deck, held, lac), encoding="ascii")
+
+    def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
+        """What to run, with `mesh.med` as unit 20 and `result.med` as unit 80."""
+        return ["run_aster", "lac.comm"]
+
+    def read(self, deck: Deck, folder: Path) -> ForeignResult:  # noqa: ARG002
+        """There is nothing to read."""
+        raise SolveError("code_aster is not run here")
+
+
+Held = list[tuple[int, float, np.ndarray]]
+
+
+def _refuse(deck: Deck) -> None:
+    if deck.forces.any():
+        raise UnsupportedError("loads other than constant pressures: not written for code_aster")
+    for pair in deck.pairs:
+        if pair.zone.clearance is not None or pair.zone.interference:
+            raise UnsupportedError(
+                "an initial gap other than as meshed: not written for code_aster"
+            )
+
+
+def _held(deck: Deck) -> Held:
+    """Axis, value and nodes of each imposed displacement."""
+    found: Held = []
+    for axis in range(deck.points.shape[1]):
+        given = deck.held[:, axis]
+        values = np.unique(given[~np.isnan(given)]).tolist()
+        if len(values) > _VALUES:
+            raise UnsupportedError(
+                "imposed displacements that vary from node to node: not written for code_aster"
+            )
+        found += [(axis, value, np.flatnonzero(given == value)) for value in values]
+    return found
+
+
+def _surfaces(deck: Deck) -> list[tuple[str, Sequence[FaceBlock]]]:
+    """The groups of faces by name."""
+    pairs = enumerate(deck.pairs)
+    sides = [(f"{side}_{i}", getattr(pair, side)) for i, pair in pairs for side in SIDES]
+    return sides + [(f"press_{i}", faces) for i, (faces, _) in enumerate(deck.pressures)]
+
+
+SIDES = ("slave", "master")
+
+
+def write_med(deck: Deck, held: Held, path: Path) -> None:
+    """Write the mesh with its groups: bodies by material, surfaces, held nodes."""
+    from meshio.med import _med
+
+    _med.meshio_to_med_type.update(quad9="QU9", hexahedron27="H27")
+    families: dict[int, list[str]] = {}
+    cells: dict[str, list[np.ndarray]] = {}
+    tags: dict[str, list[np.ndarray]] = {}
+
+    def add(kind: str, nodes: np.ndarray, numbers: np.ndarray) -> None:
+        cell = BY_NAME[kind]
+        nodes = nodes[:, cell.mirror] if cell.dim == 3 else nodes
+        nodes = nodes[:, np.argsort(_HEXA27)] if kind == "HEXA27" else nodes
+        cells.setdefault(cell.meshio, []).append(nodes)
+        tags.setdefault(cell.meshio, []).append(numbers)
+
+    for name, data in deck.cells.items():
+        families |= {-1 - n: [f"body_{n}"] for n in np.unique(deck.material[name]).tolist()}
+        add(name, data, -1 - deck.material[name])
+    for group, blocks in _surfaces(deck):
+        number = min(families) - 1
+        families[number] = [group]
+        for block in blocks:
+            add(block.type.name, block.nodes, np.full(len(block.nodes), number))
+    together = np.zeros(len(deck.points), dtype=int)
+    for i, (_, _, nodes) in enumerate(held):
+        together[nodes] += 1 << i
+    points = {
+        int(code): [f"held_{i}" for i in range(len(held)) if code >> i & 1]
+        for code in np.unique(together)
+        if code
+    }
+    mesh = meshio.Mesh(
+        deck.points,
+        [(kind, np.concatenate(parts)) for kind, parts in cells.items()],
+        cell_data={"cell_tags": [np.concatenate(parts) for parts in tags.values()]},
+        point_data={"point_tags": together},
+    )
+    mesh.cell_tags, mesh.point_tags = families, points
+    meshio.write(path, mesh, file_format="med")
+
+
+def _commands(deck: Deck, held: Held, lac: bool) -> str:
+    count = range(len(deck.pairs))
+    materials = np.unique(np.concatenate(list(deck.material.values()))).tolist()
+    of = deck.materials
+    fixed = [
+        f"_F(GROUP_NO='held_{i}', D{'XYZ'[axis]}={value!r})"
+        for i, (axis, value, _) in enumerate(held)
+    ]
+    pressed = [
+        f"_F(GROUP_MA='press_{i}', PRES={value!r})" for i, (_, value) in enumerate(deck.pressures)
+    ]
+    laws = [f"_F(E={of[n].young!r}, NU={of[n].poisson!r})" for n in materials]
+    algorithm = "ALGO_CONT='LAC'" if lac else "ALGO_CONT='STANDARD', COEF_CONT=100.0"
+    sides = [f"GROUP_MA_ESCL='slave_{i}', GROUP_MA_MAIT='master_{i}'" for i in count]
+    cut = f"DECOUPE_LAC=_F(GROUP_MA_ESCL={_tuple(repr(f'slave_{i}') for i in count)})"
+    return _COMMANDS.format(
+        cut=f"mesh = CREA_MAILLAGE(MAILLAGE=mesh, {cut})\n" if lac else "",
+        surfaces=_tuple(repr(name) for name, _ in _surfaces(deck)),
+        kind="D_PLAN" if deck.points.shape[1] == 2 else "3D",
+        laws="\n".join(
+            f"mat_{n} = DEFI_MATERIAU(ELAS={law})" for n, law in zip(materials, laws, strict=True)
+        ),
+        bodies=_tuple(f"_F(GROUP_MA='body_{n}', MATER=mat_{n})" for n in materials),
+        loads=f"DDL_IMPO={_tuple(fixed)}" + (f", PRES_REP={_tuple(pressed)}" if pressed else ""),
+        zones=_tuple(f"_F({side}, {algorithm})" for side in sides),
+    )
+
+
+def _tuple(parts: Iterable[str]) -> str:
+    return f"({', '.join(parts)},)"
+
+
+_COMMANDS = """\
+DEBUT(LANG='EN')
+mesh = LIRE_MAILLAGE(FORMAT='MED', UNITE=20)
+{cut}mesh = MODI_MAILLAGE(reuse=mesh, MAILLAGE=mesh, ORIE_PEAU=_F(GROUP_MA_PEAU={surfaces}))
+model = AFFE_MODELE(
+    MAILLAGE=mesh, AFFE=_F(TOUT='OUI', PHENOMENE='MECANIQUE', MODELISATION='{kind}')
+)
+{laws}
+material = AFFE_MATERIAU(MAILLAGE=mesh, AFFE={bodies})
+load = AFFE_CHAR_MECA(MODELE=model, {loads})
+contact = DEFI_CONTACT(
+    MODELE=model,
+    FORMULATION='CONTINUE',
+    ALGO_RESO_GEOM='NEWTON',
+    ALGO_RESO_CONT='NEWTON',
+    ZONE={zones},
+)
+times = DEFI_LIST_REEL(DEBUT=0.0, INTERVALLE=_F(JUSQU_A=1.0, NOMBRE=1))
+ramp = DEFI_FONCTION(NOM_PARA='INST', VALE=(0.0, 0.0, 1.0, 1.0))
+found = STAT_NON_LINE(
+    MODELE=model,
+    CHAM_MATER=material,
+    CONTACT=contact,
+    EXCIT=_F(CHARGE=load, FONC_MULT=ramp),
+    INCREMENT=_F(LIST_INST=times),
+    COMPORTEMENT=_F(RELATION='ELAS'),
+    NEWTON=_F(REAC_ITER=1),
+    CONVERGENCE=_F(RESI_GLOB_RELA=1e-10, ITER_GLOB_MAXI=50),
+)
+found = CALC_CHAMP(reuse=found, RESULTAT=found, CONTRAINTE='SIEF_NOEU')
+IMPR_RESU(FORMAT='MED', UNITE=80, RESU=_F(RESULTAT=found, INST=1.0))
+FIN()
+"""
