@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import meshio
 import numpy as np
+from scipy import sparse
 
 from ..case.model import Case, Zone
 from ..mechanics.fem.bodies import body_numbers
@@ -108,8 +109,9 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `fixed`: the displacements that are held, by key of the case file. `force` (n, dim)
-    and `free.offset` are for load factor 1.
+    up for it. `fixed`: the displacements that are held, by key of the case file. `springs` (n_dofs,
+    n_dofs) is the stiffness of springs to the ground. `force` (n, dim) and `free.offset` are for
+    load factor 1.
     """
 
     case: Case
@@ -126,6 +128,7 @@ class Scene:
     fixed: dict[str, Fixed]
     free: FreeMotion
     force: np.ndarray
+    springs: sparse.csr_matrix
     zones: list[ZoneScene]
     rest: Rest
 
@@ -175,7 +178,7 @@ def build_scene(
     with stage(clock, "assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
-        force = groups.forces()
+        force, springs = groups.forces(), groups.springs()
         zones = _zones(case, cut_zones, surfaces, operators, free)
     body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
     n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
@@ -198,6 +201,7 @@ def build_scene(
         fixed=groups.fixed,
         free=free,
         force=force,
+        springs=springs,
         zones=zones,
         rest=Rest(
             unloaded_bodies=np.zeros(n_bodies, dtype=bool),

@@ -93,7 +93,7 @@ class RecoveredPressure:
 class Reaction:
     """What holds a group: `force` (dim,) on the bodies, `moment` (3,) about the origin.
 
-    `group` is that of supports, a rigid body, or `axis` for the points on the axis.
+    `group` is that of supports, a rigid body, `axis` for the points on the axis, or `springs`.
     """
 
     group: str

@@ -107,3 +107,14 @@ def test_reactions_that_are_refused():
         run_checks(simulate(other, mesh))
     with pytest.raises(InputError, match=r"reference.reaction.base.*must have 2 components"):
         changed_case(2, extra=NUMBERS.replace("base: [0.0, 25.0]", "base: [0.0, 25.0, 0.0]"))
+
+
+def test_springs_have_a_reaction_and_no_strain_energy():
+    """An elastic foundation of 40 under the base bears the load; the blocks strain as before."""
+    case = changed_case(2, ("{group: base, fix: [y]}", "{group: base, spring: {normal: 40.0}}"))
+    found = simulate(case, block_mesh("QUAD4", "QUAD8", (3, 2)))
+    held = by_group(found)
+    assert list(held) == ["symx", "springs"]
+    assert held["springs"].force == pytest.approx([0, 25], abs=1e-11)
+    assert held["springs"].moment == pytest.approx([0, 0, 12.5], abs=1e-11)
+    assert found.strain_energy == pytest.approx(0.284375)
