@@ -146,9 +146,11 @@ class _Reader:
     def support(self, index: int) -> Support:
         item, keys = self.file.supports[index], ("supports", index)
         group = self.group((*keys, "group"), item.group, item.at)
+        if item.spring is not None:
+            return Support(group, {}, self.value(*keys, "spring"))
         if isinstance(item.fix, tuple):
             return Support(group, dict.fromkeys(item.fix, 0.0))
-        return Support(group, {a: self.value_or_exact(*keys, "fix", a) for a in item.fix})
+        return Support(group, {a: self.value_or_exact(*keys, "fix", a) for a in item.fix or ()})
 
     def zone(self, index: int) -> Zone:
         keys = structs.asdict(self.file.contact[index])

@@ -107,8 +107,13 @@ def _check_listed_twice(case: Case) -> None:
     fixed = [
         (f"supports[{i}]", s.group, axis) for i, s in enumerate(case.supports) for axis in s.fix
     ]
+    sprung = [
+        (f"supports[{i}]", s.group, f"spring {axis}")
+        for i, s in enumerate(case.supports)
+        for axis in s.spring
+    ]
     loaded = [(f"loads[{i}]", load.group, load.kind) for i, load in enumerate(case.loads)]
-    for given in (fixed, loaded):
+    for given in (fixed, sprung, loaded):
         seen: set[tuple[str, str]] = set()
         for key, group, what in given:
             if (group, what) in seen:
@@ -127,9 +132,10 @@ def check_dimension(case: Case, dim: int) -> None:
     if dim == 3:
         return
     for i, support in enumerate(case.supports):
-        if "z" in support.fix:
-            allowed = "z in a plane case; allowed are x, y and normal"
-            raise InputError(case.path, f"supports[{i}].fix", "z", allowed)
+        for key in ("fix", "spring"):
+            if "z" in getattr(support, key):
+                allowed = "z in a plane case; allowed are x, y and normal"
+                raise InputError(case.path, f"supports[{i}].{key}", "z", allowed)
     for expression in _expressions(case):
         if "z" in expression.names:
             allowed = "z in a plane case; allowed are x, y and r"
@@ -155,7 +161,7 @@ def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
 
 def _expressions(case: Case) -> Iterable[Expression]:
     """Every expression of the case."""
-    values: list[Any] = [support.fix for support in case.supports]
+    values: list[Any] = [{**support.fix, **support.spring} for support in case.supports]
     values += [load.value for load in case.loads]
     values += case.reference.values()
     values += [zone.clearance for zone in case.zones]

@@ -40,10 +40,15 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     # What is left on held unknowns are the reactions; on free ones nothing may be left.
     free_part = (basis @ (basis.T @ unbalanced)).reshape(points.shape)
     reactions = unbalanced.reshape(points.shape) - free_part
-    whole = reactions + state.force
+    whole = reactions + state.force - _spring_forces(state)
     result |= _both("reactions and loads", points, whole, scale, scene.length, around)
     result["free nodes: force"] = float(np.abs(free_part).max(initial=0.0) / scale)
     return result
+
+
+def _spring_forces(state: Equilibrium) -> np.ndarray:
+    """The forces (n, dim) on springs, as those on supports: reactions have the other sign."""
+    return state.iterate.springs
 
 
 def _both(

@@ -23,6 +23,7 @@ from .constraints import (
     contact_constraints,
     free_motion,
     refuse_unsolvable,
+    unit_springs,
 )
 from .displacement import Displacement
 from .iterate import ContactIterate
@@ -88,9 +89,9 @@ class ContactProblem:
         self.motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         refuse_unsolvable(scene, self.motions, self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
-        self.unsupported = unsupported(self.motions, scene.free.basis)
+        self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
         self.at_rest = Displacement.zero(
-            self.unsupported, surface, scene.options.safeguards.remainder
+            unsupported(self.motions, scene.free.basis), surface, scene.options.safeguards.remainder
         )
         self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
@@ -294,6 +295,9 @@ def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
         matrix = free.reduced(matrix)
     if mean.size:
         matrix = matrix + free.reduced(mean.stiffness())
+    if scene.springs.nnz:
+        matrix = matrix + free.reduced(scene.springs)
+        diagonal = diagonal + scene.springs.diagonal()
     return matrix, diagonal
 
 

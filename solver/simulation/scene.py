@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import meshio
 import numpy as np
+from scipy import sparse
 
 from ..case.model import Case, Zone
 from ..mechanics.fem.bodies import body_numbers
@@ -108,7 +109,8 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `force` (n, dim) and `free.offset` are for load factor 1.
+    up for it. `springs` (n_dofs, n_dofs) is the stiffness of springs
+    to the ground. `force` (n, dim) and `free.offset` are for load factor 1.
     """
 
     case: Case
@@ -124,6 +126,7 @@ class Scene:
     mean: MeanStress
     free: FreeMotion
     force: np.ndarray
+    springs: sparse.csr_matrix
     zones: list[ZoneScene]
     rest: Rest
 
@@ -173,7 +176,7 @@ def build_scene(
     with stage(clock, "assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
-        force = groups.forces()
+        force, springs = groups.forces(), groups.springs()
         zones = _zones(case, cut_zones, surfaces, operators, free)
     body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
     n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
@@ -195,6 +198,7 @@ def build_scene(
         mean=mean,
         free=free,
         force=force,
+        springs=springs,
         zones=zones,
         rest=Rest(
             unloaded_bodies=np.zeros(n_bodies, dtype=bool),
