@@ -36,6 +36,14 @@ def test_a_force_at_a_corner_of_a_platen_presses_evenly(swapped):
     assert max(errors(solved(CASE, swapped=swapped)).values()) < 1e-11
 
 
+def test_the_reaction_of_a_tie_is_a_moment_without_a_force():
+    """The force at x = 1 acts on the body as one at x = 1/2: a moment of 25/2 about z."""
+    found = {one.group: one for one in solved(CASE).reactions}
+    assert found["together"].force == pytest.approx([0, 0], abs=1e-12)
+    assert found["together"].moment == pytest.approx([0, 0, 12.5], abs=1e-11)
+    assert found["base"].force == pytest.approx([0, 25], abs=1e-11)
+
+
 def test_without_the_tie_the_force_presses_on_one_side():
     loose = CASE.replace("  - {group: press, together: [y]}\n", "")
     assert errors(solved(loose))["pressure"] > 0.1
