@@ -219,8 +219,9 @@ class Attributes:
                 values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
         return found
 
-    def supports(self) -> FreeMotion:
-        """The motion that supports and rigid bodies leave free."""
+    @cached_property
+    def fixed(self) -> dict[str, Fixed]:
+        """What the axis, supports and rigid bodies hold, by the key of the case file."""
         fixed = dict(self._fixed())
         self._refuse_moved(fixed)
         dim = self.points.shape[1]
@@ -233,11 +234,15 @@ class Attributes:
             for name, axis in zip("xyz", np.eye(dim), strict=False):
                 directions = np.tile(axis, (len(nodes), 1))
                 fixed[f"bodies.{group}.{name}"] = Fixed(nodes, directions, np.zeros(len(nodes)))
+        return fixed
+
+    def supports(self) -> FreeMotion:
+        """The motion that supports and rigid bodies leave free."""
         try:
-            return free_motion(len(self.points), dim, list(fixed.values()))
+            return free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
         except SupportClashError as clash:
-            key = list(fixed)[clash.number]
-            told = " (on the axis x is fixed)" if len(on_axis) else ""
+            key = list(self.fixed)[clash.number]
+            told = " (on the axis x is fixed)" if len(self.fixed["plane"].nodes) else ""
             raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:

@@ -14,7 +14,7 @@ from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, surface_points, volume_cells
 from ..mechanics.fem.mixed import MeanStress
-from ..mechanics.fem.supports import FreeMotion
+from ..mechanics.fem.supports import Fixed, FreeMotion
 from ..mechanics.mortar.cut import CutMesh, SubFaces, cut
 from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from ..mechanics.mortar.held import merge_fixed_multipliers
@@ -109,8 +109,9 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `springs` (n_dofs, n_dofs) is the stiffness of springs
-    to the ground. `force` (n, dim) and `free.offset` are for load factor 1.
+    up for it. `fixed`: the displacements that are held, by key of the case file. `springs` (n_dofs,
+    n_dofs) is the stiffness of springs to the ground. `force` (n, dim) and `free.offset` are for
+    load factor 1.
     """
 
     case: Case
@@ -124,6 +125,7 @@ class Scene:
     body: np.ndarray
     blocks: list[Block]
     mean: MeanStress
+    fixed: dict[str, Fixed]
     free: FreeMotion
     force: np.ndarray
     springs: sparse.csr_matrix
@@ -196,6 +198,7 @@ def build_scene(
         body=body,
         blocks=blocks,
         mean=mean,
+        fixed=groups.fixed,
         free=free,
         force=force,
         springs=springs,
