@@ -37,7 +37,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length, around)
     held, free_part = _unbalanced(scene, state, contact)
-    whole = held + state.force - state.iterate.springs
+    whole = held + state.force - _spring_forces(state)
     result |= _both("reactions and loads", points, whole, scale, scene.length, around)
     result["free nodes: force"] = float(np.abs(free_part).max(initial=0.0) / scale)
     return result
@@ -71,8 +71,8 @@ def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
         if len(fixed.nodes):
             force = found.setdefault(_holder(scene, key), np.zeros_like(left))
             force[fixed.nodes] += part
-    if state.iterate.springs.any():
-        found["springs"] = -state.iterate.springs
+    if (springs := _spring_forces(state)).any():
+        found["springs"] = -springs
     return [_resultant(scene, name, force) for name, force in found.items()]
 
 
@@ -95,7 +95,12 @@ def _resultant(scene: Scene, name: str, force: np.ndarray) -> Reaction:
 def strain_energy(state: Equilibrium) -> float:
     """½ ∫ σ:ε of the bodies: half the work of internal forces, to which rigid motions add none."""
     moved = state.iterate.deformation.sum(axis=0)
-    return float((moved * (state.iterate.internal - state.iterate.springs)).sum() / 2)
+    return float((moved * (state.iterate.internal - _spring_forces(state))).sum() / 2)
+
+
+def _spring_forces(state: Equilibrium) -> np.ndarray:
+    """The forces (n, dim) on springs, as those on supports: reactions have the other sign."""
+    return state.iterate.springs
 
 
 def _both(
