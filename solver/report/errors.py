@@ -19,11 +19,14 @@ from .charts import (
     Chart,
     Look,
     floor_band,
+    interaction,
     level,
     round_off,
+    series,
     series_chart,
+    tooltip,
 )
-from .families import CodeError
+from .families import CodeError, page_name
 from .html import KINDS
 from .rows import Row
 
@@ -36,6 +39,8 @@ _LOOKS = {
     "": Look(INK),
 }
 _BAD = "not passed"
+# Smaller shares of a tolerance are drawn here: zero has no logarithm.
+_LEAST = 1e-9
 
 
 def drawn(rows: Sequence[Row]) -> list[Row]:
@@ -79,6 +84,38 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
         width=900,
         height=400,
     )
+
+
+def draw_strip(rows: Sequence[Row]) -> Chart:
+    """The worst error of every solve over its tolerance, a line for each family."""
+    shown = [row for row in drawn(rows) if row.allowed]
+    records = [
+        _record(row)
+        | {"family": row.group, "share": max(row.accuracy[0] / row.allowed, _LEAST)}  # type: ignore[index, operator]
+        | {"url": f"{page_name(row.group)}#{quote(row.anchor)}", "series": row.word}
+        for row in shown
+    ]
+    titles = {"case": "case", "share": "error / tolerance", "error": "error", "check": "check"}
+    looks = {"passed": Look(GREEN), "failed": Look(RED, CROSS), "unreliable": Look(ORANGE, CROSS)}
+    found = {record["series"] for record in records}
+    channels = series({word: look for word, look in looks.items() if word in found})
+    channels.pop("strokeDash")
+    x = Axis("share", "error / tolerance", log=True).over([*records, {"share": 1.0}])
+    families = {"field": "family", "type": "nominal", "sort": None, "title": None}
+    channels |= {"x": x.channel(), "y": families, "href": {"field": "url"}}
+    marks = {"type": "point", "strokeWidth": 1.6, "size": 40, "cursor": "pointer"}
+    limit = {"x": {"datum": 1.0}, "color": {"value": RED}}
+    layers = [
+        {"data": {"values": [{}]}, "mark": {"type": "rule"}, "encoding": limit},
+        {
+            "mark": marks,
+            "encoding": channels | {"tooltip": tooltip(records, titles)},
+            "params": interaction()[1:],
+        },
+    ]
+    height = 22 * len({record["family"] for record in records})
+    spec = {"data": {"values": records}, "width": 900, "height": height, "layer": layers}
+    return Chart("error-over-tolerance", "Worst error of every solve over tolerance", spec, 900)
 
 
 def _record(row: Row) -> dict[str, Any]:

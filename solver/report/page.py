@@ -6,14 +6,27 @@ from pathlib import Path
 
 from . import stages
 from .charts import Chart
+from .errors import draw_strip, drawn
 from .html import MEANING, NORMS, TEMPLATES, render
 from .pictures import picture, profile
-from .rows import Row, counted, ours
+from .rows import Row, causes, choices, ours
 from .sections import FamilySection
 from .tables import outcome
 
 # Pages beside the report that other commands write.
-_PAGES = ("orders", "study", "stability", "gallery", "bench")
+_PAGES = {
+    "orders": "orders of convergence",
+    "study": "error against run time, LAC and other treatments",
+    "stability": "numerical stability",
+    "scaling": "scaling",
+    "infsup": "inf-sup test",
+    "gallery": "gallery of all solves",
+    "bench": "other codes on the same cases",
+    "compare": "comparison with another batch",
+}
+_TABLES = {"JSON": "summary.json", "CSV": "summary.csv", "Markdown": "summary.md"}
+# Where `make docs` writes the documentation, from the folder of a report.
+_DOCS = "../docs/index.html"
 
 # What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
 LEFT_OUT = {
@@ -33,11 +46,14 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         title="Verification of contact solves",
         sortable=True,
         rows=rows,
-        pages={name for name in _PAGES if (folder / f"{name}.html").is_file()},
+        charts=True,
+        links=_links(folder),
         bad=bad,
+        causes=causes(bad),
+        choices=choices(rows),
+        strip=draw_strip(ours(rows)) if drawn(rows) else None,
         good=bool(rows) and not bad,
         outcome=outcome(rows),
-        counts=counted(ours(rows)),
         families=sections,
         facts=_facts(rows),
         checks=[checks[name] for name in sorted(checks, key=_order)],
@@ -57,6 +73,7 @@ def family_page(section: FamilySection, folder: Path) -> str:
         outcome=section.outcome,
         good=not section.bad,
         section=section,
+        choices=choices(section.rows),
         orders=(folder / "orders.html").is_file(),
         norms=NORMS,
         stages=_stages(section.rows),
@@ -71,6 +88,14 @@ def _pressure(row: Row, pictures: Path) -> Chart | str:
     """The chart of the pressure beside the picture of a 2D solve, which does not show it."""
     chart = profile(row, pictures) if row.dim == 2 else ""
     return replace(chart, name=f"case-{row.name}") if isinstance(chart, Chart) else ""
+
+
+def _links(folder: Path) -> dict[str, str]:
+    """Tables beside the report, the documentation, and pages of other commands that are there."""
+    pages = {title: f"{name}.html" for name, title in _PAGES.items()}
+    there = {"Documentation": _DOCS} | pages
+    found = {title: target for title, target in there.items() if (folder / target).is_file()}
+    return _TABLES | {"JUnit": "junit.xml"} | found
 
 
 def left_out(rows: Sequence[Row]) -> list[tuple[str, str, int]]:

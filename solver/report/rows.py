@@ -123,6 +123,16 @@ class Row:
         return {stage: s for stage, s in seconds if stage != "total" and s}
 
     @property
+    def tags(self) -> dict[str, list[str]]:
+        """What rows are chosen by: family, cell types, verdict, kind of reference."""
+        return {
+            "family": [self.group.replace(" ", "_")],
+            "cells": sorted({name for body in self.sides for name in body.cells}),
+            "verdict": [self.word],
+            "reference": [self.verdict.reference_kind or "none"],
+        }
+
+    @property
     def slave(self) -> str:
         """The names of the slave bodies."""
         return ", ".join(b.name for b in self.sides if b.role in ("slave", "both"))
@@ -141,13 +151,18 @@ class Row:
 
 
 def read_rows(verdicts: Iterable[Path]) -> list[Row]:
-    """All verdicts as rows, failures first.
+    """All verdicts as rows, ours before those of other codes, failures first.
 
     A file that is not a verdict as it was written, or not that of its folder and result, is a row
     of a crashed solve.
     """
     rows = [Row(_read(path), path.parent) for path in verdicts]
-    return sorted(rows, key=lambda row: (row.group, WORDS.index(row.word), natural(row.name)))
+    return sorted(rows, key=_place)
+
+
+def _place(row: Row) -> tuple[str, bool, int, list[tuple[int, int | str]]]:
+    """Where a row is in the tables: ours before those of other codes."""
+    return row.group, bool(row.verdict.code), WORDS.index(row.word), natural(row.name)
 
 
 def natural(name: str) -> list[tuple[int, int | str]]:
@@ -172,6 +187,33 @@ def _read(path: Path) -> Verdict:
 def ours(rows: Sequence[Row]) -> list[Row]:
     """The solves of our own; where there are none, all."""
     return [row for row in rows if not row.verdict.code] or list(rows)
+
+
+def choices(rows: Sequence[Row]) -> dict[str, list[str]]:
+    """The values of each tag that occur."""
+    found: dict[str, set[str]] = {}
+    for row in rows:
+        for name, values in row.tags.items():
+            found.setdefault(name, set()).update(values)
+    return {name: sorted(values) for name, values in found.items()}
+
+
+def causes(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
+    """Rows that did not pass by what is wrong: a check and how, or a verdict and its reason.
+
+    Reasons that differ in numbers alone are the same.
+    """
+    found: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        failing = [check for check in row.verdict.checks if not check.passed]
+        keys = [
+            (c.name, "accepted value changed" if c.error <= c.tolerance else "above its tolerance")
+            for c in failing
+        ]
+        other = [(row.word, re.sub(r"\d[\d.e+-]*", "…", row.why))]
+        for key in dict.fromkeys(keys or other):
+            found.setdefault(key, []).append(row)
+    return found
 
 
 def families(rows: Sequence[Row]) -> dict[str, list[Row]]:

@@ -13,7 +13,7 @@ from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
 from .html import KINDS, NORMS
 from .pictures import profile
-from .rows import Row, families, ours
+from .rows import Row, counted, families, ours
 from .tables import outcome
 
 # Profiles on a page where the family does not say which.
@@ -57,6 +57,11 @@ class FamilySection:
     def bad(self) -> list[Row]:
         """The solves of our own that did not pass."""
         return [row for row in ours(self.rows) if not row.sound]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many rows there are of each verdict."""
+        return counted(ours(self.rows))
 
     @property
     def counted(self) -> bool:

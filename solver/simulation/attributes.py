@@ -23,12 +23,21 @@ from ..mechanics.fem.faces import (
 )
 from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
-from ..mechanics.fem.supports import SAME, Fixed, FreeMotion, SupportClashError, free_motion
+from ..mechanics.fem.supports import (
+    SAME,
+    Fixed,
+    FreeMotion,
+    SupportClashError,
+    TieError,
+    free_motion,
+    tied,
+)
 from ..mechanics.mortar.cut import CutMesh, SubFaces
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
 from .exact import node_parts
 from .groups import ALL
+from .relations import ties_of
 
 
 @dataclass(frozen=True)
@@ -202,8 +211,24 @@ class Attributes:
                 values[name][mask] = value(materials[group])
         return values
 
-    def supports(self) -> FreeMotion:
-        """The motion that supports and rigid bodies leave free."""
+    def materials_behind(self, faces: Sequence[FaceBlock]) -> list[np.ndarray]:
+        """A number (n,) of the material of the cell behind each face as meshed, by block.
+
+        Equal materials have the same number, cells of rigid bodies −1.
+        """
+        materials = self.case.materials
+        number = {material: i for i, material in enumerate(materials.values())}
+        start = number[materials[ALL]] if ALL in materials else -1
+        found = [np.full(len(block.owner), start) for block in faces]
+        for group in (g for g in materials if g != ALL):
+            mask = self.whole_cell_mask(group)
+            for values, block in zip(found, faces, strict=True):
+                values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
+        return found
+
+    @cached_property
+    def fixed(self) -> dict[str, Fixed]:
+        """What the axis, supports and rigid bodies hold, by the key of the case file."""
         fixed = dict(self._fixed())
         self._refuse_moved(fixed)
         dim = self.points.shape[1]
@@ -216,11 +241,19 @@ class Attributes:
             for name, axis in zip("xyz", np.eye(dim), strict=False):
                 directions = np.tile(axis, (len(nodes), 1))
                 fixed[f"bodies.{group}.{name}"] = Fixed(nodes, directions, np.zeros(len(nodes)))
+        return fixed
+
+    def supports(self) -> FreeMotion:
+        """The motion that supports and rigid bodies leave free."""
+        ties = ties_of(self)
         try:
-            return free_motion(len(self.points), dim, list(fixed.values()))
+            free = free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
+            return tied(free, list(ties.values()))
+        except TieError as error:
+            raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
         except SupportClashError as clash:
-            key = list(fixed)[clash.number]
-            told = " (on the axis x is fixed)" if len(on_axis) else ""
+            key = list(self.fixed)[clash.number]
+            told = " (on the axis x is fixed)" if len(self.fixed["plane"].nodes) else ""
             raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:

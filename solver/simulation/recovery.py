@@ -3,8 +3,10 @@
 What constants withhold from the bodies, Fᵀ c with c = R p, is known as soon as the means p are. It
 is given to the bodies as a load, which changes p, and so on: p ↦ p + ω (pₖ − p), ω = 0.87. The map
 is affine and contracts by 0.1–0.4 a sweep, whatever the mesh, the materials and Poisson's ratio
-(docs/recovery.md). All sweeps run on the factor of the equilibrium; the last is solved in full, so
-that the pressure returned, means and c, is in equilibrium with the displacement.
+(docs/recovery.md). From the second sweep on the combination of the last two is taken that leaves
+least of pₖ − p (D. G. Anderson, J. ACM 12 (1965) 547–560). All sweeps run on the factor of the
+equilibrium; the last is solved in full, so that means and loads are in equilibrium with the
+displacement.
 """
 
 import logging
@@ -12,7 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mechanics.mortar.recovery import Reconstruction, Recovery
+from ..mechanics.mortar.reconstruction import Reconstruction
+from ..mechanics.mortar.recovery import Recovery
 from .problem import ContactProblem, Equilibrium
 from .scene import ZoneScene
 
@@ -25,22 +28,24 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, kw_only=True)
 class _Zone:
-    """A zone's reconstruction among the macro-elements that are closed: as applied, and as read."""
+    """A zone's reconstruction among the macro-elements that are closed."""
 
     numbers: slice
     recovery: Recovery
-    applied: Reconstruction
     reconstruction: Reconstruction
 
     def coefficients(self, pressure: np.ndarray) -> np.ndarray:
-        """C (m · k,) of the pressures (k,) of all multipliers, as applied."""
-        return np.asarray(self.applied.matrix @ pressure[self.numbers])
+        """C (m · k,) of the pressures (k,) of all multipliers."""
+        return np.asarray(self.reconstruction.matrix @ pressure[self.numbers])
 
     def read(self, pressure: np.ndarray, applied: np.ndarray) -> np.ndarray:
-        """C (m · k,) as read: what was applied, where that is all there is to it."""
-        if self.reconstruction is self.applied and self.recovery.form.sweeps:
-            return applied
-        return np.asarray(self.reconstruction.matrix @ pressure[self.numbers])
+        """C (m · k,) as read: of a quadratic the one applied, else that of the last pressures.
+
+        Three sweeps settle what is applied; after two the last pressures are a sweep ahead of it.
+        """
+        form = self.recovery.form
+        quadratic = form.degree == 2 and form.keeps_means
+        return applied if quadratic else self.coefficients(pressure)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,10 +105,8 @@ def recovered(
 def _zone(zone: ZoneScene, closed: np.ndarray) -> _Zone:
     recovery = zone.operator.recovery
     assert recovery is not None
-    applied = read = recovery.reconstruction(closed[zone.numbers], applied=True)
-    if not recovery.form.keeps_means:
-        read = recovery.reconstruction(closed[zone.numbers])
-    return _Zone(numbers=zone.numbers, recovery=recovery, applied=applied, reconstruction=read)
+    reconstruction = recovery.reconstruction(closed[zone.numbers])
+    return _Zone(numbers=zone.numbers, recovery=recovery, reconstruction=reconstruction)
 
 
 def _corrected(
@@ -111,9 +114,10 @@ def _corrected(
 ) -> tuple[Equilibrium, list[np.ndarray], list[np.ndarray]]:
     """The state with the loads of its reconstruction; coefficients and loads (n_dofs,) by zone."""
     sweeps = max(zone.recovery.form.sweeps for zone in zones)
-    pressure, applied = state.pressure.copy(), [np.zeros(0)] * len(zones)
+    pressure, applied = state.pressure, [np.zeros(0)] * len(zones)
     force = state.correction.ravel().copy()
-    last, loads = state.pressure, [np.zeros_like(force)] * len(zones)
+    last, loads = pressure, [np.zeros_like(force)] * len(zones)
+    left = moved = np.zeros(0)
     for sweep in range(sweeps):
         applied = [zone.coefficients(pressure) for zone in zones]
         loads = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
@@ -122,6 +126,12 @@ def _corrected(
             state = problem.corrected(state, following.reshape(state.correction.shape))
             break
         last = last + problem.pressure_change(state.status.closed, following - force)
-        pressure, force = pressure + _RELAXATION * (last - pressure), following
+        before, left = left, last - pressure
+        step = _RELAXATION * left
+        if sweep:
+            fell = left - before
+            share = np.linalg.lstsq(fell[:, None], left, rcond=None)[0]
+            step -= share * (moved + _RELAXATION * fell)
+        pressure, moved, force = pressure + step, step, following
     read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
     return state, read, loads

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..mechanics.fem.faces import circumference
 from ..mechanics.mortar.edge import Edges, contact_edges
-from ..mechanics.mortar.recovery import vertex_neighbours
+from ..mechanics.mortar.reconstruction import vertex_neighbours
 from .problem import Equilibrium
 from .recovery import RecoveredZone
 from .scene import Scene, ZoneScene

@@ -7,19 +7,21 @@ from typing import TypeAlias
 
 import meshio
 import numpy as np
+from scipy import sparse
 
 from ..case.model import Case, Zone
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, surface_points, volume_cells
 from ..mechanics.fem.mixed import MeanStress
-from ..mechanics.fem.supports import FreeMotion
+from ..mechanics.fem.supports import Fixed, FreeMotion
 from ..mechanics.mortar.cut import CutMesh, SubFaces, cut
 from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from ..mechanics.mortar.held import merge_fixed_multipliers
 from ..mechanics.mortar.multipliers import constants
 from ..mechanics.mortar.operator import GapOperator, gap_operator
-from ..mechanics.mortar.recovery import FORMS, Asked, automatic, vertex_neighbours
+from ..mechanics.mortar.reconstruction import form_of, vertex_neighbours
+from ..mechanics.mortar.recovery import Asked
 from ..mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
 from ..mesh.catalogue import BY_NAME
 from ..system.clock import Clock
@@ -28,6 +30,7 @@ from ..system.progress import stage
 from .attributes import Attributes, CutZone, faces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .options import LEAN, Options
+from .relations import springs_of
 from .selections import with_groups
 
 # Slave and master faces of each zone.
@@ -107,7 +110,9 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `force` (n, dim) and `free.offset` are for load factor 1.
+    up for it. `fixed`: the displacements that are held, by key of the case file. `springs` (n_dofs,
+    n_dofs) is the stiffness of springs to the ground. `force` (n, dim) and `free.offset` are for
+    load factor 1.
     """
 
     case: Case
@@ -121,8 +126,10 @@ class Scene:
     body: np.ndarray
     blocks: list[Block]
     mean: MeanStress
+    fixed: dict[str, Fixed]
     free: FreeMotion
     force: np.ndarray
+    springs: sparse.csr_matrix
     zones: list[ZoneScene]
     rest: Rest
 
@@ -172,7 +179,7 @@ def build_scene(
     with stage(clock, "assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
-        force = groups.forces()
+        force, springs = groups.forces(), springs_of(groups)
         zones = _zones(case, cut_zones, surfaces, operators, free)
     body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
     n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
@@ -192,8 +199,10 @@ def build_scene(
         body=body,
         blocks=blocks,
         mean=mean,
+        fixed=groups.fixed,
         free=free,
         force=force,
+        springs=springs,
         zones=zones,
         rest=Rest(
             unloaded_bodies=np.zeros(n_bodies, dtype=bool),
@@ -342,22 +351,28 @@ def _operator(
     slaves = [facets(points, f.type, f.nodes, f.macro, around) for f in faces.sub_faces]
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
-    masters = _master_facets(points, master_faces, around)
+    materials = groups.materials_behind(master_faces)
+    masters = _master_facets(points, master_faces, materials, around)
     if not options.shortcuts.quadrature:
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
-    asked = _recovery(zone, faces.slave_faces, count) if scheme.space is constants else None
+    asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
     operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
     return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
 
 
-def _recovery(zone: Zone, slave_faces: list[FaceBlock], count: int) -> Asked:
-    """How a zone's pressure is recovered, and which of its macro-elements share a vertex."""
-    quadratic = all(block.owner_type.order == 2 for block in slave_faces)
-    name = automatic(quadratic) if zone.recovery == "automatic" else zone.recovery
+def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> Asked:
+    """How a zone's pressure is recovered, and which of its macro-elements may be neighbours."""
+    count = sum(len(block.nodes) for block in slave_faces)
+    order = min(block.owner_type.order for block in slave_faces)
+    corners = min(block.type.n_vertices for block in slave_faces)
     vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
-    return Asked(FORMS[name], vertex_neighbours(vertices, count))
+    material = np.zeros(count, dtype=int)
+    for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
+        material[block.number] = number
+    form = form_of(zone.recovery, order, corners)
+    return Asked(form, vertex_neighbours(vertices, count), material)
 
 
 def _as_bent(block: Facets) -> Facets:
@@ -385,10 +400,14 @@ def _initial_gaps(
     return initial - zone.interference * operator.covered
 
 
-def _master_facets(points: np.ndarray, faces: list[FaceBlock], around: bool) -> list[Facets]:
-    """Master faces, those of one type together whatever cell is behind them."""
+def _master_facets(
+    points: np.ndarray, faces: list[FaceBlock], materials: list[np.ndarray], around: bool
+) -> list[Facets]:
+    """Master faces, those of one type together whatever cell is behind them, by material (n,)."""
     merged = []
     for name in dict.fromkeys(block.type.name for block in faces):
-        nodes = np.concatenate([block.nodes for block in faces if block.type.name == name])
-        merged.append(facets(points, BY_NAME[name], nodes, np.arange(len(nodes)), around))
+        alike = [i for i, block in enumerate(faces) if block.type.name == name]
+        nodes = np.concatenate([faces[i].nodes for i in alike])
+        number = np.concatenate([materials[i] for i in alike])
+        merged.append(facets(points, BY_NAME[name], nodes, number, around))
     return merged

@@ -65,10 +65,10 @@ class NodalContact:
 class RecoveredPressure:
     """A pressure p* = p + Σ c ψ by macro-element (m,), recovered from the constants p.
 
-    `form`: linear, quadratic or smooth (see `mechanics.mortar.recovery`); `coefficients` c (m, k),
-    `degree` (m,) of the polynomials; `centre`, `axes`, `spread` are those of the local coordinates
-    that ψ is written in. `nodes` (n,) of the slave surface and `at_nodes` (n,), the mean there of
-    p* on the faces around.
+    `form`: linear, quadratic or smooth (`mechanics.mortar.reconstruction`); `coefficients` c
+    (m, k), `degree` (m,) of the polynomials; `centre`, `axes`, `spread` are those of the local
+    coordinates that ψ is written in. `nodes` (n,) of the slave surface and `at_nodes` (n,), the
+    mean there of p* on the faces around.
     """
 
     form: str
@@ -82,11 +82,27 @@ class RecoveredPressure:
 
     def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
         """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
-        from ..mechanics.mortar.recovery import FORMS, Local
+        from ..mechanics.mortar.reconstruction import FORMS, Local
 
         local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
         psi = local.shapes(macro, places, FORMS[self.form])
         return mean[macro][:, None] + np.einsum("sqk,sk->sq", psi, self.coefficients[macro])
+
+
+@dataclass
+class Reaction:
+    """What holds a group: `force` (dim,) on the bodies, `moment` (3,) about the origin.
+
+    `group` is that of supports, a rigid body, `axis` for the points on the axis, or `springs`.
+    """
+
+    group: str
+    force: np.ndarray
+    moment: np.ndarray
+
+    def __str__(self) -> str:
+        force, moment = (", ".join(f"{x:.6g}" for x in v) for v in (self.force, self.moment))
+        return f"force ({force}), moment ({moment})"
 
 
 @dataclass
@@ -205,6 +221,7 @@ class Solution:
     `accuracy` are the relative errors that rounding alone may cause, by cause (see
     `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
+    `reactions` of supports and `strain_energy` are those of the last load factor.
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
     `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
     the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
@@ -233,6 +250,8 @@ class Solution:
     linear_iterations: int = 0
     strain: float = float("nan")
     rotation: float = float("nan")
+    strain_energy: float | None = None
+    reactions: list[Reaction] = field(default_factory=list)
     accuracy: dict[str, float] = field(default_factory=dict)
     mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
@@ -250,6 +269,13 @@ class Solution:
     def hexahedra(self) -> str | None:
         """The cut of slave hexahedra, if it overrides that of the case."""
         return self.case.hexahedra
+
+    @property
+    def largest_displacement(self) -> tuple[float, np.ndarray]:
+        """The length of the largest displacement, and its place (dim,)."""
+        size = np.linalg.norm(self.displacement, axis=1)
+        node = int(size.argmax())
+        return float(size[node]), self.mesh.points[node]
 
     @property
     def pressure_error_estimate(self) -> float | None:

@@ -171,7 +171,7 @@ def test_kinds_of_reference_are_kept_apart_with_uncertainty_code_and_version(tmp
     heads = [
         html.index(f"Reference: {what}") for what in ("an exact", "our own", "another", "a sol")
     ]
-    at = [html.index(f'"fam.html#fam/{name}"') for name in "abced"]
+    at = [html.index(f'href="fam.html#fam/{name}"') for name in "abced"]
     assert heads[0] < at[0] < heads[1] < at[1] < heads[2] < at[2] < at[3] < heads[3] < at[4]
     kinds = {row[0]: row[1:] for row in rows if row and row[0] in ("refined", "other code")}
     assert kinds["refined"] == ["our own result on a much finer mesh", "–", "1", "± 2.0e-03"]

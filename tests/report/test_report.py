@@ -191,7 +191,7 @@ def test_pages_ask_for_nothing_from_outside(report, name):
     page = Page(folder / name)
     assert not {"link", "iframe", "object"} & set(page.tags)
     # Our own, the script of the charts with a chart, and nothing that a verdict brought in.
-    assert page.tags.count("script") == (3 if name == "fam.html" else 1)
+    assert page.tags.count("script") == 3
     for source in (v for key, v in page.values if key == "src"):
         assert (folder / unquote(source)).is_file()
     links = [v for key, v in page.values if key in ("href", "xlink:href")]

@@ -68,7 +68,8 @@ rule run_code:
 # The report of everything that is there: our own solves and those of other codes.
 rule bench:
     input:
-        lambda w: foreign_runs(),
+        codes=lambda w: foreign_runs(),
+        ours=lambda w: [results_of(job) for job in RUN.values()],
     message:
         "report of all codes"
     shell:

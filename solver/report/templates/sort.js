@@ -35,4 +35,35 @@ document.addEventListener("DOMContentLoaded", () => {
       head.addEventListener("keydown", (event) => { if (event.key === "Enter") act(); });
     });
   }
+
+  // Fields of a form choose rows; the choice stays in the address.
+  const form = document.querySelector("form.filters");
+  if (form) {
+    const rows = [...document.querySelectorAll("tr[data-verdict]")];
+    const entries = rows.map((row) => ({ row, text: row.textContent.toLowerCase(), data: row.dataset }));
+    const address = new URLSearchParams(location.search);
+    for (const field of form.elements) if (field.name) field.value = address.get(field.name) ?? "";
+    const choose = () => {
+      const wanted = [...new FormData(form)].filter(([, value]) => value.trim());
+      const text = wanted.find(([name]) => name === "text")?.[1].trim().toLowerCase() ?? "";
+      const rest = wanted.filter(([name]) => name !== "text");
+      let shown = 0;
+      for (const { row, text: words, data } of entries) {
+        row.hidden = !(words.includes(text) && rest.every(([name, value]) => data[name].split(" ").includes(value)));
+        shown += !row.hidden;
+      }
+      for (const table of new Set(rows.map((row) => row.closest("table")))) {
+        for (const body of table.tBodies) body.hidden = !body.querySelector("tr[data-verdict]:not([hidden])");
+        table.closest("section").hidden = ![...table.tBodies].some((body) => !body.hidden);
+      }
+      form.querySelector("output").value = `${shown} of ${rows.length} solves`;
+      const query = new URLSearchParams(wanted).toString();
+      history.replaceState(null, "", `${location.pathname}${query && `?${query}`}${location.hash}`);
+    };
+    form.addEventListener("input", choose);
+    form.addEventListener("submit", (event) => event.preventDefault());
+    form.addEventListener("reset", () => setTimeout(choose));
+    choose();
+  }
+  addEventListener("beforeprint", () => document.querySelectorAll("article > details").forEach((one) => { one.open = true; }));
 });

@@ -19,10 +19,6 @@ PUBLIC = {
 }
 
 
-# Some of its functions have no example yet.
-WITHOUT = {"solver.mechanics.mortar.recovery"}
-
-
 @pytest.mark.parametrize("module", MODULES, ids=NAMES)
 def test_examples(module):
     points, slave, master = segment_pair([0.0, 2.0], [0.0, 1.0, 2.0], 0.5)
@@ -44,5 +40,4 @@ def test_examples(module):
         for key, function in inspect.getmembers(module, inspect.isfunction)
         if function.__module__ == module.__name__ and not key.startswith("_")
     ]
-    if module.__name__ not in WITHOUT:
-        assert [f.__name__ for f in public if ">>>" not in f.__doc__] == []
+    assert [f.__name__ for f in public if ">>>" not in f.__doc__] == []
