@@ -148,6 +148,8 @@ class _Reader:
     def support(self, index: int) -> Support:
         item, keys = self.file.supports[index], ("supports", index)
         group = self.group((*keys, "group"), item.group, item.at)
+        if item.together is not None:
+            return Support(group, {}, together=item.together)
         if item.spring is not None:
             return Support(group, {}, self.value(*keys, "spring"))
         if isinstance(item.fix, tuple):

@@ -132,7 +132,7 @@ def check_dimension(case: Case, dim: int) -> None:
     if dim == 3:
         return
     for i, support in enumerate(case.supports):
-        for key in ("fix", "spring"):
+        for key in ("fix", "spring", "together"):
             if "z" in getattr(support, key):
                 allowed = "z in a plane case; allowed are x, y and normal"
                 raise InputError(case.path, f"supports[{i}].{key}", "z", allowed)

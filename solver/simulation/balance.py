@@ -37,7 +37,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length, around)
     held, free_part = _unbalanced(scene, state, contact)
-    whole = held + state.force - _spring_forces(state)
+    whole = held + state.force + _of_springs(state)
     result |= _both("reactions and loads", points, whole, scale, scene.length, around)
     result["free nodes: force"] = float(np.abs(free_part).max(initial=0.0) / scale)
     return result
@@ -54,7 +54,7 @@ def _unbalanced(
 
 
 def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
-    """The reactions of each group that supports hold, of rigid bodies, the axis and springs.
+    """The reactions of each group that supports hold, of rigid bodies, the axis, springs and ties.
 
     What two supports hold at a node belongs to the first of them that holds its direction.
     """
@@ -71,9 +71,16 @@ def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
         if len(fixed.nodes):
             force = found.setdefault(_holder(scene, key), np.zeros_like(left))
             force[fixed.nodes] += part
-    if (springs := _spring_forces(state)).any():
-        found["springs"] = -springs
+    if any(support.together for support in scene.case.supports):
+        found["together"] = left
+    if state.iterate.springs.any():
+        found["springs"] = _of_springs(state)
     return [_resultant(scene, name, force) for name, force in found.items()]
+
+
+def _of_springs(state: Equilibrium) -> np.ndarray:
+    """The forces (n, dim) of springs on the bodies."""
+    return -state.iterate.springs
 
 
 def _holder(scene: Scene, key: str) -> str:
@@ -95,12 +102,7 @@ def _resultant(scene: Scene, name: str, force: np.ndarray) -> Reaction:
 def strain_energy(state: Equilibrium) -> float:
     """½ ∫ σ:ε of the bodies: half the work of internal forces, to which rigid motions add none."""
     moved = state.iterate.deformation.sum(axis=0)
-    return float((moved * (state.iterate.internal - _spring_forces(state))).sum() / 2)
-
-
-def _spring_forces(state: Equilibrium) -> np.ndarray:
-    """The forces (n, dim) on springs, as those on supports: reactions have the other sign."""
-    return state.iterate.springs
+    return float((moved * (state.iterate.internal - state.iterate.springs)).sum() / 2)
 
 
 def _both(

@@ -30,6 +30,7 @@ from ..system.progress import stage
 from .attributes import Attributes, CutZone, faces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .options import LEAN, Options
+from .relations import springs_of
 from .selections import with_groups
 
 # Slave and master faces of each zone.
@@ -178,7 +179,7 @@ def build_scene(
     with stage(clock, "assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
-        force, springs = groups.forces(), groups.springs()
+        force, springs = groups.forces(), springs_of(groups)
         zones = _zones(case, cut_zones, surfaces, operators, free)
     body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
     n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
