@@ -80,8 +80,12 @@ _FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
 _Springs = Annotated[dict[_Axis, Scalar], Meta(min_length=1, description=_SPRING)]
 
 
+_Directions = Annotated[tuple[Literal["x", "y", "z"], ...], Meta(min_length=1)]
+_TOGETHER = "a list of x, y, z"
+
+
 class SupportKeys(Section, frozen=True):
-    """Imposed displacements, or springs to the ground.
+    """Imposed displacements, springs to the ground, or nodes that move as one.
 
     group: the nodes of this group, or of `all`
     at: the node at this point
@@ -89,6 +93,7 @@ class SupportKeys(Section, frozen=True):
       faces, a plane of any direction
     spring: stiffness of springs by component: force per area and displacement on faces (an elastic
       foundation), force per displacement at nodes
+    together: the components in which all nodes of the group have one displacement, an unknown
     """
 
     fix: Annotated[
@@ -96,15 +101,22 @@ class SupportKeys(Section, frozen=True):
         Meta(description=_FIX, extra_json_schema={"uniqueItems": True}),
     ] = None
     spring: _Springs | None = None
+    together: Annotated[
+        _Directions | None,
+        Meta(description=_TOGETHER, extra_json_schema={"uniqueItems": True}),
+    ] = None
     group: Groups | None = None
     at: Vector | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.group is None) == (self.at is None):
-            raise FieldError((), "must be {fix or spring, and exactly one of group, at}")
-        if (self.fix is None) == (self.spring is None):
-            raise FieldError((), "must be {group or at, and exactly one of fix, spring}")
+            raise FieldError((), "must be {fix, spring or together, and exactly one of group, at}")
+        if sum(value is not None for value in (self.fix, self.spring, self.together)) != 1:
+            problem = "must be {group or at, and exactly one of fix, spring, together}"
+            raise FieldError((), problem)
+        if self.at and self.together:
+            raise FieldError(("at",), "together needs a group")
 
 
 class LoadKeys(Section, frozen=True):

@@ -6,7 +6,6 @@ from functools import cached_property
 
 import meshio
 import numpy as np
-from scipy import sparse
 
 from ..case.expressions import evaluate
 from ..case.material import Material
@@ -24,13 +23,21 @@ from ..mechanics.fem.faces import (
 )
 from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
-from ..mechanics.fem.springs import at_nodes, foundation
-from ..mechanics.fem.supports import SAME, Fixed, FreeMotion, SupportClashError, free_motion
+from ..mechanics.fem.supports import (
+    SAME,
+    Fixed,
+    FreeMotion,
+    SupportClashError,
+    TieError,
+    free_motion,
+    tied,
+)
 from ..mechanics.mortar.cut import CutMesh, SubFaces
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
 from .exact import node_parts
 from .groups import ALL
+from .relations import ties_of
 
 
 @dataclass(frozen=True)
@@ -219,8 +226,9 @@ class Attributes:
                 values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
         return found
 
-    def supports(self) -> FreeMotion:
-        """The motion that supports and rigid bodies leave free."""
+    @cached_property
+    def fixed(self) -> dict[str, Fixed]:
+        """What the axis, supports and rigid bodies hold, by the key of the case file."""
         fixed = dict(self._fixed())
         self._refuse_moved(fixed)
         dim = self.points.shape[1]
@@ -233,11 +241,19 @@ class Attributes:
             for name, axis in zip("xyz", np.eye(dim), strict=False):
                 directions = np.tile(axis, (len(nodes), 1))
                 fixed[f"bodies.{group}.{name}"] = Fixed(nodes, directions, np.zeros(len(nodes)))
+        return fixed
+
+    def supports(self) -> FreeMotion:
+        """The motion that supports and rigid bodies leave free."""
+        ties = ties_of(self)
         try:
-            return free_motion(len(self.points), dim, list(fixed.values()))
+            free = free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
+            return tied(free, list(ties.values()))
+        except TieError as error:
+            raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
         except SupportClashError as clash:
-            key = list(fixed)[clash.number]
-            told = " (on the axis x is fixed)" if len(on_axis) else ""
+            key = list(self.fixed)[clash.number]
+            told = " (on the axis x is fixed)" if len(self.fixed["plane"].nodes) else ""
             raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:
@@ -277,39 +293,6 @@ class Attributes:
     def _normals(self, group: str, nodes: np.ndarray, key: str) -> np.ndarray:
         """Unit normals (n, dim) of a group's faces at its nodes, the mean over the faces there."""
         return nodal_normals(self.points, self.faces(group, key))[nodes]
-
-    def springs(self) -> sparse.csr_matrix:
-        """The stiffness (n_dofs, n_dofs) of springs and foundations."""
-        total = sparse.csr_matrix((self.points.size, self.points.size))
-        for i, support in enumerate(self.case.supports):
-            for direction, value in support.spring.items():
-                key = f"supports[{i}].spring.{direction}"
-                total = total + self._spring(support.group, direction, self._stiff(value, key), key)
-        return total
-
-    def _spring(self, group: str, direction: str, stiffness: Field, key: str) -> sparse.csr_matrix:
-        axis = "xyz".find(direction)
-        if group in self.mesh.point_sets:
-            nodes = np.asarray(self.mesh.point_sets[group], dtype=int)
-            return at_nodes(self.points, nodes, stiffness(self.points[nodes]), axis)
-        along = None if axis < 0 else np.eye(self.points.shape[1])[axis]
-        return sum(
-            foundation(self.points, nodes, name, stiffness, along, self.axisymmetric)
-            for name, nodes in self.faces(group, key)
-        )
-
-    def _stiff(self, value: Scalar, key: str) -> Field:
-        """A stiffness as a field; refused where it is not positive."""
-        field = self.field(value)
-
-        def stiffness(local: np.ndarray) -> np.ndarray:
-            found = field(local)
-            if (found <= 0).any():
-                allowed = "a stiffness must be positive everywhere on the group"
-                raise InputError(self.case.path, key, float(found.min()), allowed)
-            return found
-
-        return stiffness
 
     def forces(self) -> np.ndarray:
         """Nodal forces (n, dim) of all loads at load factor 1."""
