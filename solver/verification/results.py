@@ -66,7 +66,10 @@ _SCALARS = (
     "peak_memory_mb",
 )
 _ON_FACES = {
-    **{"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"},
+    "pressure": "multiplier",
+    "gap": "gap",
+    "status": "closed",
+    "coverage": "coverage",
     "pressure_error_estimate": "pressure_error_estimate",
 }
 _OBSERVED = ("pressure", "gap", "status", "coverage")
