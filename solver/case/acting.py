@@ -73,28 +73,50 @@ class SelectionKeys(Section, frozen=True):
 _Axis = Literal["x", "y", "z", "normal"]
 _Fixed = Annotated[tuple[_Axis, ...], Meta(min_length=1)]
 _Imposed = Annotated[dict[_Axis, Scalar], Meta(min_length=1)]
+_SPRING = "a mapping of x, y, z, normal to positive numbers or expressions"
 _FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
 
 
+_Springs = Annotated[dict[_Axis, Scalar], Meta(min_length=1, description=_SPRING)]
+
+
+_Directions = Annotated[tuple[Literal["x", "y", "z"], ...], Meta(min_length=1)]
+_TOGETHER = "a list of x, y, z"
+
+
 class SupportKeys(Section, frozen=True):
-    """Imposed displacements.
+    """Imposed displacements, springs to the ground, or nodes that move as one.
 
     group: the nodes of this group, or of `all`
     at: the node at this point
     fix: the components that are fixed or have a value; `normal`: along the normal of the group's
       faces, a plane of any direction
+    spring: stiffness of springs by component: force per area and displacement on faces (an elastic
+      foundation), force per displacement at nodes
+    together: the components in which all nodes of the group have one displacement, an unknown
     """
 
     fix: Annotated[
-        _Fixed | _Imposed, Meta(description=_FIX, extra_json_schema={"uniqueItems": True})
-    ]
+        _Fixed | _Imposed | None,
+        Meta(description=_FIX, extra_json_schema={"uniqueItems": True}),
+    ] = None
+    spring: _Springs | None = None
+    together: Annotated[
+        _Directions | None,
+        Meta(description=_TOGETHER, extra_json_schema={"uniqueItems": True}),
+    ] = None
     group: Groups | None = None
     at: Vector | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.group is None) == (self.at is None):
-            raise FieldError((), "must be {fix, and exactly one of group, at}")
+            raise FieldError((), "must be {fix, spring or together, and exactly one of group, at}")
+        if sum(value is not None for value in (self.fix, self.spring, self.together)) != 1:
+            problem = "must be {group or at, and exactly one of fix, spring, together}"
+            raise FieldError((), problem)
+        if self.at and self.together:
+            raise FieldError(("at",), "together needs a group")
 
 
 class LoadKeys(Section, frozen=True):

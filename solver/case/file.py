@@ -21,6 +21,7 @@ CheckName = Literal[
     "observation_gap",
     "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2", "pressure_max",
     "pressure_means", "pressure_oscillation", "half_width", "peak",
+    "force", "reaction", "contact_area", "strain_energy",
 ]  # fmt: skip
 
 
@@ -238,6 +239,11 @@ class ReferenceKeys(Section, frozen=True):
     normal_stress: stress along the contact normal at all nodes, positive in tension
     gap: gap on the slave faces, positive when open
     displacement: displacement of all nodes
+    force: contact force on the surface that is listed as slave, around the full circle if
+      axisymmetric
+    contact_area: area of contact of each zone
+    reaction: the forces with which supports hold groups
+    strain_energy: of all bodies
     stress: components of the stress at all nodes
     """
 
@@ -250,6 +256,10 @@ class ReferenceKeys(Section, frozen=True):
     normal_stress: Scalar | None = None
     gap: Scalar | None = None
     displacement: Scalars | None = None
+    force: Vector | None = None
+    contact_area: Number | None = None
+    reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
+    strain_energy: Number | None = None
     stress: Annotated[_Stress | Literal["solution"], Meta(description=_STRESS)] | None = None
 
     def __post_init__(self) -> None:

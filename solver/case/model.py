@@ -43,10 +43,15 @@ class Selection:
 
 @dataclass(frozen=True)
 class Support:
-    """Imposed displacements of a group: direction (x, y, z, normal) to value."""
+    """Imposed displacements of a group, or the stiffness of its springs: direction to value.
+
+    `together`: the directions in which all of its nodes have one displacement.
+    """
 
     group: str
     fix: dict[str, Scalar | Exact]
+    spring: dict[str, Scalar] = field(default_factory=dict)
+    together: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

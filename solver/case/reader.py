@@ -36,6 +36,8 @@ _QUANTITY = {
     "traction": "stress",
     "body_force": "body_force",
 }
+# Keys of the reference for numbers of the whole case, which no solution gives.
+_RESULTANTS = ("force", "contact_area", "reaction", "strain_energy")
 
 
 def load_case(path: str | Path) -> Case:
@@ -101,7 +103,7 @@ class _Reader:
             reference={
                 key: self.value_or_exact("reference", key)
                 for key in self.content.get("reference", ())
-                if key in _QUANTITY
+                if key in (*_QUANTITY, *_RESULTANTS)
             },
             reference_kind=reference.kind if reference else None,
             reference_uncertainty=reference.uncertainty if reference else None,
@@ -146,9 +148,13 @@ class _Reader:
     def support(self, index: int) -> Support:
         item, keys = self.file.supports[index], ("supports", index)
         group = self.group((*keys, "group"), item.group, item.at)
+        if item.together is not None:
+            return Support(group, {}, together=item.together)
+        if item.spring is not None:
+            return Support(group, {}, self.value(*keys, "spring"))
         if isinstance(item.fix, tuple):
             return Support(group, dict.fromkeys(item.fix, 0.0))
-        return Support(group, {a: self.value_or_exact(*keys, "fix", a) for a in item.fix})
+        return Support(group, {a: self.value_or_exact(*keys, "fix", a) for a in item.fix or ()})
 
     def zone(self, index: int) -> Zone:
         keys = structs.asdict(self.file.contact[index])

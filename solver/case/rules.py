@@ -20,8 +20,8 @@ ERRORS: dict[str, str] = {
     "half_width": "half_width",
     "peak": "peak",
 }
-
-
+# Keys of the reference that need contact.
+_OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area"}
 # The vectors of a selection.
 _PARTS = {"plane": ("point", "normal"), "sphere": ("centre",), "box": ("low", "high")}
 
@@ -89,7 +89,7 @@ def _check_reference(case: Case) -> None:
         if tolerance > 1:
             allowed = "must be at most 1: then the error is as large as the reference"
             raise InputError(case.path, f"tolerance.{check}", tolerance, allowed)
-    for key in case.reference.keys() & {"contact_pressure", "gap"} if not case.zones else ():
+    for key in case.reference.keys() & _OF_CONTACT if not case.zones else ():
         allowed = "cannot be compared: the case has no contact"
         raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
     if case.reference_kind and not case.reference and case.solution is None:
@@ -107,8 +107,13 @@ def _check_listed_twice(case: Case) -> None:
     fixed = [
         (f"supports[{i}]", s.group, axis) for i, s in enumerate(case.supports) for axis in s.fix
     ]
+    sprung = [
+        (f"supports[{i}]", s.group, f"spring {axis}")
+        for i, s in enumerate(case.supports)
+        for axis in s.spring
+    ]
     loaded = [(f"loads[{i}]", load.group, load.kind) for i, load in enumerate(case.loads)]
-    for given in (fixed, loaded):
+    for given in (fixed, sprung, loaded):
         seen: set[tuple[str, str]] = set()
         for key, group, what in given:
             if (group, what) in seen:
@@ -127,9 +132,10 @@ def check_dimension(case: Case, dim: int) -> None:
     if dim == 3:
         return
     for i, support in enumerate(case.supports):
-        if "z" in support.fix:
-            allowed = "z in a plane case; allowed are x, y and normal"
-            raise InputError(case.path, f"supports[{i}].fix", "z", allowed)
+        for key in ("fix", "spring", "together"):
+            if "z" in getattr(support, key):
+                allowed = "z in a plane case; allowed are x, y and normal"
+                raise InputError(case.path, f"supports[{i}].{key}", "z", allowed)
     for expression in _expressions(case):
         if "z" in expression.names:
             allowed = "z in a plane case; allowed are x, y and r"
@@ -151,11 +157,13 @@ def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
     for key, value in case.reference.items():
         if isinstance(value, tuple):
             yield f"reference.{key}", value
+        if key == "reaction" and isinstance(value, dict):
+            yield from ((f"reference.reaction.{group}", v) for group, v in value.items())
 
 
 def _expressions(case: Case) -> Iterable[Expression]:
     """Every expression of the case."""
-    values: list[Any] = [support.fix for support in case.supports]
+    values: list[Any] = [{**support.fix, **support.spring} for support in case.supports]
     values += [load.value for load in case.loads]
     values += case.reference.values()
     values += [zone.clearance for zone in case.zones]

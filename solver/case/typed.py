@@ -66,7 +66,7 @@ class Section(Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         for name in _different(type(self)):
-            items = getattr(self, name)
+            items = getattr(self, name) or ()
             if len({repr(item) for item in items}) < len(items):
                 allowed = f"must be {described(fields(type(self))[name].type)}, each once"
                 raise FieldError((name,), allowed)

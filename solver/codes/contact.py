@@ -76,7 +76,8 @@ class SurfaceValues:
 def surfaces(model: Model, placed: Placed, where: object, name: str) -> list[SurfaceValues]:
     """The values of a pressure or gap by zone; those on no slave surface are left out.
 
-    Raises InputError where they are on the master surfaces alone.
+    Raises InputError where they are on the master surfaces alone, and where pressures at nodes
+    leave corners of slave faces out.
     """
     owner = _zones_of(model, placed)
     _refuse_exchanged(model, placed, owner, where, name)
@@ -92,7 +93,7 @@ def surfaces(model: Model, placed: Placed, where: object, name: str) -> list[Sur
         if not placed.numbered and each and (far < tolerance).all():
             found.append(_at_faces(zone, mine, face, name))
         elif (apart < tolerance).all():
-            found.append(_at_nodes(model, zone, mine, zone.slave_nodes[node], name))
+            found.append(_at_nodes(model, zone, mine, zone.slave_nodes[node], name, where))
         else:
             found.append(SurfaceValues(zone, "point", mine, np.arange(len(mine.places))))
     return found
@@ -139,17 +140,21 @@ def _refuse_exchanged(
 
 
 def _at_nodes(
-    model: Model, zone: ZoneResult, placed: Placed, nodes: np.ndarray, name: str
+    model: Model, zone: ZoneResult, placed: Placed, nodes: np.ndarray, name: str, where: object
 ) -> SurfaceValues:
-    """Values at slave nodes; with all vertices known, pressures on the whole surface."""
+    """Values at slave nodes; pressures on the whole surface."""
     count = np.bincount(nodes, minlength=len(model.points))
     mean = np.bincount(nodes, placed.values, len(model.points)) / np.maximum(count, 1)
     vertices = np.unique(
         np.concatenate([f[:, : cell_type(kind).n_vertices].ravel() for kind, f, _ in zone.faces])
     )
     surface = SurfaceValues(zone, "node", placed, nodes)
-    if name != "pressure" or not count[vertices].all():
+    if name != "pressure":
         return surface
+    if missing := int((count[vertices] == 0).sum()):
+        told = f"{missing} of {len(vertices)} corners of the slave faces have none"
+        problem = f"{told}: it must be 0 where there is no contact"
+        raise InputError(where, name, None, problem)
     known = zone.slave_nodes if count[zone.slave_nodes].all() else vertices
     nothing = np.zeros(len(known))
     nodal = NodalContact(known, mean[known], nothing, mean[known] > 0)

@@ -147,6 +147,10 @@ def _is_constant(load: Load) -> bool:
 
 
 def _refuse(case: Case) -> None:
+    if any(support.together for support in case.supports):
+        raise UnsupportedError("groups that move as one: not written for codes")
+    if any(support.spring for support in case.supports):
+        raise UnsupportedError("springs and elastic foundations: not written for codes")
     if case.plane == "axisymmetric":
         raise UnsupportedError("axisymmetric bodies: not written for other codes")
     for zone in case.zones:

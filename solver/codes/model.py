@@ -179,7 +179,8 @@ class Model:
                 motion = np.zeros(self.scene.points.shape)
                 motion[mine, axis] = 1.0
                 left = motion.ravel() - basis @ (basis.T @ motion.ravel())
-                if np.abs(left).max() < 1e-9:
+                sprung = (self.scene.springs @ motion.ravel()).any()
+                if np.abs(left).max() < 1e-9 and not sprung:
                     force[axis] = sign * self.scene.force[mine, axis].sum()
         return force, scale
 

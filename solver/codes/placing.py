@@ -100,11 +100,14 @@ class Placer:
             raise self._refused("mesh", f"nothing of it is where the case has the body {name}")
 
     def place(self, field: Field, name: str) -> Placed:
-        """The values of a field on the case; NaN values are left out."""
+        """The values of a field on the case; NaN, where there may be no value, is left out."""
         places = self._flat(field.places, name)
         known = np.isfinite(field.values.reshape(len(places), -1)).all(axis=1)
         if not known.any():
             raise self._refused(name, "no value of it is a finite number")
+        if np.isinf(field.values).any() or self._lacks(field, known, name):
+            problem = f"{int((~known).sum())} of {len(known)} values are not finite numbers"
+            raise self._refused(name, problem)
         values, area = field.values[known], None if field.area is None else field.area[known]
         places = places[known]
         numbered, own = field.nodes is not None and self.points is not None, None
@@ -127,6 +130,13 @@ class Placer:
             area=area,
             own=own,
         )
+
+    def _lacks(self, field: Field, known: np.ndarray, name: str) -> bool:
+        """Whether nodes of bodies that deform have no displacement or stress."""
+        if name in CONTACT or field.nodes is None or self.points is None:
+            return False
+        body = self.body[field.nodes[~known]]
+        return bool((~self.model.rigid[body[body >= 0]]).any())
 
     def _flat(self, points: np.ndarray, name: str) -> np.ndarray:
         """Places in the case's dimension; those of a plane case may have any z."""

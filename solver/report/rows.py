@@ -151,13 +151,18 @@ class Row:
 
 
 def read_rows(verdicts: Iterable[Path]) -> list[Row]:
-    """All verdicts as rows, failures first.
+    """All verdicts as rows, ours before those of other codes, failures first.
 
     A file that is not a verdict as it was written, or not that of its folder and result, is a row
     of a crashed solve.
     """
     rows = [Row(_read(path), path.parent) for path in verdicts]
-    return sorted(rows, key=lambda row: (row.group, WORDS.index(row.word), natural(row.name)))
+    return sorted(rows, key=_place)
+
+
+def _place(row: Row) -> tuple[str, bool, int, list[tuple[int, int | str]]]:
+    """Where a row is in the tables: ours before those of other codes."""
+    return row.group, bool(row.verdict.code), WORDS.index(row.word), natural(row.name)
 
 
 def natural(name: str) -> list[tuple[int, int | str]]:

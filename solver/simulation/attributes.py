@@ -23,12 +23,21 @@ from ..mechanics.fem.faces import (
 )
 from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
-from ..mechanics.fem.supports import SAME, Fixed, FreeMotion, SupportClashError, free_motion
+from ..mechanics.fem.supports import (
+    SAME,
+    Fixed,
+    FreeMotion,
+    SupportClashError,
+    TieError,
+    free_motion,
+    tied,
+)
 from ..mechanics.mortar.cut import CutMesh, SubFaces
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
 from .exact import node_parts
 from .groups import ALL
+from .relations import ties_of
 
 
 @dataclass(frozen=True)
@@ -217,8 +226,9 @@ class Attributes:
                 values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
         return found
 
-    def supports(self) -> FreeMotion:
-        """The motion that supports and rigid bodies leave free."""
+    @cached_property
+    def fixed(self) -> dict[str, Fixed]:
+        """What the axis, supports and rigid bodies hold, by the key of the case file."""
         fixed = dict(self._fixed())
         self._refuse_moved(fixed)
         dim = self.points.shape[1]
@@ -231,11 +241,19 @@ class Attributes:
             for name, axis in zip("xyz", np.eye(dim), strict=False):
                 directions = np.tile(axis, (len(nodes), 1))
                 fixed[f"bodies.{group}.{name}"] = Fixed(nodes, directions, np.zeros(len(nodes)))
+        return fixed
+
+    def supports(self) -> FreeMotion:
+        """The motion that supports and rigid bodies leave free."""
+        ties = ties_of(self)
         try:
-            return free_motion(len(self.points), dim, list(fixed.values()))
+            free = free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
+            return tied(free, list(ties.values()))
+        except TieError as error:
+            raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
         except SupportClashError as clash:
-            key = list(fixed)[clash.number]
-            told = " (on the axis x is fixed)" if len(on_axis) else ""
+            key = list(self.fixed)[clash.number]
+            told = " (on the axis x is fixed)" if len(self.fixed["plane"].nodes) else ""
             raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:

@@ -7,6 +7,7 @@ from scipy.sparse.linalg import spsolve
 from ..mechanics.fem.faces import face_integrals
 from .problem import Equilibrium
 from .scene import Scene, ZoneScene
+from .solution import Reaction
 
 # A macro-element of which the segments miss less than this share is covered in full.
 _COVERED = 1e-6
@@ -35,15 +36,73 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         contact += state.correction
     for name, forces in by_zone.items():
         result |= _both(f"zone {name}", points, forces, scale, scene.length, around)
-    unbalanced = (state.iterate.internal - state.force - contact).astype(float).ravel()
-    basis = scene.free.basis
-    # What is left on held unknowns are the reactions; on free ones nothing may be left.
-    free_part = (basis @ (basis.T @ unbalanced)).reshape(points.shape)
-    reactions = unbalanced.reshape(points.shape) - free_part
-    whole = reactions + state.force
+    held, free_part = _unbalanced(scene, state, contact)
+    whole = held + state.force + _of_springs(state)
     result |= _both("reactions and loads", points, whole, scale, scene.length, around)
     result["free nodes: force"] = float(np.abs(free_part).max(initial=0.0) / scale)
     return result
+
+
+def _unbalanced(
+    scene: Scene, state: Equilibrium, contact: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What loads and `contact` forces leave on held unknowns, the reactions, and on free ones."""
+    unbalanced = (state.iterate.internal - state.force - contact).astype(float).ravel()
+    basis = scene.free.basis
+    free_part = (basis @ (basis.T @ unbalanced)).reshape(contact.shape)
+    return unbalanced.reshape(contact.shape) - free_part, free_part
+
+
+def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
+    """The reactions of each group that supports hold, of rigid bodies, the axis, springs and ties.
+
+    What two supports hold at a node belongs to the first of them that holds its direction.
+    """
+    contact = state.correction.copy()
+    for zone in scene.zones:
+        force = zone.operator.matrix.T @ state.pressure[zone.numbers]
+        contact += force.reshape(contact.shape)
+    left, _ = _unbalanced(scene, state, contact)
+    found: dict[str, np.ndarray] = {}
+    for key, fixed in scene.fixed.items():
+        along = np.einsum("nd,nd->n", left[fixed.nodes], fixed.directions)
+        part = along[:, None] * fixed.directions
+        left[fixed.nodes] -= part
+        if len(fixed.nodes):
+            force = found.setdefault(_holder(scene, key), np.zeros_like(left))
+            force[fixed.nodes] += part
+    if any(support.together for support in scene.case.supports):
+        found["together"] = left
+    if state.iterate.springs.any():
+        found["springs"] = _of_springs(state)
+    return [_resultant(scene, name, force) for name, force in found.items()]
+
+
+def _of_springs(state: Equilibrium) -> np.ndarray:
+    """The forces (n, dim) of springs on the bodies."""
+    return -state.iterate.springs
+
+
+def _holder(scene: Scene, key: str) -> str:
+    """The group that a key of the case file holds."""
+    if key == "plane":
+        return "axis"
+    if key.startswith("supports["):
+        return scene.case.supports[int(key[len("supports[") : key.index("]")])].group
+    return key.removeprefix("bodies.").rpartition(".")[0]
+
+
+def _resultant(scene: Scene, name: str, force: np.ndarray) -> Reaction:
+    flat = ((0, 0), (0, 3 - force.shape[1]))
+    places = np.pad(scene.points + scene.origin, flat)
+    moment = np.cross(places, np.pad(force, flat)).sum(axis=0)
+    return Reaction(name, force.sum(axis=0), moment * (not scene.case.axisymmetric))
+
+
+def strain_energy(state: Equilibrium) -> float:
+    """½ ∫ σ:ε of the bodies: half the work of internal forces, to which rigid motions add none."""
+    moved = state.iterate.deformation.sum(axis=0)
+    return float((moved * (state.iterate.internal - state.iterate.springs)).sum() / 2)
 
 
 def _both(

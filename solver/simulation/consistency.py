@@ -42,6 +42,11 @@ def _all(solution: Solution) -> Iterator[str]:
     yield from _values("the solve's own numbers", np.array(known), (len(known),))
     if {zone.name for zone in solution.zones} != {zone.name for zone in solution.case.zones}:
         yield "the contact zones are not those of the case"
+    if solution.strain_energy is not None:
+        yield from _values("strain energy", np.array([solution.strain_energy]), (1,))
+    for one in solution.reactions:
+        yield from _values(f"the force on {one.group}", one.force, (dim,))
+        yield from _values(f"the moment on {one.group}", one.moment, (3,))
     yield from _steps(solution)
     for zone in solution.zones:
         for fault in chain(_zone(zone, n, dim), _resultants(zone, dim)):

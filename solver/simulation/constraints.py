@@ -91,6 +91,12 @@ def _slave_dofs(scene: Scene) -> np.ndarray:
     return slave
 
 
+def unit_springs(scene: Scene) -> sparse.csr_matrix:
+    """The stiffness of springs, the largest entry one."""
+    largest = abs(scene.springs).max() if scene.springs.nnz else 1.0
+    return scene.springs / largest
+
+
 def free_motion(
     scene: Scene,
     motions: sparse.csc_matrix,
@@ -102,7 +108,8 @@ def free_motion(
     `motions` (n_dofs, r): the rigid motions of all bodies.
     """
     per_area = sparse.diags(1 / constraints.covered[closed]) @ constraints.gaps[closed]
-    found = unheld_motion(motions, scene.free.basis, per_area, scene.n_bodies)
+    held = sparse.vstack([per_area, unit_springs(scene)]).tocsr()
+    found = unheld_motion(motions, scene.free.basis, held, scene.n_bodies)
     if found is None:
         return ""
     return f"nothing keeps {body_names(scene)[found[0]]} from a free motion ({found[1]})"

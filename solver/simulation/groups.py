@@ -168,13 +168,15 @@ class _Groups:
     def check_supports(self) -> None:
         for i, support in enumerate(self.case.supports):
             key = f"supports[{i}].group"
+            if support.spring and support.group not in self.mesh.point_sets:
+                self.cells(key, support.group, self.dim - 1)
             if support.group == ALL:
                 if "normal" in support.fix:
                     allowed = "normal needs a group of faces; `all` is fixed along x, y and z"
                     raise self.error(key, ALL, allowed)
                 continue
             self.require(key, support.group)
-            if "normal" in support.fix:
+            if "normal" in {*support.fix, *support.spring}:
                 self.cells(key, support.group, self.dim - 1)
             cells = self.mesh.cell_sets.get(support.group, [])
             if not sum(map(len, [*cells, self.mesh.point_sets.get(support.group, [])])):

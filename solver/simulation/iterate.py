@@ -40,14 +40,19 @@ class ContactIterate:
 
     @cached_property
     def internal(self) -> np.ndarray:
-        """Internal forces (n, dim)."""
+        """Internal forces (n, dim), those in springs included."""
         points, blocks = self.scene.points, self.scene.blocks
         if self.scene.options.safeguards.differences:
             internal = internal_force(points, blocks, self.deformation, self.extended)
         else:
             product = stiffness(points, blocks)[0] @ self.displacement.total
             internal = product.reshape(self.force.shape)
-        return internal + self.scene.mean.force(self.mean_stress)
+        return internal + self.scene.mean.force(self.mean_stress) + self.springs
+
+    @cached_property
+    def springs(self) -> np.ndarray:
+        """The forces (n, dim) in springs to the ground."""
+        return (self.scene.springs @ self.displacement.total).reshape(self.force.shape)
 
     @cached_property
     def sizes(self) -> Sizes:
@@ -97,7 +102,7 @@ class ContactIterate:
         What does not depend on the force is not computed anew, and the sizes of stresses stay those
         that they were, also after the iterates that follow: they scale round-off alone.
         """
-        return replace(self, force=force)._knowing(self, "defect", "internal", "sizes")
+        return replace(self, force=force)._knowing(self, "defect", "internal", "springs", "sizes")
 
     def _knowing(self, other: "ContactIterate", *names: str) -> "ContactIterate":
         known = vars(other)

@@ -23,6 +23,7 @@ from .constraints import (
     contact_constraints,
     free_motion,
     refuse_unsolvable,
+    unit_springs,
 )
 from .displacement import Displacement
 from .iterate import ContactIterate
@@ -88,14 +89,14 @@ class ContactProblem:
         self.motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         refuse_unsolvable(scene, self.motions, self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
-        self.unsupported = unsupported(self.motions, scene.free.basis)
+        self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
         self.at_rest = Displacement.zero(
-            self.unsupported, surface, scene.options.safeguards.remainder
+            unsupported(self.motions, scene.free.basis), surface, scene.options.safeguards.remainder
         )
         self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
-        unknowns = _unknowns(scene)
+        unknowns = _unknowns(scene, self.motions)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
 
@@ -294,17 +295,19 @@ def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
         matrix = free.reduced(matrix)
     if mean.size:
         matrix = matrix + free.reduced(mean.stiffness())
+    if scene.springs.nnz:
+        matrix = matrix + free.reduced(scene.springs)
+        diagonal = diagonal + scene.springs.diagonal()
     return matrix, diagonal
 
 
-def _unknowns(scene: Scene) -> Unknowns:
-    """The meaning of a scene's free unknowns.
-
-    The motions of sections in their plane hardly strain rings that are far from the axis.
-    """
+def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
+    """The meaning of a scene's free unknowns, given the rigid motions of its bodies."""
     basis, dim = scene.free.basis, scene.points.shape[1]
     node = nodes_of_unknowns(basis, dim)
-    motions = rigid_motions(scene.points, scene.body)
+    if scene.case.axisymmetric:
+        # Those of the sections in their plane: they hardly strain rings far from the axis.
+        motions = rigid_motions(scene.points, scene.body)
     together = basis.T @ whole_motions(motions, scene.n_bodies)
     quadratic = any(block.type.order == 2 for block in scene.blocks)
     return Unknowns(dim, node, together, scene.body[node], quadratic)

@@ -7,13 +7,14 @@ from typing import TypeAlias
 
 import meshio
 import numpy as np
+from scipy import sparse
 
 from ..case.model import Case, Zone
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, surface_points, volume_cells
 from ..mechanics.fem.mixed import MeanStress
-from ..mechanics.fem.supports import FreeMotion
+from ..mechanics.fem.supports import Fixed, FreeMotion
 from ..mechanics.mortar.cut import CutMesh, SubFaces, cut
 from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from ..mechanics.mortar.held import merge_fixed_multipliers
@@ -29,6 +30,7 @@ from ..system.progress import stage
 from .attributes import Attributes, CutZone, faces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .options import LEAN, Options
+from .relations import springs_of
 from .selections import with_groups
 
 # Slave and master faces of each zone.
@@ -108,7 +110,9 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `force` (n, dim) and `free.offset` are for load factor 1.
+    up for it. `fixed`: the displacements that are held, by key of the case file. `springs` (n_dofs,
+    n_dofs) is the stiffness of springs to the ground. `force` (n, dim) and `free.offset` are for
+    load factor 1.
     """
 
     case: Case
@@ -122,8 +126,10 @@ class Scene:
     body: np.ndarray
     blocks: list[Block]
     mean: MeanStress
+    fixed: dict[str, Fixed]
     free: FreeMotion
     force: np.ndarray
+    springs: sparse.csr_matrix
     zones: list[ZoneScene]
     rest: Rest
 
@@ -173,7 +179,7 @@ def build_scene(
     with stage(clock, "assembly"):
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
-        force = groups.forces()
+        force, springs = groups.forces(), springs_of(groups)
         zones = _zones(case, cut_zones, surfaces, operators, free)
     body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
     n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
@@ -193,8 +199,10 @@ def build_scene(
         body=body,
         blocks=blocks,
         mean=mean,
+        fixed=groups.fixed,
         free=free,
         force=force,
+        springs=springs,
         zones=zones,
         rest=Rest(
             unloaded_bodies=np.zeros(n_bodies, dtype=bool),

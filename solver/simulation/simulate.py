@@ -16,7 +16,7 @@ from ..system.clock import Clock, processor_time
 from ..system.errors import SolveError
 from ..system.memory import peak_mb
 from ..system.progress import OUTCOME, stage
-from .balance import imbalances, pressures_of_forces
+from .balance import imbalances, pressures_of_forces, reactions, strain_energy
 from .consistency import inconsistency
 from .geometry import check_geometry
 from .naming import body_infos
@@ -81,6 +81,12 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
         solution = _recover(problem, states, recovered, plan)
     for zone in solution.zones:
         _LOG.log(OUTCOME, "zone %s: %s", zone.name, zone.resultants)
+    for reaction in solution.reactions:
+        _LOG.log(OUTCOME, "reaction of %s: %s", reaction.group, reaction)
+    largest, place = solution.largest_displacement
+    at = ", ".join(f"{x:.5g}" for x in place)
+    told = largest, at, solution.strain_energy
+    _LOG.log(OUTCOME, "largest displacement %.6g at (%s), strain energy %.6g", *told)
     solution.plan += [*estimated(solution), *strained(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
@@ -147,6 +153,8 @@ def _recover(
         plan=plan,
         strain=strain,
         rotation=rotation,
+        strain_energy=strain_energy(last),
+        reactions=reactions(scene, last),
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
     )

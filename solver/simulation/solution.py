@@ -90,6 +90,22 @@ class RecoveredPressure:
 
 
 @dataclass
+class Reaction:
+    """What holds a group: `force` (dim,) on the bodies, `moment` (3,) about the origin.
+
+    `group` is that of supports, a rigid body, `axis` for the points on the axis, or `springs`.
+    """
+
+    group: str
+    force: np.ndarray
+    moment: np.ndarray
+
+    def __str__(self) -> str:
+        force, moment = (", ".join(f"{x:.6g}" for x in v) for v in (self.force, self.moment))
+        return f"force ({force}), moment ({moment})"
+
+
+@dataclass
 class Resultants:
     """The resultants of contact in a zone.
 
@@ -155,6 +171,15 @@ class ZoneResult:
     resultants: Resultants | None = None
 
     @property
+    def pressure_error_estimate(self) -> np.ndarray:
+        """The estimated root mean square error (m,) of each constant, a stress; NaN if unknown."""
+        unknown = np.full(len(self.area), np.nan)
+        if self.pressure_error is None:
+            return unknown
+        covered = self.area * self.coverage
+        return np.divide(self.pressure_error, np.sqrt(covered), out=unknown, where=covered > 0)
+
+    @property
     def relative_pressure_error(self) -> float | None:
         """The estimated L2 error of the constants over their norm; None if unknown."""
         return pressure_error([self])
@@ -205,6 +230,7 @@ class Solution:
     `accuracy` are the relative errors that rounding alone may cause, by cause (see
     `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
+    `reactions` of supports and `strain_energy` are those of the last load factor.
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
     `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
     the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
@@ -233,6 +259,8 @@ class Solution:
     linear_iterations: int = 0
     strain: float = float("nan")
     rotation: float = float("nan")
+    strain_energy: float | None = None
+    reactions: list[Reaction] = field(default_factory=list)
     accuracy: dict[str, float] = field(default_factory=dict)
     mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
@@ -250,6 +278,13 @@ class Solution:
     def hexahedra(self) -> str | None:
         """The cut of slave hexahedra, if it overrides that of the case."""
         return self.case.hexahedra
+
+    @property
+    def largest_displacement(self) -> tuple[float, np.ndarray]:
+        """The length of the largest displacement, and its place (dim,)."""
+        size = np.linalg.norm(self.displacement, axis=1)
+        node = int(size.argmax())
+        return float(size[node]), self.mesh.points[node]
 
     @property
     def pressure_error_estimate(self) -> float | None:

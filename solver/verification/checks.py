@@ -94,6 +94,13 @@ def _elongation(solution: Solution) -> float:
     return float(solution.load_scale / stiffness * block_size(solution))
 
 
+def _total_force(solution: Solution) -> float:
+    """The largest reaction or contact force; one where nothing acts."""
+    forces = [r.force for r in solution.reactions]
+    forces += [zone.resultants.force for zone in solution.zones if zone.resultants]
+    return max((float(np.abs(force).max()) for force in forces), default=0.0) or 1.0
+
+
 def _unit(_: Solution) -> float:
     """One."""
     return 1.0
@@ -129,6 +136,10 @@ CHECKS: tuple[Check, ...] = (
         like="stress_components",
     ),
     Check("balance", None, None, samples.balance, _unit, 1e-10, fixed=True, by_zone=False),
+    Check("force", None, "force", samples.contact_force, _total_force),
+    Check("contact_area", None, "contact_area", samples.contact_area, _unit),
+    Check("reaction", None, "reaction", samples.reaction, _total_force, by_zone=False),
+    Check("strain_energy", None, "strain_energy", samples.strain_energy, _unit, by_zone=False),
     Check("counts", None, None, samples.counts, _unit, 0.0, fixed=True, by_zone=False),
     Check("observation", "OBSERVATION/PRES", _PRESSURE, samples.observed("pressure"), _load),
     Check(

@@ -12,7 +12,8 @@ that the checks need, so that it can be judged without solving:
                    of nodes where the treatment has its multipliers there; in `recovered` the
                    coefficients of a recovered pressure and its values at nodes; in `resultants`
                    area, force and moment of contact, in `edges` where it ends in 2D
-    /bodies /balance /steps /observation /plan /timings /checks    tables, a data set a column
+    /bodies /balance /reactions /steps /observation /plan /timings /checks
+                   tables, a data set a column
     /provenance    versions, revision, hashes, machine
 
 Where the case names its units, fields have them as their attribute `unit`, and the grid lists them.
@@ -40,6 +41,7 @@ from ..simulation.consistency import inconsistency
 from ..simulation.solution import (
     BodyInfo,
     Line,
+    Reaction,
     Solution,
     StepResult,
 )
@@ -63,7 +65,13 @@ _SCALARS = (
     "cpu_seconds",
     "peak_memory_mb",
 )
-_ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
+_ON_FACES = {
+    "pressure": "multiplier",
+    "gap": "gap",
+    "status": "closed",
+    "coverage": "coverage",
+    "pressure_error_estimate": "pressure_error_estimate",
+}
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 
@@ -100,6 +108,9 @@ def _write(
     _write_case(file.create_group("case"), solution)
     file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
     file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
+    if solution.strain_energy is not None:
+        file["solve"].attrs["strain_energy"] = solution.strain_energy
+    write_table(file.create_group("reactions"), [asdict(one) for one in solution.reactions])
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
@@ -175,6 +186,8 @@ def _read_solution(file: h5py.File) -> Solution:
         plan=[Line(**row) for row in read_table(file["plan"])],
         strain=float(file["solve"].attrs.get("strain", np.nan)),
         rotation=float(file["solve"].attrs.get("rotation", np.nan)),
+        strain_energy=_plain(file["solve"].attrs).get("strain_energy"),
+        reactions=_read_reactions(file),
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
@@ -304,6 +317,11 @@ def _read_bodies(group: h5py.Group) -> list[BodyInfo]:
         )
         for number, row in enumerate(read_table(group))
     ]
+
+
+def _read_reactions(file: h5py.File) -> list[Reaction]:
+    rows = read_table(file["reactions"]) if "reactions" in file else []
+    return [Reaction(r["group"], np.array(r["force"]), np.array(r["moment"])) for r in rows]
 
 
 def _write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:

@@ -257,6 +257,43 @@ def balance(solution: Solution, _: None, __: Reference) -> Sample:
     return Sample(values, np.zeros(len(values)), lambda i: f"the balance of {names[i]}")
 
 
+def contact_force(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+    """The force on the surface that the case lists as slave, which may be solved as master."""
+    if zone.resultants is None:
+        return None
+    sign = -1.0 if solution.swapped else 1.0
+    return Sample(sign * zone.resultants.force, np.array(reference), lambda i: f"along {'xyz'[i]}")
+
+
+def contact_area(_: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+    """The area of contact."""
+    if zone.resultants is None:
+        return None
+    return Sample(zone.resultants.area[:1], np.array([reference]), lambda _: "the whole zone")
+
+
+def reaction(solution: Solution, _: None, reference: Reference) -> Sample | None:
+    """The forces that hold groups; InputError for a group that nothing holds."""
+    found = {one.group: one.force for one in solution.reactions}
+    if not found:
+        return None
+    for group in reference:
+        if group not in found:
+            allowed = f"no support holds it; {hint(group, found)}"
+            raise InputError(solution.case.path, f"reference.reaction.{group}", group, allowed)
+    places = [f"{group} along {axis}" for group in reference for axis in "xyz"[: len(found[group])]]
+    values = np.concatenate([found[group] for group in reference])
+    return Sample(values, np.concatenate(list(reference.values())), lambda i: places[i])
+
+
+def strain_energy(solution: Solution, _: None, reference: Reference) -> Sample | None:
+    """The strain energy of all bodies together."""
+    if solution.strain_energy is None:
+        return None
+    found = np.array([solution.strain_energy])
+    return Sample(found, np.array([reference]), lambda _: "the whole solve")
+
+
 def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
     """Cells and contact faces of the bodies as meshed; the case gives the reference.
 

@@ -127,6 +127,23 @@ FAULTS = {
         "coordinates are those of the deformed mesh",
     ),
     "longer": (lambda a: a.changed(points=a.points * [1.3, 1]), 2, "the case is from (0, -50)"),
+    "a node without a value": (
+        lambda a: a.changed(
+            stress=np.where(np.arange(len(a.stress))[:, None] == 7, np.nan, a.stress)
+        ),
+        2,
+        "stress: 1 of 308 values are not finite numbers",
+    ),
+    "infinite": (
+        lambda a: a.changed(displacement=np.where(a.points[:, :1] > 49, np.inf, a.displacement)),
+        2,
+        "values are not finite numbers",
+    ),
+    "a part of the pressure": (
+        lambda a: a.changed(pressure=np.where(a.points[:, 0] < 30, a.pressure, np.nan)),
+        2,
+        "of 18 corners of the slave faces have none: it must be 0 where there is no contact",
+    ),
     "not finite": (
         lambda a: a.changed(displacement=np.full_like(a.displacement, np.nan)),
         2,

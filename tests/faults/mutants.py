@@ -47,7 +47,8 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
     "lame/cylinders-two-materials",
     "hydrostatic/tilted-hexa20-tetra10",
 )
-SPHERES, FORCES = "lame/spheres-hexa20", "loads/selected-groups"
+SPHERES = "lame/spheres-hexa20"
+FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -287,6 +288,12 @@ MUTANTS = (
            "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
     Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
            "solver.simulation.selections:_within", changed(np.ones_like)),
+    Mutant("spring-weight", "an elastic foundation is 1 % too stiff", FOUNDATION,
+           "solver.simulation.relations:foundation", changed(lambda k: 1.01 * k)),
+    Mutant("spring-reaction", "the balance of forces leaves out springs", FOUNDATION,
+           "solver.simulation.balance:_of_springs", changed(np.zeros_like)),
+    Mutant("tie-lost", "nodes that should move as one move apart", PLATEN,
+           "solver.simulation.attributes:tied", lambda _: lambda free, ties: free),
     Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
            "solver.simulation.scene:gap_operator",
            changed(lambda o: replace(o, matrix=0.97 * o.matrix))),

@@ -86,6 +86,7 @@ def test_rows_of_their_own_in_every_format(report):
     names = {"ssnp170-a", "ssnp170-a@right", "ssnp170-a@near", "ssnp170-a@cannot"}
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert {row["job"] for row in summary} == names
+    assert summary[0]["job"] == "ssnp170-a"  # before the failures of other codes
     with (folder / "summary.csv").open(encoding="utf-8", newline="") as file:
         assert {row["job"] for row in csv.DictReader(file)} == names
     suite = ET.parse(folder / "junit.xml").getroot()[0]

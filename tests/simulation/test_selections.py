@@ -143,7 +143,7 @@ REFUSED = [
     ("group: low,", "at: [0.3, -1.1],", "the nearest is at (0.5, -1), 0.224 away"),
     ("group: low,", "at: [0, 0],", "supports[0].at = [0.0, 0.0]: 2 nodes are there"),
     ("group: low,", "at: [0, 0, 0],", "supports[0].at = [0.0, 0.0, 0.0]: must have 2 components"),
-    ("group: low,", "", "must be {fix, and exactly one of group, at}"),
+    ("group: low,", "", "must be {fix, spring or together, and exactly one of group, at}"),
     ("group: low, fix: [y]", "group: all, fix: [normal]", "normal needs a group of faces"),
     ("point: [5, -1]", "point: [5, -2]", "groups.low = 'low': no faces of the mesh are there"),
     ("normal: [0, 3]", "normal: [0, 0]", "groups.low.plane.normal = [0, 0]: must have a direction"),

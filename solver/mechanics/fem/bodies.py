@@ -50,13 +50,20 @@ def whole_motions(motions: sparse.csc_matrix, n_bodies: int) -> np.ndarray:
     return np.asarray(motions @ np.tile(np.eye(each), (n_bodies, 1)))
 
 
-def unsupported(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> sparse.csr_matrix:
+def unsupported(
+    motions: sparse.csc_matrix,
+    basis: sparse.csr_matrix,
+    springs: sparse.csr_matrix | None = None,
+) -> sparse.csr_matrix:
     """The rigid motions (n_dofs, k) of each body that the supports leave free.
 
-    `basis` (n_dofs, n_free) spans the displacements that the supports leave free.
+    `basis` (n_dofs, n_free) spans the displacements that the supports leave free; `springs`
+    (n_dofs, n_dofs), a stiffness, resist motions too.
     """
     held = motions - basis @ (basis.T @ motions)
     resistance = (held.T @ held).toarray()
+    if springs is not None:
+        resistance += (motions.T @ springs @ motions).toarray()
     values, vectors = np.linalg.eigh(resistance)
     free = values <= _FREE * max(float(values[-1]), np.finfo(float).tiny)
     # Round-off entries would mix the bodies and fill the motions up.

@@ -20,6 +20,14 @@ class SupportClashError(Exception):
         self.number, self.value = number, value
 
 
+class TieError(Exception):
+    """A tie, by its `number`, has degrees of freedom that another one or a support takes."""
+
+    def __init__(self, number: int, count: int):
+        super().__init__(f"{count} of its nodes are held there, or tied, by another support")
+        self.number = number
+
+
 @dataclass(frozen=True)
 class Fixed:
     """Imposed displacement of nodes (n,) along unit directions (n, dim), of values (n,)."""
@@ -81,6 +89,32 @@ def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed]) -> FreeMotion:
         offset[node] += unit * (missing[new] / length[new])[:, None]
         count[node] += 1
     return _basis(held, count, offset)
+
+
+def tied(free: FreeMotion, ties: Sequence[np.ndarray]) -> FreeMotion:
+    """What is left free where all degrees of freedom (n,) of each tie have one displacement.
+
+    Raises TieError where one is not free by itself.
+
+    >>> tied(free_motion(2, 1, []), [np.array([0, 1])]).basis.toarray().round(4).tolist()
+    [[0.7071], [0.7071]]
+    """
+    if not ties:
+        return free
+    rows, columns = free.basis.tocsr(), free.basis.tocsc()
+    alone = np.diff(rows.indptr) == 1
+    alone[alone] = np.diff(columns.indptr)[rows.indices[rows.indptr[:-1][alone]]] == 1
+    into = np.arange(free.basis.shape[1])
+    for number, dofs in enumerate(ties):
+        if not alone[dofs].all():
+            raise TieError(number, int((~alone[dofs]).sum()))
+        unknowns = rows.indices[rows.indptr[dofs]]
+        into[unknowns] = unknowns.min()
+        alone[dofs] = False
+    _, into, count = np.unique(into, return_inverse=True, return_counts=True)
+    entries = (1 / np.sqrt(count[into]), (np.arange(len(into)), into))
+    merged = sparse.csr_matrix(entries, shape=(len(into), len(count)))
+    return FreeMotion((rows @ merged).tocsr(), free.offset, None)
 
 
 def _parts(held: np.ndarray, vector: np.ndarray) -> np.ndarray:

@@ -1,0 +1,120 @@
+"""Reactions, strain energy and largest displacement, by hand; and the checks that compare them."""
+
+import numpy as np
+import pytest
+
+from solver.simulation.simulate import simulate
+from solver.system.errors import InputError
+from solver.verification.checks import run_checks
+from solver.verification.results import read_result, write_result
+from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, changed_case
+
+NUMBERS = """\
+reference:
+  kind: analytical
+  force: [0.0, -25.0]
+  contact_area: 1.0
+  reaction: {base: [0.0, 25.0], symx: [0.0, 0.0]}
+  strain_energy: 0.284375
+"""
+
+
+def by_group(solution):
+    return {one.group: one for one in solution.reactions}
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_reactions_of_the_patch_test(swapped):
+    """A pressure of 25 on blocks of edge 1: the base bears 25 at x = ½, the sides nothing."""
+    found = simulate(changed_case(2).as_solved(swapped), block_mesh("QUAD4", "TRIA6", (4, 3)))
+    held = by_group(found)
+    assert list(held) == ["base", "symx"]
+    assert held["base"].force == pytest.approx([0, 25], abs=1e-12)
+    assert held["base"].moment == pytest.approx([0, 0, 12.5], abs=1e-12)
+    assert held["symx"].force == pytest.approx([0, 0], abs=1e-12)
+    energy = (1 - POISSON**2) * PRESSURE**2 / YOUNG / 2 * 2
+    assert found.strain_energy == pytest.approx(energy)
+    size, place = found.largest_displacement
+    strain = PRESSURE / YOUNG * np.array([POISSON * (1 + POISSON), 2 * (1 - POISSON**2)])
+    assert place == pytest.approx([1, 1])
+    assert size == pytest.approx(np.linalg.norm(strain))
+
+
+def test_reactions_in_space_and_along_normals():
+    """Supports along normals have the same reactions: 25 on the unit square of the base."""
+    held = by_group(simulate(changed_case(3, normal=True), block_mesh("HEXA8", "TETRA4", (2, 2))))
+    assert held["base"].force == pytest.approx([0, 0, 25], abs=1e-11)
+    assert held["base"].moment == pytest.approx([12.5, -12.5, 0], abs=1e-11)
+
+
+def test_sides_that_are_held_bear_the_lateral_stress():
+    """Held on both sides: σ_xx = ν/(1 − ν) σ_yy over the height of 2."""
+    case = changed_case(2, ("supports:\n", "supports:\n  - {group: farx, fix: [x]}\n"))
+    found = simulate(case, block_mesh("QUAD8", "QUAD4", (3, 2)))
+    held = by_group(found)
+    side = 2 * 25 * POISSON / (1 - POISSON)
+    assert held["symx"].force == pytest.approx([side, 0], abs=1e-11)
+    assert held["farx"].force == pytest.approx([-side, 0], abs=1e-11)
+
+
+def test_a_rigid_body_reports_the_force_on_it():
+    rigid = ("supports:\n  - {group: base, fix: [y]}", "bodies: {bottom: {rigid: true}}\nsupports:")
+    case = changed_case(
+        2, rigid, ("slave: bottom_contact, master: top", "master: bottom_contact, slave: top")
+    )
+    held = by_group(simulate(case, block_mesh("QUAD4", "QUAD8", (3, 2))))
+    assert held["bottom"].force == pytest.approx([0, 25], abs=1e-11)
+
+
+def test_mixed_form_has_the_same_energy():
+    mixed = ("poisson: 0.3", "poisson: 0.3, form: mixed")
+    found = simulate(changed_case(2, mixed), block_mesh("QUAD9", "TRIA6", (3, 2)))
+    assert found.strain_energy == pytest.approx(0.284375)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_checks_compare_them_also_of_a_stored_result(swapped, tmp_path):
+    case = changed_case(2, extra=NUMBERS).as_solved(swapped)
+    solution = simulate(case, block_mesh("QUAD4", "QUAD8", (4, 3)))
+    write_result(tmp_path / "r.vtkhdf", solution, [], {})
+    stored = read_result(tmp_path / "r.vtkhdf").solution
+    for one in (solution, stored):
+        found = {check.name: check for check in run_checks(one)}
+        for name in ("force", "contact_area", "reaction", "strain_energy"):
+            assert found[name].error < 1e-12
+            assert found[name].passed
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("force", ("-25.0]", "-24.9]")),
+        ("contact_area", ("area: 1.0", "area: 1.1")),
+        ("reaction", ("symx: [0.0", "symx: [0.1")),
+        ("strain_energy", ("0.284375", "0.284")),
+    ],
+)
+def test_another_number_does_not_pass(name, wrong):
+    case = changed_case(2, extra=NUMBERS.replace(*wrong))
+    found = {c.name: c for c in run_checks(simulate(case, block_mesh("QUAD4", "QUAD8", (4, 3))))}
+    assert [check for check, result in found.items() if not result.passed] == [name]
+
+
+def test_reactions_that_are_refused():
+    mesh = block_mesh("QUAD4", "QUAD4", (2, 2))
+    other = changed_case(2, extra=NUMBERS.replace("symx:", "farx:"))
+    with pytest.raises(InputError, match=r"reference.reaction.farx.*no support holds it; "):
+        run_checks(simulate(other, mesh))
+    with pytest.raises(InputError, match=r"reference.reaction.base.*must have 2 components"):
+        changed_case(2, extra=NUMBERS.replace("base: [0.0, 25.0]", "base: [0.0, 25.0, 0.0]"))
+
+
+def test_springs_have_a_reaction_and_no_strain_energy():
+    """An elastic foundation of 40 under the base bears the load; the blocks strain as before."""
+    case = changed_case(2, ("{group: base, fix: [y]}", "{group: base, spring: {normal: 40.0}}"))
+    found = simulate(case, block_mesh("QUAD4", "QUAD8", (3, 2)))
+    held = by_group(found)
+    assert list(held) == ["symx", "springs"]
+    assert held["springs"].force == pytest.approx([0, 25], abs=1e-11)
+    assert held["springs"].moment == pytest.approx([0, 0, 12.5], abs=1e-11)
+    assert found.strain_energy == pytest.approx(0.284375)
