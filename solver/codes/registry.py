@@ -14,6 +14,7 @@ from .own import own_code
 _CODES = {
     "calculix": (".calculix", "CalculiX"),
     "code_aster": (".code_aster", "CodeAster"),
+    "getfem": (".getfem", "GetFEM"),
     "kratos": (".kratos", "Kratos"),
     "plain": (".plain", "Plain"),
 }

@@ -68,7 +68,6 @@ rule study:
     output:
         f"results/report/{PAGE}.html",
         f"results/report/{PAGE}.csv",
-        directory(f"results/report/{PAGE}"),
     log:
         f"results/report/{PAGE}.log",
     params:

@@ -1,0 +1,64 @@
+"""GetFEM: the plain input, and a script that solves it in the system's Python.
+
+Contact is its integral formulation between nonmatching meshes, by the augmented Lagrangian of Alart
+and Curnier (Comput. Methods Appl. Mech. Engrg. 92, 1991), with multipliers on the slave's faces.
+"""
+
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ..system.errors import InputError, SolveError
+from ..system.process import run_apart
+from .deck import Deck, UnsupportedError
+from .files.read import read_result_files
+from .foreign import ForeignResult
+from .plain import Plain
+
+PYTHON = Path("/usr/bin/python3")
+CELLS = ("TRIA3", "TRIA6", "QUAD4", "QUAD8", "TETRA4", "TETRA10", "HEXA8", "HEXA20")
+_VERSION = "import getfem, subprocess; print(subprocess.check_output(['dpkg-query', '-Wf', "
+_VERSION += "'${Version}', 'python3-getfem'], text=True).partition('+')[0])"
+
+
+class GetFEM(Plain):
+    """Write, run and read; see `solver.codes.run`."""
+
+    name = "getfem"
+    install = "Debian has it as python3-getfem"
+    gave_up = r"GetFEM: no convergence[^\n]*"
+    settings: Mapping[str, str] = {
+        "contact": "integral brick between nonmatching meshes, augmentation E / size of a face",
+        "multipliers": "on the slave's faces, of the order of its cells",
+    }
+
+    def version(self) -> str:
+        """The version of Debian's package; empty where it is not installed."""
+        if not PYTHON.is_file():
+            return ""
+        return run_apart([str(PYTHON), "-Es", "-c", _VERSION], None, 60.0).output.strip()
+
+    def write(self, deck: Deck, folder: Path) -> None:
+        """Write `deck.json` and the script; UnsupportedError for what they have not."""
+        for name in deck.cells:
+            if name not in CELLS:
+                raise UnsupportedError(f"{name}: not written for GetFEM")
+        if len(deck.pairs) != 1:
+            raise UnsupportedError("more or less than one contact zone: not written for GetFEM")
+        zone = deck.pairs[0].zone
+        if zone.clearance is not None or zone.interference:
+            raise UnsupportedError("an initial gap other than as meshed: not in GetFEM")
+        super().write(deck, folder)
+        shutil.copyfile(Path(__file__).with_name("getfem_main.py"), folder / "main.py")
+
+    def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
+        """What to run in `folder`."""
+        return [str(PYTHON), "-Es", "main.py"]
+
+    def read(self, deck: Deck, folder: Path) -> ForeignResult:  # noqa: ARG002
+        """The fields at the end; SolveError where the run came to none."""
+        names = ("displacement", "stress", "pressure")
+        try:
+            return read_result_files([folder / f"{n}.csv" for n in names], code=self.name)
+        except InputError as error:
+            raise SolveError(f"its results: {error}") from None

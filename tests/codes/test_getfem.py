@@ -1,0 +1,59 @@
+"""GetFEM: the order of nodes in its script, what is refused, and GetFEM itself where installed."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import solver.codes
+from solver.codes.deck import UnsupportedError, deck_of
+from solver.codes.getfem import CELLS, GetFEM
+from solver.codes.run import Limits, run_code
+from solver.mesh.catalogue import BY_NAME
+from tests.codes.blocks import case_of
+
+SCRIPT = Path(solver.codes.__file__).with_name("getfem_main.py")
+
+
+def test_nodes_along_x_first_then_y_then_z():
+    """GetFEM counts the nodes of its reference cells in this order."""
+    tree = ast.parse(SCRIPT.read_text())
+    [kinds] = [
+        n.value for n in tree.body if isinstance(n, ast.Assign) and n.targets[0].id == "KINDS"
+    ]
+    told = ast.literal_eval(kinds)
+    assert set(told) == set(CELLS)
+    for name, (_, order) in told.items():
+        assert order == np.lexsort(BY_NAME[name].nodes.T).tolist()
+
+
+@pytest.mark.parametrize(
+    ("cells", "zone", "reason"),
+    [
+        ("QUAD9", {}, "QUAD9: not written for GetFEM"),
+        ("QUAD4", {"interference": 0.1}, "an initial gap other than as meshed"),
+    ],
+)
+def test_what_is_refused(tmp_path, cells, zone, reason):
+    contact = [{"name": "i", "slave": "bottom_contact", "master": "top_contact", **zone}]
+    with pytest.raises(UnsupportedError, match=reason):
+        GetFEM().write(deck_of(*case_of(cells, cells, contact=contact)), tmp_path)
+
+
+@pytest.mark.skipif(not GetFEM().version(), reason="GetFEM is not installed")
+# On TETRA4 its multipliers oscillate on this mesh.
+@pytest.mark.parametrize("cells", [cells for cells in CELLS if cells != "TETRA4"])
+def test_getfem_solves_it(cells, tmp_path):
+    """Its integrals over nonmatching faces leave a few per cent on these coarse meshes."""
+    deck = deck_of(*case_of(cells, cells))
+    found = run_code(GetFEM(), deck, tmp_path, Limits())
+    dim = deck.points.shape[1]
+    assert found.pressure.values == pytest.approx(25.0, rel=0.2)
+    assert found.pressure.values.mean() == pytest.approx(25.0, rel=0.02)
+    lowest = found.displacement.values[:, dim - 1].min()
+    assert lowest == pytest.approx(-1.25 * (0.91 if dim == 2 else 1), rel=2e-3)
+    below = found.stress.places[:, dim - 1] < -49.9
+    across = 0.0 if dim == 3 else -7.5
+    expected = [0, 0, -25, 0, 0, 0] if dim == 3 else [0, -25, across, 0, 0, 0]
+    assert np.abs(found.stress.values[below] - expected).max() < 1.0
