@@ -89,7 +89,7 @@ class Kratos:
             displacement=_field(deck, displacement, displacement[:, 1 : 1 + dim]),
             stress=_field(deck, stress, values),
             pressure=_field(deck, pressure, pressure[:, 1]),
-            step=deck.case.steps[-1],
+            step=deck.case.factors[-1],
         )
 
 

@@ -76,7 +76,10 @@ def draw(result: Path, png: Path) -> None:
     Raises what PyVista raises for a file that it does not read.
     """
     import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
 
+    # It warns of a missing screen, which it does not need.
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     grid = pyvista.read(result)
     dim = 3 if np.ptp(grid.points[:, 2]) > 0 else 2
     on_faces = grid.cell_data["zone"] >= 0

@@ -65,7 +65,13 @@ _SCALARS = (
     "cpu_seconds",
     "peak_memory_mb",
 )
-_ON_FACES = {"pressure": "multiplier", "gap": "gap", "status": "closed", "coverage": "coverage"}
+_ON_FACES = {
+    "pressure": "multiplier",
+    "gap": "gap",
+    "status": "closed",
+    "coverage": "coverage",
+    "pressure_error_estimate": "pressure_error_estimate",
+}
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 

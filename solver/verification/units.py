@@ -14,6 +14,8 @@ _KINDS = {
     "multiplier": "stress",
     "normal_stress": "stress",
     "pressure": "stress",
+    "pressure_error_estimate": "stress",
+    "recovered_pressure": "stress",
     "stress": "stress",
     "stress_master": "stress",
     "stress_slave": "stress",

@@ -60,6 +60,7 @@ def verdict(job, word, reason="", **more):
         "seconds": {"mesh": 0.25, "solve": 0.5, "total": 0.75},
         "cpu_seconds": 0.7,
         "peak_memory_mb": 100.0,
+        "pressure_error_estimate": 0.0123,
         "pressure": [24.9, 25.0000000001],
         "stress": [-25.0, -25.0],
         "gap": [-1e-16, 2e-16],
@@ -212,6 +213,13 @@ def test_pages_show_counts_beside_the_reference_and_say_which_sign(report):
     assert "12 / 80" in text
     assert "no value accepted yet" in text
     assert "Not drawn" in text
+
+
+def test_pages_show_the_estimated_error(report):
+    folder, _ = report
+    assert (
+        "estimated L2 error of the constant pressures 1.2e-02." in (folder / "fam.html").read_text()
+    )
 
 
 def test_numbers_keep_their_digits_in_csv(report):

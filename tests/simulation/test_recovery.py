@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import yaml
@@ -302,6 +303,15 @@ def test_a_recovered_pressure_is_read_back(tmp_path):
     for name in ("coefficients", "degree", "centre", "axes", "spread", "nodes", "at_nodes"):
         assert (getattr(back.recovered, name) == getattr(zone.recovered, name)).all()
     assert (back.pressure_error == zone.pressure_error).all()
+    with h5py.File(tmp_path / "r.vtkhdf") as file:
+        grid = file["VTKHDF"]
+        at_nodes = grid["PointData/recovered_pressure"][()]
+        on_faces = grid["CellData/pressure_error_estimate"][()][-len(zone.area) :]
+    assert (at_nodes[zone.recovered.nodes] == zone.recovered.at_nodes).all()
+    assert np.isnan(at_nodes).sum() == len(at_nodes) - len(zone.recovered.nodes)
+    # Squares of the root mean squares times areas add up to the square of the whole.
+    whole = np.sqrt((on_faces**2 * zone.area).sum() / (zone.multiplier**2 * zone.area).sum())
+    assert whole == pytest.approx(zone.relative_pressure_error, rel=1e-12)
 
 
 def test_the_recovery_asked_for_takes_the_place_of_the_cases_own(tmp_path):
