@@ -1,5 +1,6 @@
 """What all pages of the report share: templates, style, and the words for kinds and checks."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,7 @@ def render(template: Path, **values: Any) -> str:
     return environment(template.parent).get_template(template.name).render(values)
 
 
+@cache
 def environment(*folders: Path) -> Environment:
     """Where templates come from (`folders`, then the report's own), with the formats of numbers."""
     templates = Environment(

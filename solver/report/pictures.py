@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -40,7 +39,7 @@ def profile(row: Row, folder: Path, along: Expression | None = None) -> Chart | 
     """The pressure of one solve's first zone along the interface, kept in `folder` too."""
 
     def draw_row(row: Row) -> str:
-        return json.dumps(asdict(draw_pressure(_solution(row), row.name, along)))
+        return json.dumps(vars(draw_pressure(_solution(row), row.name, along)))
 
     over = f"-{sha256(along.text.encode()).hexdigest()[:8]}" if along else ""
     kept = _kept(row, folder, f"-profile{over}.json", draw_row)

@@ -12,7 +12,7 @@ from .charts import Chart
 from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
 from .html import KINDS, NORMS
-from .pictures import profile
+from .pictures import picture, profile
 from .rows import Row, counted, families, ours
 from .tables import outcome
 
@@ -112,6 +112,7 @@ class FamilySection:
         """The pressure along the interface of the solves that the family names, or of some."""
         found = []
         for row, figure in self._figures():
+            picture(row, self.pictures)  # both of one reading of the result
             drawing = profile(row, self.pictures, figure.expression)
             found.append(Profile(row, drawing, figure.caption))
         return found

@@ -43,13 +43,13 @@ def draw_space(solution: Solution, title: str) -> Markup:
         zone = solution.zones[0]
         largest, unit = max(float(zone.multiplier.max()), 1e-300), solution.case.units.get("stress")
         label = with_unit(f"p on {zone.name}", unit)
-        _plan(drawing, solution, zone, 400, label, zone.multiplier, (0.0, largest), PRESSURE)
+        _plan(drawing, solution, zone, 392, label, zone.multiplier, (0.0, largest), PRESSURE)
         means = expected(solution, zone)
         if means is not None:
             off = (zone.multiplier - means) / (np.abs(means).max() or 1.0)
             most = max(float(np.abs(off).max()), 1e-17)
-            _plan(drawing, solution, zone, 690, "Δp / max p", off, (-most, most), DEVIATION)
-        _legend(drawing, zone, (400, HEIGHT - 32))
+            _plan(drawing, solution, zone, 664, "Δp / max p", off, (-most, most), DEVIATION)
+        _legend(drawing, zone, (392, HEIGHT - 32))
     return drawing.svg()
 
 

@@ -3,7 +3,7 @@ OTHERS = [job for key, job in BATCH.items() if key not in RUN]
 # Pages of other targets: the report links those that are there.
 PAGES = [
     f"results/report/{name}.html"
-    for name in ("orders", "study", "stability", "gallery")
+    for name in ("orders", "study", "stability", "scaling", "infsup", "gallery")
 ]
 PAGES = [page for page in PAGES if os.path.isfile(page)]
 
