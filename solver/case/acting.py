@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .kinds import Groups, Scalar, Scalars, Vector
+from .kinds import Groups, Name, Scalar, Scalars, Vector
 from .typed import FieldError, Positive, Section, Text
 
 
@@ -94,6 +94,7 @@ class SupportKeys(Section, frozen=True):
     spring: stiffness of springs by component: force per area and displacement on faces (an elastic
       foundation), force per displacement at nodes
     together: the components in which all nodes of the group have one displacement, an unknown
+    name: the name that `steps` gives factors of the imposed values
     """
 
     fix: Annotated[
@@ -105,6 +106,7 @@ class SupportKeys(Section, frozen=True):
         _Directions | None,
         Meta(description=_TOGETHER, extra_json_schema={"uniqueItems": True}),
     ] = None
+    name: Name | None = None
     group: Groups | None = None
     at: Vector | None = None
 
@@ -128,6 +130,7 @@ class LoadKeys(Section, frozen=True):
     traction: force per area, as a vector
     body_force: force per volume, as a vector
     force: the whole force, as a vector: distributed evenly over the area of faces, or over nodes
+    name: the name that `steps` gives factors of the load
     """
 
     group: Groups | None = None
@@ -136,6 +139,7 @@ class LoadKeys(Section, frozen=True):
     traction: Scalars | None = None
     body_force: Scalars | None = None
     force: Vector | None = None
+    name: Name | None = None
 
     def __post_init__(self) -> None:
         given = (self.pressure, self.traction, self.body_force, self.force)

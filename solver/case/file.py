@@ -283,7 +283,11 @@ class CountKeys(Section, frozen=True):
 
 _MATERIALS = "a mapping of cell groups, or `all`, to {young, poisson}"
 _SUPPORTS = "a list of {group, fix}, at least one"
-_STEPS = "a list of increasing positive load factors"
+_STEPS = "a list of load factors, none negative, or of mappings of names to factors"
+_Factor = Annotated[float, Meta(ge=0, le=1e30)]
+_Factors = Annotated[dict[Name, Number], Meta(min_length=1)]
+_STEP = "a factor from 0 to 1e30, or a mapping of names to factors"
+_Step = Annotated[_Factor | _Factors, Meta(description=_STEP)]
 _Tolerance = Annotated[float, Meta(gt=0, description="a positive number")]
 _TOLERANCE = (
     "a positive number of at most 1, or a mapping of checks (`all`: the relative ones) to such "
@@ -327,7 +331,8 @@ class CaseFile(Section, frozen=True):
     bodies: further properties of bodies
     contact: the contact zones
     directions: solved once, or again with slave and master exchanged
-    steps: load factors, solved one after the other
+    steps: load factors, solved one after the other in any order, or the factors of named loads and
+      supports
     observe: macro-elements to report at every step
     reference: what the result is compared with
     tolerance: the tolerance of the relative checks, or one for each check
@@ -350,9 +355,9 @@ class CaseFile(Section, frozen=True):
     bodies: dict[Group, BodyKeys] = field(default_factory=dict)
     contact: tuple[ZoneKeys, ...] = ()
     directions: Literal["first", "both"] = "first"
-    steps: Annotated[
-        tuple[Positive, ...], Meta(min_length=1, max_length=1000, description=_STEPS)
-    ] = (1.0,)
+    steps: Annotated[tuple[_Step, ...], Meta(min_length=1, max_length=1000, description=_STEPS)] = (
+        1.0,
+    )
     observe: tuple[ObservationKeys, ...] = ()
     reference: ReferenceKeys | None = None
     tolerance: (

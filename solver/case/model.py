@@ -21,6 +21,8 @@ class Exact(Enum):
 EXACT = Exact.VALUE
 Scalar = float | Expression
 Vector = tuple[Scalar, ...]
+# A load factor, or the factors of named loads and supports.
+Step = float | dict[str, float]
 LOAD_KINDS = ("pressure", "traction", "body_force", "force")
 SWAPPED = "-swapped"
 
@@ -52,6 +54,7 @@ class Support:
     fix: dict[str, Scalar | Exact]
     spring: dict[str, Scalar] = field(default_factory=dict)
     together: tuple[str, ...] = ()
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,7 @@ class Load:
     group: str
     kind: str
     value: Scalar | Vector | Exact
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -118,7 +122,7 @@ class Case:
     transform: dict[str, Any] | None = None
     plane: str | None = None
     directions: str = "first"
-    steps: tuple[float, ...] = (1.0,)
+    steps: tuple[Step, ...] = (1.0,)
     observe: tuple[Observation, ...] = ()
     reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
     reference_kind: str | None = None
@@ -143,6 +147,17 @@ class Case:
     def axisymmetric(self) -> bool:
         """Whether the mesh is a meridian plane, x the radius and y the height."""
         return self.plane == "axisymmetric"
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """The load factor of each step; its number where loads have factors of their own."""
+        numbered = enumerate(self.steps, start=1)
+        return tuple(float(n) if isinstance(step, dict) else step for n, step in numbered)
+
+    @property
+    def histories(self) -> tuple[str, ...]:
+        """The names of loads and supports that have factors of their own."""
+        return tuple(self.steps[0]) if isinstance(self.steps[0], dict) else ()
 
     def as_solved(
         self, swapped: bool = False, hexahedra: str | None = None, recovery: str | None = None

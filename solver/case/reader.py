@@ -149,12 +149,13 @@ class _Reader:
         item, keys = self.file.supports[index], ("supports", index)
         group = self.group((*keys, "group"), item.group, item.at)
         if item.together is not None:
-            return Support(group, {}, together=item.together)
+            return Support(group, {}, together=item.together, name=item.name or "")
         if item.spring is not None:
-            return Support(group, {}, self.value(*keys, "spring"))
+            return Support(group, {}, self.value(*keys, "spring"), name=item.name or "")
         if isinstance(item.fix, tuple):
-            return Support(group, dict.fromkeys(item.fix, 0.0))
-        return Support(group, {a: self.value_or_exact(*keys, "fix", a) for a in item.fix or ()})
+            return Support(group, dict.fromkeys(item.fix, 0.0), name=item.name or "")
+        fix: dict[str, Any] = {a: self.value_or_exact(*keys, "fix", a) for a in item.fix or ()}
+        return Support(group, fix, name=item.name or "")
 
     def zone(self, index: int) -> Zone:
         keys = structs.asdict(self.file.contact[index])
@@ -168,7 +169,7 @@ class _Reader:
         item, keys = self.file.loads[index], ("loads", index)
         kind = next(kind for kind in LOAD_KINDS if getattr(item, kind) is not None)
         group = self.group((*keys, "group"), item.group, item.at)
-        return Load(group, kind, self.value_or_exact(*keys, kind))
+        return Load(group, kind, self.value_or_exact(*keys, kind), item.name or "")
 
     def exact_solution(self) -> ExactSolution | None:
         """The solution that the reference names, made with what the case says already."""

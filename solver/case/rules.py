@@ -5,7 +5,7 @@ from typing import Any
 
 from ..system.errors import InputError, hint
 from .expressions import Expression
-from .model import SWAPPED, Case, Scalar
+from .model import SWAPPED, Case, Load, Scalar, Support
 
 # The errors of `solver.verification.norms`, and what a solution must have for each to be known.
 ERRORS: dict[str, str] = {
@@ -32,10 +32,7 @@ def check_rules(case: Case) -> None:
         allowed = f"must not end in {SWAPPED}: that is the name of the other direction"
         raise InputError(case.path, "name", case.name, allowed)
     _check_names(case)
-    for before, after in zip(case.steps, case.steps[1:], strict=False):
-        if after <= before:
-            allowed = "load factors must increase"
-            raise InputError(case.path, "steps", list(case.steps), allowed)
+    _check_steps(case)
     _check_listed_twice(case)
     _check_errors(case)
     _check_reference(case)
@@ -45,6 +42,31 @@ def check_rules(case: Case) -> None:
         if case.thin and material.form == "mixed":
             allowed = "plane stress has no incompressible limit; allowed: automatic, displacement"
             raise InputError(case.path, f"materials.{group}.form", material.form, allowed)
+
+
+def _check_steps(case: Case) -> None:
+    """Steps are all factors, or all factors of the same names; only these have the names."""
+    acting: dict[str, Support | Load] = {
+        **{f"supports[{i}].name": s for i, s in enumerate(case.supports) if s.name},
+        **{f"loads[{i}].name": load for i, load in enumerate(case.loads) if load.name},
+    }
+    names = {one.name for one in acting.values()}
+    for i, step in enumerate(case.steps):
+        given = set(step) if isinstance(step, dict) else set()
+        if isinstance(step, dict) != isinstance(case.steps[0], dict):
+            allowed = "steps are factors, or mappings of names to factors, not both"
+            raise InputError(case.path, f"steps[{i}]", step, allowed)
+        if given - names:
+            name = min(given - names)
+            allowed = f"no load or support has this name; {hint(name, names)}"
+            raise InputError(case.path, f"steps[{i}].{name}", None, allowed)
+        if names - given:
+            allowed = f"gives no factor of {min(names - given)}"
+            raise InputError(case.path, f"steps[{i}]", step, allowed)
+    for key, one in acting.items():
+        if isinstance(one, Support) and not any(one.fix.values()):
+            allowed = "only a support with imposed values has a factor"
+            raise InputError(case.path, key, one.name, allowed)
 
 
 def _check_names(case: Case) -> None:

@@ -84,7 +84,7 @@ class CalculiX:
         for quantity in ("displacement", "stress", "pressure"):
             if getattr(found, quantity) is None:
                 raise SolveError(f"{file.name}: it holds no {quantity}")
-        return replace(found, step=deck.case.steps[-1])
+        return replace(found, step=deck.case.factors[-1])
 
 
 def deck_lines(deck: Deck, stiffness: float = STIFFNESS) -> Iterator[str]:

@@ -52,8 +52,8 @@ class Compared:
     def of(cls, case: Case, foreign: ForeignResult, mesh: meshio.Mesh) -> Compared:
         """The comparison; raises InputError where result and case do not belong together."""
         where = f"{case.name}@{foreign.code}"
-        if foreign.step is not None and abs(foreign.step - case.steps[-1]) > _STEP:
-            allowed = f"the result must be that of load factor {case.steps[-1]:g}"
+        if foreign.step is not None and abs(foreign.step - case.factors[-1]) > _STEP:
+            allowed = f"the result must be that of load factor {case.factors[-1]:g}"
             raise InputError(where, "step", foreign.step, allowed)
         foreign = flattened(foreign, mesh.points.shape[1], where)
         model = Model.of(case, mesh)

@@ -114,7 +114,7 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
     given = Attributes(replace(case, loads=others), mesh, whole, [], origin)
     materials = [*case.materials.values(), _RIGID]
     numbers = given.by_material(lambda m: float(materials.index(m)), len(materials) - 1.0)
-    factor = case.steps[-1]
+    factor = case.factors[-1]
     return Deck(
         case=case,
         points=mesh.points,
@@ -147,6 +147,8 @@ def _is_constant(load: Load) -> bool:
 
 
 def _refuse(case: Case) -> None:
+    if case.histories:
+        raise UnsupportedError("factors of single loads in steps: not written for codes")
     if any(support.together for support in case.supports):
         raise UnsupportedError("groups that move as one: not written for codes")
     if any(support.spring for support in case.supports):

@@ -166,7 +166,8 @@ class Model:
         support holds there, where that body is in one zone only.
         """
         force = np.full(self.dim, np.nan)
-        scale = np.abs(self.scene.force).sum(axis=0).max(initial=0.0)
+        acting, _ = self.scene.acting(self.case.steps[-1])
+        scale = np.abs(acting).sum(axis=0).max(initial=0.0)
         for blocks, sign in ((zone.slave_faces, -1.0), (zone.master_faces, 1.0)):
             body = self._alone(blocks, zone)
             if body is None:
@@ -181,7 +182,7 @@ class Model:
                 left = motion.ravel() - basis @ (basis.T @ motion.ravel())
                 sprung = (self.scene.springs @ motion.ravel()).any()
                 if np.abs(left).max() < 1e-9 and not sprung:
-                    force[axis] = sign * self.scene.force[mine, axis].sum()
+                    force[axis] = sign * acting[mine, axis].sum()
         return force, scale
 
     def _alone(self, blocks: Sequence[FaceBlock], zone: ZoneScene) -> int | None:

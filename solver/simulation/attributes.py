@@ -1,7 +1,7 @@
 """Materials, supports and loads of a case on the groups of the cut mesh."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import meshio
@@ -300,6 +300,30 @@ class Attributes:
         for i, load in enumerate(self.case.loads):
             total += self._force(load, f"loads[{i}].group")
         return total
+
+    def histories(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Forces (n, dim) and displacements (n_dofs,) of each name in `steps`; of no name too."""
+        if not self.case.histories:
+            return {}
+        return {name: self._history(name) for name in ("", *self.case.histories)}
+
+    def _history(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        mine = [f"supports[{i}]." for i, s in enumerate(self.case.supports) if s.name == name]
+        fixed = {
+            key: replace(f, values=f.values * key.startswith(tuple(mine)))
+            for key, f in self.fixed.items()
+        }
+        force = np.zeros_like(self.points)
+        for i, load in enumerate(self.case.loads):
+            if load.name == name:
+                force += self._force(load, f"loads[{i}].group")
+        try:
+            free = free_motion(len(self.points), self.points.shape[1], list(fixed.values()))
+        except SupportClashError as clash:
+            allowed = f"{clash}, of another name in steps"
+            key = list(fixed)[clash.number]
+            raise InputError(self.case.path, key, clash.value, allowed) from None
+        return force, free.offset
 
     def _force(self, load: Load, key: str) -> np.ndarray:
         total = np.zeros_like(self.points)

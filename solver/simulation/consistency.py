@@ -58,7 +58,7 @@ def _all(solution: Solution) -> Iterator[str]:
 def _steps(solution: Solution) -> Iterator[str]:
     sizes = {zone.name: len(zone.multiplier) for zone in solution.zones}
     wanted = [item.zone for item in solution.case.observe]
-    if [step.factor for step in solution.steps] != list(solution.case.steps):
+    if [step.factor for step in solution.steps] != list(solution.case.factors):
         yield "the load steps are not those of the case"
     for step in solution.steps:
         seen = step.observations

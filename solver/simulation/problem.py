@@ -6,6 +6,7 @@ from functools import cached_property, partial
 import numpy as np
 from scipy import sparse
 
+from ..case.model import Step
 from ..mechanics.fem.bodies import (
     nodes_of_unknowns,
     rigid_motions,
@@ -126,12 +127,12 @@ class ContactProblem:
 
     def solve(
         self,
-        factor: float,
+        step: Step,
         start: np.ndarray | None = None,
         bilateral: bool = False,
         correction: np.ndarray | float = 0.0,
     ) -> Equilibrium:
-        """Equilibrium at a load factor, the status search starting from `start` (k,), a guess.
+        """Equilibrium at a step, the status search starting from `start` (k,), a guess.
 
         `bilateral`: no status is sought, all macro-elements stay closed, in tension too.
         `correction` (n, dim): see `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0,
@@ -140,20 +141,20 @@ class ContactProblem:
         scene, eligible = self.scene, self.constraints.eligible
         if not scene.options.shortcuts.status:
             start = eligible
-        start = self._first_guess(factor) if start is None else start
+        start = self._first_guess(step) if start is None else start
         latest: list[Equilibrium] = []
 
         def attempt(closed: np.ndarray) -> Trial:
             if not scene.options.shortcuts.status:
                 self._systems.forget()
-            latest[:] = [self._solve_closed(closed, factor, correction)]
+            latest[:] = [self._solve_closed(closed, step, correction)]
             return latest[0].trial
 
         if bilateral:
             attempt(eligible)
             return latest[0]
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
-        stiffness = partial(self._gap_stiffness, factor)
+        stiffness = partial(self._gap_stiffness, step)
         status = find_status(attempt, start, eligible, area, stiffness, confirm)
         trial = latest[0].trial
         touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
@@ -179,13 +180,14 @@ class ContactProblem:
         found[closed] = system.multiplier(pushed - self.matrix @ change)
         return found
 
-    def _first_guess(self, factor: float) -> np.ndarray:
+    def _first_guess(self, step: Step) -> np.ndarray:
         """Macro-elements (k,) that loads and imposed displacements are likely to close."""
         scene, constraints = self.scene, self.constraints
         eligible = constraints.eligible
-        imposed = factor * np.abs(scene.free.offset).max(initial=0.0)
+        acting, offset = scene.acting(step)
+        imposed = np.abs(offset).max(initial=0.0)
         moduli = 2 * np.concatenate([block.shear for block in scene.blocks])
-        force = abs(factor) * np.linalg.norm(scene.force, axis=1).sum()
+        force = np.linalg.norm(acting, axis=1).sum()
         push = force * (1 / moduli.min() + 1 / moduli.max())
         gap = constraints.initial / np.where(eligible, constraints.covered, np.inf) - imposed
         guess = likely_closed(gap, constraints.covered, eligible, push, scene.space)
@@ -195,14 +197,15 @@ class ContactProblem:
         return free_motion(self.scene, self.motions, self.constraints, closed)
 
     def _solve_closed(
-        self, closed: np.ndarray, factor: float, correction: np.ndarray | float
+        self, closed: np.ndarray, step: Step, correction: np.ndarray | float
     ) -> Equilibrium:
         """Equilibrium with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
             raise SolveError(f"{moves} once {int((~closed).sum())} macro-elements are open")
         correction = np.zeros(scene.force.shape) + correction
-        offset, force = factor * scene.free.offset, factor * scene.force + correction
+        acting, offset = scene.acting(step)
+        force = acting + correction
         scale = self._force_scale(force, offset.reshape(scene.points.shape))
         start = ContactIterate(
             scene=scene,
@@ -263,7 +266,7 @@ class ContactProblem:
         internal = internal_force(self.scene.points, self.scene.blocks, imposed)
         return float(max(np.abs(force).max(), np.abs(internal).max())) or 1.0
 
-    def _gap_stiffness(self, factor: float) -> np.ndarray:
+    def _gap_stiffness(self, step: Step) -> np.ndarray:
         """The forces (e, e) that average gaps bring up, each imposed with all others closed.
 
         Of the e multipliers that may close; symmetric, positive semidefinite. Raises SolveError
@@ -273,7 +276,7 @@ class ContactProblem:
 
         eligible = self.constraints.eligible
         push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
-        loads = factor * self.unsupported.T @ self.scene.force.ravel()
+        loads = self.unsupported.T @ self.scene.acting(step)[0].ravel()
         largest = np.abs(loads).max(initial=0.0)
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..case.model import Step
 from ..mechanics.mortar.reconstruction import Reconstruction
 from ..mechanics.mortar.recovery import Recovery
 from .problem import ContactProblem, Equilibrium
@@ -71,9 +72,9 @@ Recovered = dict[str, RecoveredZone]
 
 
 def recovered(
-    problem: ContactProblem, state: Equilibrium, factor: float
+    problem: ContactProblem, state: Equilibrium, step: Step
 ) -> tuple[Equilibrium, Recovered]:
-    """The equilibrium of a load factor under the recovered pressure, and this by zone.
+    """The equilibrium of a step under the recovered pressure, and this by zone.
 
     Where the status does not settle under the correction, the state stays as it is and no pressure
     is recovered.
@@ -97,7 +98,7 @@ def recovered(
                 )
                 for zone, fit, c, force in zip(given, zones, read, forces, strict=True)
             }
-        found = problem.solve(factor, found.status.closed, correction=found.correction)
+        found = problem.solve(step, found.status.closed, correction=found.correction)
     _LOG.info("recovery: the contact status does not settle; the pressure stays constant by face")
     return state, {}
 

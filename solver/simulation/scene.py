@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 from scipy import sparse
 
-from ..case.model import Case, Zone
+from ..case.model import Case, Step, Zone
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, surface_points, volume_cells
@@ -130,8 +130,17 @@ class Scene:
     free: FreeMotion
     force: np.ndarray
     springs: sparse.csr_matrix
+    histories: dict[str, tuple[np.ndarray, np.ndarray]]
     zones: list[ZoneScene]
     rest: Rest
+
+    def acting(self, step: Step) -> tuple[np.ndarray, np.ndarray]:
+        """Forces (n, dim) and imposed displacements (n_dofs,) of a step."""
+        if not isinstance(step, dict):
+            return step * self.force, step * self.free.offset
+        parts = [(step.get(name, 1.0), *part) for name, part in self.histories.items()]
+        force = np.sum([f * force for f, force, _ in parts], axis=0)
+        return force, np.sum([f * offset for f, _, offset in parts], axis=0)
 
     @property
     def n_dofs(self) -> int:
@@ -203,6 +212,7 @@ def build_scene(
         free=free,
         force=force,
         springs=springs,
+        histories=groups.histories(),
         zones=zones,
         rest=Rest(
             unloaded_bodies=np.zeros(n_bodies, dtype=bool),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import meshio
 import numpy as np
 
-from ..case.model import Case
+from ..case.model import Case, Step
 from ..mechanics.fem.elasticity import largest_strain, nodal_stress
 from ..mechanics.fem.faces import nodal_normals
 from ..mechanics.fem.stress import normal_stress
@@ -75,7 +75,7 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
     with stage(clock, "solve"):
-        states, recovered = _walk(problem, problem.scene.case.steps)
+        states, recovered = _walk(problem)
     plan += noted(problem, states)
     with stage(clock, "recovery"):
         solution = _recover(problem, states, recovered, plan)
@@ -94,24 +94,31 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     return solution
 
 
-def _walk(problem: ContactProblem, steps: tuple[float, ...]) -> tuple[list[Equilibrium], Recovered]:
-    """Solve the load factors in turn, each from the status of the one before.
+def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], Recovered]:
+    """Solve the steps in turn, each from the status of the one before.
 
     With the states the pressure recovered in the last one.
     """
     states: list[Equilibrium] = []
     fields: Recovered = {}
-    for factor in steps:
+    case = problem.scene.case
+    for factor, step in zip(case.factors, case.steps, strict=True):
         start = states[-1].status.closed if states else None
-        state = problem.solve(factor, start)
+        state = problem.solve(step, start)
         if (state.trial.offence(state.iterate.closed) > 1).any():
-            raise SolveError(f"load factor {factor:g}: contact bears tension or surfaces overlap")
-        state, fields = recovered(problem, state, factor)
+            raise SolveError(f"{_called(step, factor)}: contact bears tension or surfaces overlap")
+        state, fields = recovered(problem, state, step)
         states.append(state)
         closed = int(state.status.closed.sum())
-        told = factor, state.status.iterations, closed, state.residual
-        _LOG.log(OUTCOME, "load factor %g: %d iterations, %d closed, residual %.1e", *told)
+        told = _called(step, factor), state.status.iterations, closed, state.residual
+        _LOG.log(OUTCOME, "%s: %d iterations, %d closed, residual %.1e", *told)
     return states, fields
+
+
+def _called(step: Step, factor: float) -> str:
+    if not isinstance(step, dict):
+        return f"load factor {factor:g}"
+    return f"step {factor:g} ({', '.join(f'{name} {value:g}' for name, value in step.items())})"
 
 
 def _recover(
@@ -273,7 +280,7 @@ def _nodal_normals(
 
 def _step_results(scene: Scene, states: list[Equilibrium], scale: float) -> list[StepResult]:
     results = []
-    for factor, state in zip(scene.case.steps, states, strict=True):
+    for factor, state in zip(scene.case.factors, states, strict=True):
         seen = []
         for wanted in scene.case.observe:
             zone = next(z for z in scene.zones if z.zone.name == wanted.zone)

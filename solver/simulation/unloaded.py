@@ -28,6 +28,8 @@ def without_unloaded(scene: Scene) -> Scene:
     No group is left out where a body could move freely (a solve refuses it by name), and nothing
     where there would be nothing to solve.
     """
+    if scene.histories:  # what acts in one step may not in another
+        return scene
     gaps, free = _gaps(scene), scene.free
     acting = (gaps @ free.basis).tocsr()
     bodies = scene.body[nodes_of_unknowns(free.basis, scene.points.shape[1])]

@@ -323,7 +323,10 @@ def observed(quantity: str) -> Sampler:
             for o in step.observations
             if o["zone"] == zone.name
         ]
-        if isinstance(reference, ExactValues):  # of the whole load
+        if solution.case.histories:  # the reference is that of the last step
+            last = len(solution.steps)
+            rows = [(1.0, *row[1:]) for row in rows if row[0] == last]
+        elif isinstance(reference, ExactValues):  # of the whole load
             rows = [row for row in rows if row[0] == 1.0]
         if not rows:
             return None

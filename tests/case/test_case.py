@@ -275,11 +275,19 @@ REFUSED = [
         "loads[1].group = 'Top': the group is listed twice with pressure",
     ),
     # steps, observations, references, tolerances, counts
-    ("steps: []", "steps = []: must be a list of increasing positive load factors"),
-    ("steps: [1, 0.5]", "steps = [1.0, 0.5]: load factors must increase"),
-    ("steps: [1, 1]", "steps = [1.0, 1.0]: load factors must increase"),
-    ("steps: [0, 1]", "steps[0] = 0: must be a positive number"),
-    ("steps: 1", "steps = 1: must be a list of increasing positive load factors"),
+    ("steps: []", "steps = []: must be a list of load factors, none negative, or of mappings"),
+    ("steps: [-1, 1]", "steps[0] = -1: must be a factor from 0 to 1e30, or a mapping"),
+    ("steps: 1", "steps = 1: must be a list of load factors, none negative, or of mappings"),
+    ("steps: [1, {press: 1}]", "steps[1] = {'press': 1.0}: steps are factors, or mappings"),
+    ("steps: [{press: 1}]", "steps[0].press: no load or support has this name"),
+    (
+        "loads: [{group: Top, pressure: 1, name: press}]\nsteps: [{pres: 1, press: 2}]",
+        "steps[0].pres: no load or support has this name",
+    ),
+    (
+        "loads: [{group: Top, pressure: 1, name: press}]",
+        "steps[0] = 1.0: gives no factor of press",
+    ),
     (
         CONTACT + "observe: [{zone: b, nearest: [0, 0]}]",
         "observe[0].zone = 'b': no such zone; allowed: a",

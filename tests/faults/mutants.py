@@ -49,6 +49,7 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
 )
 SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
+UNLOADING = "loads/unloading"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -294,6 +295,9 @@ MUTANTS = (
            "solver.simulation.balance:_of_springs", changed(np.zeros_like)),
     Mutant("tie-lost", "nodes that should move as one move apart", PLATEN,
            "solver.simulation.attributes:tied", lambda _: lambda free, ties: free),
+    Mutant("history-lost", "every load acts in full in every step", UNLOADING,
+           "solver.simulation.scene:Scene.acting",
+           lambda made: lambda scene, step: made(scene, dict.fromkeys(step, 1.0))),
     Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
            "solver.simulation.scene:gap_operator",
            changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
