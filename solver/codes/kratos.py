@@ -102,8 +102,10 @@ def _field(deck: Deck, rows: np.ndarray, values: np.ndarray) -> Field:
 def _refuse(deck: Deck) -> None:
     for name in deck.cells:
         if name not in ELEMENTS:
-            reason = "has no such element" if name == "PYRA5" else "crashes in contact"
-            raise UnsupportedError(f"{name}: Kratos {reason}")
+            reason = (
+                "no such element" if name == "PYRA5" else "no mortar contact on quadratic faces"
+            )
+            raise UnsupportedError(f"{name}: Kratos has {reason}")
     for pair in deck.pairs:
         if pair.zone.clearance is not None or pair.zone.interference:
             raise UnsupportedError("an initial gap other than as meshed: not in Kratos")
