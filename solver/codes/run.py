@@ -21,12 +21,12 @@ from .verdicts import LOG, VERDICT, store, without_foreign
 
 
 class CrashError(Exception):
-    """The process of a code died, or came to no end in time."""
+    """The process of a code died, or did not end in time."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a process may take: seconds, memory (bytes), cores; None: one thread on any core."""
+    """Limits of a process: seconds, memory (bytes), cores; None: one thread on any core."""
 
     seconds: float = 120.0
     memory: float = 4e9
@@ -34,11 +34,11 @@ class Limits:
 
 
 def run_code(code: Code, deck: Deck, folder: Path, limits: Limits) -> ForeignResult:
-    """Write the input into `folder`, run the code there, read what it found.
+    """Write the input into `folder`, run the code there, read its result.
 
-    What it prints is in `folder/log`. Raises UnsupportedError for what the code cannot express,
-    CrashError where its process dies or is stopped, SolveError where it does not converge or what
-    it wrote cannot be read.
+    Its output is in `folder/log`. Raises UnsupportedError for what the code cannot express,
+    CrashError if its process dies or is stopped, SolveError if it does not converge or its result
+    cannot be read.
     """
     code.write(deck, folder)
     command = code.command(folder)
@@ -63,10 +63,10 @@ def run_code(code: Code, deck: Deck, folder: Path, limits: Limits) -> ForeignRes
 def run_case(
     code: Code, case: Case, mesh: meshio.Mesh, folder: Path, limits: Limits | None = None
 ) -> Verdict:
-    """Run a code on a case as solved, check what it found, write all of it into `folder`.
+    """Run a code on a case as solved, check its result, write all of it into `folder`.
 
     A code that is not installed or cannot express the case, a crash, a hang, no convergence: each
-    ends with a verdict that gives the reason. What the code said is in `folder/log`.
+    ends with a verdict that gives the reason. The output of the code is in `folder/log`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     version, started = code.version(), now()
@@ -95,7 +95,7 @@ def run_case(
                 shutil.copyfile(said, folder / LOG)
 
 
-# What is wrong with a result of its mesh is no fault of the code's.
+# InputError: case, mesh and result do not belong together.
 _WORDS = {
     UnsupportedError: REFUSED,
     InputError: REFUSED,
