@@ -39,7 +39,7 @@ class GetFEM(Plain):
         return run_apart([str(PYTHON), "-Es", "-c", _VERSION], None, 60.0).output.strip()
 
     def write(self, deck: Deck, folder: Path) -> None:
-        """Write `deck.json` and the script; UnsupportedError for what they have not."""
+        """Write `deck.json` and the script; UnsupportedError for what they lack."""
         for name in deck.cells:
             if name not in CELLS:
                 raise UnsupportedError(f"{name}: not written for GetFEM")

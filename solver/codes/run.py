@@ -76,7 +76,8 @@ def run_case(
                 raise UnsupportedError(f"not installed: {code.install}")
             deck = deck_of(case, mesh, code.layer)
             found = run_code(code, deck, Path(scratch), limits or Limits())
-            return store(case, replace(found, version=version), folder, mesh)
+            found = replace(_thin(found) if case.thin else found, version=version)
+            return store(case, found, folder, mesh)
         except Exception as error:  # noqa: BLE001 -- a user's own class may raise anything
             known = [word for kind, word in _WORDS.items() if isinstance(error, kind)]
             verdict = without_foreign(
@@ -93,6 +94,15 @@ def run_case(
         finally:
             if (said := Path(scratch, LOG)).is_file():
                 shutil.copyfile(said, folder / LOG)
+
+
+def _thin(found: ForeignResult) -> ForeignResult:
+    """The result in plane stress: the stress zz of the equivalent plane strain is not there."""
+    if found.stress is None:
+        return found
+    values = found.stress.values.copy()
+    values[:, 2] = 0.0
+    return replace(found, stress=replace(found.stress, values=values))
 
 
 # InputError: case, mesh and result do not belong together.
