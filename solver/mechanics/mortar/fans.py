@@ -14,8 +14,6 @@ Pieces = tuple[np.ndarray, np.ndarray, np.ndarray]
 # Of numbers (a,), places (a, q, 2) and slopes (a, q, 2) of curves through them: both in the image.
 Image = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-# Points along an arc whose image is no polynomial.
-_RIM = 12
 # More points along arcs whose images are no polynomials.
 _MORE = 2
 # Images of arcs that are off their chord by less than this are straight.
