@@ -48,7 +48,7 @@ class CalculiX:
 
     @property
     def settings(self) -> Mapping[str, str]:
-        """What it is asked to do, to be shown."""
+        """Its main settings, to be shown."""
         return {
             "contact": "SURFACE TO SURFACE, frictionless",
             "pressure-overclosure": f"LINEAR, {self.stiffness:g} E",
@@ -56,7 +56,7 @@ class CalculiX:
         }
 
     def version(self) -> str:
-        """The program's version; empty where it is not installed."""
+        """The program's version; empty if it is not installed."""
         if shutil.which(PROGRAM) is None:
             return ""
         # It leaves files wherever it runs.
@@ -66,16 +66,16 @@ class CalculiX:
         return found[1] if found else "unknown"
 
     def write(self, deck: Deck, folder: Path) -> None:
-        """Write the input into `folder`; UnsupportedError for what CalculiX has not."""
+        """Write the input into `folder`; UnsupportedError for what CalculiX lacks."""
         lines = list(deck_lines(deck, self.stiffness))
         (folder / f"{_NAME}.inp").write_text("\n".join(lines) + "\n", encoding="ascii")
 
     def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002 -- the same for all codes
-        """What to run in `folder`."""
+        """The command to run in `folder`."""
         return [PROGRAM, "-i", _NAME]
 
     def read(self, deck: Deck, folder: Path) -> ForeignResult:
-        """The fields at the end; SolveError where the run came to none."""
+        """The fields at the end; SolveError without a result."""
         file = folder / f"{_NAME}.frd"
         try:
             found = read_result_files([file], code=self.name)
@@ -88,7 +88,7 @@ class CalculiX:
 
 
 def deck_lines(deck: Deck, stiffness: float = STIFFNESS) -> Iterator[str]:
-    """The lines of the input; UnsupportedError for cells and gaps that CalculiX has not."""
+    """The lines of the input; UnsupportedError for cells and gaps that CalculiX lacks."""
     _refuse(deck)
     yield "*NODE, NSET=NALL"
     for number, place in enumerate(deck.points.tolist(), start=1):

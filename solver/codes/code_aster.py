@@ -19,12 +19,12 @@ from .foreign import ForeignResult
 _MESH = "mesh.med"
 # Face centres of HEXA27 have an order of their own; all cells are mirrored (see `mesh.files.med`).
 _HEXA27 = [*range(20), 24, 22, 21, 23, 20, 25, 26]
-# More different values of imposed displacements than these are no boundary condition of a group.
+# The largest number of different values of imposed displacements that are written.
 _VALUES = 12
 
 
 class CodeAster:
-    """Only written: it is in no package that could be installed."""
+    """Only written: no package contains code_aster."""
 
     name = "code_aster"
     layer = False
@@ -45,7 +45,7 @@ class CodeAster:
             (folder / f"{name}.comm").write_text(_commands(deck, held, lac), encoding="ascii")
 
     def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
-        """What to run, with `mesh.med` as unit 20 and `result.med` as unit 80."""
+        """The command to run, with `mesh.med` as unit 20 and `result.med` as unit 80."""
         return ["run_aster", "lac.comm"]
 
     def read(self, deck: Deck, folder: Path) -> ForeignResult:  # noqa: ARG002

@@ -1,4 +1,4 @@
-"""What may be wrong with values that fail their check: a sign, a unit, a step, an order."""
+"""Likely causes of values that fail their check: a sign, a unit, a step, an order."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SAME = 0.02
 
 
 def fault(sample: Sample, names: Sequence[str] = ()) -> str:
-    """What would make the values (n,) fit, in words; empty where nothing simple does.
+    """The change that would make the values (n,) fit, in words; empty if nothing simple does.
 
     `names` are those of components, whose values follow one another.
     """
@@ -36,7 +36,7 @@ def fault(sample: Sample, names: Sequence[str] = ()) -> str:
 
 
 def _multiple(values: np.ndarray, reference: np.ndarray) -> str:
-    """In which factor the values differ from the reference."""
+    """The factor between the values and the reference, in words."""
     ratio = float(values @ reference / (reference @ reference))
     if np.linalg.norm(values - ratio * reference) > _ALIKE * np.linalg.norm(values):
         return ""
@@ -78,7 +78,7 @@ def _exchanged(value: np.ndarray, wanted: np.ndarray, names: Sequence[str]) -> s
 
 
 def summed_up(faults: dict[str, str]) -> str:
-    """The faults by quantity in one line: those that are alike are said once."""
+    """The faults by quantity in one line: equal ones are listed together."""
     by_fault: dict[str, list[str]] = {}
     for name, told in faults.items():
         by_fault.setdefault(told, []).append(name.replace("_", " "))

@@ -33,13 +33,13 @@ class GetFEM(Plain):
     }
 
     def version(self) -> str:
-        """The version of Debian's package; empty where it is not installed."""
+        """The version of Debian's package; empty if it is not installed."""
         if not PYTHON.is_file():
             return ""
         return run_apart([str(PYTHON), "-Es", "-c", _VERSION], None, 60.0).output.strip()
 
     def write(self, deck: Deck, folder: Path) -> None:
-        """Write `deck.json` and the script; UnsupportedError for what they have not."""
+        """Write `deck.json` and the script; UnsupportedError for what they lack."""
         for name in deck.cells:
             if name not in CELLS:
                 raise UnsupportedError(f"{name}: not written for GetFEM")
@@ -52,11 +52,11 @@ class GetFEM(Plain):
         shutil.copyfile(Path(__file__).with_name("getfem_main.py"), folder / "main.py")
 
     def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
-        """What to run in `folder`."""
+        """The command to run in `folder`."""
         return [str(PYTHON), "-Es", "main.py"]
 
     def read(self, deck: Deck, folder: Path) -> ForeignResult:  # noqa: ARG002
-        """The fields at the end; SolveError where the run came to none."""
+        """The fields at the end; SolveError without a result."""
         names = ("displacement", "stress", "pressure")
         try:
             return read_result_files([folder / f"{n}.csv" for n in names], code=self.name)

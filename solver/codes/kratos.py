@@ -46,20 +46,20 @@ class Kratos:
 
     @property
     def settings(self) -> Mapping[str, str]:
-        """What it is asked to do, to be shown."""
+        """Its main settings, to be shown."""
         return {
             "contact": "ALMContactFrictionless, penalty and scale chosen by Kratos",
             "elements": "SmallDisplacementElement; geometry not updated",
         }
 
     def version(self) -> str:
-        """The version; empty where it is not installed."""
+        """The version; empty if it is not installed."""
         if not PYTHON.is_file():
             return ""
         return run_apart([str(PYTHON), "-I", "-c", _VERSION], None, 60.0).output.strip()
 
     def write(self, deck: Deck, folder: Path) -> None:
-        """Write mesh, settings and the script; UnsupportedError for what Kratos has not."""
+        """Write mesh, settings and the script; UnsupportedError for what Kratos lacks."""
         _refuse(deck)
         text = "\n".join(_mesh_lines(deck)) + "\n"
         (folder / "mesh.mdpa").write_text(text, encoding="ascii")
@@ -69,11 +69,11 @@ class Kratos:
         shutil.copyfile(Path(__file__).with_name("kratos_main.py"), folder / "main.py")
 
     def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002 -- the same for all codes
-        """What to run in `folder`."""
+        """The command to run in `folder`."""
         return [str(PYTHON), "main.py"]
 
     def read(self, deck: Deck, folder: Path) -> ForeignResult:
-        """The fields at the end; SolveError where the run came to none."""
+        """The fields at the end; SolveError without a result."""
         try:
             found = json.loads((folder / "result.json").read_text(encoding="ascii"))
         except (OSError, ValueError):

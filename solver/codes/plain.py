@@ -1,4 +1,4 @@
-"""The evaluated case as one JSON file, `deck.json`: for codes without a format of ours.
+"""The evaluated case as one JSON file, `deck.json`: for codes whose format is not written here.
 
 Nodes count from 0, axes are 0, 1, 2. `points`: coordinates; `cells`: nodes by type, in the order of
 VTK; `material`: by type, the place of each cell's material in `materials`; `held`: [node, axis,
@@ -22,7 +22,7 @@ FILE = "deck.json"
 
 
 class Plain:
-    """Only written: a user's own code reads it."""
+    """Only written: a code of the user reads it."""
 
     name = "plain"
     layer = False
@@ -49,7 +49,7 @@ class Plain:
 
 
 def content(deck: Deck) -> dict[str, Any]:
-    """What the file holds."""
+    """The content of the file."""
     nodes, axes = np.nonzero(deck.all_forces)
     forces = deck.all_forces[nodes, axes]
     return {

@@ -10,7 +10,7 @@ results:
   - {cases: [ssnp170-a, ssnp170-b], pressure: 4.0e-13, stress: 4.0e-13}
   - {cases: [ssnp170-z3], stress: 4.0e-3, remark: what is special}
 
-A file lies in `recorded/` beside the case files of its family. Errors are relative and bounds.
+A file is in `recorded/` beside the case files of its family. Errors are relative, and are bounds.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from ..case.typed import ONCE, Positive, Section, Text, Version, read_as
 from ..case.yaml import read_mapping
 from ..verification.checks import RELATIVE
 from ..verification.verdict import FAILED, PASSED, CheckError, CheckResult, Verdict
-from .files.map import Code
+from .files.map import CodeName
 
 FOLDER = "recorded"
 
 
 class RecordedResult(Section, frozen=True):
-    """What is stated of some solves.
+    """The figures of some solves.
 
     cases: names of solves, as in the report
     pressure: the largest relative error of the contact pressure
@@ -59,7 +59,7 @@ class RecordedFile(Section, frozen=True):
     """
 
     kind: Literal["recorded"]
-    code: Code
+    code: CodeName
     version: Version
     date: Version
     source: Text

@@ -1,4 +1,4 @@
-"""The codes by name: those that are written here, and a user's own in a folder of its own."""
+"""The codes by name: those of this folder, and those of users, each in a folder of its own."""
 
 from collections.abc import Mapping, Sequence
 from importlib import import_module
@@ -10,7 +10,7 @@ from .deck import Deck
 from .foreign import ForeignResult
 from .own import own_code
 
-# Module and class; each is imported where it is asked for.
+# Module and class, imported on demand.
 _CODES = {
     "calculix": (".calculix", "CalculiX"),
     "code_aster": (".code_aster", "CodeAster"),
@@ -21,11 +21,11 @@ _CODES = {
 
 
 class Code(Protocol):
-    """One code: writes its input, says what to run, reads what came of it.
+    """One code: writes its input, gives the command to run, reads its results.
 
     `name` is its name in `<case>@<name>`. `layer`: a plane case is given to it as one layer of
     cells in space. `settings` are shown beside its results. `install`: how it is installed.
-    `gave_up`: a regular expression that its output matches where the solve does not converge.
+    `gave_up`: a regular expression that its output matches if the solve does not converge.
     """
 
     name: str
@@ -35,28 +35,28 @@ class Code(Protocol):
 
     @property
     def settings(self) -> Mapping[str, str]:
-        """What it is asked to do, to be shown."""
+        """Its main settings, to be shown."""
 
     def version(self) -> str:
-        """The version; empty where it is not installed."""
+        """The version; empty if it is not installed."""
 
     def write(self, deck: Deck, folder: Path) -> None:
-        """Write the input into `folder`; UnsupportedError for what the code has not."""
+        """Write the input into `folder`; UnsupportedError for what the code lacks."""
 
     def command(self, folder: Path) -> Sequence[str]:
-        """What to run in `folder`."""
+        """The command to run in `folder`."""
 
     def read(self, deck: Deck, folder: Path) -> ForeignResult:
-        """The fields at the end; SolveError where there are none."""
+        """The fields at the end; SolveError without a result."""
 
 
 def names() -> list[str]:
-    """The names of the codes that are written here."""
+    """The names of the codes of this folder."""
     return list(_CODES)
 
 
 def find(name: str) -> Code:
-    """The code of a name, or in a folder of the user's; InputError for one that there is not."""
+    """The code of a name, or in a folder of the user; InputError for an unknown name."""
     if "/" in name or Path(name).is_dir():
         own: Code = own_code(Path(name), find)
         return own

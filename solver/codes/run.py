@@ -21,12 +21,12 @@ from .verdicts import LOG, VERDICT, store, without_foreign
 
 
 class CrashError(Exception):
-    """The process of a code died, or came to no end in time."""
+    """The process of a code died, or did not end in time."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a process may take: seconds, memory (bytes), cores; None: one thread on any core."""
+    """Limits of a process: seconds, memory (bytes), cores; None: one thread on any core."""
 
     seconds: float = 120.0
     memory: float = 4e9
@@ -34,11 +34,11 @@ class Limits:
 
 
 def run_code(code: Code, deck: Deck, folder: Path, limits: Limits) -> ForeignResult:
-    """Write the input into `folder`, run the code there, read what it found.
+    """Write the input into `folder`, run the code there, read its result.
 
-    What it prints is in `folder/log`. Raises UnsupportedError for what the code cannot express,
-    CrashError where its process dies or is stopped, SolveError where it does not converge or what
-    it wrote cannot be read.
+    Its output is in `folder/log`. Raises UnsupportedError for what the code cannot express,
+    CrashError if its process dies or is stopped, SolveError if it does not converge or its result
+    cannot be read.
     """
     code.write(deck, folder)
     command = code.command(folder)
@@ -63,10 +63,10 @@ def run_code(code: Code, deck: Deck, folder: Path, limits: Limits) -> ForeignRes
 def run_case(
     code: Code, case: Case, mesh: meshio.Mesh, folder: Path, limits: Limits | None = None
 ) -> Verdict:
-    """Run a code on a case as solved, check what it found, write all of it into `folder`.
+    """Run a code on a case as solved, check its result, write all of it into `folder`.
 
     A code that is not installed or cannot express the case, a crash, a hang, no convergence: each
-    ends with a verdict that gives the reason. What the code said is in `folder/log`.
+    ends with a verdict that gives the reason. The output of the code is in `folder/log`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     version, started = code.version(), now()
@@ -76,7 +76,8 @@ def run_case(
                 raise UnsupportedError(f"not installed: {code.install}")
             deck = deck_of(case, mesh, code.layer)
             found = run_code(code, deck, Path(scratch), limits or Limits())
-            return store(case, replace(found, version=version), folder, mesh)
+            found = replace(_thin(found) if case.thin else found, version=version)
+            return store(case, found, folder, mesh)
         except Exception as error:  # noqa: BLE001 -- a user's own class may raise anything
             known = [word for kind, word in _WORDS.items() if isinstance(error, kind)]
             verdict = without_foreign(
@@ -95,7 +96,16 @@ def run_case(
                 shutil.copyfile(said, folder / LOG)
 
 
-# What is wrong with a result of its mesh is no fault of the code's.
+def _thin(found: ForeignResult) -> ForeignResult:
+    """The result in plane stress: the stress zz of the equivalent plane strain is not there."""
+    if found.stress is None:
+        return found
+    values = found.stress.values.copy()
+    values[:, 2] = 0.0
+    return replace(found, stress=replace(found.stress, values=values))
+
+
+# InputError: case, mesh and result do not belong together.
 _WORDS = {
     UnsupportedError: REFUSED,
     InputError: REFUSED,

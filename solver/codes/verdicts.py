@@ -1,8 +1,8 @@
 """The verdicts of other codes, and where they are: `results/<family>/<case>@<code>/`.
 
-`verdict.json` as of a solve of ours; `result.vtkhdf` with the fields that the code gives;
-`pressure.csv` with the contact pressure by place; `log` is what the code said, written by whoever
-runs it.
+`verdict.json` as for our own solver; `result.vtkhdf` with the fields that the code gives;
+`pressure.csv` with the contact pressure by place; `log` with the output of the code, written by
+`run`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def check_foreign(case: Case, foreign: ForeignResult, mesh: meshio.Mesh | None =
 
 
 def folder_of(results: Path, case: Case, code: str) -> Path:
-    """Where the verdict of a code belongs in a folder of results."""
+    """The folder of a code's verdict in a folder of results."""
     job = job_name(case.name, case.swapped, case.hexahedra, case.recovery)
     return results / case.family / f"{job}@{code}"
 

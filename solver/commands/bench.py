@@ -32,7 +32,7 @@ def add_commands(commands: Any) -> None:
 
 
 def _add_case(command: argparse.ArgumentParser) -> None:
-    """What singles out one solve by one code."""
+    """Add the arguments that identify a solve by one code."""
     command.add_argument("case", type=Path, metavar="CASE.yaml")
     command.add_argument("--code", required=True, metavar="NAME", help="which code")
     command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, used unchanged")
@@ -60,7 +60,8 @@ def _export(options: argparse.Namespace) -> int:
         code.write(deck_of(case, mesh, code.layer), options.output)
     except UnsupportedError as error:
         raise InputError(options.case, "--code", code.name, str(error)) from None
-    print(f"{options.output}: written; next, there: {' '.join(code.command(options.output))}")
+    command = " ".join(code.command(options.output))
+    print(f"{options.output}: written{command and f'; next, there: {command}'}")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""The commands on results of other codes."""
+"""The command that checks results of other codes."""
 
 import argparse
 from pathlib import Path

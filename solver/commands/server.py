@@ -1,8 +1,8 @@
 """The warm process: all modules are loaded, and each command runs in a fork of it.
 
 A fork is a separate process: it may crash, run out of memory or be killed without effect on others.
- It runs the command as `python -m solver` does, on the standard output and error of its
-client (`solver.commands.warm`).
+It runs the command as `python -m solver` does, on the standard output and error of its client
+(`solver.commands.warm`).
 """
 
 import gc

@@ -43,21 +43,21 @@ from .tables import to_json as rows_to_json
 
 PAGE = "bench.html"
 OURS, _REFERENCE = "this project", "reference"
-# Pressures below this share of the largest are none, for the part of the interface that is drawn.
+# Pressures below this share of the largest count as zero for the part of the interface shown.
 _NOTHING = 1e-6
 # A pressure that varies by a smaller share is drawn as constant.
 _ROUND_OFF = 1e-3
 # Digits of a number in double precision; an error of zero has all of them.
 _MOST = 16.0
 _COLORS = (ORANGE, GREEN, PURPLE, RED, "#000000", "#e69f00")
-# The errors that tell the digits, the first that there is.
+# The errors that give the digits: the first one that exists.
 PRESSURES = ("multiplier", "pressure_l2", "pressure_means", "pressure_max", "peak")
 STRESSES = ("nodal_stress", "stress_components", "surface_stress_slave", "stress_max", "stress_l2")
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What one code has of one case."""
+    """The result of one code on one case."""
 
     row: Row
 
@@ -72,7 +72,7 @@ class Cell:
         return bool(self.row.verdict.recorded)
 
     def _error(self, names: Iterable[str]) -> float | None:
-        """The error of the first of the checks, or norms, that there is."""
+        """The error of the first check, or norm, that exists."""
         for name in names:
             if found := self.row.errors([name]):
                 return found[0][0]
@@ -137,7 +137,7 @@ class Bench:
 
     @cached_property
     def cells(self) -> dict[tuple[str, str], dict[str, Cell]]:
-        """By family and case, by code: those that another code has something of."""
+        """By family and case, by code: the cases that another code has a result of."""
         found: dict[tuple[str, str], dict[str, Cell]] = {}
         for row in self.rows:
             cell = Cell(row)
@@ -224,7 +224,7 @@ def _pressures(row: Row) -> np.ndarray:
 
 
 def _solution(row: Row) -> Solution | None:
-    """The solution of a solve of ours; None where there is none."""
+    """The solution of our own solver; None without a result that can be read."""
     if row.result_file is None:
         return None
     try:

@@ -73,7 +73,7 @@ def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], str]) -> st
     if row.result_file is None:
         return Markup("<p class=none>No result, no picture.</p>")
     kept = folder / f"{_name(row)}{ending}"
-    if not is_current(kept, row.result_file):
+    if not _is_current(kept, row.result_file):
         try:
             drawing = draw(row)
         except (InputError, OSError, LookupError, ValueError, ArithmeticError) as error:
@@ -87,10 +87,9 @@ def _name(row: Row) -> str:
     return f"{row.group}-{row.folder.name}"
 
 
-def is_current(kept: Path, result: Path, *drawing: Path) -> bool:
-    """Whether a picture is newer than its result, this folder's sources and those of `drawing`."""
-    sources = [s for folder in (Path(__file__).parent, *drawing) for s in folder.glob("*.py")]
-    newest = max(path.stat().st_mtime for path in (result, *sources))
+def _is_current(kept: Path, result: Path) -> bool:
+    """Whether a picture is newer than its result and the sources of this folder."""
+    newest = max(path.stat().st_mtime for path in (result, *Path(__file__).parent.glob("*.py")))
     return kept.is_file() and kept.stat().st_mtime > newest
 
 

@@ -67,7 +67,7 @@ class Row:
 
     @property
     def result_file(self) -> Path | None:
-        """The result of a solve of ours, which pictures can be drawn of."""
+        """The result of our own solver, from which pictures can be drawn."""
         return None if self.verdict.code else self.stored
 
     def errors(self, names: Iterable[str]) -> list[tuple[float, str]]:

@@ -143,7 +143,7 @@ def md(text: str) -> str:
 def to_failures(rows: Sequence[Row]) -> str:
     """One line for each solve that did not pass: name, verdict, reason; empty if all did.
 
-    Other codes are shown in the tables; they fail no batch of ours.
+    Other codes are shown in the tables; they do not fail the batch.
     """
     bad = (row for row in rows if not row.sound and not row.verdict.code)
     return "".join(f"{row.name}: {row.word}: {row.why}\n" for row in bad)

@@ -12,7 +12,7 @@ from ..case.rules import check_dimension
 from ..mechanics.fem.faces import corner_sets
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError, hint
-from .groups import with_cells
+from .groups import ALL, with_cells
 
 # A node is at a place where it is nearer than this share of the mesh's extent.
 _NEAR = 1e-6
@@ -33,7 +33,7 @@ def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
     if any(selection.of == "faces" for selection in case.selections):
         mesh = _with_outer_faces(mesh)
     for selection in case.selections:
-        if selection.name in {*mesh.cell_sets, *mesh.point_sets}:
+        if selection.name in {ALL, *mesh.cell_sets, *mesh.point_sets}:
             allowed = "the mesh has a group of this name; give another one"
             raise InputError(case.path, selection.key, selection.name, allowed)
         _add(case, mesh, selection)

@@ -86,3 +86,22 @@ def test_a_result_is_checked(tmp_path, value, word):
     assert verdict.verdict == word
     assert verdict.seconds["total"] > 0
     assert (tmp_path / "out/log").read_text() == f"{value}\n"
+
+
+class PlaneStrain(Fake):
+    """Stress of the equivalent plane strain: zz = -25 ν/(1 + ν)."""
+
+    def read(self, deck, folder):
+        stress = np.tile([0.0, -25.0, -25 * 0.3 / 1.3, 0.0, 0.0, 0.0], (len(deck.points), 1))
+        nodes = np.arange(len(stress))
+        return ForeignResult(
+            code=self.name, stress=Field(places=deck.points, values=stress, nodes=nodes)
+        )
+
+
+@pytest.mark.parametrize(("plane", "word"), [("stress", "passed"), ("strain", "failed")])
+def test_plane_stress_has_none_across_the_plane(tmp_path, plane, word):
+    reference = {"kind": "analytical", "stress": {"yy": -25.0, "zz": 0.0}}
+    case, mesh = case_of("QUAD4", "QUAD4", plane=plane, reference=reference)
+    verdict = run_case(PlaneStrain("pass"), case, mesh, tmp_path, Limits())
+    assert (verdict.verdict, [c.name for c in verdict.checks]) == (word, ["stress_components"])

@@ -76,7 +76,6 @@ def write_scaling(folder: Path) -> None:
     benchmark = yaml.safe_load((folder / "benchmark.yaml").read_text())
     comparison = benchmark["comparisons"][0] | {"series": "quad4"}
     benchmark["comparisons"] = [comparison | {"ways": comparison["ways"][:1]}]
-    benchmark["batch"]["cases"] = ["../ssnp170/e.yaml"]
     (folder / "benchmark.yaml").write_text(yaml.safe_dump(benchmark))
 
 

@@ -1,5 +1,5 @@
-# Other codes on the same cases: one run makes a folder beside that of our own solve, with a verdict
-# whatever became of it.
+# Other codes on the same cases: each run makes a folder with a verdict beside the folder of our own
+# solve.
 
 
 @cache
@@ -26,7 +26,7 @@ def version_of(code):
 
 
 def sources_of(code):
-    """The files of a user's own code; none of one of ours, which are among the solver's."""
+    """The files of a user's own code; empty for the codes of the solver."""
     return sorted(str(f) for f in Path(code).rglob("*") if f.is_file())
 
 
@@ -65,7 +65,7 @@ rule run_code:
         " || test -s {output:q}/verdict.json"
 
 
-# The report of everything that is there: our own solves and those of other codes.
+# The report of all solves: our own and those of other codes.
 rule bench:
     input:
         codes=lambda w: foreign_runs(),

@@ -20,7 +20,7 @@ from ...case.typed import ONCE, FieldError, Number, Positive, Section, Text, Ver
 Component = Literal["x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz", "yx", "zy", "zx"]
 Names = Annotated[tuple[Text, ...], ONCE]
 CODE = r"^[A-Za-z0-9._-]+$"
-Code = Annotated[str, Meta(pattern=CODE, description="letters, digits, -, _ and .")]
+CodeName = Annotated[str, Meta(pattern=CODE, description="letters, digits, -, _ and .")]
 
 
 class FieldMap(Section, frozen=True):
@@ -71,7 +71,7 @@ class ResultMap(Section, frozen=True):
     seconds: how long the code took
     """
 
-    code: Code | None = None
+    code: CodeName | None = None
     version: Version | None = None
     length: Positive = 1.0
     stress: Positive = 1.0

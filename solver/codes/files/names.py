@@ -151,7 +151,7 @@ def _missing(where: object, found: Found, quantity: str, names: Sequence[str]) -
 
 
 def named(raw: Raw, names: Sequence[str], where: object, key: str) -> tuple[RawField, ...]:
-    """The fields (or `FIELD COMPONENT`) of these names; InputError for one that there is not."""
+    """The fields (or `FIELD COMPONENT`) of these names; InputError for an unknown name."""
     there: dict[str, RawField] = dict(raw.fields)
     for name, field in raw.fields.items():
         for i, component in enumerate(field.components):

@@ -14,7 +14,7 @@ Pieces = tuple[np.ndarray, np.ndarray, np.ndarray]
 # Of numbers (a,), places (a, q, 2) and slopes (a, q, 2) of curves through them: both in the image.
 Image = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-# More points along arcs whose images are no polynomials.
+# Additional points along arcs whose images are not polynomials.
 _MORE = 2
 # Images of arcs that are off their chord by less than this are straight.
 _STRAIGHT = 1e-12

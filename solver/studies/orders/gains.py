@@ -54,6 +54,12 @@ class Gain:
         return self.curve.ladder.recovery or ""
 
     @property
+    def problem(self) -> str:
+        """Family and problem, without what distinguishes the ladders of constants."""
+        problem = self.constants.ladder.problem.removesuffix("constant pressure").rstrip(", ")
+        return ": ".join(filter(None, [self.curve.family.name, problem]))
+
+    @property
     def pair(self) -> str:
         """The cell types of slave and master."""
         sides = self.curve.solved[-1].sides
