@@ -79,9 +79,9 @@ def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
             force = found.setdefault(_holder(scene, key), np.zeros_like(left))
             force[nodes] += part
     if any(support.together for support in scene.case.supports):
-        found["together"] = left
+        found["together"] = found.get("together", 0.0) + left
     if state.iterate.springs.any():
-        found["springs"] = _of_springs(state)
+        found["springs"] = found.get("springs", 0.0) + _of_springs(state)
     return [_resultant(scene, name, force) for name, force in found.items()]
 
 
@@ -103,7 +103,9 @@ def _resultant(scene: Scene, name: str, force: np.ndarray) -> Reaction:
     flat = ((0, 0), (0, 3 - force.shape[1]))
     places = np.pad(scene.points + scene.origin, flat)
     moment = np.cross(places, np.pad(force, flat)).sum(axis=0)
-    return Reaction(name, force.sum(axis=0), moment * (not scene.case.axisymmetric))
+    if scene.case.axisymmetric:
+        moment = np.zeros(3)
+    return Reaction(name, force.sum(axis=0), moment)
 
 
 def strain_energy(state: Equilibrium) -> float:

@@ -130,3 +130,14 @@ def test_supports_that_are_not_at_right_angles_hold_the_load_together():
     assert total == pytest.approx([0, PRESSURE], abs=1e-11)
     # The pressure acts from x = 1/2 to 3/2 at the height 1.
     assert sum(one.moment for one in found.reactions)[2] == pytest.approx(PRESSURE, abs=1e-11)
+
+
+def test_a_group_that_is_called_springs_keeps_what_it_holds():
+    """A foundation of 40 bears the load; the group `springs` of the sides holds its stress."""
+    change = ("{group: base, fix: [y]}", "{group: base, spring: {normal: 40.0}}")
+    mesh = block_mesh("QUAD4", "QUAD8", (3, 2))
+    mesh.cell_sets["springs"] = mesh.cell_sets.pop("symx")
+    sides = ("{group: symx, fix: [x]}", "{group: springs, fix: [x]}\n  - {group: farx, fix: [x]}")
+    held = by_group(simulate(changed_case(2, change, sides), mesh))
+    side = 2 * 25 * POISSON / (1 - POISSON)
+    assert held["springs"].force == pytest.approx([side, 25], abs=1e-11)
