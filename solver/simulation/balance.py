@@ -5,6 +5,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from ..mechanics.fem.faces import face_integrals
+from ..mechanics.fem.supports import DEPENDENT
 from .problem import Equilibrium
 from .scene import Scene, ZoneScene
 from .solution import Reaction
@@ -56,7 +57,8 @@ def _unbalanced(
 def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
     """The reactions of each group that supports hold, of rigid bodies, the axis, springs and ties.
 
-    What two supports hold at a node belongs to the first of them that holds its direction.
+    A support gets the force along its direction, without the part in those of supports before it:
+    all forces sum to what is held.
     """
     contact = state.correction.copy()
     for zone in scene.zones:
@@ -64,13 +66,18 @@ def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
         contact += force.reshape(contact.shape)
     left, _ = _unbalanced(scene, state, contact)
     found: dict[str, np.ndarray] = {}
+    spanned = np.zeros((*left.shape, left.shape[1]))
     for key, fixed in scene.fixed.items():
-        along = np.einsum("nd,nd->n", left[fixed.nodes], fixed.directions)
-        part = along[:, None] * fixed.directions
-        left[fixed.nodes] -= part
-        if len(fixed.nodes):
+        nodes, direction = fixed.nodes, fixed.directions
+        rest = direction - np.einsum("nij,nj->ni", spanned[nodes], direction)
+        size = np.linalg.norm(rest, axis=1, keepdims=True)
+        unit = np.divide(rest, size, out=np.zeros_like(rest), where=size > DEPENDENT)
+        spanned[nodes] += unit[:, :, None] * unit[:, None]
+        part = np.einsum("nd,nd->n", left[nodes], unit)[:, None] * unit
+        left[nodes] -= part
+        if len(nodes):
             force = found.setdefault(_holder(scene, key), np.zeros_like(left))
-            force[fixed.nodes] += part
+            force[nodes] += part
     if any(support.together for support in scene.case.supports):
         found["together"] = left
     if state.iterate.springs.any():
