@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeAlias
 
 import meshio
 import numpy as np
@@ -20,17 +19,15 @@ from ..mechanics.mortar.held import merge_fixed_multipliers
 from ..mechanics.mortar.operator import GapOperator
 from ..mechanics.mortar.treatments import TREATMENTS, Treatment
 from ..system.clock import Clock
-from ..system.errors import InputError
 from ..system.progress import stage
-from .attributes import Attributes, CutZone, faces_of
+from .attributes import Attributes, CutZone
 from .groups import ON_AXIS, check_groups, named_parts
 from .operators import operator_of
 from .options import LEAN, Options
 from .relations import springs_of
 from .selections import with_groups
+from .surfaces import Surfaces, surfaces_of
 
-# Slave and master faces of each zone.
-Surfaces: TypeAlias = list[tuple[list[FaceBlock], list[FaceBlock]]]
 # An average initial gap below this many roundings of the coordinates is none.
 _GAP_ROUND_OFF = 8
 
@@ -169,7 +166,7 @@ def build_scene(
     local = replace_points(mesh, mesh.points - origin)
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
     with stage(clock, "cut"):
-        surfaces = _surfaces(case, local)
+        surfaces = surfaces_of(case, local)
         cut_mesh, sub_faces = _cut(local, case.zones, surfaces)
     cut_zones = [
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
@@ -263,61 +260,6 @@ def radial(points: np.ndarray) -> np.ndarray:
 def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
     """The same cells and groups on other points."""
     return meshio.Mesh(points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets)
-
-
-def _surfaces(case: Case, mesh: meshio.Mesh) -> Surfaces:
-    """Slave and master faces of each zone; refuses slave nodes shared by two zones."""
-    owner: dict[int, str] = {}
-    surfaces = []
-    for i, zone in enumerate(case.zones):
-        slave, master = (
-            faces_of(mesh, getattr(zone, side), case, case.zone_key(i, side))
-            for side in ("slave", "master")
-        )
-        _refuse_untreated(case, i, zone, slave)
-        if case.axisymmetric:
-            _refuse_on_axis(case, mesh, i, slave)
-        nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave])).tolist()
-        shared = [n for n in nodes if n in owner]
-        if shared:
-            raise InputError(
-                case.path,
-                case.zone_key(i, "slave"),
-                zone.slave,
-                f"{len(shared)} of its nodes are slave nodes of zone {owner[shared[0]]} too; "
-                "a node may be a slave in one zone only",
-            )
-        owner |= dict.fromkeys(nodes, zone.name)
-        surfaces.append((slave, master))
-    return surfaces
-
-
-def _refuse_untreated(case: Case, i: int, zone: Zone, slave: list[FaceBlock]) -> None:
-    treatment = TREATMENTS[zone.treatment]
-    for block in slave:
-        if block.type.name not in treatment.faces:
-            others = [name for name, t in TREATMENTS.items() if block.type.name in t.faces]
-            allowed = (
-                f"does not exist for slave faces {block.type.name} of {block.owner_type.name}: "
-                f"{treatment.why}; allowed there: {', '.join(others)}"
-            )
-            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
-
-
-def _refuse_on_axis(case: Case, mesh: meshio.Mesh, i: int, slave: list[FaceBlock]) -> None:
-    """Refuse slave faces of no area, and treatments that divide by the area of one node."""
-    zone = case.zones[i]
-    for block in slave:
-        ends = mesh.points[block.nodes[:, : block.type.n_vertices], 0] == 0
-        if flat := int(ends.all(axis=1).sum()):
-            allowed = f"{flat} of its faces lie on the axis: they have no area"
-            raise InputError(case.path, case.zone_key(i, "slave"), zone.slave, allowed)
-        if ends.any() and zone.treatment == "node_to_segment" and block.type.order == 2:
-            allowed = (
-                f"does not exist for slave faces {block.type.name} that end on the axis: a uniform "
-                "pressure has no force at the node there; allowed there: lac, quadrature, nodal"
-            )
-            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
 
 
 def _cut(
