@@ -24,8 +24,8 @@ except InputError as error:
     print(error)
 import importlib, pkgutil, mortarcheck
 for module in pkgutil.walk_packages(mortarcheck.__path__, "mortarcheck."):
-    if module.name.rpartition(".")[2] not in ("__main__", "drawing", "shapes"):  # need PyVista
-        importlib.import_module(module.name)
+    if not module.name.endswith("_main") and not module.name.endswith("_main__"):
+        importlib.import_module(module.name)  # the others are started, by the Python of other codes
 assert not [name for name in sys.modules if name.partition(".")[0] == "solver"]
 print(__version__)
 """

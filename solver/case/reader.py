@@ -7,6 +7,7 @@ mesh.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,7 +74,7 @@ class _Reader:
         for name in file.groups:
             self.select(name)
         if file.plane == "stress":
-            self.materials = {g: m.in_plane_stress() for g, m in self.materials.items()}
+            self.materials = {g: self.thin(g, m) for g, m in self.materials.items()}
         self.zones = tuple(map(self.zone, range(len(file.contact))))
         self.solution = self.exact_solution()
 
@@ -116,6 +117,13 @@ class _Reader:
             selections=tuple(self.selections.values()),
         )
 
+    def thin(self, group: str, material: Material) -> Material:
+        """The material in plane stress; its equivalent in plane strain needs ν > -0.5."""
+        if material.poisson <= -0.5:
+            allowed = "must be greater than -0.5 in plane stress"
+            raise InputError(self.path, f"materials.{group}.poisson", material.poisson, allowed)
+        return material.in_plane_stress()
+
     def select(self, name: str) -> None:
         """Add a group that the file makes."""
         item, keys = self.file.groups[name], ("groups", name)
@@ -141,9 +149,13 @@ class _Reader:
         if given is not None:
             made = Selection("+".join(given), key_path(keys), "groups", given)
         else:
-            name = f"({', '.join(f'{x:g}' for x in at)})"
+            name = f"({', '.join(_shown(x) for x in at)})"
             made = Selection(name, key_path((*keys[:-1], "at")), "nodes", (), "at", at)
-        return self.selections.setdefault(made.name, made).name
+        known = self.selections.setdefault(made.name, made)
+        if replace(known, key=made.key) != made:
+            allowed = f"the group of {known.key} has this name; give that one another name"
+            raise InputError(self.path, made.key, made.name, allowed)
+        return made.name
 
     def support(self, index: int) -> Support:
         item, keys = self.file.supports[index], ("supports", index)
@@ -224,3 +236,9 @@ def _only(values: Iterable[Any]) -> float | None:
     different = {value for value in values if value is not None}
     value = different.pop() if len(different) == 1 else None
     return float(value) if isinstance(value, int | float) else None
+
+
+def _shown(x: float) -> str:
+    """A number in few digits, or in all where few are another number."""
+    short = f"{x:g}"
+    return short if float(short) == x else repr(x)

@@ -55,7 +55,7 @@ class Compared:
         if foreign.step is not None and abs(foreign.step - case.factors[-1]) > _STEP:
             allowed = f"the result must be that of load factor {case.factors[-1]:g}"
             raise InputError(where, "step", foreign.step, allowed)
-        foreign = flattened(foreign, mesh.points.shape[1], where)
+        foreign = flattened(foreign, mesh.points.shape[1], where, case.thin)
         model = Model.of(case, mesh)
         placer = Placer(model, foreign, where)
         names = ("displacement", "stress", "pressure", "gap")

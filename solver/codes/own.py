@@ -111,7 +111,9 @@ def own_code(folder: Path, find: Any) -> Any:
     try:
         re.compile(file.gave_up)
     except re.error as error:
-        raise InputError(path, "gave_up", file.gave_up, f"no regular expression: {error}") from None
+        raise InputError(
+            path, "gave_up", file.gave_up, f"must be a regular expression: {error}"
+        ) from None
     return OwnCode(folder, file, find(file.input))
 
 

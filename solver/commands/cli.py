@@ -260,7 +260,7 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
         verdicts += [p for p in found if "orders" not in p.relative_to(options.results).parts]
     if not verdicts:
         where = options.results or options.run.__name__.strip("_")
-        raise InputError(where, "VERDICT.json", None, "there is none")
+        raise InputError(where, "VERDICT.json", None, "no verdict is named or found")
     return verdicts
 
 

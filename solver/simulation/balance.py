@@ -5,6 +5,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from ..mechanics.fem.faces import face_integrals
+from ..mechanics.fem.supports import DEPENDENT
 from .problem import Equilibrium
 from .scene import Scene, ZoneScene
 from .solution import Reaction
@@ -56,7 +57,8 @@ def _unbalanced(
 def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
     """The reactions of each group that supports hold, of rigid bodies, the axis, springs and ties.
 
-    What two supports hold at a node belongs to the first of them that holds its direction.
+    A support gets the force along its direction, without the part in those of supports before it:
+    all forces sum to what is held.
     """
     contact = state.correction.copy()
     for zone in scene.zones:
@@ -64,17 +66,22 @@ def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
         contact += force.reshape(contact.shape)
     left, _ = _unbalanced(scene, state, contact)
     found: dict[str, np.ndarray] = {}
+    spanned = np.zeros((*left.shape, left.shape[1]))
     for key, fixed in scene.fixed.items():
-        along = np.einsum("nd,nd->n", left[fixed.nodes], fixed.directions)
-        part = along[:, None] * fixed.directions
-        left[fixed.nodes] -= part
-        if len(fixed.nodes):
+        nodes, direction = fixed.nodes, fixed.directions
+        rest = direction - np.einsum("nij,nj->ni", spanned[nodes], direction)
+        size = np.linalg.norm(rest, axis=1, keepdims=True)
+        unit = np.divide(rest, size, out=np.zeros_like(rest), where=size > DEPENDENT)
+        spanned[nodes] += unit[:, :, None] * unit[:, None]
+        part = np.einsum("nd,nd->n", left[nodes], unit)[:, None] * unit
+        left[nodes] -= part
+        if len(nodes):
             force = found.setdefault(_holder(scene, key), np.zeros_like(left))
-            force[fixed.nodes] += part
+            force[nodes] += part
     if any(support.together for support in scene.case.supports):
-        found["together"] = left
+        found["together"] = found.get("together", 0.0) + left
     if state.iterate.springs.any():
-        found["springs"] = _of_springs(state)
+        found["springs"] = found.get("springs", 0.0) + _of_springs(state)
     return [_resultant(scene, name, force) for name, force in found.items()]
 
 
@@ -96,7 +103,9 @@ def _resultant(scene: Scene, name: str, force: np.ndarray) -> Reaction:
     flat = ((0, 0), (0, 3 - force.shape[1]))
     places = np.pad(scene.points + scene.origin, flat)
     moment = np.cross(places, np.pad(force, flat)).sum(axis=0)
-    return Reaction(name, force.sum(axis=0), moment * (not scene.case.axisymmetric))
+    if scene.case.axisymmetric:
+        moment = np.zeros(3)
+    return Reaction(name, force.sum(axis=0), moment)
 
 
 def strain_energy(state: Equilibrium) -> float:

@@ -92,9 +92,12 @@ def _slave_dofs(scene: Scene) -> np.ndarray:
 
 
 def unit_springs(scene: Scene) -> sparse.csr_matrix:
-    """The stiffness of springs, the largest entry one."""
-    largest = abs(scene.springs).max() if scene.springs.nnz else 1.0
-    return scene.springs / largest
+    """The rows (n_dofs, n_dofs) of the stiffness of springs, the largest entry of each one.
+
+    They resist the same motions, soft springs beside stiff ones too.
+    """
+    largest = abs(scene.springs).max(axis=1).toarray().ravel()
+    return (sparse.diags_array(1 / np.where(largest > 0, largest, 1.0)) @ scene.springs).tocsr()
 
 
 def free_motion(

@@ -3,7 +3,7 @@
 Every refusal is an `InputError` that names the case file, the key and the groups that are there.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import meshio
 import numpy as np
@@ -63,20 +63,27 @@ def named_parts(case: Case, mesh: meshio.Mesh) -> tuple[meshio.Mesh, tuple[int, 
     }
     points = {name: nodes for name, nodes in mesh.point_sets.items() if name in named}
     left = len(mesh.cell_sets) - len(sets) + len(mesh.point_sets) - len(points)
-    members: dict[str, list[np.ndarray]] = {name: [] for name in sets}
-    cells, count = [], 0
-    for i, (block, whole) in enumerate(zip(mesh.cells, volume, strict=True)):
-        kept = np.full(len(block.data), whole)
-        for parts in sets.values():
+    found = meshio.Mesh(mesh.points, mesh.cells, cell_sets=sets, point_sets=points)
+    wanted = [np.full(len(b.data), whole) for b, whole in zip(mesh.cells, volume, strict=True)]
+    found = with_cells(found, wanted)
+    count = sum(len(block.data) for block in mesh.cells)
+    count -= sum(len(block.data) for block in found.cells)
+    return (found, (left, count)) if left or count else (mesh, (0, 0))
+
+
+def with_cells(mesh: meshio.Mesh, wanted: Sequence[np.ndarray]) -> meshio.Mesh:
+    """The mesh with its `wanted` cells (n,), by block, and those of its groups."""
+    sets: dict[str, list[np.ndarray]] = {name: [] for name in mesh.cell_sets}
+    cells = []
+    for i, (block, chosen) in enumerate(zip(mesh.cells, wanted, strict=True)):
+        kept = chosen.copy()
+        for parts in mesh.cell_sets.values():
             kept[np.asarray(parts[i], dtype=int)] = True
         place = np.cumsum(kept) - 1
-        for name, parts in sets.items():
-            members[name].append(place[np.asarray(parts[i], dtype=int)])
+        for name, parts in mesh.cell_sets.items():
+            sets[name].append(place[np.asarray(parts[i], dtype=int)])
         cells.append((block.type, block.data[kept]))
-        count += int((~kept).sum())
-    if not left and not count:
-        return mesh, (0, 0)
-    return meshio.Mesh(mesh.points, cells, cell_sets=members, point_sets=points), (left, count)
+    return meshio.Mesh(mesh.points, cells, cell_sets=sets, point_sets=mesh.point_sets)
 
 
 def _named(case: Case) -> set[str]:
@@ -137,6 +144,14 @@ class _Groups:
         if group not in names:
             raise self.error(key, group, f"no such group in the mesh; {hint(group, names)}")
 
+    def of_nodes(self, key: str, group: str) -> bool:
+        """Whether a group is one of nodes; refuses one that holds faces or cells too."""
+        if group not in self.mesh.point_sets:
+            return False
+        if any(map(len, self.mesh.cell_sets.get(group, ()))):
+            raise self.error(key, group, "holds nodes, and faces or cells; one kind is needed")
+        return True
+
     def error(self, key: str, value: object, allowed: str) -> InputError:
         return InputError(self.case.path, key, value, allowed)
 
@@ -168,7 +183,7 @@ class _Groups:
     def check_supports(self) -> None:
         for i, support in enumerate(self.case.supports):
             key = f"supports[{i}].group"
-            if support.spring and support.group not in self.mesh.point_sets:
+            if support.spring and not self.of_nodes(key, support.group):
                 self.cells(key, support.group, self.dim - 1)
             if support.group == ALL:
                 if "normal" in support.fix:
@@ -188,7 +203,7 @@ class _Groups:
             if on_volume and load.group == ALL:
                 chosen = zip(self.mesh.cells, self.block_dims, strict=True)
                 parts = [np.arange(len(block.data) * (dim == self.dim)) for block, dim in chosen]
-            elif load.kind == "force" and load.group in self.mesh.point_sets:
+            elif load.kind == "force" and self.of_nodes(key, load.group):
                 self.check_forced(key, load)
                 continue
             else:

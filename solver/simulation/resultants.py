@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..mechanics.fem.faces import circumference
+from ..mechanics.fem.faces import surface_points
 from ..mechanics.mortar.edge import Edges, contact_edges
 from ..mechanics.mortar.reconstruction import vertex_neighbours
 from .problem import Equilibrium
@@ -46,7 +46,8 @@ def _extent(
         whole = surface.covered / surface.area * (zone.operator.nodes is None)
         points = scene.points + scene.origin
         around = scene.case.axisymmetric
-        length = surface.area / circumference(surface.centre) if around else surface.area
+        at = surface_points(points, [(b.type.name, b.nodes, b.number) for b in zone.slave_faces])
+        length = np.bincount(at.macro, at.weight)
         edges = contact_edges(points, ends, length, whole, mean, closed, around)
         return edges, surface.covered[closed].sum() + edges.lengths.sum(axis=0)
     near = vertex_neighbours(faces, len(closed)).astype(int)

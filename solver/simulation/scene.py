@@ -1,9 +1,8 @@
 """From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeAlias
 
 import meshio
 import numpy as np
@@ -12,29 +11,23 @@ from scipy import sparse
 from ..case.model import Case, Step, Zone
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block
-from ..mechanics.fem.faces import FaceBlock, surface_points, volume_cells
+from ..mechanics.fem.faces import FaceBlock, volume_cells
 from ..mechanics.fem.mixed import MeanStress
 from ..mechanics.fem.supports import Fixed, FreeMotion
 from ..mechanics.mortar.cut import CutMesh, SubFaces, cut
-from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
 from ..mechanics.mortar.held import merge_fixed_multipliers
-from ..mechanics.mortar.multipliers import constants
-from ..mechanics.mortar.operator import GapOperator, gap_operator
-from ..mechanics.mortar.reconstruction import form_of, vertex_neighbours
-from ..mechanics.mortar.recovery import Asked
-from ..mechanics.mortar.treatments import TREATMENTS, Treatment, scheme_of
-from ..mesh.catalogue import BY_NAME
+from ..mechanics.mortar.operator import GapOperator
+from ..mechanics.mortar.treatments import TREATMENTS, Treatment
 from ..system.clock import Clock
-from ..system.errors import InputError
 from ..system.progress import stage
-from .attributes import Attributes, CutZone, faces_of
+from .attributes import Attributes, CutZone
 from .groups import ON_AXIS, check_groups, named_parts
+from .operators import operator_of
 from .options import LEAN, Options
 from .relations import springs_of
 from .selections import with_groups
+from .surfaces import Surfaces, surfaces_of
 
-# Slave and master faces of each zone.
-Surfaces: TypeAlias = list[tuple[list[FaceBlock], list[FaceBlock]]]
 # An average initial gap below this many roundings of the coordinates is none.
 _GAP_ROUND_OFF = 8
 
@@ -173,7 +166,7 @@ def build_scene(
     local = replace_points(mesh, mesh.points - origin)
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
     with stage(clock, "cut"):
-        surfaces = _surfaces(case, local)
+        surfaces = surfaces_of(case, local)
         cut_mesh, sub_faces = _cut(local, case.zones, surfaces)
     cut_zones = [
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
@@ -182,7 +175,7 @@ def build_scene(
     with stage(clock, "pairing"):
         noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
         operators = [
-            _operator(groups, zone, faces, master, noise, options)
+            operator_of(groups, zone, faces, master, noise, options)
             for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
         ]
     with stage(clock, "assembly"):
@@ -269,61 +262,6 @@ def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
     return meshio.Mesh(points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets)
 
 
-def _surfaces(case: Case, mesh: meshio.Mesh) -> Surfaces:
-    """Slave and master faces of each zone; refuses slave nodes shared by two zones."""
-    owner: dict[int, str] = {}
-    surfaces = []
-    for i, zone in enumerate(case.zones):
-        slave, master = (
-            faces_of(mesh, getattr(zone, side), case, case.zone_key(i, side))
-            for side in ("slave", "master")
-        )
-        _refuse_untreated(case, i, zone, slave)
-        if case.axisymmetric:
-            _refuse_on_axis(case, mesh, i, slave)
-        nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave])).tolist()
-        shared = [n for n in nodes if n in owner]
-        if shared:
-            raise InputError(
-                case.path,
-                case.zone_key(i, "slave"),
-                zone.slave,
-                f"{len(shared)} of its nodes are slave nodes of zone {owner[shared[0]]} too; "
-                "a node may be a slave in one zone only",
-            )
-        owner |= dict.fromkeys(nodes, zone.name)
-        surfaces.append((slave, master))
-    return surfaces
-
-
-def _refuse_untreated(case: Case, i: int, zone: Zone, slave: list[FaceBlock]) -> None:
-    treatment = TREATMENTS[zone.treatment]
-    for block in slave:
-        if block.type.name not in treatment.faces:
-            others = [name for name, t in TREATMENTS.items() if block.type.name in t.faces]
-            allowed = (
-                f"does not exist for slave faces {block.type.name} of {block.owner_type.name}: "
-                f"{treatment.why}; allowed there: {', '.join(others)}"
-            )
-            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
-
-
-def _refuse_on_axis(case: Case, mesh: meshio.Mesh, i: int, slave: list[FaceBlock]) -> None:
-    """Refuse slave faces of no area, and treatments that divide by the area of one node."""
-    zone = case.zones[i]
-    for block in slave:
-        ends = mesh.points[block.nodes[:, : block.type.n_vertices], 0] == 0
-        if flat := int(ends.all(axis=1).sum()):
-            allowed = f"{flat} of its faces lie on the axis: they have no area"
-            raise InputError(case.path, case.zone_key(i, "slave"), zone.slave, allowed)
-        if ends.any() and zone.treatment == "node_to_segment" and block.type.order == 2:
-            allowed = (
-                f"does not exist for slave faces {block.type.name} that end on the axis: a uniform "
-                "pressure has no force at the node there; allowed there: lac, quadrature, nodal"
-            )
-            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
-
-
 def _cut(
     mesh: meshio.Mesh, zones: Sequence[Zone], surfaces: Surfaces
 ) -> tuple[CutMesh, list[list[SubFaces]]]:
@@ -345,79 +283,3 @@ def _cut(
             [SubFaces(f.type, f.nodes[m], f.macro[m] - low) for f, m in mine if m.any()]
         )
     return cut_mesh, sub_faces
-
-
-def _operator(
-    groups: Attributes,
-    zone: Zone,
-    faces: CutZone,
-    master_faces: list[FaceBlock],
-    noise: float,
-    options: Options,
-) -> GapOperator:
-    """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
-    points, count = groups.points, sum(len(block.nodes) for block in faces.slave_faces)
-    around = groups.axisymmetric
-    slaves = [facets(points, f.type, f.nodes, f.macro, around) for f in faces.sub_faces]
-    if zone.normal == "nodal":
-        slaves = with_nodal_normals(slaves, points)
-    materials = groups.materials_behind(master_faces)
-    masters = _master_facets(points, master_faces, materials, around)
-    if not options.shortcuts.quadrature:
-        slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
-    scheme = scheme_of(zone.treatment, zone.points)
-    scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
-    asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
-    operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
-    return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
-
-
-def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> Asked:
-    """How a zone's pressure is recovered, and which of its macro-elements may be neighbours."""
-    count = sum(len(block.nodes) for block in slave_faces)
-    order = min(block.owner_type.order for block in slave_faces)
-    corners = min(block.type.n_vertices for block in slave_faces)
-    vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
-    material = np.zeros(count, dtype=int)
-    for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
-        material[block.number] = number
-    form = form_of(zone.recovery, order, corners)
-    return Asked(form, vertex_neighbours(vertices, count), material)
-
-
-def _as_bent(block: Facets) -> Facets:
-    """The faces treated as no affine images of their reference face."""
-    return replace(block, affine=np.zeros(len(block.affine), dtype=bool))
-
-
-def _initial_gaps(
-    zone: Zone,
-    operator: GapOperator,
-    groups: Attributes,
-    sub_faces: list[SubFaces],
-    noise: float,
-) -> np.ndarray:
-    """∫ φ gap (k,) at the start: as meshed, without those below `noise`, or as the case says."""
-    if zone.clearance is None:
-        meshed = operator.initial
-        initial = np.where(np.abs(meshed) <= noise * operator.covered, 0.0, meshed)
-    else:
-        faces = [(f.type.name, f.nodes, f.macro) for f in sub_faces]
-        at = surface_points(groups.points, faces, groups.axisymmetric)
-        means = at.means(groups.field(zone.clearance)(at.place))
-        whole = operator.mean.T @ (operator.surface.area * means)
-        initial = whole * operator.covered / operator.area
-    return initial - zone.interference * operator.covered
-
-
-def _master_facets(
-    points: np.ndarray, faces: list[FaceBlock], materials: list[np.ndarray], around: bool
-) -> list[Facets]:
-    """Master faces, those of one type together whatever cell is behind them, by material (n,)."""
-    merged = []
-    for name in dict.fromkeys(block.type.name for block in faces):
-        alike = [i for i, block in enumerate(faces) if block.type.name == name]
-        nodes = np.concatenate([faces[i].nodes for i in alike])
-        number = np.concatenate([materials[i] for i in alike])
-        merged.append(facets(points, BY_NAME[name], nodes, number, around))
-    return merged

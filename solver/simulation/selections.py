@@ -12,7 +12,7 @@ from ..case.rules import check_dimension
 from ..mechanics.fem.faces import corner_sets
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError, hint
-from .groups import ALL
+from .groups import ALL, with_cells
 
 # A node is at a place where it is nearer than this share of the mesh's extent.
 _NEAR = 1e-6
@@ -29,6 +29,7 @@ def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
         point_sets=dict(mesh.point_sets),
         cell_sets={name: list(parts) for name, parts in mesh.cell_sets.items()},
     )
+    given = {block.type: len(block.data) for block in mesh.cells}
     if any(selection.of == "faces" for selection in case.selections):
         mesh = _with_outer_faces(mesh)
     for selection in case.selections:
@@ -36,11 +37,12 @@ def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
             allowed = "the mesh has a group of this name; give another one"
             raise InputError(case.path, selection.key, selection.name, allowed)
         _add(case, mesh, selection)
-    return mesh
+    mesh.cell_sets.pop(_OUTER, None)
+    return with_cells(mesh, [np.arange(len(b.data)) < given.get(b.type, 0) for b in mesh.cells])
 
 
 def _add(case: Case, mesh: meshio.Mesh, selection: Selection) -> None:
-    names = {*mesh.cell_sets, *mesh.point_sets}
+    names = {*mesh.cell_sets, *mesh.point_sets} - {_OUTER}
     for group in selection.groups:
         if group not in names:
             allowed = f"no such group in the mesh; {hint(group, names)}"

@@ -93,7 +93,9 @@ class RecoveredPressure:
 class Reaction:
     """What holds a group: `force` (dim,) on the bodies, `moment` (3,) about the origin.
 
-    `group` is that of supports, a rigid body, `axis` for the points on the axis, or `springs`.
+    `group`: a group that supports hold, a rigid body, `axis` for the points on the axis, `springs`
+    or `together`. The force along x on axisymmetric bodies is the sum of radial forces around the
+    circle, which balances itself; they have no moment.
     """
 
     group: str

@@ -19,6 +19,7 @@ from ..mechanics.fem.bodies import (
     unheld_motion,
 )
 from ..mechanics.fem.supports import FreeMotion
+from .constraints import unit_springs
 from .scene import Rest, Scene
 
 
@@ -82,7 +83,8 @@ def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:
     there = covered > 0
     per_area = sparse.diags(1 / covered[there]) @ gaps[there]
     motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
-    return unheld_motion(motions, scene.free.basis, per_area, scene.n_bodies) is not None
+    held = sparse.vstack([per_area, unit_springs(scene)]).tocsr()
+    return unheld_motion(motions, scene.free.basis, held, scene.n_bodies) is not None
 
 
 def _gaps(scene: Scene) -> sparse.csr_matrix:

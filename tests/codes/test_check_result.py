@@ -1,6 +1,7 @@
 """`check-result`: results of other codes, right ones and planted faults."""
 
 import json
+from dataclasses import replace
 
 import meshio
 import numpy as np
@@ -250,6 +251,14 @@ def test_a_layer_that_moves_across_the_plane_is_refused(tmp_path, capsys):
     file = results.write_vtu(answer.changed(displacement=moved), tmp_path / "result.vtu")
     assert main(["check-result", CASE, str(file)]) == 2
     assert "the case is one of plane strain" in capsys.readouterr().err
+    # A thin plate may become thinner or thicker.
+    mesh, case = results.mesh_and_case("ssnp170/a")
+    given = Field(places=answer.points, values=moved, nodes=np.arange(len(moved)))
+    thin = check_foreign(
+        replace(case, plane="stress"), foreign(displacement=given, mesh=mesh), mesh
+    )
+    assert [c.name for c in thin.checks] == ["displacement"]
+    assert thin.passed
 
 
 def test_hertz_is_checked_by_its_norms(tmp_path):

@@ -53,7 +53,7 @@ def test_frd(cubes, tmp_path, capsys):
     file.write_text(text.replace("SYY", "SYX"), encoding="ascii")
     assert "xx, yy, zz and xy at least" in checked(capsys, CUBES, file)[1]
     file.write_text("nothing", encoding="ascii")
-    assert "no FRD file, or a damaged one" in checked(capsys, CUBES, file)[1]
+    assert "not an FRD file, or a damaged one" in checked(capsys, CUBES, file)[1]
 
 
 def test_med(answer, tmp_path, capsys):
@@ -171,7 +171,7 @@ def test_files_that_are_no_results_are_refused(tmp_path, capsys):
     for name, told in {
         "b.vtu": "cannot be read",
         "b.med": "no MED file",
-        "b.e": "no Exodus file",
+        "b.e": "not an Exodus file",
         "b.vtkhdf": "b.vtkhdf: ",
     }.items():
         (tmp_path / name).write_text("not what it says", encoding="utf-8")

@@ -98,7 +98,7 @@ def test_the_plain_input_balances(tmp_path):
     [
         ("version: '1'\n", "code.yaml", "command"),
         (FILE + "input: abaqus\n", "code.yaml", "input = 'abaqus': must be plain, calculix"),
-        (FILE + "gave_up: '('\n", "code.yaml", "gave_up = '(': no regular expression"),
+        (FILE + "gave_up: '('\n", "code.yaml", "gave_up = '(': must be a regular expression"),
         ("class Code:\n    layer = False\n", "code.py", "Code: it has no install, gave_up"),
         ("raise OSError('no licence')", "code.py", "Code: OSError: no licence"),
         ("", "other.txt", "code: a folder with code.yaml or code.py is needed"),

@@ -77,7 +77,7 @@ def test_the_page_has_every_solve(tmp_path, capsys):
     assert "no picture: no result" in page
     assert "no picture: the result result.vtkhdf is missing or damaged" in page
     assert main(["gallery", "-o", str(out)]) == 2
-    assert capsys.readouterr().err == "gallery: VERDICT.json: there is none\n"
+    assert capsys.readouterr().err == "gallery: VERDICT.json: no verdict is named or found\n"
 
 
 @pytest.mark.usefixtures("no_opengl_needed")

@@ -8,6 +8,8 @@ import pytest
 from solver.case.reader import parse_case
 from solver.mechanics.mortar import segments
 from solver.mesh import transform
+from solver.simulation.resultants import _extent
+from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, with_points
@@ -153,3 +155,14 @@ def test_refusals_on_and_beyond_the_axis():
 def test_a_plane_mesh_needs_to_say_what_it_is():
     with pytest.raises(InputError, match=r"this key is needed \(strain, stress or axisymmetric\)"):
         simulate(case(**{"plane: axisymmetric\n": ""}), mesh("QUAD4", "QUAD8", 0.0))
+
+
+def test_contact_of_the_macro_element_at_the_axis():
+    """An edge is known to the radius h of the only closed disc: π h², between 0 and 4 π h²."""
+    scene = build_scene(case(), mesh("QUAD4", "QUAD4", 0.0))
+    [zone] = scene.zones
+    closed = zone.operator.surface.centre[:, 0] < 0.25
+    edges, area = _extent(scene, zone, 25.0 * closed, closed)
+    assert closed.sum() == 1
+    assert edges.lower == pytest.approx(np.array([[0.0, 0.0]]), abs=1e-12)
+    assert area == pytest.approx(np.pi * 0.0625 * np.array([1, 0, 4]), abs=1e-12)

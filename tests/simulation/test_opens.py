@@ -22,6 +22,7 @@ FIELDS = {
     "point": {"displacement": 3, "stress": 6, "normal_stress": 1, "body": 1},
     "cell": {
         "pressure": 1, "gap": 1, "status": 1, "coverage": 1, "macro_element": 1, "zone": 1,
+        "pressure_error_estimate": 1,
     },
 }  # fmt: skip
 
@@ -71,7 +72,8 @@ def assert_opened(opened, solution):
     )
     assert units == [
         "Points: mm", "displacement: mm", "gap: mm",
-        "normal_stress: N/mm²", "pressure: N/mm²", "stress: N/mm²",
+        "normal_stress: N/mm²", "pressure: N/mm²", "pressure_error_estimate: N/mm²",
+        "stress: N/mm²",
     ]  # fmt: skip
 
 

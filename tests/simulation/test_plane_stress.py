@@ -97,3 +97,9 @@ def test_reader_and_case_agree_on_the_material():
     assert case.thin
     assert case.materials["all"] == Material(YOUNG, POISSON).in_plane_stress()
     assert parse_case(case.source, case.path).materials == case.materials
+
+
+def test_an_equivalent_of_infinite_softness_is_refused():
+    """At ν = −½ the equivalent Young's modulus is zero, below it is negative."""
+    with pytest.raises(InputError, match=r"materials.all.poisson = -0.5: .* -0.5 in plane stress"):
+        changed_case(2, THIN, ("poisson: 0.3", "poisson: -0.5"))

@@ -7,7 +7,7 @@ from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.results import read_result, write_result
-from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, changed_case
+from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, changed_case, with_points
 
 NUMBERS = """\
 reference:
@@ -118,3 +118,26 @@ def test_springs_have_a_reaction_and_no_strain_energy():
     assert held["springs"].force == pytest.approx([0, 25], abs=1e-11)
     assert held["springs"].moment == pytest.approx([0, 0, 12.5], abs=1e-11)
     assert found.strain_energy == pytest.approx(0.284375)
+
+
+def test_supports_that_are_not_at_right_angles_hold_the_load_together():
+    """Sides that lean by 1 : 2; at their foot the base and the normal hold the same nodes."""
+    mesh = block_mesh("QUAD4", "QUAD4", (3, 2))
+    leaning = with_points(mesh, mesh.points + np.outer(mesh.points[:, 1] / 2, [1, 0]))
+    case = changed_case(2, ("symx, fix: [x]", "symx, fix: [normal]"))
+    found = simulate(case, leaning)
+    total = sum(one.force for one in found.reactions)
+    assert total == pytest.approx([0, PRESSURE], abs=1e-11)
+    # The pressure acts from x = 1/2 to 3/2 at the height 1.
+    assert sum(one.moment for one in found.reactions)[2] == pytest.approx(PRESSURE, abs=1e-11)
+
+
+def test_a_group_that_is_called_springs_keeps_what_it_holds():
+    """A foundation of 40 bears the load; the group `springs` of the sides holds its stress."""
+    change = ("{group: base, fix: [y]}", "{group: base, spring: {normal: 40.0}}")
+    mesh = block_mesh("QUAD4", "QUAD8", (3, 2))
+    mesh.cell_sets["springs"] = mesh.cell_sets.pop("symx")
+    sides = ("{group: symx, fix: [x]}", "{group: springs, fix: [x]}\n  - {group: farx, fix: [x]}")
+    held = by_group(simulate(changed_case(2, change, sides), mesh))
+    side = 2 * 25 * POISSON / (1 - POISSON)
+    assert held["springs"].force == pytest.approx([side, 25], abs=1e-11)

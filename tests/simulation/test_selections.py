@@ -6,6 +6,7 @@ state has the pressure 25.
 
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 
@@ -158,6 +159,12 @@ REFUSED = [
     ("  low: ", "  base: ", "groups.base = 'base': the mesh has a group of this name"),
     ("  low: ", "  all: ", "groups.all = 'all': the mesh has a group of this name"),
     ("group: press, pressure: 25.0", "at: [0, 1], pressure: 2.0", "{at, force}"),
+    (
+        "group: press, pressure: 25.0",
+        "group: [press, corner], force: [0, -1]",
+        "holds nodes, and faces or cells; one kind is needed",
+    ),
+    ("group: low, fix: [y]", "group: [low, corner], spring: {normal: 1}", "one kind is needed"),
     ("group: press, pressure: 25.0", "group: top, force: [1, 0]", "a group of faces is needed"),
 ]
 
@@ -169,3 +176,41 @@ def test_refusals(old, new, message):
     with pytest.raises(InputError) as refusal:
         simulate(parsed(text.replace(old, new)), block_mesh("QUAD4", "TRIA3", (2, 3)))
     assert message in str(refusal.value)
+
+
+def test_points_that_differ_in_the_seventh_digit_are_two_groups():
+    text = CASE.replace(
+        "{group: press, pressure: 25.0}",
+        "{at: [1.0000001, 1], force: [0, -1]}, {at: [1.0000002, 1], force: [0, -1]}",
+    )
+    case = parsed(text + GROUPS)
+    assert [load.group for load in case.loads] == ["(1.0000001, 1)", "(1.0000002, 1)"]
+    assert {made.values for made in case.selections if made.shape == "at"} == {
+        (1.0000001, 1.0),
+        (1.0000002, 1.0),
+    }
+
+
+def test_a_group_with_the_name_of_a_list_of_groups_is_refused():
+    text = (CASE + GROUPS).replace("  low:", "  a+b: {of: cells, where: y}\n  low:")
+    with pytest.raises(InputError, match=r"loads\[0\].group = 'a\+b': the group of groups"):
+        parsed(text.replace("group: press", "group: [a, b]"))
+
+
+def test_faces_that_selections_do_not_take_leave_no_trace():
+    """The faces on the outside are found for a selection; the mesh then has those selected."""
+    case, mesh = parsed(CASE + GROUPS), block_mesh("QUAD4", "TRIA3", (2, 3))
+    kept = {name for name in mesh.cell_sets if name in ("top", "bottom", "press")}
+    bare = meshio.Mesh(
+        mesh.points,
+        [b for b in mesh.cells if b.type != "line"],
+        cell_sets={
+            name: [
+                p for p, b in zip(mesh.cell_sets[name], mesh.cells, strict=True) if b.type != "line"
+            ]
+            for name in kept - {"press"}
+        },
+    )
+    found = with_groups(case, bare)
+    assert {*found.cell_sets} == {"top", "bottom", "low", "left", "slave", "master", "cells"}
+    assert [len(block.data) for block in found.cells if block.type == "line"] == [12]

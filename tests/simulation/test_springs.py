@@ -137,3 +137,12 @@ def test_refusals(old, new, message):
     with pytest.raises(InputError) as refusal:
         solved(CASE.replace(old, new, 1))
     assert message in str(refusal.value)
+
+
+def test_soft_springs_beside_stiff_ones_hold_a_body():
+    """The upper block hangs sideways on a spring 10⁹ times softer than the foundation below."""
+    text = CASE.replace(
+        "{group: symx, fix: [x]}", "{at: [0, -1], fix: [x]}, {at: [0, 1], spring: {x: 4.0e-8}}"
+    )
+    found = solved(text)
+    assert found.zones[0].multiplier == pytest.approx(PRESSURE, rel=1e-6)

@@ -256,3 +256,10 @@ def test_groups_and_faces_that_the_case_does_not_name_are_left_behind():
         f"left behind: {len(groups)} group, {edges - used} faces and edges of the mesh"
     ]
     assert [body.name for body in found.bodies] == ["bottom", "top"]
+
+
+def test_a_body_that_springs_alone_hold_is_left_out_too():
+    text = SCENE.replace("{group: base_far, fix: [y]}", "{group: base_far, spring: {y: 40.0}}")
+    mesh = side_by_side(*[block_mesh("QUAD4", "QUAD4", (2, 2))] * 2)
+    scene = without_unloaded(build_scene(parse_case(text, Path("side.yaml")), mesh))
+    assert scene.rest.unloaded_bodies.tolist() == [False, False, True, True]

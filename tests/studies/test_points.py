@@ -9,18 +9,22 @@ import pytest
 from solver.studies.points import announcement, expected, measured_before
 from solver.studies.work_precision.description import read_study
 
-STUDY = read_study(Path(__file__).parents[2] / "cases/study/study.yaml", "quick")
+FILE = Path(__file__).parents[2] / "cases/study/study.yaml"
+STUDY = read_study(FILE, "quick")
 MODEL = {point.name: point.seconds for point in STUDY.points}
 
 
 def test_unknowns_of_regular_grids_are_counted():
-    point = next(p for p in STUDY.points if p.slave == "HEXA8" and p.level == 2)
-    nodes = [prod(2 * n + 1 for n in body) for body in point.problem.divisions]
-    if point.master == "HEXA20":
-        nodes[1] += sum(
-            prod(2 * n + (i != k) for k, n in enumerate(point.problem.divisions[1]))
-            for i in range(3)
-        )
+    pair = ("HEXA20", "HEXA20")
+    points = read_study(FILE, "full").points
+    point = next(p for p in points if (p.slave, p.master) == pair and p.level == 2)
+    corners = [prod(2 * n + 1 for n in body) for body in point.problem.divisions]
+    edges = [
+        prod(2 * n + (i != k) for k, n in enumerate(body))
+        for body in point.problem.divisions
+        for i in range(3)
+    ]
+    nodes = [*corners, *edges]
     assert point.mesh.unknowns == 3 * sum(nodes)
 
 

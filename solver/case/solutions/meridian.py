@@ -11,7 +11,7 @@ import numpy as np
 from ..material import Material
 from .base import ElasticSolution, ExactSolution, Part
 
-# The axes r, z, θ of a meridian plane among those of three dimensions at y = 0.
+# The axes r, z, θ of a meridian plane as axes x, z, y of three dimensions at y = 0.
 _AXES = [0, 2, 1]
 
 
@@ -27,28 +27,28 @@ class Meridian(ElasticSolution):
 
     @property
     def materials(self) -> tuple[Material, ...]:
-        """Those of the parts."""
+        """The materials of the parts."""
         assert isinstance(self.whole, ElasticSolution)
         return self.whole.materials
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
-        """That of the whole."""
+        """The contact pressure (n,) of the whole at points (n, 2)."""
         return self.whole.contact_pressure(_around(x))
 
     def gap(self, x: np.ndarray) -> np.ndarray:
-        """That of the whole."""
+        """The gap (n,) of the whole at points (n, 2)."""
         return self.whole.gap(_around(x))
 
     def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
-        """Along r and z."""
+        """Displacement (n, 2) along r and z at points (n, 2)."""
         return self.whole.displacement(_around(x), part)[:, _AXES[:2]]
 
     def gradient(self, x: np.ndarray, part: Part = None) -> np.ndarray:
-        """Of three dimensions (n, 3, 3), the hoop strain last."""
+        """Displacement gradients (n, 3, 3) at points (n, 2), the hoop strain last."""
         return self.whole.gradient(_around(x), part)[:, _AXES][:, :, _AXES]
 
     def body_force(self, x: np.ndarray, part: Part = None) -> np.ndarray:
-        """Along r and z."""
+        """Force per volume (n, 2) along r and z at points (n, 2)."""
         return self.whole.body_force(_around(x), part)[:, _AXES[:2]]
 
     def regular(self, x: np.ndarray) -> np.ndarray:
@@ -65,12 +65,12 @@ class Meridian(ElasticSolution):
 
     @property
     def half_width(self) -> float:
-        """The radius of the contact."""
+        """The radius of the contact, a length."""
         return self.whole.half_width
 
     @property
     def peak(self) -> float:
-        """The largest pressure."""
+        """The largest pressure, a stress."""
         return self.whole.peak
 
     def measured(

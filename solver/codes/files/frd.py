@@ -51,7 +51,9 @@ def read(path: Path) -> Raw:
             block, position = _block(lines, position)
             blocks[name] = components, *_records(block, line)
     if not len(numbers):
-        raise InputError(path, "nodes", None, "there are none: no FRD file, or a damaged one")
+        raise InputError(
+            path, "nodes", None, "the file has none: not an FRD file, or a damaged one"
+        )
     return _assembled(numbers, places, cells, blocks, version)
 
 

@@ -44,7 +44,7 @@ def read_vtkhdf(path: Path) -> Raw:
     with read_file(path) as file:
         group = file.get("VTKHDF")
         if group is None or "Connectivity" not in group:
-            raise InputError(path, "grid", None, "no VTKHDF unstructured grid")
+            raise InputError(path, "grid", None, "not an unstructured grid of VTKHDF")
         if len(group["NumberOfPoints"]) != 1:
             raise InputError(path, "grid", None, "must be one piece at one time")
         offsets, types = group["Offsets"][()], group["Types"][()]
@@ -120,7 +120,7 @@ def read_exodus(path: Path) -> Raw:
         with netcdf_file(path, "r", mmap=False) as file:
             return _exodus(path, file.variables, lambda item: getattr(item, "elem_type", b""))
     except (TypeError, ValueError) as error:
-        raise InputError(path, "file", None, f"no Exodus file ({error})") from None
+        raise InputError(path, "file", None, f"not an Exodus file ({error})") from None
 
 
 def _exodus(path: Path, file: Mapping[str, Any], type_of: Any) -> Raw:
@@ -130,7 +130,7 @@ def _exodus(path: Path, file: Mapping[str, Any], type_of: Any) -> Raw:
         axes = [f"coord{axis}" for axis in "xyz" if f"coord{axis}" in file]
         points = np.column_stack([np.asarray(file[axis][:], dtype=float) for axis in axes])
     else:
-        raise InputError(path, "nodes", None, "there are none: no Exodus file")
+        raise InputError(path, "nodes", None, "the file has none: not an Exodus file")
     cells = []
     for name in sorted(n for n in file if re.fullmatch(r"connect\d+", n)):
         nodes, kind = np.asarray(file[name][:], dtype=int) - 1, type_of(file[name])

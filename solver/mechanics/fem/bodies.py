@@ -58,12 +58,13 @@ def unsupported(
     """The rigid motions (n_dofs, k) of each body that the supports leave free.
 
     `basis` (n_dofs, n_free) spans the displacements that the supports leave free; `springs`
-    (n_dofs, n_dofs), a stiffness, resist motions too.
+    (n_dofs, n_dofs), rows of a stiffness, resist motions too.
     """
     held = motions - basis @ (basis.T @ motions)
     resistance = (held.T @ held).toarray()
     if springs is not None:
-        resistance += (motions.T @ springs @ motions).toarray()
+        stretched = springs @ motions
+        resistance += (stretched.T @ stretched).toarray()
     values, vectors = np.linalg.eigh(resistance)
     free = values <= _FREE * max(float(values[-1]), np.finfo(float).tiny)
     # Round-off entries would mix the bodies and fill the motions up.

@@ -118,7 +118,7 @@ class _Shapes:
 def shapes_in(
     points: np.ndarray, block: Block, cells: np.ndarray, reference: np.ndarray
 ) -> _Shapes:
-    """Those of some cells (n, n_nodes) of a block at reference points (q, dim)."""
+    """The shapes of some cells (n, n_nodes) of a block at reference points (q, dim)."""
     gradient, measure = physical_gradients(points, cells, block.type, reference)
     if not block.axisymmetric:
         return _Shapes(gradient, measure, None)
@@ -316,7 +316,7 @@ def _stress(
 ) -> np.ndarray:
     """In-plane or 3D stress tensors (n, q, dim, dim) in cells (n, n_nodes).
 
-    Those of axisymmetric cells are 3D, the third axis the circumference.
+    Tensors of axisymmetric cells are 3D, the third axis the circumference.
     """
     nodal = displacement.reshape(-1, *displacement.shape[-2:])[:, cells]
     difference = (nodal - nodal[:, :, :1]).sum(axis=0)

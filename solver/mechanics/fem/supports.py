@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-# Directions (unit vectors) whose part outside the others is smaller depend on them.
-_DEPENDENT = 1e-8
+DEPENDENT = 1e-8
+"""Directions (unit vectors) whose part outside the others is smaller depend on them."""
 SAME = 1e-9
 """Displacements that differ by less than this share of the largest are the same."""
 
@@ -79,7 +79,7 @@ def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed]) -> FreeMotion:
         rest -= np.einsum("nrd,nr->nd", held[node], _parts(held[node], rest))
         length = np.linalg.norm(rest, axis=1)
         missing = values[now] - np.einsum("nd,nd->n", direction, offset[node])
-        new = length > _DEPENDENT
+        new = length > DEPENDENT
         clash = ~new & (np.abs(missing) > SAME * largest)
         if clash.any():
             first = np.flatnonzero(now)[clash.argmax()]

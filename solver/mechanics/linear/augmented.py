@@ -58,7 +58,7 @@ class AugmentedSystem:
         return change
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
-        """Those that balance the force best: least squares, weighted by the compliance 1/D."""
+        """The multipliers that balance the force best: least squares with the weights 1/D."""
         return (-self.gram.solve(self.compliant @ force).T / self.size).T
 
     def imbalance(self, force: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from .description import StudyTreatment
 from .records import LevelLine, Panel, TimedSolve
 
 TARGETS = {1e-2: "1 %", 1e-3: "0.1 %", 1e-4: "0.01 %"}
-OURS, TIED, OTHER, NONE = "recovery", "tied", "other", "none"
+RECOVERED, TIED, OTHER, NONE = "recovery", "tied", "other", "none"
 
 
 def is_recovered(treatment: StudyTreatment) -> bool:
@@ -49,7 +49,7 @@ def _first(panel: Panel, target: float) -> First:
     recovered = {line.title for line in panel.lines if is_recovered(line.treatment)}
     title, solve = next(iter(quickest.items()))
     if title in recovered:
-        return First(OURS, title, solve)
+        return First(RECOVERED, title, solve)
     if recovered & set(quickest):
         return First(TIED, title, solve)
     return First(OTHER, title, solve, _reason(panel, target, solve, recovered))

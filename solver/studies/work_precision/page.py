@@ -163,7 +163,7 @@ def _to_html(
         targets=TARGETS,
         firsts=found,
         first_targets=first.TARGETS,
-        won=sum(word in (first.OURS, first.TIED) for word in words),
+        won=sum(word in (first.RECOVERED, first.TIED) for word in words),
         decided=sum(word != first.NONE for word in words),
         tie=f"{100 * (TIE - 1):.0f} %",
         limit=LIMIT,

@@ -50,7 +50,7 @@ def test_only_quadratic_cells_with_a_recovery_are_judged(found):
 
 def test_recovery_is_first_or_tied_or_nobody_is(found):
     of = found([5e-3, 5e-4, 5e-4], [5e-2, 5e-3, 5e-4], 1.4)["QUAD8–TRIA6"]
-    assert [one.word for one in of.values()] == [first.OURS, first.OURS, first.NONE]
+    assert [one.word for one in of.values()] == [first.RECOVERED, first.RECOVERED, first.NONE]
     assert of[1e-2].solve.point.level == 1
     of = found([5e-3] * 3, [5e-3] * 3, 1.05)["QUAD8–TRIA6"]
     assert (of[1e-2].word, of[1e-2].title) == (first.TIED, "nodal")

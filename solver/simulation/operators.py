@@ -1,0 +1,94 @@
+"""The gap operator of a zone from its faces: initial gaps, and the recovery of its pressure."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..case.model import Zone
+from ..mechanics.fem.faces import FaceBlock, surface_points
+from ..mechanics.mortar.cut import SubFaces
+from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
+from ..mechanics.mortar.multipliers import constants
+from ..mechanics.mortar.operator import GapOperator, gap_operator
+from ..mechanics.mortar.reconstruction import form_of, vertex_neighbours
+from ..mechanics.mortar.recovery import Asked
+from ..mechanics.mortar.treatments import scheme_of
+from ..mesh.catalogue import BY_NAME
+from .attributes import Attributes, CutZone
+from .options import Options
+
+
+def operator_of(
+    groups: Attributes,
+    zone: Zone,
+    faces: CutZone,
+    master_faces: list[FaceBlock],
+    noise: float,
+    options: Options,
+) -> GapOperator:
+    """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
+    points, count = groups.points, sum(len(block.nodes) for block in faces.slave_faces)
+    around = groups.axisymmetric
+    slaves = [facets(points, f.type, f.nodes, f.macro, around) for f in faces.sub_faces]
+    if zone.normal == "nodal":
+        slaves = with_nodal_normals(slaves, points)
+    materials = groups.materials_behind(master_faces)
+    masters = _master_facets(points, master_faces, materials, around)
+    if not options.shortcuts.quadrature:
+        slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
+    scheme = scheme_of(zone.treatment, zone.points)
+    scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
+    asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
+    operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
+    return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
+
+
+def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> Asked:
+    """How a zone's pressure is recovered, and which of its macro-elements may be neighbours."""
+    count = sum(len(block.nodes) for block in slave_faces)
+    order = min(block.owner_type.order for block in slave_faces)
+    corners = min(block.type.n_vertices for block in slave_faces)
+    vertices = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in slave_faces]
+    material = np.zeros(count, dtype=int)
+    for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
+        material[block.number] = number
+    form = form_of(zone.recovery, order, corners)
+    return Asked(form, vertex_neighbours(vertices, count), material)
+
+
+def _as_bent(block: Facets) -> Facets:
+    """The faces treated as no affine images of their reference face."""
+    return replace(block, affine=np.zeros(len(block.affine), dtype=bool))
+
+
+def _initial_gaps(
+    zone: Zone,
+    operator: GapOperator,
+    groups: Attributes,
+    sub_faces: list[SubFaces],
+    noise: float,
+) -> np.ndarray:
+    """∫ φ gap (k,) at the start: as meshed, without those below `noise`, or as the case says."""
+    if zone.clearance is None:
+        meshed = operator.initial
+        initial = np.where(np.abs(meshed) <= noise * operator.covered, 0.0, meshed)
+    else:
+        faces = [(f.type.name, f.nodes, f.macro) for f in sub_faces]
+        at = surface_points(groups.points, faces, groups.axisymmetric)
+        means = at.means(groups.field(zone.clearance)(at.place))
+        whole = operator.mean.T @ (operator.surface.area * means)
+        initial = whole * operator.covered / operator.area
+    return initial - zone.interference * operator.covered
+
+
+def _master_facets(
+    points: np.ndarray, faces: list[FaceBlock], materials: list[np.ndarray], around: bool
+) -> list[Facets]:
+    """Master faces, those of one type together whatever cell is behind them, by material (n,)."""
+    merged = []
+    for name in dict.fromkeys(block.type.name for block in faces):
+        alike = [i for i, block in enumerate(faces) if block.type.name == name]
+        nodes = np.concatenate([faces[i].nodes for i in alike])
+        number = np.concatenate([materials[i] for i in alike])
+        merged.append(facets(points, BY_NAME[name], nodes, number, around))
+    return merged
