@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import bench, codes, jobs, studies
+from . import codes, jobs, results, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
@@ -132,10 +132,10 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
-    codes.add_commands(commands)
+    results.add_commands(commands)
     studies.add_commands(commands)
     jobs.add_commands(commands)
-    bench.add_commands(commands)
+    codes.add_commands(commands)
 
     command = add_command(commands, "validate", _validate, "check whether case files are valid")
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 import solver.codes
+from solver.case.reader import load_case
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.codes.getfem import CELLS, GetFEM
-from solver.codes.run import Limits, run_code
+from solver.codes.run import Limits, run_case, run_code
 from solver.mesh.catalogue import BY_NAME
+from solver.verification.run import mesh_of
 from tests.codes.blocks import case_of
 
+CASES = Path(__file__).parents[2] / "cases"
 SCRIPT = Path(solver.codes.__file__).with_name("getfem_main.py")
 
 
@@ -57,3 +60,11 @@ def test_getfem_solves_it(cells, tmp_path):
     across = 0.0 if dim == 3 else -7.5
     expected = [0, 0, -25, 0, 0, 0] if dim == 3 else [0, -25, across, 0, 0, 0]
     assert np.abs(found.stress.values[below] - expected).max() < 1.0
+
+
+@pytest.mark.skipif(not GetFEM().version(), reason="GetFEM is not installed")
+def test_contact_closes_a_gap_wider_than_a_share_of_a_cell(tmp_path):
+    """The parabola is 0.0125 below the block at its ends: a quarter of a cell of the master."""
+    case = load_case(CASES / "manufactured" / "quad8.yaml")
+    verdict = run_case(GetFEM(), case, mesh_of(case), tmp_path)
+    assert verdict.sound, verdict.reason
