@@ -136,9 +136,9 @@ lint: lint-environment ## check format, style and types of the sources
 environment:
 	@$(INSTALL) run
 
-code-environment: ## install another code into an environment of its own: CODE=kratos
-	@test -f "requirements-$(CODE).txt" && test -n "$(filter kratos,$(CODE))" \
-	  || { echo "make code-environment: name a code that is installed by it, CODE=kratos"; exit 2; }
+code-environment: ## install another code into an environment of its own: CODE=kratos or ngsolve
+	@test -f "requirements-$(CODE).txt" && test -n "$(filter kratos ngsolve,$(CODE))" \
+	  || { echo "make code-environment: name a code that is installed by it, CODE=kratos or ngsolve"; exit 2; }
 	@$(PYTHON) -Es -m venv --clear .venv-$(CODE)
 	@.venv-$(CODE)/bin/python -Es -m pip --disable-pip-version-check install --quiet \
 	  --require-hashes --only-binary :all: --requirement requirements-$(CODE).txt
@@ -177,7 +177,8 @@ lock: ## lock the packages of pyproject.toml again: make lock ARGS=--upgrade
 	@$(INSTALL) lock
 	@$(LOCK) $(ARGS) pyproject.toml --group pyproject.toml:batch \
 	  --output-file requirements.txt
-	@$(LOCK) $(ARGS) --group pyproject.toml:kratos --output-file requirements-kratos.txt
+	@for code in kratos ngsolve; do \
+	  $(LOCK) $(ARGS) --group pyproject.toml:$$code --output-file requirements-$$code.txt || exit; done
 	@for group in build mkl slurm gallery test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done

@@ -16,6 +16,7 @@ _CODES = {
     "code_aster": (".code_aster", "CodeAster"),
     "getfem": (".getfem", "GetFEM"),
     "kratos": (".kratos", "Kratos"),
+    "ngsolve": (".ngsolve", "NGSolve"),
     "plain": (".plain", "Plain"),
 }
 
