@@ -205,7 +205,8 @@ def estimate(
     if scale == 0:
         return Accuracy({"forces": float(forces.max()) / force_scale})
     noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
-    moving, moved = _moving(iterate)[closed], iterate.displacement.total.reshape(scene.points.shape)
+    moving = constraints.moving[closed]
+    moved = iterate.displacement.total.reshape(scene.points.shape)
     pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
@@ -231,7 +232,7 @@ def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) 
     left = iterate.residual() + constraints.on_free.T @ pressure
     unbalanced = np.abs(scene.free.basis @ left)
     forces, known = np.repeat(_rounding_of_forces(iterate), dim), _rounding_of_gaps(iterate)
-    moving, limit = _moving(iterate), np.zeros(len(pressure))
+    moving, limit = constraints.moving, np.zeros(len(pressure))
     for zone in scene.zones:
         mine, rows = zone.numbers, moving[zone.numbers]
         places = constraints.gaps[mine].indices
@@ -253,14 +254,6 @@ def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) 
 
 def _unit(iterate: ContactIterate) -> float:
     return EPSILON_EXTENDED if iterate.extended else EPSILON
-
-
-def _moving(iterate: ContactIterate) -> sparse.csr_matrix:
-    """The coefficients of gaps (k, n_dofs) on what supports leave free of the slave nodes."""
-    own = iterate.constraints.slave & (np.diff(iterate.scene.free.basis.indptr) > 0)
-    moving = (iterate.constraints.gaps @ sparse.diags(own.astype(float))).tocsr()
-    moving.eliminate_zeros()
-    return moving
 
 
 def _rounding_of_forces(iterate: ContactIterate) -> np.ndarray:

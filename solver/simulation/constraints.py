@@ -26,8 +26,8 @@ class ContactConstraints:
 
     `gaps` (k, n_dofs); `on_free` (k, n_free) the same on free unknowns; `initial` (k,); `area`,
     `covered` (k,) whole and intersected; `eligible` (k,) may close; `inactive_multipliers` (k,)
-    move nothing; `slave` (n_dofs,) marks the degrees of freedom of slave nodes, `own` (n_free,) the
-    free unknowns there.
+    move nothing; `own` (n_free,) marks the free unknowns of slave nodes, `moving` (k, n_dofs) has
+    the coefficients of `gaps` on what supports leave free there.
     """
 
     gaps: sparse.csr_matrix
@@ -37,7 +37,7 @@ class ContactConstraints:
     covered: np.ndarray
     eligible: np.ndarray
     inactive_multipliers: np.ndarray
-    slave: np.ndarray
+    moving: sparse.csr_matrix
     own: np.ndarray
 
     @cached_property
@@ -65,6 +65,9 @@ def contact_constraints(scene: Scene) -> ContactConstraints:
     for zone in scene.zones:
         active[zone.numbers] |= zone.treatment.cut
     slave = _slave_dofs(scene)
+    free = slave & (np.diff(scene.free.basis.indptr) > 0)
+    moving = (gaps @ sparse.diags(free.astype(float))).tocsr()
+    moving.eliminate_zeros()
     return ContactConstraints(
         gaps=gaps,
         on_free=on_free,
@@ -73,7 +76,7 @@ def contact_constraints(scene: Scene) -> ContactConstraints:
         covered=covered,
         eligible=touching & active & ~scene.rest.unloaded_multipliers,
         inactive_multipliers=touching & ~active,
-        slave=slave,
+        moving=moving,
         own=np.asarray(abs(scene.free.basis).T @ slave.astype(float)) > 0,
     )
 

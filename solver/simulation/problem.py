@@ -13,7 +13,7 @@ from ..mechanics.fem.bodies import (
     unsupported,
     whole_motions,
 )
-from ..mechanics.fem.elasticity import internal_force, stiffness
+from ..mechanics.fem.elasticity import stiffness
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ..mechanics.linear.multigrid import Unknowns
 from ..mechanics.linear.systems import Systems, parts_of
@@ -206,7 +206,6 @@ class ContactProblem:
         correction = np.zeros(scene.force.shape) + correction
         acting, offset = scene.acting(step)
         force = acting + correction
-        scale = self._force_scale(force, offset.reshape(scene.points.shape))
         start = ContactIterate(
             scene=scene,
             constraints=self.constraints,
@@ -215,7 +214,7 @@ class ContactProblem:
             displacement=self.at_rest.moved(offset),
             mean_stress=np.zeros(scene.mean.size),
         )
-        return self._refined(start, scale, StatusResult(closed, 1, []), correction)
+        return self._refined(start, _force_scale(start), StatusResult(closed, 1, []), correction)
 
     def _refined(
         self,
@@ -261,11 +260,6 @@ class ContactProblem:
     def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
         return self._systems.closed(closed)
 
-    def _force_scale(self, force: np.ndarray, imposed: np.ndarray) -> float:
-        """The size of the forces at work: the loads, or those that imposed values bring up."""
-        internal = internal_force(self.scene.points, self.scene.blocks, imposed)
-        return float(max(np.abs(force).max(), np.abs(internal).max())) or 1.0
-
     def _gap_stiffness(self, step: Step) -> np.ndarray:
         """The forces (e, e) that average gaps bring up, each imposed with all others closed.
 
@@ -288,6 +282,12 @@ class ContactProblem:
             change = system.correction(np.zeros((size, len(some))), imposed)
             found[:, some] = area[:, None] * system.multiplier(-(self.matrix @ change))
         return found
+
+
+def _force_scale(start: ContactIterate) -> float:
+    """The size of the forces at work: the loads, or those that imposed values bring up."""
+    internal = start.internal - start.springs
+    return float(max(np.abs(start.force).max(), np.abs(internal).max())) or 1.0
 
 
 def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
