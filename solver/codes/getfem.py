@@ -31,6 +31,7 @@ class GetFEM(Plain):
     gave_up = r"GetFEM: no convergence[^\n]*"
     settings: Mapping[str, str] = {
         "contact": "raytracing, integrals of the augmented Lagrangian, E / size of a face",
+        "integration": "order 6 on 4 parts of each edge of the slave's faces",
         "multipliers": "on the slave's faces, of the order of its cells",
     }
 
