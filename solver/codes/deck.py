@@ -87,7 +87,7 @@ class Deck:
         yield from zip(nodes.tolist(), axes.tolist(), values.tolist(), strict=True)
 
     def loaded(self) -> Iterator[tuple[int, int, float]]:
-        """Node and axis, both from 0, and value of each force on a node; round-off is none."""
+        """Node and axis, both from 0, and value of each nodal force that is not round-off."""
         least = 1e-14 * np.abs(self.forces).max(initial=0.0)
         nodes, axes = np.nonzero(np.abs(self.forces) > least)
         values = self.forces[nodes, axes]

@@ -40,8 +40,8 @@ class Placed:
     """Values (k, …) at places (k, dim) of the case; `area` (k,) of each place or None.
 
     `own` (k,) are nodes of the result's own mesh. `numbered`: the result says itself which nodes
-    the places are. `node` (k,) of the case's mesh and `body` (k,) are -1 where there is none, or
-    unknown because two bodies touch there.
+    the places are. `node` (k,) of the case's mesh and `body` (k,) are -1 where no node is
+    there, or the body is unknown because two bodies touch there.
     """
 
     places: np.ndarray

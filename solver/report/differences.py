@@ -195,7 +195,7 @@ def read_batch(path: Path) -> Batch:
     """A batch, by its folder of results, the folder of its report, or its summary.json.
 
     `FOLDER@CODE` is what one code has in it, `FOLDER@ours` what our solver has; the solves go by
-    the names of their cases then. Raises `InputError` where there is none, or the file is not what
+    the names of their cases then. Raises `InputError` where the file is missing or is not what
     a report writes.
     """
     code = ""

@@ -25,7 +25,7 @@ SIZES = {2: (plane.WIDTH, plane.HEIGHT), 3: (space.WIDTH, space.HEIGHT)}
 
 
 def picture(row: Row, folder: Path) -> Markup:
-    """The picture of one solve, a file in `folder`; a line that says why there is none."""
+    """The picture of one solve, a file in `folder`; else a line with the reason."""
     kept = _kept(row, folder, ".svg", lambda row: draw(_solution(row), row.name))
     if isinstance(kept, Markup):
         return kept

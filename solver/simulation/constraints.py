@@ -109,7 +109,7 @@ def free_motion(
     constraints: ContactConstraints,
     closed: np.ndarray,
 ) -> str:
-    """The free motion with `closed` (k,) multipliers, in words; empty if there is none.
+    """The free motion with `closed` (k,) multipliers, in words; empty if nothing is free.
 
     `motions` (n_dofs, r): the rigid motions of all bodies.
     """
