@@ -135,6 +135,12 @@ def test_every_command_works_in_its_order(project: Path):
         assert run.returncode == 0, f"{text}\n{run.stdout}"
     assert (project / "results" / "report" / "workflow.html").is_file()
     assert (project / "results" / "my-cases" / "my-block" / "result.vtkhdf").is_file()
+    made = subprocess.run(
+        ["make", "gallery"], cwd=project, env=environment, capture_output=True, text=True
+    )
+    drawn = (project / "results" / "report" / "gallery.html").is_file()
+    assert drawn == (made.returncode == 0), made.stdout + made.stderr
+    assert drawn or "cannot draw here (EGL" in made.stdout + made.stderr
 
 
 def test_links_lead_to_files():
