@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..system.errors import InputError, SolveError
-from ..system.process import run_apart
+from ..system.process import printed_by
 from .deck import Deck, UnsupportedError
 from .files.read import read_result_files
 from .foreign import ForeignResult
@@ -37,9 +37,7 @@ class GetFEM(Plain):
 
     def version(self) -> str:
         """The version of Debian's package; empty if it is not installed."""
-        if not PYTHON.is_file():
-            return ""
-        return run_apart([str(PYTHON), "-Es", "-c", _VERSION], None, 60.0).output.strip()
+        return printed_by(PYTHON, "-Es", _VERSION)
 
     def write(self, deck: Deck, folder: Path) -> None:
         """Write `deck.json` and the script; UnsupportedError for what they lack."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..mechanics.fem.faces import FaceBlock
 from ..system.errors import SolveError
-from ..system.process import run_apart
+from ..system.process import printed_by
 from .deck import Deck, UnsupportedError
 from .foreign import Field, ForeignResult
 
@@ -44,19 +44,14 @@ class Kratos:
     install = "make code-environment CODE=kratos"
     gave_up = r"ATTENTION: max iterations \( [^)]*\) exceeded!"
 
-    @property
-    def settings(self) -> Mapping[str, str]:
-        """Its main settings, to be shown."""
-        return {
-            "contact": "ALMContactFrictionless, penalty and scale chosen by Kratos",
-            "elements": "SmallDisplacementElement; geometry not updated",
-        }
+    settings: Mapping[str, str] = {
+        "contact": "ALMContactFrictionless, penalty and scale chosen by Kratos",
+        "elements": "SmallDisplacementElement; geometry not updated",
+    }
 
     def version(self) -> str:
         """The version; empty if it is not installed."""
-        if not PYTHON.is_file():
-            return ""
-        return run_apart([str(PYTHON), "-I", "-c", _VERSION], None, 60.0).output.strip()
+        return printed_by(PYTHON, "-I", _VERSION)
 
     def write(self, deck: Deck, folder: Path) -> None:
         """Write mesh, settings and the script; UnsupportedError for what Kratos lacks."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..mesh.catalogue import cell_type
 from ..system.errors import SolveError
-from ..system.process import run_apart
+from ..system.process import printed_by
 from .deck import Deck, UnsupportedError
 from .foreign import Field, ForeignResult
 from .plain import FILE, Plain, content
@@ -41,9 +41,7 @@ class NGSolve(Plain):
 
     def version(self) -> str:
         """The version; empty if it is not installed."""
-        if not PYTHON.is_file():
-            return ""
-        return run_apart([str(PYTHON), "-I", "-c", _VERSION], None, 60.0).output.strip()
+        return printed_by(PYTHON, "-I", _VERSION)
 
     def write(self, deck: Deck, folder: Path) -> None:
         """Write `deck.json` and the script; UnsupportedError for what they lack."""

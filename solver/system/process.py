@@ -69,6 +69,13 @@ def cores_for(threads: int) -> list[int]:
     return sorted(os.sched_getaffinity(0))[-threads:]
 
 
+def printed_by(python: Path, option: str, program: str) -> str:
+    """What a program prints in another Python, started with `option`; empty without this Python."""
+    if not python.is_file():
+        return ""
+    return run_apart([str(python), option, "-c", program], None, 60.0).output.strip()
+
+
 def run_apart(
     command: Sequence[str],
     cores: Sequence[int] | None,
