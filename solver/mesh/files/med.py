@@ -68,8 +68,8 @@ def _mesh_of(file: h5py.File, path: Path) -> tuple[str, h5py.Group]:
     steps = [mesh, *(entry for entry in mesh.values() if isinstance(entry, h5py.Group))]
     found = next((step for step in steps if "NOE" in step), None)
     if found is None:
-        allowed = "no nodes in the layout of MED 2.2 or later; medimport of the MED library converts"
-        raise InputError(path, "mesh", name, f"{allowed} older files")
+        allowed = "no nodes in the layout of MED 2.2 or later; for older files: medimport OLD NEW"
+        raise InputError(path, "mesh", name, allowed)
     if any(int(entry.attrs.get("REP", 0)) for entry in (mesh, found["NOE/COO"])):
         raise InputError(path, "coordinates", None, "must be Cartesian")
     return name, found
@@ -78,10 +78,10 @@ def _mesh_of(file: h5py.File, path: Path) -> tuple[str, h5py.Group]:
 def _families(file: h5py.File, mesh: str, entity: str) -> dict[int, list[str]]:
     """The group names of each family number."""
     places = (f"FAS/{mesh}/{entity}", f"ENS_MAA/{mesh}/FAS/{entity}")
-    folder = next((file[place] for place in places if place in file), {})
     return {
         int(family.attrs["NUM"]): _names(family["GRO/NOM"][()])
-        for family in folder.values()
+        for place in places
+        for family in file.get(place, {}).values()
         if "GRO" in family
     }
 
