@@ -22,6 +22,7 @@ from .base import (
     ParameterError,
     Part,
 )
+from .bending import Bending
 from .half_planes import ContactEdge
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .indenter import Indenter
@@ -47,6 +48,7 @@ __all__ = [
 _CLASSES: tuple[type[ExactSolution], ...] = (
     UniformCompression,
     Hydrostatic,
+    Bending,
     NestedCylinders,
     NestedTubes,
     NestedSpheres,
