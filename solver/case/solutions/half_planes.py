@@ -1,17 +1,18 @@
 """Two elastic half-planes in contact without friction: fields from one analytic function.
 
-The upper body fills y > 0, the lower one mirrors it. With z = x + i|y|, Westergaard's function Z, its
-integral Ẑ and derivative Z′, in plane strain and with v pointing away from the interface,
+The upper body fills y > 0, the lower one mirrors it. With z = x + i|y|, Westergaard's function Z,
+its integral Ẑ and derivative Z′, in plane strain and with v pointing away from the interface,
 
     σ_x = Re Z − |y| Im Z′,    σ_y = Re Z + |y| Im Z′,    τ = −|y| Re Z′
     2 μ u = (1 − 2ν) Re Ẑ − |y| Im Z,    2 μ v = 2 (1 − ν) Im Ẑ − |y| Re Z
 
-hold in each body with its own μ, ν: there is no shear at the interface, and the pressure −Re Z is the
-same from both sides. With 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂ and the initial gap g₀, the gap is
-g₀ + (2/E*) Im Ẑ. Im Ẑ is zero in the middle of the contact. Given as displacement and traction on the
-outside of any two blocks, a field is an exact problem of linear elasticity, without an error of its own.
-Sources: H. M. Westergaard, J. Appl. Mech. 6 (1939) A49–A53; K. L. Johnson, Contact Mechanics (1985),
-§2.7, §5.2, §13.2; M. Ciavarella, D. A. Hills, G. Monno, Proc. IMechE C 212 (1998) 319–328 (the punch).
+hold in each body with its own μ, ν: there is no shear at the interface, and the pressure −Re Z is
+the same from both sides. With 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂ and the initial gap g₀, the gap is
+g₀ + (2/E*) Im Ẑ; Im Ẑ is zero in the middle of the contact. With these fields as displacement and
+traction on the outside of two blocks, their contact is an exact problem of linear elasticity.
+Sources: H. M. Westergaard, J. Appl. Mech. 6 (1939) A49–A53; K. L. Johnson, Contact Mechanics
+(1985), §2.7, §5.2, §13.2; the punch: M. Ciavarella, D. A. Hills, G. Monno, Proc. IMechE C 212
+(1998) 319–328.
 """
 
 from dataclasses import dataclass, field
@@ -111,7 +112,7 @@ class HalfPlanes(ElasticSolution):
 
 @dataclass(frozen=True, kw_only=True)
 class ContactEdge(HalfPlanes):
-    """The end of a contact of flat faces, alone: p = C √(e − x), gap (4 C / (3 E*)) (x − e)^{3/2}."""
+    """The end of a contact of flat faces: p = C √(e − x), g = (4 C / (3 E*)) (x − e)^{3/2}."""
 
     name: ClassVar[str] = "contact_edge"
 

@@ -88,7 +88,7 @@ class Hertz(ExactSolution):
     def measured(
         self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
     ) -> dict[str, float]:
-        """Those of the half ellipse of a computed pressure: the mean of ρ² is a²/4, in 3D 2 a²/5."""
+        """Those of the half ellipse of a computed pressure: the mean of ρ² is a²/4, in 3D 2a²/5."""
         share = 0.25 if self.dim == 2 else 0.4
         return half_ellipse(self._distance(x), force, self._distance(centre), mean, share)
 

@@ -1,21 +1,22 @@
-"""Contacts of half-planes that are symmetric about x = 0: waves, Hertz's, a rounded punch, a wedge.
+"""Contacts of half-planes that are symmetric about x = 0: waves, Hertz's, a punch, a wedge.
 
-The contact is |x| < a. With R = √(z − a) √(z + a) and L = ln((z + R)/a) the functions of `half_planes` are
+The contact is |x| < a. With R = √(z − a) √(z + a), L = ln((z + R)/a) the functions of `half_planes`
+are
 
     waves   Z = −2i p̄ cos ψ/(w + r),   Ẑ = −i (p̄ λ/π) (w/(w + r) + ln((w + r)/s))
     Hertz   Z = −i p₀ a/(z + R),       Ẑ = −i (p₀ a/2) (z/(z + R) + L)
-    punch   Z = −i K (z B − b A − α R),  Ẑ = −i K ((z² + b²) B/2 − b z A − α (z R − a² L)/2 − b d L/2)
+    punch   Z = −i K (z B − b A − α R),
+            Ẑ = −i K ((z² + b²) B/2 − b z A − α (z R − a² L)/2 − b d L/2)
     wedge   Z = −i (E* m/π) asin(a/z),   Ẑ = −i (E* m/π) (z asin(a/z) + a L)
 
 with ψ = πz/λ, w = sin ψ, s = sin(πa/λ), r = √(w − s) √(w + s); p₀ = E* a/(2 R₁); K = E*/(π R₁),
-d = √(a² − b²), α = arccos(b/a), A = arctan(d/R), B = arctan(z d/(b R)). The waves are Hertz's contact in
-sin(πx/λ). The punch and the wedge sum up flat punches of half-widths t, each of the load P′(t) dt: E* t
-arccos(b/t)/R₁ and E* m. Sources: `half_planes`.
+d = √(a² − b²), α = arccos(b/a), A = arctan(d/R), B = arctan(z d/(b R)). The waves are Hertz's
+contact in sin(πx/λ). The punch and the wedge are sums of flat punches of half-widths t, each of the
+load P′(t) dt: P′ = E* t arccos(b/t)/R₁ and E* m. Sources: `half_planes`.
 """
 
-from dataclasses import dataclass, field
-from functools import cached_property
-from math import acos, asin, pi, sin, sqrt
+from dataclasses import dataclass
+from math import acos, asin, pi, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -233,13 +234,15 @@ class RoundedPunch(_Given):
         return part / (4 * a**2 * (a**2 * self._angle - b * d))
 
     def functions(self, z: np.ndarray) -> Functions:
-        """Those of the sum of flat punches; for x < 0 by symmetry, since A and B are not unique there."""
+        """Those of the sum of flat punches; for x < 0, where A and B are not unique, mirrored."""
         left = z.real < 0
         z = self._aside(np.where(left, -z.conj(), z), self.flat)
         a, b, d, alpha = self.end, self.flat, self._rise, self._angle
         root = self._root(z)
-        one = 0.5j * (np.log(root - 1j * d) - np.log(root + 1j * d))
-        two = 0.5j * (np.log(b * root - 1j * d * z) - np.log(b * root + 1j * d * z))
+        # R² + d² = z² − b² and b² R² + d² z² = a² (z² − b²): near z = b their logarithms cancel.
+        shared = np.log((z - b) * (z + b)) / 2
+        one = 1j * (shared - np.log(root + 1j * d))
+        two = 1j * (shared - np.log((b * root + 1j * d * z) / a))
         factor = -1j * self.modulus / (pi * self.radius)
         log = np.log((z + root) / a)
         whole = (z**2 + b**2) * two / 2 - b * z * one - b * d * log / 2
