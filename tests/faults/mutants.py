@@ -287,6 +287,9 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared equally among the nodes of a face", BENT,
            "solver.mechanics.fem.loads:surface_vectors",
            changed(lambda found: (np.full(found[0].shape, 1 / found[0].shape[1]), found[1]))),
+    Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
+           "solver.simulation.probes:locate", changed(
+               lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
     Mutant("force-share", "a force on a group is 1 % too large", FORCES,
            "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
     Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
