@@ -180,6 +180,7 @@ class ZoneKeys(Section, frozen=True):
     points: points per direction on a slave face, only for the treatment quadrature
     normal: the direction of gaps: normals of the faces, or their means at the nodes
     recovery: how a pressure of higher order is recovered from the constants
+    sweeps: solves with the loads of the recovered pressure; each brings it nearer to their limit
     interference: initial overlap of bodies that are modelled without it; subtracted from the gap
     clearance: the initial gap, which replaces the gap between the meshed faces
     """
@@ -193,6 +194,7 @@ class ZoneKeys(Section, frozen=True):
     )
     normal: Literal["element", "nodal"] = "element"
     recovery: Literal["none", "linear", "quadratic", "smooth", "automatic"] = "none"
+    sweeps: Annotated[int, Meta(ge=2, le=100, description="a number from 2 to 100")] | None = None
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
     clearance: Scalar | None = None

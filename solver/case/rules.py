@@ -81,6 +81,9 @@ def _check_names(case: Case) -> None:
         if zone.points and zone.treatment != "quadrature":
             allowed = "only the treatment quadrature has points"
             raise InputError(case.path, f"contact[{i}].points", zone.points, allowed)
+        if zone.sweeps and zone.recovery == "none":
+            allowed = "only a recovery has sweeps"
+            raise InputError(case.path, f"contact[{i}].sweeps", zone.sweeps, allowed)
         if zone.normal == "nodal" and zone.treatment in ("quadrature", "node_to_segment"):
             allowed = f"the treatment {zone.treatment} has normals of its own; allowed: element"
             raise InputError(case.path, f"contact[{i}].normal", zone.normal, allowed)

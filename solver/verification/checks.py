@@ -95,9 +95,9 @@ def _elongation(solution: Solution) -> float:
 
 
 def _total_force(solution: Solution) -> float:
-    """The largest reaction or contact force; one where nothing acts."""
-    forces = [r.force for r in solution.reactions]
-    forces += [zone.resultants.force for zone in solution.zones if zone.resultants]
+    """The largest reaction or contact force of any step; one where nothing acts."""
+    forces = [one.force for step in solution.steps for one in step.reactions]
+    forces += [one.force for step in solution.steps for one in step.resultants.values()]
     return max((float(np.abs(force).max()) for force in forces), default=0.0) or 1.0
 
 

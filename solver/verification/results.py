@@ -12,7 +12,10 @@ that the checks need, so that it can be judged without solving:
                    of nodes where the treatment has its multipliers there; in `recovered` the
                    coefficients of a recovered pressure and its values at nodes; in `resultants`
                    area, force and moment of contact, in `edges` where it ends in 2D
-    /bodies /balance /reactions /steps /observation /plan /timings /checks
+    /reactions /resultants
+                   what holds each group, and area, force and moment of contact in each zone, by
+                   step (counted from 0)
+    /bodies /balance /steps /observation /plan /timings /checks
                    tables, a data set a column
     /provenance    versions, revision, hashes, machine
 
@@ -42,6 +45,7 @@ from ..simulation.solution import (
     BodyInfo,
     Line,
     Reaction,
+    Resultants,
     Solution,
     StepResult,
 )
@@ -72,6 +76,8 @@ _ON_FACES = {
     "coverage": "coverage",
     "pressure_error_estimate": "pressure_error_estimate",
 }
+_OF_STEP = ("factor", "iterations", "status_changes", "residual", "complementarity")
+_RESULTANTS = ("area", "force", "moment", "pressure")
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 
@@ -110,7 +116,6 @@ def _write(
     file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
     if solution.strain_energy is not None:
         file["solve"].attrs["strain_energy"] = solution.strain_energy
-    write_table(file.create_group("reactions"), [asdict(one) for one in solution.reactions])
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
@@ -187,7 +192,9 @@ def _read_solution(file: h5py.File) -> Solution:
         strain=float(file["solve"].attrs.get("strain", np.nan)),
         rotation=float(file["solve"].attrs.get("rotation", np.nan)),
         strain_energy=_plain(file["solve"].attrs).get("strain_energy"),
-        reactions=_read_reactions(file),
+        reaction=point_data["reaction"][:, : grid.points.shape[1]]
+        if "reaction" in point_data
+        else None,
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
@@ -218,6 +225,8 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
         "normal_stress": solution.nodal_normal_stress,
         "body": solution.body,
     }
+    if solution.reaction is not None:
+        point_data["reaction"] = np.pad(solution.reaction, ((0, 0), (0, 3 - dim)))
     if any(zone.recovered for zone in solution.zones):
         point_data["recovered_pressure"] = _recovered_at_nodes(solution)
     write_grid(
@@ -319,16 +328,19 @@ def _read_bodies(group: h5py.Group) -> list[BodyInfo]:
     ]
 
 
-def _read_reactions(file: h5py.File) -> list[Reaction]:
-    rows = read_table(file["reactions"]) if "reactions" in file else []
-    return [Reaction(r["group"], np.array(r["force"]), np.array(r["moment"])) for r in rows]
-
-
 def _write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
-    """The cost of every step, and what was observed as arrays (steps, observed places)."""
-    rows = [asdict(step) for step in steps]
-    observed = [row.pop("observations") for row in rows]
+    """The cost of every step, its forces, and what was observed (steps, observed places)."""
+    rows = [{name: getattr(step, name) for name in _OF_STEP} for step in steps]
+    observed = [step.observations for step in steps]
     write_table(file.create_group("steps"), rows)
+    held = [{"step": i, **vars(one)} for i, step in enumerate(steps) for one in step.reactions]
+    write_table(file.create_group("reactions"), held)
+    contact = [
+        {"step": i, "zone": zone} | {name: getattr(one, name) for name in _RESULTANTS}
+        for i, step in enumerate(steps)
+        for zone, one in step.resultants.items()
+    ]
+    write_table(file.create_group("resultants"), contact)
     group = file.create_group("observation")
     group["factor"] = [step.factor for step in steps]
     first = observed[0] if observed else []
@@ -343,6 +355,7 @@ def _read_steps(file: h5py.File) -> list[StepResult]:
     group = file["observation"]
     zones, elements = group["zone"].asstr()[()], group["macro_element"][()].tolist()
     values = {name: group[name][()] for name in _OBSERVED}
+    reactions, resultants = (_read_forces(file, name) for name in ("reactions", "resultants"))
     return [
         StepResult(
             **row,
@@ -351,9 +364,21 @@ def _read_steps(file: h5py.File) -> list[StepResult]:
                 | {name: float(values[name][i, j]) for name in _OBSERVED}
                 for j, (zone, element) in enumerate(zip(zones, elements, strict=True))
             ],
+            reactions=[Reaction(**row) for row in reactions.get(i, ())],
+            resultants={row.pop("zone"): Resultants(**row) for row in resultants.get(i, ())},
         )
         for i, row in enumerate(read_table(file["steps"]))
     ]
+
+
+def _read_forces(file: h5py.File, table: str) -> dict[int, list[dict[str, Any]]]:
+    """The rows of a table of forces by step; files of earlier versions name no step."""
+    found: dict[int, list[dict[str, Any]]] = {}
+    for row in read_table(file[table]) if table in file else []:
+        step = int(row.pop("step", 0))
+        arrays = {k: np.array(v) if isinstance(v, list) else v for k, v in row.items()}
+        found.setdefault(step, []).append(arrays)
+    return found
 
 
 # Tables: a group with one data set for each column

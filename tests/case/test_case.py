@@ -215,6 +215,10 @@ REFUSED = [
         ),
     ),
     (
+        "contact: [{slave: S, master: M, sweeps: 4}]",
+        "contact[0].sweeps = 4: only a recovery has sweeps",
+    ),
+    (
         "contact: [{slave: S, master: M, points: 4}]",
         "contact[0].points = 4: only the treatment quadrature has points",
     ),

@@ -51,6 +51,7 @@ SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 UNLOADING = "loads/unloading"
 
+BENDING = "bending/quad8-tria6"
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 # A segment below this share of the largest is round-off of the intersection.
@@ -352,6 +353,12 @@ MUTANTS = (
     Mutant("hoop-halved", "the hoop strain of axisymmetric cells is half of what it is", RINGS,
            "solver.mechanics.fem.elasticity:hoop_values",
            changed(lambda found: (0.5 * found[0], found[1]))),
+    Mutant("recovered-load", "the loads of the recovered pressure are 0.1 % too small", BENDING,
+           "solver.mechanics.mortar.operator:recovery",
+           changed(lambda r: r and replace(r, loads=0.999 * r.loads))),
+    Mutant("sweeps-lost", "a recovery makes the sweeps of its form alone", BENDING,
+           "solver.simulation.operators:_recovery",
+           changed(lambda asked: replace(asked, form=replace(asked.form, sweeps=2)))),
 )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from .base import (
     ParameterError,
     Part,
 )
+from .bending import Bending
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .indenter import Indenter
 from .manufactured import Parabola2d, Paraboloid3d
@@ -45,6 +46,7 @@ __all__ = [
 _CLASSES: tuple[type[ExactSolution], ...] = (
     UniformCompression,
     Hydrostatic,
+    Bending,
     NestedCylinders,
     NestedTubes,
     NestedSpheres,
