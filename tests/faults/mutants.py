@@ -132,6 +132,11 @@ def _first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
     return values
 
 
+def _first_nodes_exchanged(found: Any) -> Any:
+    order = [1, 0, *range(2, found.on_reference.shape[1])]
+    return replace(found, on_reference=found.on_reference[:, order])
+
+
 def _one_dropped(parts: list) -> list:
     """Without the smallest segment that is more than round-off."""
     sizes = [part.area for part in parts]
@@ -256,11 +261,10 @@ MUTANTS = (
     Mutant("template-piece-lost", "the cut loses a piece of the cell", SOLID,
            "solver.mechanics.mortar.cut:_template", changed(_template_piece_lost)),
     Mutant("jacobian", "the Jacobian of one cell is 1 % too large", PLANE,
-           "solver.mechanics.fem.elasticity:physical_gradients",
-           changed(lambda found: (found[0], _first_scaled(found[1], 1.01)))),
+           "solver.mechanics.fem.elasticity:shapes_in",
+           changed(lambda found: replace(found, measure=_first_scaled(found.measure, 1.01)))),
     Mutant("node-order", "the first two nodes of every cell are exchanged", PLANE,
-           "solver.mechanics.fem.elasticity:physical_gradients",
-           changed(lambda found: (found[0][:, :, [1, 0, *range(2, found[0].shape[2])]], found[1]))),
+           "solver.mechanics.fem.elasticity:shapes_in", changed(_first_nodes_exchanged)),
     Mutant("quadrature-weight", "one quadrature weight of the cells is 10 % off", BENT,
            "solver.mechanics.fem.elasticity:volume_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
