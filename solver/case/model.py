@@ -73,7 +73,7 @@ class Zone:
 
     `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
     gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
-    quadratic, smooth or automatic.
+    quadratic, smooth or automatic, with so many `sweeps`; None: by the form.
     """
 
     slave: str
@@ -86,6 +86,7 @@ class Zone:
     points: int | None = None
     clearance: Scalar | None = None
     recovery: str = "none"
+    sweeps: int | None = None
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,21 @@ class Observation:
 
     zone: str
     nearest: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A place whose displacement and stress are results; of a `zone`, its contact pressure.
+
+    A point `at` a place (dim,), of several bodies there the one with the cells `within`; or the
+    nodes of a `group`.
+    """
+
+    name: str
+    at: tuple[float, ...] = ()
+    group: str = ""
+    within: str = ""
+    zone: str = ""
 
 
 @dataclass(frozen=True)
@@ -124,6 +140,7 @@ class Case:
     directions: str = "first"
     steps: tuple[Step, ...] = (1.0,)
     observe: tuple[Observation, ...] = ()
+    probes: tuple[Probe, ...] = ()
     reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
     reference_kind: str | None = None
     reference_uncertainty: float | None = None

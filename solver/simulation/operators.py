@@ -53,6 +53,8 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> A
     for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
         material[block.number] = number
     form = form_of(zone.recovery, order, corners)
+    if form.sweeps and zone.sweeps:
+        form = replace(form, sweeps=zone.sweeps)
     return Asked(form, vertex_neighbours(vertices, count), material)
 
 

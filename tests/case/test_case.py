@@ -215,6 +215,10 @@ REFUSED = [
         ),
     ),
     (
+        "contact: [{slave: S, master: M, sweeps: 4}]",
+        "contact[0].sweeps = 4: only a recovery has sweeps",
+    ),
+    (
         "contact: [{slave: S, master: M, points: 4}]",
         "contact[0].points = 4: only the treatment quadrature has points",
     ),
@@ -318,7 +322,7 @@ REFUSED = [
     ),
     (
         "reference: {kind: analytical, pressure: 1}",
-        "reference.pressure = 1: unknown key; did you mean contact_pressure?",
+        "reference.pressure = 1: unknown key; did you mean pressure_at?",
     ),
     ("tolerance: 0", "tolerance = 0: must be a positive number of at most 1, or a mapping of"),
     ("tolerance: {multiplier: -1}", "tolerance.multiplier = -1: must be a positive number"),

@@ -5,6 +5,7 @@ import pytest
 
 from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, ParameterError
+from solver.case.solutions.bending import Bending
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.meridian import Meridian
 from solver.case.solutions.nested import NestedCylinders, NestedSpheres, NestedTubes
@@ -29,6 +30,8 @@ ALL = [
     UniformCompression(pressure=25.0, base=-50.0, lower=SOFT, upper=HARD, dim=3, interface=1.0),
     Hydrostatic(pressure=25.0, material=SOFT, dim=2),
     Hydrostatic(pressure=25.0, material=SOFT, dim=3),
+    Bending(mean=9.0, slope=(-3.0,), base=-1.0, bottom=SOFT, top=HARD, dim=2),
+    Bending(mean=9.0, slope=(-3.0, 2.0), base=-1.0, bottom=SOFT, top=HARD, dim=3),
     nested(NestedCylinders),
     nested(NestedCylinders, spin=0.002),
     nested(NestedTubes, spin=0.002),
@@ -59,7 +62,7 @@ def points_of(solution: ElasticSolution, part: int) -> np.ndarray:
         return x
     if isinstance(solution, UniformCompression):
         x[:, -1] += 1.0 if part else -1.0
-    if isinstance(solution, (Waves2d, PolynomialPressure2d)):
+    if isinstance(solution, (Bending, Waves2d, PolynomialPressure2d)):
         x[:, -1] *= 1.0 if part else -1.0
     return x
 
@@ -341,3 +344,23 @@ def test_a_solution_in_its_meridian_plane():
 def test_spheres_do_not_rotate():
     with pytest.raises(ParameterError, match="spheres do not rotate"):
         nested(NestedSpheres, spin=0.1)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_bending_leaves_the_sides_free_and_the_rollers_flat(dim):
+    solution = Bending(
+        mean=9.0, slope=(-3.0, 2.0)[: dim - 1], base=-1.0, bottom=SOFT, top=HARD, dim=dim
+    )
+    x = points_of(solution, 1)
+    stress, p = solution.stress(x), 9.0 + x[:, :-1] @ np.array([-3.0, 2.0])[: dim - 1]
+    expected = np.zeros((len(x), 6))
+    expected[:, dim - 1] = -p
+    if dim == 2:
+        expected[:, 2] = -0.2 * p
+    np.testing.assert_allclose(stress, expected, atol=1e-13)
+    x[:, -1] = -1.0
+    assert (solution.displacement(x)[:, -1] == 0).all()
+    # a beam of height 1 + 1 in the plane of x: u_x,zz = s/E' = -3/E'
+    bent = solution.gradient(np.array([[0.5] * dim, [0.5] * (dim - 1) + [1.5]]), 1)[:, 0, -1]
+    young = 70000.0 / (1 - 0.2**2) if dim == 2 else 70000.0
+    assert np.ptp(bent) == pytest.approx(3.0 / young, rel=1e-12)
