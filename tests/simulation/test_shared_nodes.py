@@ -126,7 +126,5 @@ def test_two_zones_with_the_same_two_surfaces_are_refused():
     """Both say that the mean of all gaps is zero: the pressures would not be unique."""
     once = "{name: interface, slave: bottom_contact, master: top_contact}"
     again = f"{once}\n  - {{name: back, slave: top_contact, master: bottom_contact}}"
-    with pytest.raises(
-        InputError, match=r"of zone .* another zone hold their inner"
-    ):
+    with pytest.raises(InputError, match=r"of zone .* another zone hold their inner"):
         simulate(changed_case(2, (once, again)), block_mesh("QUAD4", "TRIA3"))
