@@ -17,6 +17,7 @@ ERRORS: dict[str, str] = {
     "pressure_max": "contact_pressure",
     "pressure_means": "contact_pressure",
     "pressure_oscillation": "contact_pressure",
+    "pressure_inner": "contact_pressure",
     "half_width": "half_width",
     "peak": "peak",
 }

@@ -46,6 +46,7 @@ NORMS = {
     "pressure_max": "pressure, maximum",
     "pressure_means": "pressure, macro-element means",
     "pressure_oscillation": "pressure, second difference",
+    "pressure_inner": "pressure, two macro-elements inside",
     "half_width": "half-width of contact",
     "peak": "peak pressure",
     "stress_max": "stress, largest at nodes",

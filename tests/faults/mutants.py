@@ -52,6 +52,8 @@ FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads
 UNLOADING = "loads/unloading"
 
 BENDING = "bending/quad8-tria6"
+ENDING = "partial-waves/tria6"
+
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 # A segment below this share of the largest is round-off of the intersection.
@@ -196,6 +198,12 @@ def _stays_closed(true: Wrapped) -> Wrapped:
     return status
 
 
+def _last_opened(found: Any) -> Any:
+    closed = found.closed.copy()
+    closed[np.flatnonzero(closed)[-1:]] = False
+    return replace(found, closed=closed)
+
+
 def _every_third_off(stress: np.ndarray) -> np.ndarray:
     stress[::3, 0] -= 9e-4 * 25  # between the extremes: accepted values notice nothing
     return stress
@@ -333,6 +341,10 @@ MUTANTS = (
            changed(lambda p: -p)),
     Mutant("never-closes", "the contact status never closes a macro-element", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
+    Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
+           ENDING, "solver.simulation.problem:find_status", _stays_closed),
+    Mutant("end-too-early", "the last macro-element of the contact stays open", ENDING,
+           "solver.simulation.problem:find_status", changed(_last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
            "solver.simulation.problem:find_status", _stays_closed),
     Mutant("support-lost", "a support loses its last node", PLANE,
