@@ -35,9 +35,11 @@ class MeshFileKeys(Section, frozen=True):
     """A mesh of your own.
 
     file: .med, .msh, .inp, .vtu or .vtkhdf, relative to the case file
+    refine: 2 halves all edges, 4 does so twice, and so on
     """
 
     file: Text
+    refine: Literal[1, 2, 4, 8, 16, 32, 64] = 1
 
 
 class BlockKeys(Section, frozen=True):
