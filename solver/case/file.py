@@ -4,11 +4,14 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, field
 
-from .acting import LoadKeys, SelectionKeys, SupportKeys
+from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
 from .kinds import Group, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
-FORM = "{file: MESH} alone, or {recipe: NAME, …}"
+FORM = "{file: MESH, refine: 2}, or {recipe: NAME, …}"
+HALVINGS = (1, 2, 4, 8, 16, 32, 64)
+"""How often finer a mesh file can be made: by halving all edges, once or several times."""
+HALVINGS_TEXT = "1, 2, 4, 8, 16, 32 or 64"
 
 Angle = Annotated[Number, Meta(description="an angle in degrees")]
 Poisson = Annotated[
@@ -20,8 +23,9 @@ CheckName = Literal[
     "displacement", "stress_components", "integration_stress", "balance", "counts", "observation",
     "observation_gap",
     "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2", "pressure_max",
-    "pressure_means", "pressure_oscillation", "half_width", "peak",
+    "pressure_means", "pressure_oscillation", "pressure_inner", "half_width", "peak",
     "force", "reaction", "contact_area", "strain_energy",
+    "displacement_at", "stress_at", "pressure_at",
 ]  # fmt: skip
 
 
@@ -225,6 +229,7 @@ class CodeKeys(Section, frozen=True):
 _UNCERTAINTY = "a positive number: the possible relative error of the reference"
 _SOLUTION = "the name of a documented solution, or {name: NAME, …} with its parameters"
 _STRESS = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions, or `solution`"
+_Components = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
 _Stress = Annotated[dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar], Meta(min_length=1)]
 
 
@@ -246,6 +251,9 @@ class ReferenceKeys(Section, frozen=True):
     contact_area: area of contact of each zone
     reaction: the forces with which supports hold groups
     strain_energy: of all bodies
+    displacement_at: displacement at probes
+    stress_at: components of the stress at probes, xx, yy, zz, xy, yz, xz
+    pressure_at: contact pressure at probes
     stress: components of the stress at all nodes
     """
 
@@ -262,6 +270,9 @@ class ReferenceKeys(Section, frozen=True):
     contact_area: Number | None = None
     reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
     strain_energy: Number | None = None
+    displacement_at: Annotated[dict[Name, _Components], Meta(min_length=1)] | None = None
+    stress_at: Annotated[dict[Name, _Stress], Meta(min_length=1)] | None = None
+    pressure_at: Annotated[dict[Name, Scalar], Meta(min_length=1)] | None = None
     stress: Annotated[_Stress | Literal["solution"], Meta(description=_STRESS)] | None = None
 
     def __post_init__(self) -> None:
@@ -321,7 +332,8 @@ class CaseFile(Section, frozen=True):
     title: one line for the report
     description: free text for readers
     mesh: either `file`, a mesh file (.med, .msh, .inp, .vtu, .vtkhdf), relative to the case file,
-      or `recipe`, a recipe that generates the mesh, and the keys of the recipe
+      and `refine` to halve its edges (2: once, 4: twice), or `recipe`, a recipe that generates the
+      mesh, and the keys of the recipe
     transform: changes of the mesh, in the order of the keys
     plane: plane strain, plane stress, or a section of axisymmetric bodies with x as the radius and
       y along the axis; only for 2D meshes
@@ -336,6 +348,7 @@ class CaseFile(Section, frozen=True):
     steps: load factors, solved one after the other in any order, or the factors of named loads and
       supports
     observe: macro-elements to report at every step
+    probes: points and nodes whose displacement and stress, or contact pressure, are results
     reference: what the result is compared with
     tolerance: the tolerance of the relative checks, or one for each check
     counts: the expected numbers of cells and contact faces of a body
@@ -361,6 +374,7 @@ class CaseFile(Section, frozen=True):
         1.0,
     )
     observe: tuple[ObservationKeys, ...] = ()
+    probes: dict[Name, ProbeKeys] = field(default_factory=dict)
     reference: ReferenceKeys | None = None
     tolerance: (
         Annotated[_Tolerance | dict[CheckName, _Tolerance], Meta(description=_TOLERANCE)] | None
@@ -370,8 +384,10 @@ class CaseFile(Section, frozen=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         keys = self.mesh.keys() & {"file", "recipe"}
-        if len(keys) != 1 or ("file" in keys and len(self.mesh) > 1):
+        if len(keys) != 1 or ("file" in keys and self.mesh.keys() - {"file", "refine"}):
             raise FieldError(("mesh",), f"must be {FORM}")
+        if "file" in keys and self.mesh.get("refine", 1) not in HALVINGS:
+            raise FieldError(("mesh", "refine"), f"must be {HALVINGS_TEXT}")
         for key in keys:
             if not isinstance(self.mesh[key], str) or not self.mesh[key]:
                 problem = "the path of a mesh file" if key == "file" else "the name of a recipe"

@@ -46,6 +46,8 @@ def _all(solution: Solution) -> Iterator[str]:
         yield from _values("strain energy", np.array([solution.strain_energy]), (1,))
     if solution.reaction is not None:
         yield from _values("reaction", solution.reaction, (n, dim))
+    if solution.probes.keys() - {probe.name for probe in solution.case.probes}:
+        yield "the probes are not those of the case"
     yield from _steps(solution, dim)
     for zone in solution.zones:
         for fault in chain(_zone(zone, n, dim), _edges(zone, dim)):

@@ -22,6 +22,7 @@ from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
 from .plan import decided, estimated, noted, strained
+from .probes import probed
 from .problem import ContactProblem, Equilibrium
 from .recovery import Recovered, RecoveredZone, recovered
 from .resultants import resultants
@@ -95,6 +96,9 @@ def _tell_forces(solution: Solution) -> None:
             _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, forces)
         for reaction in step.reactions:
             _LOG.log(OUTCOME, "%sreaction of %s: %s", of_step, reaction.group, reaction)
+    for name, probe in solution.probes.items():
+        for line in probe.lines():
+            _LOG.log(OUTCOME, "probe %s %s", name, line)
     largest, place = solution.largest_displacement
     at = ", ".join(f"{x:.5g}" for x in place)
     told = largest, at, solution.strain, solution.strain_energy
@@ -173,6 +177,7 @@ def _recover(
         rotation=rotation,
         strain_energy=strain_energy(last),
         reaction=at_nodes,
+        probes=probed(scene, zones, last.displacement, stress),
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
     )

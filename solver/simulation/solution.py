@@ -7,7 +7,7 @@ open, stress is positive in tension.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -142,6 +142,31 @@ class Resultants:
 
 
 @dataclass
+class ProbeResult:
+    """The values at the `place` (k, dim) of a probe: `displacement` (k, dim) and `stress` (k, 6).
+
+    Or the contact `pressure` (k,). NaN where the probe asks for the other kind.
+    """
+
+    place: np.ndarray
+    displacement: np.ndarray
+    stress: np.ndarray
+    pressure: np.ndarray
+
+    def lines(self, most: int = 10) -> Iterator[str]:
+        """Each place with its values, `most` of them at most."""
+        for i, place in enumerate(self.place[:most]):
+            given = (
+                f"{name} ({', '.join(f'{x:.6g}' for x in np.atleast_1d(values[i]))})"
+                for name, values in vars(self).items()
+                if name != "place" and np.isfinite(values[i]).all()
+            )
+            yield f"at ({', '.join(f'{x:.5g}' for x in place)}): {', '.join(given)}"
+        if len(self.place) > most:
+            yield f"{len(self.place) - most} further places are in the result file"
+
+
+@dataclass
 class ZoneResult:
     """The contact state of one zone, by macro-element, and the stress on both surfaces.
 
@@ -242,7 +267,7 @@ class Solution:
     `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
     `strain_energy` is that of the last load factor, and so is `reaction` (n, dim), the forces at
-    nodes with which supports, rigid bodies, springs and ties hold the bodies.
+    nodes with which supports, rigid bodies, springs and ties hold the bodies; `probes` by name.
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
     `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
     the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
@@ -273,6 +298,7 @@ class Solution:
     rotation: float = float("nan")
     strain_energy: float | None = None
     reaction: np.ndarray | None = None
+    probes: dict[str, ProbeResult] = field(default_factory=dict)
     accuracy: dict[str, float] = field(default_factory=dict)
     mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)

@@ -42,6 +42,9 @@ ACCURACY = (
     "displacement",
     "stress_components",
     "integration_stress",
+    "displacement_at",
+    "stress_at",
+    "pressure_at",
 )
 # Fields that a verdict copies from a solution.
 _OF_SOLUTION = (

@@ -15,6 +15,7 @@ that the checks need, so that it can be judged without solving:
     /reactions /resultants
                    what holds each group, and area, force and moment of contact in each zone, by
                    step (counted from 0)
+    /probes        by name: places with displacement and stress, or pressure
     /bodies /balance /steps /observation /plan /timings /checks
                    tables, a data set a column
     /provenance    versions, revision, hashes, machine
@@ -44,14 +45,12 @@ from ..simulation.consistency import inconsistency
 from ..simulation.solution import (
     BodyInfo,
     Line,
-    Reaction,
-    Resultants,
     Solution,
-    StepResult,
 )
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
-from ..system.hdf5 import column, new_file, read_file, read_table, write_table
+from ..system.hdf5 import new_file, read_file, read_table, write_table
+from .steps import read_probes, read_steps, write_probes, write_steps
 from .units import label_fields
 from .verdict import CheckResult
 from .zones import read_zone, write_zone
@@ -76,9 +75,6 @@ _ON_FACES = {
     "coverage": "coverage",
     "pressure_error_estimate": "pressure_error_estimate",
 }
-_OF_STEP = ("factor", "iterations", "status_changes", "residual", "complementarity")
-_RESULTANTS = ("area", "force", "moment", "pressure")
-_OBSERVED = ("pressure", "gap", "status", "coverage")
 
 
 @dataclass
@@ -116,6 +112,7 @@ def _write(
     file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
     if solution.strain_energy is not None:
         file["solve"].attrs["strain_energy"] = solution.strain_energy
+    write_probes(file.create_group("probes"), solution.probes)
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
@@ -125,7 +122,7 @@ def _write(
     for number, zone in enumerate(solution.zones):
         write_zone(contact.create_group(zone.name), zone, number)
     _write_bodies(file.create_group("bodies"), solution.bodies)
-    _write_steps(file, solution.steps)
+    write_steps(file, solution.steps)
     write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
     write_table(file.create_group("timings"), _timings(solution))
     write_table(file.create_group("plan"), [line._asdict() for line in solution.plan])
@@ -187,7 +184,7 @@ def _read_solution(file: h5py.File) -> Solution:
         ],
         nodal_normal_stress=point_data["normal_stress"],
         balance=dict(_read_pairs(file["balance"], "name", "value")),
-        steps=_read_steps(file),
+        steps=read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
         strain=float(file["solve"].attrs.get("strain", np.nan)),
         rotation=float(file["solve"].attrs.get("rotation", np.nan)),
@@ -195,6 +192,7 @@ def _read_solution(file: h5py.File) -> Solution:
         reaction=point_data["reaction"][:, : grid.points.shape[1]]
         if "reaction" in point_data
         else None,
+        probes=read_probes(file),
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
@@ -326,59 +324,6 @@ def _read_bodies(group: h5py.Group) -> list[BodyInfo]:
         )
         for number, row in enumerate(read_table(group))
     ]
-
-
-def _write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
-    """The cost of every step, its forces, and what was observed (steps, observed places)."""
-    rows = [{name: getattr(step, name) for name in _OF_STEP} for step in steps]
-    observed = [step.observations for step in steps]
-    write_table(file.create_group("steps"), rows)
-    held = [{"step": i, **vars(one)} for i, step in enumerate(steps) for one in step.reactions]
-    write_table(file.create_group("reactions"), held)
-    contact = [
-        {"step": i, "zone": zone} | {name: getattr(one, name) for name in _RESULTANTS}
-        for i, step in enumerate(steps)
-        for zone, one in step.resultants.items()
-    ]
-    write_table(file.create_group("resultants"), contact)
-    group = file.create_group("observation")
-    group["factor"] = [step.factor for step in steps]
-    first = observed[0] if observed else []
-    group["zone"] = column([o["zone"] for o in first])
-    group["macro_element"] = np.array([o["macro_element"] for o in first], dtype=int)
-    for name in _OBSERVED:
-        values = [[float(o[name]) for o in row] for row in observed]
-        group[name] = np.reshape(values, (len(steps), len(first)))
-
-
-def _read_steps(file: h5py.File) -> list[StepResult]:
-    group = file["observation"]
-    zones, elements = group["zone"].asstr()[()], group["macro_element"][()].tolist()
-    values = {name: group[name][()] for name in _OBSERVED}
-    reactions, resultants = (_read_forces(file, name) for name in ("reactions", "resultants"))
-    return [
-        StepResult(
-            **row,
-            observations=[
-                {"zone": zone, "macro_element": element}
-                | {name: float(values[name][i, j]) for name in _OBSERVED}
-                for j, (zone, element) in enumerate(zip(zones, elements, strict=True))
-            ],
-            reactions=[Reaction(**row) for row in reactions.get(i, ())],
-            resultants={row.pop("zone"): Resultants(**row) for row in resultants.get(i, ())},
-        )
-        for i, row in enumerate(read_table(file["steps"]))
-    ]
-
-
-def _read_forces(file: h5py.File, table: str) -> dict[int, list[dict[str, Any]]]:
-    """The rows of a table of forces by step; files of earlier versions name no step."""
-    found: dict[int, list[dict[str, Any]]] = {}
-    for row in read_table(file[table]) if table in file else []:
-        step = int(row.pop("step", 0))
-        arrays = {k: np.array(v) if isinstance(v, list) else v for k, v in row.items()}
-        found.setdefault(step, []).append(arrays)
-    return found
 
 
 # Tables: a group with one data set for each column

@@ -294,6 +294,33 @@ def reaction(solution: Solution, _: None, reference: Reference) -> Sample | None
     return Sample(values, np.concatenate(list(reference.values())), lambda i: places[i])
 
 
+def probed(quantity: str) -> Sampler:
+    """Sample a quantity at the probes that the reference names."""
+
+    def sample(solution: Solution, _: None, reference: Reference) -> Sample | None:
+        found = []
+        for name, expected in reference.items():
+            if (probe := solution.probes.get(name)) is None:
+                return None
+            values = getattr(probe, quantity).reshape(len(probe.place), -1)
+            names = COMPONENTS if quantity == "stress" else ("x", "y", "z")
+            for key, value in _components(quantity, expected).items():
+                found_there = values[:, names.index(key or "x")]
+                rows = zip(found_there, evaluate(value, probe.place), strict=True)
+                found += [(*row, f"probe {name}{key and f' ({key})'}") for row in rows]
+        got, wanted, places = zip(*found, strict=True)
+        return Sample(np.array(got), np.array(wanted), lambda i: places[i])
+
+    return sample
+
+
+def _components(quantity: str, expected: Any) -> dict[str, Any]:
+    """The expected components by name."""
+    if quantity == "displacement":
+        return dict(zip("xyz", expected, strict=False))
+    return {"": expected} if quantity == "pressure" else expected
+
+
 def strain_energy(solution: Solution, _: None, reference: Reference) -> Sample | None:
     """The strain energy of all bodies together."""
     if solution.strain_energy is None:

@@ -17,6 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from scipy.sparse import diags_array
 
 from solver.case.model import Material
 from solver.case.reader import load_case
@@ -50,8 +51,11 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
 SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 UNLOADING = "loads/unloading"
+CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
 BENDING = "bending/quad8-tria6"
+ENDING = "partial-waves/tria6"
+
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 # A segment below this share of the largest is round-off of the intersection.
@@ -154,6 +158,19 @@ def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray
     return pairs[0][kept], pairs[1][kept]
 
 
+def _shared_nodes_free(true: Wrapped) -> Wrapped:
+    def zones(*given: Any) -> list[Any]:
+        first, *others = true(*given)
+        kept = np.ones((first.operator.matrix.shape[1] // 2, 2))
+        for faces in first.sub_faces:
+            kept[faces.nodes] = 0.0
+        cut_off = diags_array(kept.ravel())
+        rest = [replace(z.operator, matrix=z.operator.matrix @ cut_off) for z in others]
+        return [first, *(replace(z, operator=o) for z, o in zip(others, rest, strict=True))]
+
+    return zones
+
+
 def _never_closing(true: Wrapped) -> Wrapped:
     def constraints(scene: Any) -> Any:
         found = true(scene)
@@ -194,6 +211,12 @@ def _stays_closed(true: Wrapped) -> Wrapped:
         return true(no_tension_seen, eligible, eligible, *more)
 
     return status
+
+
+def _last_opened(found: Any) -> Any:
+    closed = found.closed.copy()
+    closed[np.flatnonzero(closed)[-1:]] = False
+    return replace(found, closed=closed)
 
 
 def _every_third_off(stress: np.ndarray) -> np.ndarray:
@@ -291,6 +314,9 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared equally among the nodes of a face", BENT,
            "solver.mechanics.fem.loads:surface_vectors",
            changed(lambda found: (np.full(found[0].shape, 1 / found[0].shape[1]), found[1]))),
+    Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
+           "solver.simulation.probes:locate", changed(
+               lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
     Mutant("force-share", "a force on a group is 1 % too large", FORCES,
            "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
     Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
@@ -304,6 +330,11 @@ MUTANTS = (
     Mutant("history-lost", "every load acts in full in every step", UNLOADING,
            "solver.simulation.scene:Scene.acting",
            lambda made: lambda scene, step: made(scene, dict.fromkeys(step, 1.0))),
+    Mutant("zone-ends", "a zone has no force at nodes that an earlier zone has", CORNER,
+           "solver.simulation.scene:_zones", _shared_nodes_free),
+    Mutant("zone-twice", "a node in two zones has a multiplier in each", SPLIT,
+           "solver.mechanics.mortar.held:_held",
+           given(lambda operator, nodes, basis, _: (operator, nodes, basis, None))),
     Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
            "solver.simulation.operators:gap_operator",
            changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
@@ -330,6 +361,10 @@ MUTANTS = (
            changed(lambda p: -p)),
     Mutant("never-closes", "the contact status never closes a macro-element", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
+    Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
+           ENDING, "solver.simulation.problem:find_status", _stays_closed),
+    Mutant("end-too-early", "the last macro-element of the contact stays open", ENDING,
+           "solver.simulation.problem:find_status", changed(_last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
            "solver.simulation.problem:find_status", _stays_closed),
     Mutant("support-lost", "a support loses its last node", PLANE,
