@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, field
 
-from .acting import LoadKeys, SelectionKeys, SupportKeys
+from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
 from .kinds import Group, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
@@ -20,8 +20,9 @@ CheckName = Literal[
     "displacement", "stress_components", "integration_stress", "balance", "counts", "observation",
     "observation_gap",
     "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2", "pressure_max",
-    "pressure_means", "pressure_oscillation", "half_width", "peak",
+    "pressure_means", "pressure_oscillation", "pressure_inner", "half_width", "peak",
     "force", "reaction", "contact_area", "strain_energy",
+    "displacement_at", "stress_at", "pressure_at",
 ]  # fmt: skip
 
 
@@ -225,6 +226,7 @@ class CodeKeys(Section, frozen=True):
 _UNCERTAINTY = "a positive number: the possible relative error of the reference"
 _SOLUTION = "the name of a documented solution, or {name: NAME, …} with its parameters"
 _STRESS = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions, or `solution`"
+_Components = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
 _Stress = Annotated[dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar], Meta(min_length=1)]
 
 
@@ -247,6 +249,9 @@ class ReferenceKeys(Section, frozen=True):
     coverage: covered share of the slave faces, at their centres; left out: covered in full
     reaction: the forces with which supports hold groups
     strain_energy: of all bodies
+    displacement_at: displacement at probes
+    stress_at: components of the stress at probes, xx, yy, zz, xy, yz, xz
+    pressure_at: contact pressure at probes
     stress: components of the stress at all nodes
     """
 
@@ -264,6 +269,9 @@ class ReferenceKeys(Section, frozen=True):
     coverage: Scalar | None = None
     reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
     strain_energy: Number | None = None
+    displacement_at: Annotated[dict[Name, _Components], Meta(min_length=1)] | None = None
+    stress_at: Annotated[dict[Name, _Stress], Meta(min_length=1)] | None = None
+    pressure_at: Annotated[dict[Name, Scalar], Meta(min_length=1)] | None = None
     stress: Annotated[_Stress | Literal["solution"], Meta(description=_STRESS)] | None = None
 
     def __post_init__(self) -> None:
@@ -338,6 +346,7 @@ class CaseFile(Section, frozen=True):
     steps: load factors, solved one after the other in any order, or the factors of named loads and
       supports
     observe: macro-elements to report at every step
+    probes: points and nodes whose displacement and stress, or contact pressure, are results
     reference: what the result is compared with
     tolerance: the tolerance of the relative checks, or one for each check
     expected: the error of a check that a refinement ladder predicts for this mesh, in place of its
@@ -365,6 +374,7 @@ class CaseFile(Section, frozen=True):
         1.0,
     )
     observe: tuple[ObservationKeys, ...] = ()
+    probes: dict[Name, ProbeKeys] = field(default_factory=dict)
     reference: ReferenceKeys | None = None
     tolerance: (
         Annotated[_Tolerance | dict[CheckName, _Tolerance], Meta(description=_TOLERANCE)] | None

@@ -100,6 +100,21 @@ class Observation:
 
 
 @dataclass(frozen=True)
+class Probe:
+    """A place whose displacement and stress are results; of a `zone`, its contact pressure.
+
+    A point `at` a place (dim,), of several bodies there the one with the cells `within`; or the
+    nodes of a `group`.
+    """
+
+    name: str
+    at: tuple[float, ...] = ()
+    group: str = ""
+    within: str = ""
+    zone: str = ""
+
+
+@dataclass(frozen=True)
 class Case:
     """A case: one file, ready to be solved once its mesh is there.
 
@@ -128,6 +143,7 @@ class Case:
     directions: str = "first"
     steps: tuple[Step, ...] = (1.0,)
     observe: tuple[Observation, ...] = ()
+    probes: tuple[Probe, ...] = ()
     reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
     reference_kind: str | None = None
     reference_uncertainty: float | None = None

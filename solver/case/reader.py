@@ -18,7 +18,18 @@ from ..system.files import is_file
 from .expressions import Expression
 from .file import CaseFile
 from .material import Material
-from .model import EXACT, LOAD_KINDS, MARGIN, Case, Load, Observation, Selection, Support, Zone
+from .model import (
+    EXACT,
+    LOAD_KINDS,
+    MARGIN,
+    Case,
+    Load,
+    Observation,
+    Probe,
+    Selection,
+    Support,
+    Zone,
+)
 from .rules import check_rules
 from .typed import read_as
 from .yaml import parse_mapping, read_text
@@ -38,7 +49,10 @@ _QUANTITY = {
     "body_force": "body_force",
 }
 # Other keys of the reference, which no solution gives.
-_OTHERS = ("force", "contact_area", "reaction", "strain_energy", "coverage")
+_OTHERS = (
+    *("force", "contact_area", "reaction", "strain_energy", "coverage"),
+    *("displacement_at", "stress_at", "pressure_at"),
+)
 
 
 def load_case(path: str | Path) -> Case:
@@ -100,6 +114,7 @@ class _Reader:
             plane=file.plane,
             directions=file.directions,
             steps=file.steps,
+            probes=tuple(map(self.probe, file.probes)),
             observe=tuple(Observation(item.zone, item.nearest) for item in file.observe),
             reference={
                 key: self.value_or_exact("reference", key)
@@ -196,6 +211,11 @@ class _Reader:
         kind = next(kind for kind in LOAD_KINDS if getattr(item, kind) is not None)
         group = self.group((*keys, "group"), item.group, item.at)
         return Load(group, kind, self.value_or_exact(*keys, kind), item.name or "")
+
+    def probe(self, name: str) -> Probe:
+        item = self.file.probes[name]
+        group = self.group(("probes", name, "group"), item.group) if item.group else ""
+        return Probe(name, item.at or (), group, item.within or "", item.zone or "")
 
     def exact_solution(self) -> ExactSolution | None:
         """The solution that the reference names, made with what the case says already."""

@@ -17,11 +17,14 @@ ERRORS: dict[str, str] = {
     "pressure_max": "contact_pressure",
     "pressure_means": "contact_pressure",
     "pressure_oscillation": "contact_pressure",
+    "pressure_inner": "contact_pressure",
     "half_width": "half_width",
     "peak": "peak",
 }
 # Keys of the reference that need contact.
-_OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage"}
+_OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
+# Keys of the reference for values at probes.
+PROBED = ("displacement_at", "stress_at", "pressure_at")
 # The vectors of a selection.
 _PARTS = {"plane": ("point", "normal"), "sphere": ("centre",), "box": ("low", "high")}
 
@@ -34,6 +37,7 @@ def check_rules(case: Case) -> None:
     _check_names(case)
     _check_steps(case)
     _check_listed_twice(case)
+    _check_probes(case)
     _check_errors(case)
     _check_reference(case)
     if case.plane:
@@ -92,6 +96,23 @@ def _check_names(case: Case) -> None:
         if item.zone not in names:
             allowed = f"no such zone; {hint(item.zone, names)}"
             raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
+
+
+def _check_probes(case: Case) -> None:
+    """Probes are on zones of the case; references are those of probes that have such a value."""
+    zones = {zone.name for zone in case.zones}
+    for probe in case.probes:
+        if probe.zone and probe.zone not in zones:
+            allowed = f"no such zone; {hint(probe.zone, zones)}"
+            raise InputError(case.path, f"probes.{probe.name}.zone", probe.zone, allowed)
+    for key in PROBED:
+        names = {p.name for p in case.probes if bool(p.zone) == (key == "pressure_at")}
+        given = case.reference.get(key)
+        for name in given if isinstance(given, dict) else ():
+            if name not in names:
+                kind = "with a zone" if key == "pressure_at" else "without a zone"
+                allowed = f"no probe {kind} has this name; {hint(name, names)}"
+                raise InputError(case.path, f"reference.{key}.{name}", None, allowed)
 
 
 def _check_errors(case: Case) -> None:
@@ -172,21 +193,31 @@ def check_dimension(case: Case, dim: int) -> None:
 
 def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
     """Every vector of the case, with its key."""
+    yield from _placed(case)
     for i, load in enumerate(case.loads):
         if isinstance(load.value, tuple):
             yield f"loads[{i}].{load.kind}", load.value
+    for key, value in case.reference.items():
+        if isinstance(value, tuple):
+            yield f"reference.{key}", value
+        if key in ("reaction", "displacement_at") and isinstance(value, dict):
+            for name, vector in value.items():
+                assert isinstance(vector, tuple)
+                yield f"reference.{key}.{name}", vector
+
+
+def _placed(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
+    """Every vector of the case that says where something is."""
     for i, item in enumerate(case.observe):
         yield f"observe[{i}].nearest", item.nearest
+    for probe in case.probes:
+        if probe.at:
+            yield f"probes.{probe.name}.at", probe.at
     for made in case.selections:
         if made.shape == "at":
             yield made.key, made.values
         for key, value in zip(_PARTS.get(made.shape, ()), made.values, strict=False):
             yield f"{made.key}.{made.shape}.{key}", value
-    for key, value in case.reference.items():
-        if isinstance(value, tuple):
-            yield f"reference.{key}", value
-        if key == "reaction" and isinstance(value, dict):
-            yield from ((f"reference.reaction.{group}", v) for group, v in value.items())
 
 
 def _expressions(case: Case) -> Iterable[Expression]:

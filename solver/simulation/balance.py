@@ -54,11 +54,11 @@ def _unbalanced(
     return unbalanced.reshape(contact.shape) - free_part, free_part
 
 
-def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
+def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndarray]:
     """The reactions of each group that supports hold, of rigid bodies, the axis, springs and ties.
 
-    A support gets the force along its direction, without the part in those of supports before it:
-    all forces sum to what is held.
+    With the forces (n, dim) of all of them at nodes. A support gets the force along its direction,
+    without the part in those of supports before it: all forces sum to what is held.
     """
     contact = state.correction.copy()
     for zone in scene.zones:
@@ -82,7 +82,8 @@ def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
         found["together"] = found.get("together", 0.0) + left
     if state.iterate.springs.any():
         found["springs"] = found.get("springs", 0.0) + _of_springs(state)
-    return [_resultant(scene, name, force) for name, force in found.items()]
+    at_nodes = sum(found.values(), np.zeros_like(left))
+    return [_resultant(scene, name, force) for name, force in found.items()], at_nodes
 
 
 def _of_springs(state: Equilibrium) -> np.ndarray:

@@ -104,8 +104,8 @@ class Scene:
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
     up for it. `fixed`: the displacements that are held, by key of the case file. `springs` (n_dofs,
-    n_dofs) is the stiffness of springs to the ground. `force` (n, dim) and `free.offset` are for
-    load factor 1.
+    n_dofs) is the stiffness of springs to the ground. `probed`: nodes by probe. `force` (n, dim)
+    and `free.offset` are for load factor 1.
     """
 
     case: Case
@@ -123,6 +123,7 @@ class Scene:
     free: FreeMotion
     force: np.ndarray
     springs: sparse.csr_matrix
+    probed: dict[str, np.ndarray]
     histories: dict[str, tuple[np.ndarray, np.ndarray]]
     zones: list[ZoneScene]
     rest: Rest
@@ -205,6 +206,7 @@ def build_scene(
         free=free,
         force=force,
         springs=springs,
+        probed={p.name: groups.nodes(p.group, "probes") for p in case.probes if p.group},
         histories=groups.histories(),
         zones=zones,
         rest=Rest(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from .verdict import (
     Body,
     CheckError,
     CheckResult,
+    Force,
     Sides,
     Verdict,
 )
@@ -44,6 +45,9 @@ ACCURACY = (
     "displacement",
     "stress_components",
     "integration_stress",
+    "displacement_at",
+    "stress_at",
+    "pressure_at",
 )
 # Checks whose tolerance is round-off whatever the mesh: they say nothing of a solve's strictness.
 OF_STATUS = ("element_gap", "observation_gap", "element_status", "coverage")
@@ -57,6 +61,7 @@ _OF_SOLUTION = (
         "load_scale",
         "strain",
         "rotation",
+        "strain_energy",
         "stage_cpu_seconds",
         "cpu_seconds",
     ),
@@ -108,6 +113,8 @@ def judge(
         bodies=_bodies(solution),
         plan=[list(entry) for entry in solution.plan],
         checks=list(checks),
+        forces=list(_forces(solution)),
+        largest_displacement=solution.largest_displacement[0],
         attainable=accuracy.estimate,
         provenance=dict(provenance or {}),
     )
@@ -172,6 +179,17 @@ def _bodies(solution: Solution) -> list[Body]:
         )
         for body in solution.bodies
     ]
+
+
+def _forces(solution: Solution) -> Iterator[Force]:
+    """The forces of all steps: of each zone, then of what holds each group."""
+    for number, step in enumerate(solution.steps, start=1):
+        named = [(f"zone {name}", one) for name, one in step.resultants.items()]
+        for name, one in (*named, *((held.group, held) for held in step.reactions)):
+            keys = ("force", "moment", "area", "pressure")
+            given = ((key, getattr(one, key, None)) for key in keys)
+            lists = {key: value.tolist() for key, value in given if value is not None}
+            yield Force(step=number, factor=step.factor, name=name, **lists)
 
 
 def _first_of(reasons: Sequence[str]) -> str:

@@ -29,6 +29,8 @@ from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
 
 Reference = Any
+# Pressures and gaps below this share of load and length are none.
+_TOUCHING = 1e-12
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.
 _CHUNK = 1 << 17
 
@@ -91,9 +93,15 @@ def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
 
 
 def status(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
-    """Closed where the reference presses; either status is right at the edge of contact."""
+    """Closed where the reference presses.
+
+    Either status is right at the edge of contact, and where surfaces touch without pressure.
+    """
     found = zone.closed.astype(float)
     expected = (_covered(solution, zone, reference) > 0).astype(float)
+    touching = zone.multiplier <= _TOUCHING * solution.load_scale
+    touching &= zone.gap <= _TOUCHING * solution.length
+    expected = np.where(touching & (expected == 0), found, expected)
     if isinstance(reference, ExactValues):
         expected = np.where(reference.ends_within(zone), found, expected)
     return _at_macro_elements(found, expected)
@@ -301,6 +309,33 @@ def reaction(solution: Solution, _: None, reference: Reference) -> Sample | None
     return Sample(values, np.concatenate(list(reference.values())), lambda i: places[i])
 
 
+def probed(quantity: str) -> Sampler:
+    """Sample a quantity at the probes that the reference names."""
+
+    def sample(solution: Solution, _: None, reference: Reference) -> Sample | None:
+        found = []
+        for name, expected in reference.items():
+            if (probe := solution.probes.get(name)) is None:
+                return None
+            values = getattr(probe, quantity).reshape(len(probe.place), -1)
+            names = COMPONENTS if quantity == "stress" else ("x", "y", "z")
+            for key, value in _components(quantity, expected).items():
+                found_there = values[:, names.index(key or "x")]
+                rows = zip(found_there, evaluate(value, probe.place), strict=True)
+                found += [(*row, f"probe {name}{key and f' ({key})'}") for row in rows]
+        got, wanted, places = zip(*found, strict=True)
+        return Sample(np.array(got), np.array(wanted), lambda i: places[i])
+
+    return sample
+
+
+def _components(quantity: str, expected: Any) -> dict[str, Any]:
+    """The expected components by name."""
+    if quantity == "displacement":
+        return dict(zip("xyz", expected, strict=False))
+    return {"": expected} if quantity == "pressure" else expected
+
+
 def strain_energy(solution: Solution, _: None, reference: Reference) -> Sample | None:
     """The strain energy of all bodies together."""
     if solution.strain_energy is None:
@@ -329,7 +364,10 @@ def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
 
 
 def observed(quantity: str) -> Sampler:
-    """Sample the observations in a zone at every step; pressure grows with the load factor."""
+    """Sample the observations in a zone at every step; pressure grows with the load factor.
+
+    The reference is that of the last step; where nothing acts in it, no other step is compared.
+    """
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
         rows = [
@@ -338,8 +376,8 @@ def observed(quantity: str) -> Sampler:
             for o in step.observations
             if o["zone"] == zone.name
         ]
-        if solution.case.histories:  # the reference is that of the last step
-            last = len(solution.steps)
+        last = solution.steps[-1].factor
+        if solution.case.histories or not last:
             rows = [(1.0, *row[1:]) for row in rows if row[0] == last]
         elif isinstance(reference, ExactValues):  # of the whole load
             rows = [row for row in rows if row[0] == 1.0]
@@ -351,7 +389,7 @@ def observed(quantity: str) -> Sampler:
         else:
             expected = evaluate(reference, zone.centre[elements])
             if quantity == "pressure":
-                expected = expected * factors
+                expected = expected * factors / (1.0 if solution.case.histories else last or 1.0)
         return Sample(
             values, expected, lambda i: f"macro-element {elements[i]}, load factor {factors[i]:g}"
         )

@@ -103,6 +103,23 @@ class CheckResult:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Force:
+    """A force of a step: on the slave of a zone, or of what holds a group.
+
+    `moment` (3,) about the origin; `area` (3,) of contact with its bounds, and `pressure` (2,), the
+    smallest and the largest of the macro-elements, of zones.
+    """
+
+    step: int
+    factor: float
+    name: str
+    force: list[float]
+    moment: list[float]
+    area: list[float] | None = None
+    pressure: list[float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class CheckError:
     """A check by name and zone, and its error."""
 
@@ -195,6 +212,9 @@ class Verdict:
     bodies: list[Body] = field(default_factory=list)
     plan: list[list[str]] = field(default_factory=list)
     checks: list[CheckResult] = field(default_factory=list)
+    forces: list[Force] = field(default_factory=list)
+    largest_displacement: float | None = None
+    strain_energy: float | None = None
     accuracy: dict[str, float] = field(default_factory=dict)
     attainable: float | None = None
     errors: dict[str, float] = field(default_factory=dict)

@@ -326,7 +326,7 @@ REFUSED = [
     ),
     (
         "reference: {kind: analytical, pressure: 1}",
-        "reference.pressure = 1: unknown key; did you mean contact_pressure?",
+        "reference.pressure = 1: unknown key; did you mean pressure_at?",
     ),
     ("tolerance: 0", "tolerance = 0: must be a positive number of at most 1, or a mapping of"),
     ("tolerance: {multiplier: -1}", "tolerance.multiplier = -1: must be a positive number"),

@@ -52,6 +52,8 @@ FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads
 UNLOADING = "loads/unloading"
 
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
+ENDING = "partial-waves/tria6"
+
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 # A segment below this share of the largest is round-off of the intersection.
@@ -132,6 +134,11 @@ def _first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
     return values
 
 
+def _first_nodes_exchanged(found: Any) -> Any:
+    order = [1, 0, *range(2, found.on_reference.shape[1])]
+    return replace(found, on_reference=found.on_reference[:, order])
+
+
 def _one_dropped(parts: list) -> list:
     """Without the smallest segment that is more than round-off."""
     sizes = [part.area for part in parts]
@@ -189,6 +196,12 @@ def _stays_closed(true: Wrapped) -> Wrapped:
         return true(no_tension_seen, eligible, eligible, *more)
 
     return status
+
+
+def _last_opened(found: Any) -> Any:
+    closed = found.closed.copy()
+    closed[np.flatnonzero(closed)[-1:]] = False
+    return replace(found, closed=closed)
 
 
 def _every_third_off(stress: np.ndarray) -> np.ndarray:
@@ -262,11 +275,10 @@ MUTANTS = (
     Mutant("template-piece-lost", "the cut loses a piece of the cell", SOLID,
            "solver.mechanics.mortar.cut:_template", changed(_template_piece_lost)),
     Mutant("jacobian", "the Jacobian of one cell is 1 % too large", PLANE,
-           "solver.mechanics.fem.elasticity:physical_gradients",
-           changed(lambda found: (found[0], _first_scaled(found[1], 1.01)))),
+           "solver.mechanics.fem.elasticity:shapes_in",
+           changed(lambda found: replace(found, measure=_first_scaled(found.measure, 1.01)))),
     Mutant("node-order", "the first two nodes of every cell are exchanged", PLANE,
-           "solver.mechanics.fem.elasticity:physical_gradients",
-           changed(lambda found: (found[0][:, :, [1, 0, *range(2, found[0].shape[2])]], found[1]))),
+           "solver.mechanics.fem.elasticity:shapes_in", changed(_first_nodes_exchanged)),
     Mutant("quadrature-weight", "one quadrature weight of the cells is 10 % off", BENT,
            "solver.mechanics.fem.elasticity:volume_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
@@ -293,6 +305,9 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared equally among the nodes of a face", BENT,
            "solver.mechanics.fem.loads:surface_vectors",
            changed(lambda found: (np.full(found[0].shape, 1 / found[0].shape[1]), found[1]))),
+    Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
+           "solver.simulation.probes:locate", changed(
+               lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
     Mutant("force-share", "a force on a group is 1 % too large", FORCES,
            "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
     Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
@@ -332,6 +347,10 @@ MUTANTS = (
            changed(lambda p: -p)),
     Mutant("never-closes", "the contact status never closes a macro-element", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
+    Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
+           ENDING, "solver.simulation.problem:find_status", _stays_closed),
+    Mutant("end-too-early", "the last macro-element of the contact stays open", ENDING,
+           "solver.simulation.problem:find_status", changed(_last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
            "solver.simulation.problem:find_status", _stays_closed),
     Mutant("support-lost", "a support loses its last node", PLANE,

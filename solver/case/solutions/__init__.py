@@ -23,6 +23,7 @@ from .base import (
     Part,
 )
 from .bending import Bending
+from .half_planes import ContactEdge
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .indenter import Indenter
 from .manufactured import Parabola2d, Paraboloid3d
@@ -30,6 +31,7 @@ from .meridian import Meridian
 from .nested import NestedCylinders, NestedSpheres, NestedTubes
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
+from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
 from .uniform import Hydrostatic, UniformCompression
 from .waves import Waves2d, Waves3d
 
@@ -59,6 +61,11 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     Indenter,
     Waves2d,
     Waves3d,
+    PartialWaves,
+    ContactEdge,
+    HertzHalfPlanes,
+    RoundedPunch,
+    Wedge,
     PolynomialPressure2d,
     PolynomialPressure3d,
 )
