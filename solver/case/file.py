@@ -8,7 +8,10 @@ from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
 from .kinds import Group, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
-FORM = "{file: MESH} alone, or {recipe: NAME, …}"
+FORM = "{file: MESH, refine: 2}, or {recipe: NAME, …}"
+HALVINGS = (1, 2, 4, 8, 16, 32, 64)
+"""How often finer a mesh file can be made: by halving all edges, once or several times."""
+HALVINGS_TEXT = "1, 2, 4, 8, 16, 32 or 64"
 
 Angle = Annotated[Number, Meta(description="an angle in degrees")]
 Poisson = Annotated[
@@ -331,7 +334,8 @@ class CaseFile(Section, frozen=True):
     title: one line for the report
     description: free text for readers
     mesh: either `file`, a mesh file (.med, .msh, .inp, .vtu, .vtkhdf), relative to the case file,
-      or `recipe`, a recipe that generates the mesh, and the keys of the recipe
+      and `refine` to halve its edges (2: once, 4: twice), or `recipe`, a recipe that generates the
+      mesh, and the keys of the recipe
     transform: changes of the mesh, in the order of the keys
     plane: plane strain, plane stress, or a section of axisymmetric bodies with x as the radius and
       y along the axis; only for 2D meshes
@@ -385,8 +389,10 @@ class CaseFile(Section, frozen=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         keys = self.mesh.keys() & {"file", "recipe"}
-        if len(keys) != 1 or ("file" in keys and len(self.mesh) > 1):
+        if len(keys) != 1 or ("file" in keys and self.mesh.keys() - {"file", "refine"}):
             raise FieldError(("mesh",), f"must be {FORM}")
+        if "file" in keys and self.mesh.get("refine", 1) not in HALVINGS:
+            raise FieldError(("mesh", "refine"), f"must be {HALVINGS_TEXT}")
         for key in keys:
             if not isinstance(self.mesh[key], str) or not self.mesh[key]:
                 problem = "the path of a mesh file" if key == "file" else "the name of a recipe"

@@ -177,7 +177,7 @@ def _add_job(command: argparse.ArgumentParser) -> None:
         help="how to recover a pressure of higher order, instead of the case's own setting",
     )
     command.add_argument(
-        "--refine", type=int, default=1, metavar="N", help="multiply the recipe's divisions"
+        "--refine", type=int, default=1, metavar="N", help="a mesh so many times finer"
     )
 
 

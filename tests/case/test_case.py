@@ -381,10 +381,10 @@ CHANGED = [
     ("[x, y, z]", "{w: 1}", "supports[0].fix.w = 1: unknown key; allowed: normal, x, y, z"),
     ("[x, y, z]", "{x: 1/}", "supports[0].fix.x = '1/': must be a number or an expression"),
     ("z]}]", "z]}, {group: base, fix: [z]}]", "supports[1].group = 'base': the group is listed"),
-    ("recipe: blocks, size: 1.0", "size: 1.0", "mesh = {'size': 1.0}: must be {file: MESH}"),
-    ("recipe: blocks, ", "recipe: blocks, file: a.med, ", "must be {file: MESH} alone, or {rec"),
-    ("recipe: blocks, ", "file: a.med, ", "must be {file: MESH} alone, or {recipe: NAME, …}"),
-    ("{recipe: blocks, size: 1.0}", "a.med", "mesh = 'a.med': must be {file: MESH} alone, or"),
+    ("recipe: blocks, size: 1.0", "size: 1.0", "mesh = {'size': 1.0}: must be {file: MESH, ref"),
+    ("recipe: blocks, ", "recipe: blocks, file: a.med, ", "must be {file: MESH, refine: 2}, or {"),
+    ("recipe: blocks, ", "file: a.med, ", "must be {file: MESH, refine: 2}, or {recipe: NAME, …}"),
+    ("{recipe: blocks, size: 1.0}", "a.med", "mesh = 'a.med': must be {file: MESH, refine: 2}, or"),
 ]
 
 

@@ -17,6 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from scipy.sparse import diags_array
 
 from solver.case.model import Material
 from solver.case.reader import load_case
@@ -50,6 +51,7 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
 SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 UNLOADING = "loads/unloading"
+CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 ENDING = "partial-waves/tria6"
@@ -154,6 +156,19 @@ def _one_dropped(parts: list) -> list:
 def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     kept = pairs[1] != 3
     return pairs[0][kept], pairs[1][kept]
+
+
+def _shared_nodes_free(true: Wrapped) -> Wrapped:
+    def zones(*given: Any) -> list[Any]:
+        first, *others = true(*given)
+        kept = np.ones((first.operator.matrix.shape[1] // 2, 2))
+        for faces in first.sub_faces:
+            kept[faces.nodes] = 0.0
+        cut_off = diags_array(kept.ravel())
+        rest = [replace(z.operator, matrix=z.operator.matrix @ cut_off) for z in others]
+        return [first, *(replace(z, operator=o) for z, o in zip(others, rest, strict=True))]
+
+    return zones
 
 
 def _never_closing(true: Wrapped) -> Wrapped:
@@ -321,6 +336,11 @@ MUTANTS = (
     Mutant("history-lost", "every load acts in full in every step", UNLOADING,
            "solver.simulation.scene:Scene.acting",
            lambda made: lambda scene, step: made(scene, dict.fromkeys(step, 1.0))),
+    Mutant("zone-ends", "a zone has no force at nodes that an earlier zone has", CORNER,
+           "solver.simulation.scene:_zones", _shared_nodes_free),
+    Mutant("zone-twice", "a node in two zones has a multiplier in each", SPLIT,
+           "solver.mechanics.mortar.held:_held",
+           given(lambda operator, nodes, basis, _: (operator, nodes, basis, None))),
     Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
            "solver.simulation.operators:gap_operator",
            changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
