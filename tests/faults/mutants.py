@@ -53,6 +53,7 @@ FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads
 UNLOADING = "loads/unloading"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
+TUBES = "axisymmetric/compound-tube"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 ENDING = "partial-waves/tria6"
 
@@ -402,6 +403,9 @@ MUTANTS = (
            changed(lambda asked: replace(asked, form=replace(asked.form, sweeps=2)))),
     Mutant("covered-share", "partly covered faces have 0.1 % too much of covered area", UNCOVERED,
            "solver.simulation.operators:gap_operator", changed(_more_covered)),
+    Mutant("zone-interference", "every zone has the interference 0.02", TUBES,
+           "solver.simulation.operators:_initial_gaps",
+           given(lambda zone, *rest: (replace(zone, interference=0.02), *rest))),
 )  # fmt: skip
 
 
