@@ -249,6 +249,7 @@ class ReferenceKeys(Section, frozen=True):
     force: contact force on the surface that is listed as slave, around the full circle if
       axisymmetric
     contact_area: area of contact of each zone
+    coverage: covered share of the slave faces, at their centres; left out: covered in full
     reaction: the forces with which supports hold groups
     strain_energy: of all bodies
     displacement_at: displacement at probes
@@ -268,6 +269,7 @@ class ReferenceKeys(Section, frozen=True):
     displacement: Scalars | None = None
     force: Vector | None = None
     contact_area: Number | None = None
+    coverage: Scalar | None = None
     reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
     strain_energy: Number | None = None
     displacement_at: Annotated[dict[Name, _Components], Meta(min_length=1)] | None = None
@@ -351,6 +353,8 @@ class CaseFile(Section, frozen=True):
     probes: points and nodes whose displacement and stress, or contact pressure, are results
     reference: what the result is compared with
     tolerance: the tolerance of the relative checks, or one for each check
+    expected: the error of a check that a refinement ladder predicts for this mesh, in place of its
+      tolerance; 1.5 times as much is allowed
     counts: the expected numbers of cells and contact faces of a body
     """
 
@@ -379,6 +383,7 @@ class CaseFile(Section, frozen=True):
     tolerance: (
         Annotated[_Tolerance | dict[CheckName, _Tolerance], Meta(description=_TOLERANCE)] | None
     ) = None
+    expected: Annotated[dict[CheckName, _Tolerance], Meta(min_length=1)] | None = None
     counts: dict[Group, CountKeys] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

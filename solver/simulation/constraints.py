@@ -43,7 +43,7 @@ class ContactConstraints:
     @cached_property
     def dependent(self) -> np.ndarray:
         """The numbers of eligible multipliers without a free unknown of their own."""
-        _, _, found = choose_pivots(self.on_free[self.eligible], self.own)
+        _, found = choose_pivots(self.on_free[self.eligible], self.own)
         return np.flatnonzero(self.eligible)[~found]
 
 
