@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from msgspec import Meta, field
 
 from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
-from .kinds import Group, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
+from .kinds import Group, GroupList, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
 FORM = "{file: MESH, refine: 2}, or {recipe: NAME, …}"
@@ -50,7 +50,7 @@ class Perturbation(Section, frozen=True):
 
     amplitude: Positive
     seed: Whole = 0
-    group: Group | None = None
+    group: Groups | None = None
 
 
 class Shift(Section, frozen=True):
@@ -60,7 +60,7 @@ class Shift(Section, frozen=True):
     by: the vector of the move
     """
 
-    group: Group
+    group: Groups
     by: Vector
 
 
@@ -71,14 +71,14 @@ class Turn(Section, frozen=True):
     angle: the angle of rotation
     """
 
-    group: Group
+    group: Groups
     angle: Angle
 
 
 class Pick(Section, frozen=True):
     """A group made of the cells of another that are in a box."""
 
-    source: Group = field(name="from")
+    source: Groups = field(name="from")
     low: Vector
     high: Vector
     name: Group
@@ -341,7 +341,7 @@ class CaseFile(Section, frozen=True):
       y along the axis; only for 2D meshes
     units: the units of the numbers, only labels of fields and pictures
     materials: the material of each group of cells, or of `all`
-    groups: groups that the case makes on the mesh, by name
+    groups: groups that the case makes on the mesh, by name; a list of groups makes one of them all
     supports: imposed displacements
     loads: loads on the bodies
     bodies: further properties of bodies
@@ -369,7 +369,7 @@ class CaseFile(Section, frozen=True):
     transform: Transform | None = None
     plane: Literal["strain", "stress", "axisymmetric"] | None = None
     units: Units | None = None
-    groups: dict[Group, SelectionKeys] = field(default_factory=dict)
+    groups: dict[Group, SelectionKeys | GroupList] = field(default_factory=dict)
     loads: tuple[LoadKeys, ...] = ()
     bodies: dict[Group, BodyKeys] = field(default_factory=dict)
     contact: tuple[ZoneKeys, ...] = ()

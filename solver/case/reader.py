@@ -156,6 +156,9 @@ class _Reader:
     def select(self, name: str) -> None:
         """Add a group that the file makes."""
         item, keys = self.file.groups[name], ("groups", name)
+        if isinstance(item, tuple):
+            self.selections[name] = Selection(name, key_path(keys), "groups", item)
+            return
         within = () if item.within is None else item.within
         shape = next(s for s in ("plane", "sphere", "box", "where") if getattr(item, s))
         given = getattr(item, shape)
@@ -214,8 +217,9 @@ class _Reader:
 
     def probe(self, name: str) -> Probe:
         item = self.file.probes[name]
-        group = self.group(("probes", name, "group"), item.group) if item.group else ""
-        return Probe(name, item.at or (), group, item.within or "", item.zone or "")
+        given = {key: getattr(item, key) for key in ("group", "within")}
+        groups = {k: self.group(("probes", name, k), v) if v else "" for k, v in given.items()}
+        return Probe(name, item.at or (), **groups, zone=item.zone or "")
 
     def exact_solution(self) -> ExactSolution | None:
         """The solution that the reference names, made with what the case says already."""
@@ -261,7 +265,8 @@ class _Reader:
         if isinstance(value, dict):
             return {key: self.value(*keys, key) for key in value}
         if isinstance(value, str):
-            return Expression(value, where=str(self.path), key=key_path(keys))
+            around = self.file.plane == "axisymmetric"
+            return Expression(value, str(self.path), key_path(keys), axisymmetric=around)
         return float(value)
 
 
