@@ -20,6 +20,7 @@ RECORD, FOLDER = "RECORD.json", "DIR"
 def add_commands(commands: Any) -> None:
     """Add the commands of all studies to those of the program."""
     _add_orders(commands)
+    _add_expect(commands)
     study = commands.add_parser("study", description="Error against run time.")
     _add_study(study.add_subparsers(title="commands", metavar="COMMAND", required=True))
     scaling = commands.add_parser("scaling", description="Cost against size.")
@@ -58,6 +59,28 @@ def _add_orders(commands: Any) -> None:
     command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
     command.add_argument("--results", type=Path, required=True, metavar=FOLDER, help="the levels")
     _output(command, FOLDER)
+
+
+def _add_expect(commands: Any) -> None:
+    purpose = "the errors that refined meshes predict for a case's own: its `expected`"
+    command = add_command(commands, "expect", _expect, purpose)
+    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument(
+        "--levels",
+        type=int,
+        nargs="+",
+        metavar="N",
+        help="factors of divisions (1 2 4)",
+    )
+
+
+def _expect(options: argparse.Namespace) -> int:
+    from ..studies.orders.expected import LEVELS, expected_errors
+
+    print("expected:")
+    for name, error in expected_errors(options.case, options.levels or LEVELS).items():
+        print(f"  {name}: {error:.1e}")
+    return 0
 
 
 def _orders(options: argparse.Namespace) -> int:
