@@ -50,6 +50,11 @@ class CutZone:
     slave_faces: list[FaceBlock]
     sub_faces: list[SubFaces]
 
+    @property
+    def count(self) -> int:
+        """How many macro-elements there are."""
+        return sum(len(block.nodes) for block in self.slave_faces)
+
 
 def faces_of(mesh: meshio.Mesh, group: str, case: Case, key: str) -> list[FaceBlock]:
     """The faces of a group that the case names under `key`; refuses those not on a boundary."""
@@ -93,29 +98,24 @@ class Attributes:
 
     def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
         """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
-        found: list[tuple[str, np.ndarray]] = []
-        for block in faces_of(self.mesh, group, self.case, key):
-            plain = np.ones(len(block.nodes), dtype=bool)
-            for zone in self.zones:
-                plain &= ~self._swap_sub_faces(block, zone, found)
-            found.append((block.type.name, block.nodes[plain]))
-        return [(name, nodes) for name, nodes in found if len(nodes)]
+        blocks = self.as_cut(faces_of(self.mesh, group, self.case, key))
+        return [(block.type.name, block.nodes) for block in blocks]
 
-    @staticmethod
-    def _swap_sub_faces(
-        block: FaceBlock, zone: CutZone, found: list[tuple[str, np.ndarray]]
-    ) -> np.ndarray:
-        """Mark the faces that are cut slave faces of the zone; append their sub-faces."""
-        hit = np.zeros(len(block.nodes), dtype=bool)
-        for slave in zone.slave_faces:
-            if slave.owner_type is block.owner_type and slave.type is block.type:
-                mine, theirs = (10 * b.owner + b.local for b in (block, slave))
-                hit |= np.isin(mine, theirs)
-                macro = slave.number[np.isin(theirs, mine)]
-                found += [
-                    (sub.type.name, sub.nodes[np.isin(sub.macro, macro)]) for sub in zone.sub_faces
-                ]
-        return hit
+    def as_cut(self, faces: Sequence[FaceBlock]) -> list[FaceBlock]:
+        """The faces as meshed, slave faces replaced by their sub-faces."""
+        found: list[FaceBlock] = []
+        for block in faces:
+            whole = np.ones(len(block.nodes), dtype=bool)
+            for zone in self.zones:
+                for slave in zone.slave_faces:
+                    mine, theirs = block.common(slave)
+                    if len(mine):
+                        whole[mine] = False
+                        number = np.full(zone.count, -1)
+                        number[slave.number[theirs]] = mine
+                        found += [_part(block, sub, number) for sub in zone.sub_faces]
+            found.append(block.of(whole))
+        return [block for block in found if len(block.nodes)]
 
     def nodes(self, group: str, key: str) -> np.ndarray:
         """All nodes of a group: of its volume cells, faces, edges and points."""
@@ -383,6 +383,12 @@ class Attributes:
             kind == "pressure",
             self.axisymmetric,
         )
+
+
+def _part(block: FaceBlock, sub: SubFaces, number: np.ndarray) -> FaceBlock:
+    """The sub-faces of a block's faces, which `number` (m,) gives by macro-element, or −1."""
+    face = number[sub.macro]
+    return replace(block.of(face[face >= 0]), type=sub.type, nodes=sub.nodes[face >= 0])
 
 
 def _type_name(meshio_name: str) -> str:

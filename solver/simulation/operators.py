@@ -27,7 +27,7 @@ def operator_of(
     options: Options,
 ) -> GapOperator:
     """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
-    points, count = groups.points, sum(len(block.nodes) for block in faces.slave_faces)
+    points, count = groups.points, faces.count
     around = groups.axisymmetric
     slaves = [facets(points, f.type, f.nodes, f.macro, around) for f in faces.sub_faces]
     if zone.normal == "nodal":

@@ -173,6 +173,8 @@ def build_scene(
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
     ]
     groups = Attributes(case, local, cut_mesh, cut_zones, origin)
+    # The master surface of a zone may be the slave surface of another, and cut.
+    surfaces = [(slave, groups.as_cut(master)) for slave, master in surfaces]
     with stage(clock, "pairing"):
         noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
         operators = [
@@ -224,18 +226,23 @@ def _zones(
     operators: Sequence[GapOperator],
     free: FreeMotion,
 ) -> list[ZoneScene]:
-    """The zones, multipliers of fixed nodes merged with others where the treatment does so."""
+    """The zones; multipliers of nodes that are fixed, or have one of another zone, are merged."""
     found: list[ZoneScene] = []
-    first = 0
+    first, taken = 0, None
+    if sum(operator.nodes is not None for operator in operators) > 1:
+        dim = operators[0].surface.centre.shape[1]
+        taken = np.zeros((free.basis.shape[0] // dim, dim, dim))
     for i, zone in enumerate(case.zones):
         operator, (slave, master) = operators[i], surfaces[i]
-        if TREATMENTS[zone.treatment].joins:
-            operator = merge_fixed_multipliers(operator, free.basis)
+        joins = TREATMENTS[zone.treatment].joins
+        if joins or (taken is not None and operator.nodes is not None):
+            basis = free.basis if joins else sparse.identity(free.basis.shape[0], format="csr")
+            operator = merge_fixed_multipliers(operator, basis, taken)
         found.append(
             ZoneScene(
                 zone=zone,
                 first=first,
-                count=sum(len(block.nodes) for block in slave),
+                count=cut_zones[i].count,
                 slave_faces=slave,
                 master_faces=master,
                 sub_faces=cut_zones[i].sub_faces,

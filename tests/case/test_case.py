@@ -215,6 +215,10 @@ REFUSED = [
         ),
     ),
     (
+        "expected: {all: 1.0e-3}",
+        "expected.all = 0.001: must be the name of a check without a tolerance of its own",
+    ),
+    (
         "contact: [{slave: S, master: M, sweeps: 4}]",
         "contact[0].sweeps = 4: only a recovery has sweeps",
     ),
@@ -377,10 +381,10 @@ CHANGED = [
     ("[x, y, z]", "{w: 1}", "supports[0].fix.w = 1: unknown key; allowed: normal, x, y, z"),
     ("[x, y, z]", "{x: 1/}", "supports[0].fix.x = '1/': must be a number or an expression"),
     ("z]}]", "z]}, {group: base, fix: [z]}]", "supports[1].group = 'base': the group is listed"),
-    ("recipe: blocks, size: 1.0", "size: 1.0", "mesh = {'size': 1.0}: must be {file: MESH}"),
-    ("recipe: blocks, ", "recipe: blocks, file: a.med, ", "must be {file: MESH} alone, or {rec"),
-    ("recipe: blocks, ", "file: a.med, ", "must be {file: MESH} alone, or {recipe: NAME, …}"),
-    ("{recipe: blocks, size: 1.0}", "a.med", "mesh = 'a.med': must be {file: MESH} alone, or"),
+    ("recipe: blocks, size: 1.0", "size: 1.0", "mesh = {'size': 1.0}: must be {file: MESH, ref"),
+    ("recipe: blocks, ", "recipe: blocks, file: a.med, ", "must be {file: MESH, refine: 2}, or {"),
+    ("recipe: blocks, ", "file: a.med, ", "must be {file: MESH, refine: 2}, or {recipe: NAME, …}"),
+    ("{recipe: blocks, size: 1.0}", "a.med", "mesh = 'a.med': must be {file: MESH, refine: 2}, or"),
 ]
 
 

@@ -17,6 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from scipy.sparse import diags_array
 
 from solver.case.model import Material
 from solver.case.reader import load_case
@@ -50,9 +51,11 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
 SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 UNLOADING = "loads/unloading"
+CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
-BENDING = "bending/quad8-tria6"
 ENDING, EDGE, CYLINDER = "partial-waves/tria6", "contact-edge/tria3", "half-planes/hertz-quad4"
+TUBES = "axisymmetric/compound-tube"
+BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -156,6 +159,19 @@ def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray
     return pairs[0][kept], pairs[1][kept]
 
 
+def _shared_nodes_free(true: Wrapped) -> Wrapped:
+    def zones(*given: Any) -> list[Any]:
+        first, *others = true(*given)
+        kept = np.ones((first.operator.matrix.shape[1] // 2, 2))
+        for faces in first.sub_faces:
+            kept[faces.nodes] = 0.0
+        cut_off = diags_array(kept.ravel())
+        rest = [replace(z.operator, matrix=z.operator.matrix @ cut_off) for z in others]
+        return [first, *(replace(z, operator=o) for z, o in zip(others, rest, strict=True))]
+
+    return zones
+
+
 def _never_closing(true: Wrapped) -> Wrapped:
     def constraints(scene: Any) -> Any:
         found = true(scene)
@@ -238,6 +254,12 @@ def _template_piece_lost(result: Any) -> Any:
     return replace(result, pieces=result.pieces[1:])
 
 
+def _more_covered(operator: Any) -> Any:
+    at = operator.surface
+    more = np.where(at.covered < 0.999 * at.area, 1.001, 1.0) * at.covered
+    return replace(operator, covered=more, surface=replace(at, covered=more))
+
+
 MUTANTS = (
     Mutant("gap-sign", "the initial gap has the wrong sign", CLOSING,
            "solver.mechanics.mortar.operator:integrals",
@@ -317,6 +339,11 @@ MUTANTS = (
     Mutant("history-lost", "every load acts in full in every step", UNLOADING,
            "solver.simulation.scene:Scene.acting",
            lambda made: lambda scene, step: made(scene, dict.fromkeys(step, 1.0))),
+    Mutant("zone-ends", "a zone has no force at nodes that an earlier zone has", CORNER,
+           "solver.simulation.scene:_zones", _shared_nodes_free),
+    Mutant("zone-twice", "a node in two zones has a multiplier in each", SPLIT,
+           "solver.mechanics.mortar.held:_held",
+           given(lambda operator, nodes, basis, _: (operator, nodes, basis, None))),
     Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
            "solver.simulation.operators:gap_operator",
            changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
@@ -376,6 +403,11 @@ MUTANTS = (
     Mutant("sweeps-lost", "a recovery makes the sweeps of its form alone", BENDING,
            "solver.simulation.operators:_recovery",
            changed(lambda asked: replace(asked, form=replace(asked.form, sweeps=2)))),
+    Mutant("covered-share", "partly covered faces have 0.1 % too much of covered area", UNCOVERED,
+           "solver.simulation.operators:gap_operator", changed(_more_covered)),
+    Mutant("zone-interference", "every zone has the interference 0.02", TUBES,
+           "solver.simulation.operators:_initial_gaps",
+           given(lambda zone, *rest: (replace(zone, interference=0.02), *rest))),
 )  # fmt: skip
 
 

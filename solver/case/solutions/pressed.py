@@ -1,7 +1,7 @@
 """Contacts of half-planes that are symmetric about x = 0: waves, Hertz's, a punch, a wedge.
 
-The contact is |x| < a. With R = √(z − a) √(z + a), L = ln((z + R)/(i a)) the functions of `half_planes`
-are
+The contact is |x| < a. With R = √(z − a) √(z + a) and L = ln((z + R)/(i a)) the functions of
+`half_planes` are
 
     waves   Z = −2i p̄ cos ψ/(w + r),   Ẑ = −i (p̄ λ/π) (w/(w + r) + ln((w + r)/(i s)))
     Hertz   Z = −i p₀ a/(z + R),       Ẑ = −i (p₀ a/2) (z/(z + R) + L)
