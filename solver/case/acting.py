@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .kinds import Group, Groups, Name, Scalar, Scalars, Vector
+from .kinds import Groups, Name, Scalar, Scalars, Vector
 from .typed import FieldError, Positive, Section, Text
 
 
@@ -81,7 +81,7 @@ class ProbeKeys(Section, frozen=True):
 
     at: Vector | None = None
     group: Groups | None = None
-    within: Group | None = None
+    within: Groups | None = None
     zone: Name | None = None
 
     def __post_init__(self) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from msgspec import Meta, field
 
 from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
-from .kinds import Group, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
+from .kinds import Group, GroupList, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
 FORM = "{file: MESH, refine: 2}, or {recipe: NAME, …}"
@@ -50,7 +50,7 @@ class Perturbation(Section, frozen=True):
 
     amplitude: Positive
     seed: Whole = 0
-    group: Group | None = None
+    group: Groups | None = None
 
 
 class Shift(Section, frozen=True):
@@ -60,7 +60,7 @@ class Shift(Section, frozen=True):
     by: the vector of the move
     """
 
-    group: Group
+    group: Groups
     by: Vector
 
 
@@ -71,14 +71,14 @@ class Turn(Section, frozen=True):
     angle: the angle of rotation
     """
 
-    group: Group
+    group: Groups
     angle: Angle
 
 
 class Pick(Section, frozen=True):
     """A group made of the cells of another that are in a box."""
 
-    source: Group = field(name="from")
+    source: Groups = field(name="from")
     low: Vector
     high: Vector
     name: Group
@@ -249,6 +249,7 @@ class ReferenceKeys(Section, frozen=True):
     force: contact force on the surface that is listed as slave, around the full circle if
       axisymmetric
     contact_area: area of contact of each zone
+    coverage: covered share of the slave faces, at their centres; left out: covered in full
     reaction: the forces with which supports hold groups
     strain_energy: of all bodies
     displacement_at: displacement at probes
@@ -268,6 +269,7 @@ class ReferenceKeys(Section, frozen=True):
     displacement: Scalars | None = None
     force: Vector | None = None
     contact_area: Number | None = None
+    coverage: Scalar | None = None
     reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
     strain_energy: Number | None = None
     displacement_at: Annotated[dict[Name, _Components], Meta(min_length=1)] | None = None
@@ -339,7 +341,7 @@ class CaseFile(Section, frozen=True):
       y along the axis; only for 2D meshes
     units: the units of the numbers, only labels of fields and pictures
     materials: the material of each group of cells, or of `all`
-    groups: groups that the case makes on the mesh, by name
+    groups: groups that the case makes on the mesh, by name; a list of groups makes one of them all
     supports: imposed displacements
     loads: loads on the bodies
     bodies: further properties of bodies
@@ -351,6 +353,8 @@ class CaseFile(Section, frozen=True):
     probes: points and nodes whose displacement and stress, or contact pressure, are results
     reference: what the result is compared with
     tolerance: the tolerance of the relative checks, or one for each check
+    expected: the error of a check that a refinement ladder predicts for this mesh, in place of its
+      tolerance; 1.5 times as much is allowed
     counts: the expected numbers of cells and contact faces of a body
     """
 
@@ -365,7 +369,7 @@ class CaseFile(Section, frozen=True):
     transform: Transform | None = None
     plane: Literal["strain", "stress", "axisymmetric"] | None = None
     units: Units | None = None
-    groups: dict[Group, SelectionKeys] = field(default_factory=dict)
+    groups: dict[Group, SelectionKeys | GroupList] = field(default_factory=dict)
     loads: tuple[LoadKeys, ...] = ()
     bodies: dict[Group, BodyKeys] = field(default_factory=dict)
     contact: tuple[ZoneKeys, ...] = ()
@@ -379,6 +383,7 @@ class CaseFile(Section, frozen=True):
     tolerance: (
         Annotated[_Tolerance | dict[CheckName, _Tolerance], Meta(description=_TOLERANCE)] | None
     ) = None
+    expected: Annotated[dict[CheckName, _Tolerance], Meta(min_length=1)] | None = None
     counts: dict[Group, CountKeys] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

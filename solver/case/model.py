@@ -25,6 +25,8 @@ Vector = tuple[Scalar, ...]
 Step = float | dict[str, float]
 LOAD_KINDS = ("pressure", "traction", "body_force", "force")
 SWAPPED = "-swapped"
+# A discretisation error may exceed the expected one by this factor.
+MARGIN = 1.5
 
 
 @dataclass(frozen=True)
@@ -118,9 +120,10 @@ class Case:
 
     `materials` in plane stress are those of `Material.in_plane_stress`. `mesh` is the file's
     mapping, the key `file` replaced by `path`, relative to the case file. `tolerance` holds the
-    overrides by check name, under `all` where one number was given. `units` names those of length
-    and stress, for labels alone. `source` is the file's text. `family` is the name of the file's
-    folder. `reference_uncertainty` is relative, `reference_code` has the keys name and version.
+    overrides by check name, under `all` where one number was given; that of a check with
+    an `expected` error follows from it. `units` names those of length and stress, for labels alone.
+    `source` is the file's text. `family` is the name of the file's folder. `reference_uncertainty`
+    is relative, `reference_code` has the keys name and version.
     `swapped`, `hexahedra` and `recovery`: how the case is solved, as `as_solved` was told.
     """
 
@@ -148,6 +151,7 @@ class Case:
     reference_remark: str = ""
     solution: "ExactSolution | None" = None
     tolerance: dict[str, float] = field(default_factory=dict)
+    expected: dict[str, float] = field(default_factory=dict)
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     selections: tuple[Selection, ...] = ()

@@ -22,7 +22,7 @@ ERRORS: dict[str, str] = {
     "peak": "peak",
 }
 # Keys of the reference that need contact.
-_OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "pressure_at"}
+_OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
 # Keys of the reference for values at probes.
 PROBED = ("displacement_at", "stress_at", "pressure_at")
 # The vectors of a selection.
@@ -138,6 +138,9 @@ def _check_reference(case: Case) -> None:
     for key in case.reference.keys() & _OF_CONTACT if not case.zones else ():
         allowed = "cannot be compared: the case has no contact"
         raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+    if "coverage" in case.reference and "contact_pressure" not in case.reference:
+        allowed = "needs contact_pressure: it says where that acts"
+        raise InputError(case.path, "reference.coverage", case.reference["coverage"], allowed)
     if case.reference_kind and not case.reference and case.solution is None:
         allowed = "gives no value to compare with, such as contact_pressure"
         raise InputError(case.path, "reference.kind", case.reference_kind, allowed)

@@ -185,11 +185,11 @@ class _Groups:
     def check_supports(self) -> None:
         for i, support in enumerate(self.case.supports):
             key = f"supports[{i}].group"
-            if support.spring and not self.of_nodes(key, support.group):
+            if support.spring and support.group != ALL and not self.of_nodes(key, support.group):
                 self.cells(key, support.group, self.dim - 1)
             if support.group == ALL:
-                if "normal" in support.fix:
-                    allowed = "normal needs a group of faces; `all` is fixed along x, y and z"
+                if "normal" in {*support.fix, *support.spring}:
+                    allowed = "normal needs a group of faces; `all` is held along x, y and z"
                     raise self.error(key, ALL, allowed)
                 continue
             self.require(key, support.group)

@@ -69,6 +69,10 @@ class Check:
                 return overrides[name]
         return overrides.get("all", RELATIVE) if self.tolerance is None else self.tolerance
 
+    def expected_in(self, expected: Mapping[str, float]) -> float | None:
+        """The expected error by a case's; None where a tolerance is stated."""
+        return expected.get(self.name, expected.get(self.like))
+
 
 def block_size(solution: Solution) -> float:
     """The extent of the smallest body."""
@@ -235,6 +239,7 @@ def _judge(
         scale=scale,
         error=error,
         tolerance=tolerance,
+        expected=check.expected_in(solution.case.expected),
         regression=regression,
         passed=error <= tolerance and (regression is None or regression.passed),
         verifies=check.verifies,

@@ -14,9 +14,12 @@ from ..case import job_name
 from ..simulation.accuracy import Accuracy
 from ..simulation.validity import limits_passed
 from .verdict import (
+    EXACT,
+    EXPECTED,
     FAILED,
     PASSED,
     SOLVED,
+    STATED,
     UNRELIABLE,
     Body,
     CheckError,
@@ -47,6 +50,9 @@ ACCURACY = (
     "stress_at",
     "pressure_at",
 )
+# Checks whose tolerance is round-off whatever the mesh: they say nothing of a solve's strictness.
+OF_STATUS = ("element_gap", "observation_gap", "element_status", "coverage")
+_ROUND_OFF = 1e-10
 # Fields that a verdict copies from a solution.
 _OF_SOLUTION = (
     *("dofs", "macro_elements", "iterations", "linear_solver", "linear_iterations"),
@@ -90,6 +96,7 @@ def judge(
         **_identity(solution.case, (solution.swapped, solution.hexahedra, solution.case.recovery)),
         verdict=word,
         passed=word == PASSED,
+        judged=_judged(checks) if word == PASSED else "",
         reason=_first_of(reasons) or (NOT_VERIFIED if word == SOLVED else ""),
         result=result,
         result_sha256=sha256,
@@ -151,6 +158,15 @@ def _identity(case: Case | Path, told: Told) -> dict[str, Any]:
             "reference_solution": case.solution.name if case.solution else None,
         }
     return found | {"case": name, "family": family, "job": job_name(name, *told)}
+
+
+def _judged(checks: Iterable[CheckResult]) -> str:
+    """How strict the tolerances of the checks against a reference are."""
+    strict = [check for check in checks if check.verifies and check.name not in OF_STATUS]
+    loose = [check for check in strict if check.tolerance > _ROUND_OFF]
+    if not loose:
+        return EXACT
+    return STATED if any(check.expected is None for check in loose) else EXPECTED
 
 
 def _bodies(solution: Solution) -> list[Body]:

@@ -130,6 +130,14 @@ def _write(
     write_table(file.create_group("checks"), [_flat(check) for check in checks])
     file.create_group("provenance").attrs.update(provenance)
     label_fields(file[GRID], contact, solution.case.units)
+    file.attrs["objects"] = _objects(file)
+
+
+def _objects(file: h5py.File) -> int:
+    """The number of groups and datasets of a file: some need not be there, but none gets lost."""
+    names: list[str] = []
+    file.visit(names.append)
+    return len(names)
 
 
 def read_result(path: str | Path) -> Result:
@@ -139,8 +147,11 @@ def read_result(path: str | Path) -> Result:
     try:
         with read_file(path) as file:
             file.visititems(_refuse_complex)
+            lost = int(file.attrs["objects"]) - _objects(file)
             result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)
+        if not fault and lost > 0:
+            fault = f"{lost} of its HDF5 objects are missing"
     except InputError:
         raise
     except Exception as error:

@@ -215,6 +215,10 @@ REFUSED = [
         ),
     ),
     (
+        "expected: {all: 1.0e-3}",
+        "expected.all = 0.001: must be the name of a check without a tolerance of its own",
+    ),
+    (
         "contact: [{slave: S, master: M, sweeps: 4}]",
         "contact[0].sweeps = 4: only a recovery has sweeps",
     ),

@@ -53,7 +53,8 @@ FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads
 UNLOADING = "loads/unloading"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
-BENDING = "bending/quad8-tria6"
+TUBES = "axisymmetric/compound-tube"
+BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 ENDING = "partial-waves/tria6"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
@@ -253,6 +254,12 @@ def _template_piece_lost(result: Any) -> Any:
     return replace(result, pieces=result.pieces[1:])
 
 
+def _more_covered(operator: Any) -> Any:
+    at = operator.surface
+    more = np.where(at.covered < 0.999 * at.area, 1.001, 1.0) * at.covered
+    return replace(operator, covered=more, surface=replace(at, covered=more))
+
+
 MUTANTS = (
     Mutant("gap-sign", "the initial gap has the wrong sign", CLOSING,
            "solver.mechanics.mortar.operator:integrals",
@@ -394,6 +401,11 @@ MUTANTS = (
     Mutant("sweeps-lost", "a recovery makes the sweeps of its form alone", BENDING,
            "solver.simulation.operators:_recovery",
            changed(lambda asked: replace(asked, form=replace(asked.form, sweeps=2)))),
+    Mutant("covered-share", "partly covered faces have 0.1 % too much of covered area", UNCOVERED,
+           "solver.simulation.operators:gap_operator", changed(_more_covered)),
+    Mutant("zone-interference", "every zone has the interference 0.02", TUBES,
+           "solver.simulation.operators:_initial_gaps",
+           given(lambda zone, *rest: (replace(zone, interference=0.02), *rest))),
 )  # fmt: skip
 
 
