@@ -257,6 +257,22 @@ def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
 
 
 @dataclass
+class Validity:
+    """How far a solve is from what it takes for granted, the largest of all load steps.
+
+    `strain` (principal) and `rotation` (radians), in the middle of the cells; `slip` of closed
+    contact, a mean over the macro-element, by the size of that; `pushed_past`: the number of cells
+    inside another body; `partly_covered`: of closed macro-elements under the end of the master.
+    """
+
+    strain: float = float("nan")
+    rotation: float = float("nan")
+    slip: float = float("nan")
+    pushed_past: int = 0
+    partly_covered: int = 0
+
+
+@dataclass
 class StepResult:
     """One load step: load factor, cost of the status iteration, and what was observed.
 
@@ -288,7 +304,7 @@ class Solution:
     `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
     `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
     the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
-    largest stress. `strain` and `rotation` (radians) are the largest of the last load factor.
+    largest stress. `validity`: see there.
     `accuracy` are the relative errors that rounding alone may cause, by cause (see
     `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
@@ -320,8 +336,7 @@ class Solution:
     plan: list[Line]
     matrix_entries: int = 0
     linear_iterations: int = 0
-    strain: float = float("nan")
-    rotation: float = float("nan")
+    validity: Validity = field(default_factory=Validity)
     strain_energy: float | None = None
     reaction: np.ndarray | None = None
     probes: dict[str, ProbeResult] = field(default_factory=dict)

@@ -54,6 +54,8 @@ UNLOADING = "loads/unloading"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
 TUBES = "axisymmetric/compound-tube"
+MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
+RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 ENDING = "partial-waves/tria6"
 
@@ -254,6 +256,23 @@ def _template_piece_lost(result: Any) -> Any:
     return replace(result, pieces=result.pieces[1:])
 
 
+def _first_status_kept(true: Wrapped) -> Wrapped:
+    """What is open in the first step stays so."""
+    kept: list[np.ndarray] = []
+
+    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
+        found = true(solve, start, kept[0] if kept else eligible, *more)
+        kept.append(found.closed)
+        return found
+
+    return status
+
+
+def _normals_rolled(blocks: list) -> list:
+    turned = [b.directions if b.directions is None else b.directions[:, ::-1] for b in blocks]
+    return [replace(b, directions=d) for b, d in zip(blocks, turned, strict=True)]
+
+
 def _more_covered(operator: Any) -> Any:
     at = operator.surface
     more = np.where(at.covered < 0.999 * at.area, 1.001, 1.0) * at.covered
@@ -406,6 +425,16 @@ MUTANTS = (
     Mutant("zone-interference", "every zone has the interference 0.02", TUBES,
            "solver.simulation.operators:_initial_gaps",
            given(lambda zone, *rest: (replace(zone, interference=0.02), *rest))),
+    Mutant("mixed-weight", "the mixed form is 1 % too stiff against a change of volume", MIXED,
+           "solver.mechanics.fem.mixed:_integrals",
+           changed(lambda found: (*found[:2], 0.99 * found[2]))),
+    Mutant("normals-rolled", "nodes of a face have the normals of its other end", NODAL_NORMALS,
+           "solver.simulation.operators:with_nodal_normals", changed(_normals_rolled)),
+    Mutant("chords", "curved faces count as straight", RATIO,
+           "solver.simulation.operators:facets",
+           changed(lambda f: replace(f, affine=np.ones(len(f.affine), dtype=bool)))),
+    Mutant("first-status", "what is open in the first step stays open", SIDES,
+           "solver.simulation.problem:find_status", _first_status_kept),
 )  # fmt: skip
 
 
