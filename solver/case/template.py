@@ -82,6 +82,7 @@ reference:
   displacement: solution                 # or expressions: [0.00375 * x, …]
 
 tolerance: 1.0e-3                        # or by check: {{multiplier: 1.0e-6, element_gap: 1.0e-8}}
+# expected: {{displacement: 2.0e-4}}     # or an expected error (see the command expect)
 """
 
 

@@ -6,7 +6,7 @@ solve and in a file that is read back.
 """
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, product
 
 import numpy as np
 
@@ -46,6 +46,8 @@ def _all(solution: Solution) -> Iterator[str]:
         yield from _values("strain energy", np.array([solution.strain_energy]), (1,))
     if solution.reaction is not None:
         yield from _values("reaction", solution.reaction, (n, dim))
+    if solution.probes.keys() - {probe.name for probe in solution.case.probes}:
+        yield "the probes are not those of the case"
     yield from _steps(solution, dim)
     for zone in solution.zones:
         for fault in chain(_zone(zone, n, dim), _edges(zone, dim)):
@@ -75,6 +77,10 @@ def _steps(solution: Solution, dim: int) -> Iterator[str]:
         for one in step.reactions:
             yield from _values(f"the force on {one.group}", one.force, (dim,))
             yield from _values(f"the moment on {one.group}", one.moment, (3,))
+        shapes = {"point": (dim,), "translation": (dim,), "force": (dim,)}
+        shapes |= {"rotation": (3,), "moment": (3,)}
+        for body, (name, shape) in product(step.rigid, shapes.items()):
+            yield from _values(f"{name} of {body.body}", getattr(body, name), shape)
 
 
 def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:

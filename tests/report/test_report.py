@@ -254,6 +254,16 @@ def test_a_batch_that_passed_leaves_no_failures(tmp_path):
     assert logged.startswith("The one solve passed.")
 
 
+def test_a_badge_says_how_strictly_a_solve_was_judged(tmp_path):
+    check = CHECK | {"error": 1e-3, "tolerance": 1.5e-3, "expected": 1.2e-3, "passed": True}
+    made = verdict("fam-a", "passed") | {"judged": "expected error", "checks": [check]}
+    write_report([put(tmp_path / "fam-a" / "verdict.json", made)], tmp_path / "report")
+    page = (tmp_path / "report" / "fam.html").read_text()
+    badges = '<span class="badge passed">passed</span> <span class="badge expected-error">'
+    assert f"{badges}expected error</span>" in page
+    assert "<td class=n>1.2e-03</td>\n<td class=n>1.5e-03</td>" in page
+
+
 def test_a_solve_without_a_reference_has_its_own_word_and_is_no_failure(tmp_path):
     made = [verdict("fam-a", "passed"), verdict("fam-free", "solved", "not verified: no reference")]
     paths = [put(tmp_path / each["job"] / "verdict.json", each) for each in made]

@@ -23,13 +23,15 @@ from .base import (
     Part,
 )
 from .bending import Bending
+from .half_planes import ContactEdge
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .indenter import Indenter
 from .manufactured import Parabola2d, Paraboloid3d
 from .meridian import Meridian
-from .nested import NestedCylinders, NestedSpheres, NestedTubes
+from .nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
+from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
 from .uniform import Hydrostatic, UniformCompression
 from .waves import Waves2d, Waves3d
 
@@ -50,6 +52,7 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     NestedCylinders,
     NestedTubes,
     NestedSpheres,
+    CompoundTube,
     OvalCylinders,
     Parabola2d,
     Paraboloid3d,
@@ -59,6 +62,11 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     Indenter,
     Waves2d,
     Waves3d,
+    PartialWaves,
+    ContactEdge,
+    HertzHalfPlanes,
+    RoundedPunch,
+    Wedge,
     PolynomialPressure2d,
     PolynomialPressure3d,
 )
