@@ -54,6 +54,7 @@ UNLOADING = "loads/unloading"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
 ENDING, EDGE, CYLINDER = "partial-waves/tria6", "contact-edge/tria3", "half-planes/hertz-quad4"
+RECEDING = "receding/quad8"
 TUBES = "axisymmetric/compound-tube"
 MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
 RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
@@ -214,6 +215,12 @@ def _stays_closed(true: Wrapped) -> Wrapped:
         return true(no_tension_seen, eligible, eligible, *more)
 
     return status
+
+
+def _first_guess_kept(true: Wrapped) -> Wrapped:
+    return lambda solve, start, eligible, *more: replace(
+        true(solve, start, eligible, *more), closed=start & eligible
+    )
 
 
 def _last_opened(found: Any) -> Any:
@@ -390,7 +397,9 @@ MUTANTS = (
     Mutant("never-closes", "the contact status never closes a macro-element", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
     Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
-           ENDING, "solver.simulation.problem:find_status", _stays_closed),
+           RECEDING, "solver.simulation.problem:find_status", _stays_closed),
+    Mutant("first-guess-kept", "the contact status is its first guess", ENDING,
+           "solver.simulation.problem:find_status", _first_guess_kept),
     Mutant("end-too-early", "the last macro-element of the contact stays open", EDGE,
            "solver.simulation.problem:find_status", changed(_last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
