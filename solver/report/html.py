@@ -29,6 +29,7 @@ MEANING = {
     "force": "contact force on the surface listed as slave",
     "contact_area": "area of contact",
     "reaction": "forces that hold groups",
+    "moment": "moment of contact on rigid bodies, about their reference points",
     "displacement_at": "displacement at probes",
     "stress_at": "stress at probes",
     "pressure_at": "contact pressure at probes",

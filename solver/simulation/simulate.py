@@ -16,7 +16,13 @@ from ..system.clock import Clock, processor_time
 from ..system.errors import SolveError
 from ..system.memory import peak_mb
 from ..system.progress import OUTCOME, stage
-from .balance import imbalances, pressures_of_forces, reactions, strain_energy
+from .balance import (
+    imbalances,
+    pressures_of_forces,
+    reactions,
+    rigid_bodies,
+    strain_energy,
+)
 from .consistency import inconsistency
 from .geometry import check_geometry
 from .naming import body_infos
@@ -97,6 +103,8 @@ def _tell_forces(solution: Solution) -> None:
             _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, forces)
         for reaction in step.reactions:
             _LOG.log(OUTCOME, "%sreaction of %s: %s", of_step, reaction.group, reaction)
+        for body in step.rigid:
+            _LOG.log(OUTCOME, "%scontact on rigid body %s: %s", of_step, body.body, body)
     for name, probe in solution.probes.items():
         for line in probe.lines():
             _LOG.log(OUTCOME, "probe %s %s", name, line)
@@ -332,6 +340,7 @@ def _step_results(
                     for zone in scene.zones
                 },
                 reactions=held,
+                rigid=rigid_bodies(scene, state),
             )
         )
     return results, at_nodes

@@ -108,6 +108,31 @@ class Reaction:
 
 
 @dataclass
+class RigidMotion:
+    """A rigid body: its motion, and the contact force on it.
+
+    `translation` (dim,) and `rotation` (3,) in radians at the reference `point` (dim,); `force`
+    (dim,) of contact on the body and its `moment` (3,) about the point. Axisymmetric bodies turn by
+    nothing and have no moment.
+    """
+
+    body: str
+    point: np.ndarray
+    translation: np.ndarray
+    rotation: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+
+    def __str__(self) -> str:
+        names = "point", "translation", "rotation", "force", "moment"
+        shown = {name: ", ".join(f"{x:.6g}" for x in getattr(self, name)) for name in names}
+        return (
+            f"force ({shown['force']}), moment ({shown['moment']}) about ({shown['point']}), "
+            f"moved by ({shown['translation']}), turned by ({shown['rotation']})"
+        )
+
+
+@dataclass
 class Resultants:
     """The resultants of contact in a zone.
 
@@ -256,7 +281,7 @@ class StepResult:
 
     `observations` holds one mapping per observed macro-element, in the order of the case file:
     zone, macro_element (number), pressure, gap, status (0 or 1), coverage. `resultants` of contact
-    by zone, and `reactions`; both empty in files of earlier versions.
+    by zone, `reactions` and motions of `rigid` bodies; all empty in files of earlier versions.
     """
 
     factor: float
@@ -267,6 +292,7 @@ class StepResult:
     observations: list[dict[str, Any]]
     resultants: dict[str, Resultants] = field(default_factory=dict)
     reactions: list[Reaction] = field(default_factory=list)
+    rigid: list[RigidMotion] = field(default_factory=list)
 
 
 @dataclass
@@ -338,9 +364,16 @@ class Solution:
         return self.steps[-1].reactions
 
     @property
+    def rigid(self) -> list[RigidMotion]:
+        """The rigid bodies in the last step."""
+        return self.steps[-1].rigid
+
+    @property
     def largest_displacement(self) -> tuple[float, np.ndarray]:
-        """The length of the largest displacement, and its place (dim,)."""
-        size = np.linalg.norm(self.displacement, axis=1)
+        """The length of the largest displacement of deformable bodies, and its place (dim,)."""
+        from .exact import deformable
+
+        size = np.linalg.norm(self.displacement, axis=1) * deformable(self)
         node = int(size.argmax())
         return float(size[node]), self.mesh.points[node]
 

@@ -182,10 +182,13 @@ def _bodies(solution: Solution) -> list[Body]:
 
 
 def _forces(solution: Solution) -> Iterator[Force]:
-    """The forces of all steps: of each zone, then of what holds each group."""
+    """The forces of all steps: of each zone, of what holds each group, on each rigid body."""
     for number, step in enumerate(solution.steps, start=1):
+        named: list[tuple[str, Any]]
         named = [(f"zone {name}", one) for name, one in step.resultants.items()]
-        for name, one in (*named, *((held.group, held) for held in step.reactions)):
+        named += [(held.group, held) for held in step.reactions]
+        named += [(f"{one.body}, about its reference point", one) for one in step.rigid]
+        for name, one in named:
             keys = ("force", "moment", "area", "pressure")
             given = ((key, getattr(one, key, None)) for key in keys)
             lists = {key: value.tolist() for key, value in given if value is not None}

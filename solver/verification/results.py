@@ -12,9 +12,9 @@ that the checks need, so that it can be judged without solving:
                    of nodes where the treatment has its multipliers there; in `recovered` the
                    coefficients of a recovered pressure and its values at nodes; in `resultants`
                    area, force and moment of contact, in `edges` where it ends in 2D
-    /reactions /resultants
-                   what holds each group, and area, force and moment of contact in each zone, by
-                   step (counted from 0)
+    /reactions /resultants /rigid
+                   what holds each group; area, force and moment of contact in each zone; motion of
+                   rigid bodies and contact on them; by step (counted from 0)
     /probes        by name: places with displacement and stress, or pressure
     /bodies /balance /steps /observation /plan /timings /checks
                    tables, a data set a column

@@ -104,10 +104,10 @@ class CheckResult:
 
 @dataclass(frozen=True, kw_only=True)
 class Force:
-    """A force of a step: on the slave of a zone, or of what holds a group.
+    """A force of a step: on the slave of a zone, of what holds a group, or on a rigid body.
 
-    `moment` (3,) about the origin; `area` (3,) of contact with its bounds, and `pressure` (2,), the
-    smallest and the largest of the macro-elements, of zones.
+    `moment` (3,) about the origin, or a rigid body's reference point; `area` (3,) of contact with
+    its bounds, and `pressure` (2,), the smallest and the largest of the macro-elements, of zones.
     """
 
     step: int
