@@ -84,10 +84,9 @@ def test_corner_with_multigrid():
 
 
 def at_the_corner(n, treatment):
-    """β_h of a QUAD4 seat of n slave faces on the wall and 2n on the floor, master four times wider."""
-    text = CORNER.replace(
-        "cells: TRIA6, divisions: [3, 3]", f"cells: QUAD4, divisions: [{n // 2}, 1]"
-    )
+    """β_h of a seat with n slave faces on the wall and 2n on the floor, master faces far longer."""
+    block = f"cells: QUAD4, divisions: [{n // 2}, 1]"
+    text = CORNER.replace("cells: TRIA6, divisions: [3, 3]", block)
     for sizes in ("[2, 2]", "[4, 2]"):
         text = text.replace(f"divisions: {sizes}", f"divisions: [{n * int(sizes[1]) // 2}, {n}]")
     for name in ("under}", "side}"):
