@@ -53,11 +53,11 @@ FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads
 UNLOADING = "loads/unloading"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
+ENDING, EDGE, CYLINDER = "partial-waves/tria6", "contact-edge/tria3", "half-planes/hertz-quad4"
 TUBES = "axisymmetric/compound-tube"
 MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
 RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
-ENDING = "partial-waves/tria6"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -343,6 +343,8 @@ MUTANTS = (
     Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
            "solver.simulation.probes:locate", changed(
                lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
+    Mutant("traction-lost", "the exact solution's traction does not act", CYLINDER,
+           "solver.simulation.attributes:Attributes._exact_force", changed(np.zeros_like)),
     Mutant("force-share", "a force on a group is 1 % too large", FORCES,
            "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
     Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
@@ -389,7 +391,7 @@ MUTANTS = (
            "solver.simulation.problem:find_status", _never_closes),
     Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
            ENDING, "solver.simulation.problem:find_status", _stays_closed),
-    Mutant("end-too-early", "the last macro-element of the contact stays open", ENDING,
+    Mutant("end-too-early", "the last macro-element of the contact stays open", EDGE,
            "solver.simulation.problem:find_status", changed(_last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
            "solver.simulation.problem:find_status", _stays_closed),
