@@ -126,7 +126,7 @@ class MeanStress:
         return values
 
     def nodal_stress(self, stress: np.ndarray, blocks: Sequence[Block]) -> np.ndarray:
-        """The part of s in the stress at nodes (n_nodes, 6), averaged over the cells around each."""
+        """The part of s in the stress at nodes (n_nodes, 6), averaged over the cells around."""
         n = self._shape[0]
         total, count = np.zeros(n), np.zeros(n)
         for part, nodal in self._nodal(stress):
