@@ -232,7 +232,7 @@ class Solved:
         return f"<Solved {self.outcome.summary}>"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the picture, and the verdict in one line."""
+        """For notebooks: the picture, and the verdict in one line."""
         from markupsafe import escape
 
         return f"<figure>{self.picture()}<figcaption>{escape(self)}</figcaption></figure>"
