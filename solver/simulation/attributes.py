@@ -25,10 +25,12 @@ from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
 from ..mechanics.fem.supports import (
     SAME,
+    CopyError,
     Fixed,
     FreeMotion,
     SupportClashError,
     TieError,
+    copied,
     free_motion,
     tied,
 )
@@ -37,7 +39,7 @@ from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
 from .exact import node_parts
 from .groups import ALL
-from .relations import ties_of
+from .relations import copies_of, ties_of
 
 
 @dataclass(frozen=True)
@@ -245,10 +247,13 @@ class Attributes:
 
     def supports(self) -> FreeMotion:
         """The motion that supports and rigid bodies leave free."""
-        ties = ties_of(self)
+        ties, copies = ties_of(self), copies_of(self)
         try:
             free = free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
-            return tied(free, list(ties.values()))
+            return tied(copied(free, list(copies.values())), list(ties.values()))
+        except CopyError as error:
+            key = list(copies)[error.number]
+            raise InputError(self.case.path, key, None, str(error)) from None
         except TieError as error:
             raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
         except SupportClashError as clash:
@@ -319,6 +324,7 @@ class Attributes:
                 force += self._force(load, f"loads[{i}].group")
         try:
             free = free_motion(len(self.points), self.points.shape[1], list(fixed.values()))
+            free = copied(free, list(copies_of(self).values()))
         except SupportClashError as clash:
             allowed = f"{clash}, of another name in steps"
             key = list(fixed)[clash.number]
