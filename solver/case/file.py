@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from msgspec import Meta, field
 
 from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
+from .bodies import BodyKeys
 from .kinds import Angle, Group, GroupList, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
@@ -23,7 +24,7 @@ CheckName = Literal[
     "observation_gap",
     "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2", "pressure_max",
     "pressure_means", "pressure_oscillation", "pressure_inner", "half_width", "peak",
-    "force", "reaction", "contact_area", "strain_energy",
+    "force", "reaction", "moment", "contact_area", "strain_energy",
     "displacement_at", "stress_at", "pressure_at",
 ]  # fmt: skip
 
@@ -162,16 +163,6 @@ class MaterialKeys(Section, frozen=True):
             raise FieldError(("poisson",), "must be greater than 0 in the mixed form")
 
 
-class BodyKeys(Section, frozen=True):
-    """A body.
-
-    rigid: the body neither moves nor deforms; it takes no load or displacement, and a rigid side
-      is always master
-    """
-
-    rigid: bool = False
-
-
 class ZoneKeys(Section, frozen=True):
     """A contact zone.
 
@@ -228,6 +219,9 @@ class CodeKeys(Section, frozen=True):
 _UNCERTAINTY = "a positive number: the possible relative error of the reference"
 _SOLUTION = "the name of a documented solution, or {name: NAME, …} with its parameters"
 _STRESS = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions, or `solution`"
+_MOMENT = "a number (plane) or a list of three numbers"
+_Three = Annotated[tuple[Number, ...], Meta(min_length=3, max_length=3)]
+_Moment = Annotated[Number | _Three, Meta(description=_MOMENT)]
 _Components = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
 _Stress = Annotated[dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar], Meta(min_length=1)]
 
@@ -250,6 +244,8 @@ class ReferenceKeys(Section, frozen=True):
     contact_area: area of contact of each zone
     coverage: covered share of the slave faces, at their centres; left out: covered in full
     reaction: the forces with which supports hold groups
+    moment: the moment of contact on rigid bodies about their reference points; one number in 2D,
+      three in 3D
     strain_energy: of all bodies
     displacement_at: displacement at probes
     stress_at: components of the stress at probes, xx, yy, zz, xy, yz, xz
@@ -270,6 +266,7 @@ class ReferenceKeys(Section, frozen=True):
     contact_area: Number | None = None
     coverage: Scalar | None = None
     reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
+    moment: Annotated[dict[Group, _Moment], Meta(min_length=1)] | None = None
     strain_energy: Number | None = None
     displacement_at: Annotated[dict[Name, _Components], Meta(min_length=1)] | None = None
     stress_at: Annotated[dict[Name, _Stress], Meta(min_length=1)] | None = None

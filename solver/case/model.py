@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Exact(Enum):
-    """`solution` in place of a value: what the case's exact solution has there."""
+    """`solution` in place of a value: the value of the case's exact solution."""
 
     VALUE = "solution"
 
@@ -104,6 +104,35 @@ class Zone:
 
 
 @dataclass(frozen=True)
+class Rigid:
+    """A rigid body: its motion about a reference point, and its surface if it has no cells.
+
+    `surface`: plane, sphere, cylinder or parabola, with its `values` by key; empty: as meshed.
+    `move`: the imposed displacement by component, x … rz; `force`: force or moment by component,
+    in which the body is free to move. It is held in all others.
+    """
+
+    surface: str = ""
+    values: dict[str, Any] = field(default_factory=dict)
+    reference: tuple[float, ...] | None = None
+    move: dict[str, float] = field(default_factory=dict)
+    force: dict[str, float] = field(default_factory=dict)
+    name: str = ""
+
+    @property
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        """Its points and directions by key."""
+        given = {"reference": self.reference}
+        given |= {f"{self.surface}.{key}": value for key, value in self.values.items()}
+        return [(key, value) for key, value in given.items() if isinstance(value, tuple)]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a motion, imposed or free."""
+        return bool(self.move or self.force)
+
+
+@dataclass(frozen=True)
 class Observation:
     """The macro-element of a zone nearest to a point, to be reported at every step."""
 
@@ -149,7 +178,7 @@ class Case:
     supports: tuple[Support, ...]
     loads: tuple[Load, ...] = ()
     zones: tuple[Zone, ...] = ()
-    rigid: frozenset[str] = frozenset()
+    rigid: dict[str, Rigid] = field(default_factory=dict)
     transform: dict[str, Any] | None = None
     plane: str | None = None
     directions: str = "first"

@@ -15,6 +15,7 @@ from msgspec import structs
 
 from ..system.errors import InputError, key_path
 from ..system.files import is_file
+from .bodies import BodyKeys
 from .expressions import Expression
 from .file import CaseFile
 from .material import Material
@@ -27,6 +28,7 @@ from .model import (
     Load,
     Observation,
     Probe,
+    Rigid,
     Selection,
     Support,
     Zone,
@@ -51,7 +53,7 @@ _QUANTITY = {
 }
 # Other keys of the reference, which no solution gives.
 _OTHERS = (
-    *("force", "contact_area", "reaction", "strain_energy", "coverage"),
+    *("force", "contact_area", "reaction", "moment", "strain_energy", "coverage"),
     *("displacement_at", "stress_at", "pressure_at"),
 )
 
@@ -110,7 +112,9 @@ class _Reader:
             supports=tuple(map(self.support, range(len(file.supports)))),
             loads=tuple(map(self.load, range(len(file.loads)))),
             zones=self.zones,
-            rigid=frozenset(group for group, body in file.bodies.items() if body.rigid),
+            rigid={
+                g: _rigid(body) for g, body in file.bodies.items() if body.rigid or body.surface
+            },
             transform=self.content.get("transform"),
             plane=file.plane,
             directions=file.directions,
@@ -272,6 +276,17 @@ class _Reader:
             around = self.file.plane == "axisymmetric"
             return Expression(value, str(self.path), key_path(keys), axisymmetric=around)
         return float(value)
+
+
+def _rigid(body: BodyKeys) -> Rigid:
+    return Rigid(
+        surface=body.surface,
+        values=structs.asdict(getattr(body, body.surface)) if body.surface else {},
+        reference=body.reference,
+        move={str(key): value for key, value in (body.move or {}).items()},
+        force={str(key): value for key, value in (body.force or {}).items()},
+        name=body.name or "",
+    )
 
 
 def _only(values: Iterable[Any]) -> float | None:

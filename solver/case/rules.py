@@ -5,7 +5,7 @@ from typing import Any
 
 from ..system.errors import InputError, hint
 from .expressions import Expression
-from .model import SWAPPED, Case, Load, Scalar, Support
+from .model import SWAPPED, Case, Load, Rigid, Scalar, Support
 
 # The errors of `solver.verification.norms`, and what a solution must have for each to be known.
 ERRORS: dict[str, str] = {
@@ -40,6 +40,7 @@ def check_rules(case: Case) -> None:
     _check_probes(case)
     _check_errors(case)
     _check_reference(case)
+    _check_rigid(case)
     if case.plane:
         check_dimension(case, 2)
     for group, material in case.materials.items():
@@ -50,9 +51,10 @@ def check_rules(case: Case) -> None:
 
 def _check_steps(case: Case) -> None:
     """Steps are all factors, or all factors of the same names; only these have the names."""
-    acting: dict[str, Support | Load] = {
+    acting: dict[str, Support | Load | Rigid] = {
         **{f"supports[{i}].name": s for i, s in enumerate(case.supports) if s.name},
         **{f"loads[{i}].name": load for i, load in enumerate(case.loads) if load.name},
+        **{f"bodies.{group}.name": body for group, body in case.rigid.items() if body.name},
     }
     names = {one.name for one in acting.values()}
     for i, step in enumerate(case.steps):
@@ -62,7 +64,7 @@ def _check_steps(case: Case) -> None:
             raise InputError(case.path, f"steps[{i}]", step, allowed)
         if given - names:
             name = min(given - names)
-            allowed = f"no load or support has this name; {hint(name, names)}"
+            allowed = f"no load, support or rigid body has this name; {hint(name, names)}"
             raise InputError(case.path, f"steps[{i}].{name}", None, allowed)
         if names - given:
             allowed = f"gives no factor of {min(names - given)}"
@@ -171,6 +173,44 @@ def _check_listed_twice(case: Case) -> None:
             seen.add((group, what))
 
 
+def _check_rigid(case: Case) -> None:
+    """A rigid surface without a mesh is the master of a zone, and nothing else."""
+    masters = {zone.master for zone in case.zones}
+    for name, body in case.rigid.items():
+        if body.surface and name not in masters | {zone.slave for zone in case.zones}:
+            allowed = "has no mesh and is the master of no contact zone"
+            raise InputError(case.path, f"bodies.{name}", body.surface, allowed)
+        for i, zone in enumerate(case.zones) if body.surface else ():
+            if name == zone.slave or (name == zone.master and case.directions == "both"):
+                allowed = f"is a rigid {body.surface}; a rigid side is always the master"
+                key, side = ("slave", zone.slave) if name == zone.slave else ("master", name)
+                allowed += ", so directions must be `first`" * (key == "master")
+                raise InputError(case.path, f"contact[{i}].{key}", side, allowed)
+
+
+def _check_motion(case: Case, dim: int) -> None:
+    """The components in which rigid bodies move, and the shapes that they have."""
+    known = ["x", "y", "z", "rx", "ry", "rz"] if dim == 3 else ["x", "y", "rz"]
+    known = ["y"] if case.axisymmetric else known
+    for name, body in case.rigid.items():
+        for key in ("move", "force"):
+            for component in getattr(body, key):
+                if component not in known:
+                    allowed = f"allowed here: {', '.join(known)}"
+                    raise InputError(case.path, f"bodies.{name}.{key}", component, allowed)
+        if body.surface == "cylinder" and dim == 2:
+            allowed = "is 3D: a circle is a `sphere` here, the side of a shaft a `plane`"
+            raise InputError(case.path, f"bodies.{name}", body.surface, allowed)
+    moments = case.reference.get("moment", {})
+    for name, value in moments.items() if isinstance(moments, dict) else ():
+        if name not in case.rigid:
+            allowed = f"is no rigid body; {hint(name, case.rigid)}"
+            raise InputError(case.path, f"reference.moment.{name}", None, allowed)
+        if isinstance(value, tuple) != (dim == 3):
+            allowed = f"must be {'a list of three numbers' if dim == 3 else 'a number'} here"
+            raise InputError(case.path, f"reference.moment.{name}", value, allowed)
+
+
 def check_dimension(case: Case, dim: int) -> None:
     """Raise `InputError` for a vector, direction or expression that does not fit the dimension."""
     allowed = f"must have {dim} components, as the mesh has"
@@ -178,6 +218,7 @@ def check_dimension(case: Case, dim: int) -> None:
         if len(vector) != dim:
             shown = [v.text if isinstance(v, Expression) else v for v in vector]
             raise InputError(case.path, key, shown, allowed)
+    _check_motion(case, dim)
     if dim == 3:
         return
     for i, support in enumerate(case.supports):
@@ -221,6 +262,8 @@ def _placed(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
             yield made.key, made.values
         for key, value in zip(_PARTS.get(made.shape, ()), made.values, strict=False):
             yield f"{made.key}.{made.shape}.{key}", value
+    for name, body in case.rigid.items():
+        yield from ((f"bodies.{name}.{key}", vector) for key, vector in body.vectors)
 
 
 def _expressions(case: Case) -> Iterable[Expression]:

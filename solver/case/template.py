@@ -46,7 +46,7 @@ supports:
 loads:
   - {{group: press, pressure: 25.0}}
 
-# Contact zones. The finer surface, or that of the softer body, is the better slave.
+# Contact zones. The finer surface, or the surface of the softer body, is the better slave.
 contact:
   - name: interface
     slave: bottom_contact

@@ -1,4 +1,4 @@
-"""What all pages of the report share: templates, style, and the words for kinds and checks."""
+"""Common to all pages: templates, style, and the words for kinds and checks."""
 
 from functools import cache
 from pathlib import Path
@@ -29,6 +29,7 @@ MEANING = {
     "force": "contact force on the surface listed as slave",
     "contact_area": "area of contact",
     "reaction": "forces that hold groups",
+    "moment": "moment of contact on rigid bodies, about their reference points",
     "displacement_at": "displacement at probes",
     "stress_at": "stress at probes",
     "pressure_at": "contact pressure at probes",

@@ -6,7 +6,7 @@ solve and in a file that is read back.
 """
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, product
 
 import numpy as np
 
@@ -77,6 +77,10 @@ def _steps(solution: Solution, dim: int) -> Iterator[str]:
         for one in step.reactions:
             yield from _values(f"the force on {one.group}", one.force, (dim,))
             yield from _values(f"the moment on {one.group}", one.moment, (3,))
+        shapes = {"point": (dim,), "translation": (dim,), "force": (dim,)}
+        shapes |= {"rotation": (3,), "moment": (3,)}
+        for body, (name, shape) in product(step.rigid, shapes.items()):
+            yield from _values(f"{name} of {body.body}", getattr(body, name), shape)
 
 
 def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..mechanics.fem.mixed import AUTOMATIC_ABOVE
 from ..mechanics.mortar.cut import needs_cut
-from .accuracy import NOTED_STRAIN
 from .constraints import MIN_COVERAGE
 from .naming import body_names
 from .options import Options
@@ -112,10 +111,3 @@ def estimated(solution: Solution) -> Iterator[Line]:
         if zone.recovered and (left := int((zone.closed & (zone.recovered.degree == 0)).sum())):
             what = f"{zone.name}: pressure constant on {left} macro-elements"
             yield Line(what, "too few closed neighbours to recover it from")
-
-
-def strained(solution: Solution) -> Iterator[Line]:
-    """A note where strains or rotations are not small."""
-    if max(solution.strain, solution.rotation) > NOTED_STRAIN:
-        what = f"largest strain {solution.strain:.1e}, rotation {solution.rotation:.1e}"
-        yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")

@@ -25,6 +25,7 @@ from .groups import ON_AXIS, check_groups, named_parts
 from .operators import operator_of
 from .options import LEAN, Options
 from .relations import springs_of
+from .rigid import Frame
 from .selections import with_groups
 from .surfaces import Surfaces, surfaces_of
 
@@ -103,9 +104,9 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `fixed`: the displacements that are held, by key of the case file. `springs` (n_dofs,
-    n_dofs) is the stiffness of springs to the ground. `probed`: nodes by probe. `force` (n, dim)
-    and `free.offset` are for load factor 1.
+    up for it. `fixed`: the displacements that are held, by key of the case file, `rigid`: the rigid
+    bodies. `springs` (n_dofs, n_dofs) is the stiffness of springs to the ground. `probed`: nodes by
+    probe. `force` (n, dim) and `free.offset` are for load factor 1.
     """
 
     case: Case
@@ -120,6 +121,7 @@ class Scene:
     blocks: list[Block]
     mean: MeanStress
     fixed: dict[str, Fixed]
+    rigid: dict[str, Frame]
     free: FreeMotion
     force: np.ndarray
     springs: sparse.csr_matrix
@@ -205,6 +207,7 @@ def build_scene(
         blocks=blocks,
         mean=mean,
         fixed=groups.fixed,
+        rigid=groups.frames,
         free=free,
         force=force,
         springs=springs,

@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 
 from ..case.model import Case, Step
-from ..mechanics.fem.elasticity import largest_strain, nodal_stress
+from ..mechanics.fem.elasticity import nodal_stress
 from ..mechanics.fem.faces import nodal_normals
 from ..mechanics.fem.stress import normal_stress
 from ..mesh.catalogue import BY_NAME
@@ -16,12 +16,18 @@ from ..system.clock import Clock, processor_time
 from ..system.errors import SolveError
 from ..system.memory import peak_mb
 from ..system.progress import OUTCOME, stage
-from .balance import imbalances, pressures_of_forces, reactions, strain_energy
+from .balance import (
+    imbalances,
+    pressures_of_forces,
+    reactions,
+    rigid_bodies,
+    strain_energy,
+)
 from .consistency import inconsistency
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
-from .plan import decided, estimated, noted, strained
+from .plan import decided, estimated, noted
 from .probes import probed
 from .problem import ContactProblem, Equilibrium
 from .recovery import Recovered, RecoveredZone, recovered
@@ -36,6 +42,7 @@ from .solution import (
     ZoneResult,
 )
 from .unloaded import without_unloaded
+from .validity import remarks, validity
 
 _LOG = logging.getLogger(__name__)
 # Half, but for round-off.
@@ -81,7 +88,7 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     with stage(clock, "recovery"):
         solution = _recover(problem, states, fields, plan)
     _tell_forces(solution)
-    solution.plan += [*estimated(solution), *strained(solution)]
+    solution.plan += [*estimated(solution), *remarks(solution.validity)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
@@ -96,12 +103,14 @@ def _tell_forces(solution: Solution) -> None:
             _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, forces)
         for reaction in step.reactions:
             _LOG.log(OUTCOME, "%sreaction of %s: %s", of_step, reaction.group, reaction)
+        for body in step.rigid:
+            _LOG.log(OUTCOME, "%scontact on rigid body %s: %s", of_step, body.body, body)
     for name, probe in solution.probes.items():
         for line in probe.lines():
             _LOG.log(OUTCOME, "probe %s %s", name, line)
     largest, place = solution.largest_displacement
     at = ", ".join(f"{x:.5g}" for x in place)
-    told = largest, at, solution.strain, solution.strain_energy
+    told = largest, at, solution.validity.strain, solution.strain_energy
     text = "largest displacement %.6g at (%s), largest strain %.3g, strain energy %.6g"
     _LOG.log(OUTCOME, text, *told)
 
@@ -148,7 +157,6 @@ def _recover(
         stress[:, 2] = 0.0
     scale = _stress_scale(scene, states, stress)
     steps, at_nodes = _step_results(scene, states, fields, scale)
-    strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
     zones = [
         _zone_result(scene, zone, last, stress, forces, fields[-1].get(zone.zone.name), steps[-1])
         for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
@@ -173,8 +181,7 @@ def _recover(
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
         plan=plan,
-        strain=strain,
-        rotation=rotation,
+        validity=validity(scene, states),
         strain_energy=strain_energy(last),
         reaction=at_nodes,
         probes=probed(scene, zones, last.displacement, stress),
@@ -333,6 +340,7 @@ def _step_results(
                     for zone in scene.zones
                 },
                 reactions=held,
+                rigid=rigid_bodies(scene, state),
             )
         )
     return results, at_nodes

@@ -108,6 +108,31 @@ class Reaction:
 
 
 @dataclass
+class RigidMotion:
+    """A rigid body: its motion, and the contact force on it.
+
+    `translation` (dim,) and `rotation` (3,) in radians at the reference `point` (dim,); `force`
+    (dim,) of contact on the body and its `moment` (3,) about the point. Axisymmetric bodies turn by
+    nothing and have no moment.
+    """
+
+    body: str
+    point: np.ndarray
+    translation: np.ndarray
+    rotation: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+
+    def __str__(self) -> str:
+        names = "point", "translation", "rotation", "force", "moment"
+        shown = {name: ", ".join(f"{x:.6g}" for x in getattr(self, name)) for name in names}
+        return (
+            f"force ({shown['force']}), moment ({shown['moment']}) about ({shown['point']}), "
+            f"moved by ({shown['translation']}), turned by ({shown['rotation']})"
+        )
+
+
+@dataclass
 class Resultants:
     """The resultants of contact in a zone.
 
@@ -232,6 +257,22 @@ def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
 
 
 @dataclass
+class Validity:
+    """How far a solve is from what it takes for granted, the largest of all load steps.
+
+    `strain` (principal) and `rotation` (radians), in the middle of the cells; `slip` of closed
+    contact, a mean over the macro-element, by the size of that; `pushed_past`: the number of cells
+    inside another body; `partly_covered`: of closed macro-elements under the end of the master.
+    """
+
+    strain: float = float("nan")
+    rotation: float = float("nan")
+    slip: float = float("nan")
+    pushed_past: int = 0
+    partly_covered: int = 0
+
+
+@dataclass
 class StepResult:
     """One load step: load factor, cost of the status iteration, and what was observed.
 
@@ -240,7 +281,7 @@ class StepResult:
 
     `observations` holds one mapping per observed macro-element, in the order of the case file:
     zone, macro_element (number), pressure, gap, status (0 or 1), coverage. `resultants` of contact
-    by zone, and `reactions`; both empty in files of earlier versions.
+    by zone, `reactions` and motions of `rigid` bodies; all empty in files of earlier versions.
     """
 
     factor: float
@@ -251,6 +292,7 @@ class StepResult:
     observations: list[dict[str, Any]]
     resultants: dict[str, Resultants] = field(default_factory=dict)
     reactions: list[Reaction] = field(default_factory=list)
+    rigid: list[RigidMotion] = field(default_factory=list)
 
 
 @dataclass
@@ -262,7 +304,7 @@ class Solution:
     `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
     `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
     the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
-    largest stress. `strain` and `rotation` (radians) are the largest of the last load factor.
+    largest stress. `validity`: see there.
     `accuracy` are the relative errors that rounding alone may cause, by cause (see
     `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
@@ -294,8 +336,7 @@ class Solution:
     plan: list[Line]
     matrix_entries: int = 0
     linear_iterations: int = 0
-    strain: float = float("nan")
-    rotation: float = float("nan")
+    validity: Validity = field(default_factory=Validity)
     strain_energy: float | None = None
     reaction: np.ndarray | None = None
     probes: dict[str, ProbeResult] = field(default_factory=dict)
@@ -323,9 +364,16 @@ class Solution:
         return self.steps[-1].reactions
 
     @property
+    def rigid(self) -> list[RigidMotion]:
+        """The rigid bodies in the last step."""
+        return self.steps[-1].rigid
+
+    @property
     def largest_displacement(self) -> tuple[float, np.ndarray]:
-        """The length of the largest displacement, and its place (dim,)."""
-        size = np.linalg.norm(self.displacement, axis=1)
+        """The length of the largest displacement of deformable bodies, and its place (dim,)."""
+        from .exact import deformable
+
+        size = np.linalg.norm(self.displacement, axis=1) * deformable(self)
         node = int(size.argmax())
         return float(size[node]), self.mesh.points[node]
 

@@ -105,6 +105,11 @@ def _total_force(solution: Solution) -> float:
     return max((float(np.abs(force).max()) for force in forces), default=0.0) or 1.0
 
 
+def _total_moment(solution: Solution) -> float:
+    """The largest force times the extent of the smallest body."""
+    return _total_force(solution) * block_size(solution)
+
+
 def _unit(_: Solution) -> float:
     """One."""
     return 1.0
@@ -143,6 +148,7 @@ CHECKS: tuple[Check, ...] = (
     Check("force", None, "force", samples.contact_force, _total_force),
     Check("contact_area", None, "contact_area", samples.contact_area, _unit),
     Check("reaction", None, "reaction", samples.reaction, _total_force, by_zone=False),
+    Check("moment", None, "moment", samples.moment, _total_moment, by_zone=False),
     Check(
         "displacement_at",
         None,

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..case import job_name
-from ..simulation.accuracy import Accuracy, beyond_small_strain
+from ..simulation.accuracy import Accuracy
+from ..simulation.validity import limits_passed
 from .verdict import (
     EXACT,
     EXPECTED,
@@ -59,8 +60,6 @@ _OF_SOLUTION = (
         "matrix_entries",
         "length",
         "load_scale",
-        "strain",
-        "rotation",
         "strain_energy",
         "stage_cpu_seconds",
         "cpu_seconds",
@@ -80,13 +79,13 @@ def judge(
 
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
-    relative error that rounding alone may cause, is the first reason) or where strain or rotation
-    is beyond small strain. `result` is the name of the result file beside the verdict and `sha256`
-    its hash.
+    relative error that rounding alone may cause, is the first reason) or where the solve is beyond
+    what linear theory takes for granted. `result` is the name of the result file beside the verdict
+    and `sha256` its hash.
     """
     accuracy = Accuracy(solution.accuracy)
-    large = beyond_small_strain(solution.case, solution.strain, solution.rotation)
-    unreliable = [reason for reason in (accuracy.reason, large) if reason]
+    unreliable = [reason for reason in (accuracy.reason,) if reason]
+    unreliable += limits_passed(solution.case, solution.validity)
     reasons = unreliable + [check.reason for check in checks if not check.passed]
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:
@@ -102,6 +101,7 @@ def judge(
         result=result,
         result_sha256=sha256,
         **{name: getattr(solution, name) for name in _OF_SOLUTION},
+        **asdict(solution.validity),
         seconds={**seconds, "total": seconds.get("total", sum(seconds.values()))},
         pressure=_extremes(zone.multiplier for zone in zones),
         stress=_extremes([solution.nodal_normal_stress[solution.body >= 0]]),
@@ -182,10 +182,13 @@ def _bodies(solution: Solution) -> list[Body]:
 
 
 def _forces(solution: Solution) -> Iterator[Force]:
-    """The forces of all steps: of each zone, then of what holds each group."""
+    """The forces of all steps: of each zone, of what holds each group, on each rigid body."""
     for number, step in enumerate(solution.steps, start=1):
+        named: list[tuple[str, Any]]
         named = [(f"zone {name}", one) for name, one in step.resultants.items()]
-        for name, one in (*named, *((held.group, held) for held in step.reactions)):
+        named += [(held.group, held) for held in step.reactions]
+        named += [(f"{one.body}, about its reference point", one) for one in step.rigid]
+        for name, one in named:
             keys = ("force", "moment", "area", "pressure")
             given = ((key, getattr(one, key, None)) for key in keys)
             lists = {key: value.tolist() for key, value in given if value is not None}
@@ -207,7 +210,7 @@ def _extremes(arrays: Iterable[np.ndarray]) -> list[Any] | None:
 
 
 def _worst(checks: Sequence[CheckResult]) -> CheckError | None:
-    """The check of `ACCURACY` with the largest error; where none ran, that of the norms checked."""
+    """The check of `ACCURACY` with the largest error; where none ran, of the norms checked."""
     relative = [check for check in checks if check.name in ACCURACY]
     relative = relative or [check for check in checks if check.norm == "error"]
     found = [CheckError(name=c.name, zone=c.zone, error=c.error) for c in relative]

@@ -12,9 +12,9 @@ that the checks need, so that it can be judged without solving:
                    of nodes where the treatment has its multipliers there; in `recovered` the
                    coefficients of a recovered pressure and its values at nodes; in `resultants`
                    area, force and moment of contact, in `edges` where it ends in 2D
-    /reactions /resultants
-                   what holds each group, and area, force and moment of contact in each zone, by
-                   step (counted from 0)
+    /reactions /resultants /rigid
+                   what holds each group; area, force and moment of contact in each zone; motion of
+                   rigid bodies and contact on them; by step (counted from 0)
     /probes        by name: places with displacement and stress, or pressure
     /bodies /balance /steps /observation /plan /timings /checks
                    tables, a data set a column
@@ -46,6 +46,7 @@ from ..simulation.solution import (
     BodyInfo,
     Line,
     Solution,
+    Validity,
 )
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
@@ -109,11 +110,11 @@ def _write(
     _write_grid(file.create_group(GRID), solution)
     _write_case(file.create_group("case"), solution)
     file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
-    file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
     if solution.strain_energy is not None:
         file["solve"].attrs["strain_energy"] = solution.strain_energy
     write_probes(file.create_group("probes"), solution.probes)
     file.create_group("accuracy").attrs.update(solution.accuracy)
+    file.create_group("validity").attrs.update(asdict(solution.validity))
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
     for kind, values in solution.mean_stress.items():
@@ -129,6 +130,14 @@ def _write(
     write_table(file.create_group("checks"), [_flat(check) for check in checks])
     file.create_group("provenance").attrs.update(provenance)
     label_fields(file[GRID], contact, solution.case.units)
+    file.attrs["objects"] = _objects(file)
+
+
+def _objects(file: h5py.File) -> int:
+    """The number of groups and datasets of a file: some need not be there, but none gets lost."""
+    names: list[str] = []
+    file.visit(names.append)
+    return len(names)
 
 
 def read_result(path: str | Path) -> Result:
@@ -138,8 +147,11 @@ def read_result(path: str | Path) -> Result:
     try:
         with read_file(path) as file:
             file.visititems(_refuse_complex)
+            lost = int(file.attrs["objects"]) - _objects(file)
             result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)
+        if not fault and lost > 0:
+            fault = f"{lost} of its HDF5 objects are missing"
     except InputError:
         raise
     except Exception as error:
@@ -186,8 +198,7 @@ def _read_solution(file: h5py.File) -> Solution:
         balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
-        strain=float(file["solve"].attrs.get("strain", np.nan)),
-        rotation=float(file["solve"].attrs.get("rotation", np.nan)),
+        validity=Validity(**(_plain(file["validity"].attrs) if "validity" in file else {})),
         strain_energy=_plain(file["solve"].attrs).get("strain_energy"),
         reaction=point_data["reaction"][:, : grid.points.shape[1]]
         if "reaction" in point_data

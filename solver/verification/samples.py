@@ -309,6 +309,21 @@ def reaction(solution: Solution, _: None, reference: Reference) -> Sample | None
     return Sample(values, np.concatenate(list(reference.values())), lambda i: places[i])
 
 
+def moment(solution: Solution, _: None, reference: Reference) -> Sample | None:
+    """The moments of contact on rigid bodies about their reference points."""
+    found = {one.body: one.moment for one in solution.rigid}
+    if not found:
+        return None
+    rows: list[tuple[float, float, str]] = []
+    for body, given in reference.items():
+        axes = "xyz" if isinstance(given, tuple) else "z"
+        values = found[body]["xyz".index(axes[0]) :].tolist()
+        wanted = np.atleast_1d(given).tolist()
+        rows += zip(values, wanted, [f"{body} about {axis}" for axis in axes], strict=True)
+    values, expected = np.array([row[:2] for row in rows]).T
+    return Sample(values, expected, lambda i: rows[i][2])
+
+
 def probed(quantity: str) -> Sampler:
     """Sample a quantity at the probes that the reference names."""
 

@@ -6,7 +6,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..simulation.solution import ProbeResult, Reaction, Resultants, StepResult
+from ..simulation.solution import ProbeResult, Reaction, Resultants, RigidMotion, StepResult
 from ..system.hdf5 import column, read_table, write_table
 
 _OF_STEP = ("factor", "iterations", "status_changes", "residual", "complementarity")
@@ -19,8 +19,9 @@ def write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
     rows = [{name: getattr(step, name) for name in _OF_STEP} for step in steps]
     observed = [step.observations for step in steps]
     write_table(file.create_group("steps"), rows)
-    held = [{"step": i, **vars(one)} for i, step in enumerate(steps) for one in step.reactions]
-    write_table(file.create_group("reactions"), held)
+    for name in ("reactions", "rigid"):
+        forces = [{"step": i, **vars(one)} for i, s in enumerate(steps) for one in getattr(s, name)]
+        write_table(file.create_group(name), forces)
     contact = [
         {"step": i, "zone": zone} | {name: getattr(one, name) for name in _RESULTANTS}
         for i, step in enumerate(steps)
@@ -42,7 +43,8 @@ def read_steps(file: h5py.File) -> list[StepResult]:
     group = file["observation"]
     zones, elements = group["zone"].asstr()[()], group["macro_element"][()].tolist()
     values = {name: group[name][()] for name in _OBSERVED}
-    reactions, resultants = (_read_forces(file, name) for name in ("reactions", "resultants"))
+    tables = ("reactions", "resultants", "rigid")
+    reactions, resultants, rigid = (_read_forces(file, name) for name in tables)
     return [
         StepResult(
             **row,
@@ -52,6 +54,7 @@ def read_steps(file: h5py.File) -> list[StepResult]:
                 for j, (zone, element) in enumerate(zip(zones, elements, strict=True))
             ],
             reactions=[Reaction(**row) for row in reactions.get(i, ())],
+            rigid=[RigidMotion(**row) for row in rigid.get(i, ())],
             resultants={row.pop("zone"): Resultants(**row) for row in resultants.get(i, ())},
         )
         for i, row in enumerate(read_table(file["steps"]))

@@ -104,10 +104,10 @@ class CheckResult:
 
 @dataclass(frozen=True, kw_only=True)
 class Force:
-    """A force of a step: on the slave of a zone, or of what holds a group.
+    """A force of a step: on the slave of a zone, of what holds a group, or on a rigid body.
 
-    `moment` (3,) about the origin; `area` (3,) of contact with its bounds, and `pressure` (2,), the
-    smallest and the largest of the macro-elements, of zones.
+    `moment` (3,) about the origin, or a rigid body's reference point; `area` (3,) of contact with
+    its bounds, and `pressure` (2,), the smallest and the largest of the macro-elements, of zones.
     """
 
     step: int
@@ -159,8 +159,9 @@ class Verdict:
     `closest_to_tolerance` the one nearest to its tolerance or furthest past it. Pairs are minimum
     and maximum over all zones; `seconds` has wall times by stage and their `total`.
     `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
-    reconstruction. `transient`: the machine is the reason (memory, disk, a kill), so that the same
-    solve may succeed another time.
+    reconstruction. `strain` to `partly_covered`: see `solver.simulation.solution.Validity`.
+    `transient`: the machine is the reason (memory, disk, a kill), so that the same solve may
+    succeed another time.
 
     Of the result of another code: `code`, its version and `settings`; `printed_digits` are the
     significant ones of its values, where a file has fewer than a number; `not_given` are the checks
@@ -198,6 +199,9 @@ class Verdict:
     pressure_error_estimate: float | None = None
     strain: float | None = None
     rotation: float | None = None
+    slip: float | None = None
+    pushed_past: int | None = None
+    partly_covered: int | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float | None = None

@@ -53,8 +53,11 @@ FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads
 UNLOADING, SECTOR = "loads/unloading", "lame/rings-sector"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
+ENDING, EDGE, CYLINDER = "partial-waves/tria6", "contact-edge/tria3", "half-planes/hertz-quad4"
+TUBES = "axisymmetric/compound-tube"
+MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
+RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
-ENDING = "partial-waves/tria6"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -253,6 +256,23 @@ def _template_piece_lost(result: Any) -> Any:
     return replace(result, pieces=result.pieces[1:])
 
 
+def _first_status_kept(true: Wrapped) -> Wrapped:
+    """What is open in the first step stays so."""
+    kept: list[np.ndarray] = []
+
+    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
+        found = true(solve, start, kept[0] if kept else eligible, *more)
+        kept.append(found.closed)
+        return found
+
+    return status
+
+
+def _normals_rolled(blocks: list) -> list:
+    turned = [b.directions if b.directions is None else b.directions[:, ::-1] for b in blocks]
+    return [replace(b, directions=d) for b, d in zip(blocks, turned, strict=True)]
+
+
 def _more_covered(operator: Any) -> Any:
     at = operator.surface
     more = np.where(at.covered < 0.999 * at.area, 1.001, 1.0) * at.covered
@@ -326,6 +346,8 @@ MUTANTS = (
     Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
            "solver.simulation.probes:locate", changed(
                lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
+    Mutant("traction-lost", "the exact solution's traction does not act", CYLINDER,
+           "solver.simulation.attributes:Attributes._exact_force", changed(np.zeros_like)),
     Mutant("force-share", "a force on a group is 1 % too large", FORCES,
            "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
     Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
@@ -372,7 +394,7 @@ MUTANTS = (
            "solver.simulation.problem:find_status", _never_closes),
     Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
            ENDING, "solver.simulation.problem:find_status", _stays_closed),
-    Mutant("end-too-early", "the last macro-element of the contact stays open", ENDING,
+    Mutant("end-too-early", "the last macro-element of the contact stays open", EDGE,
            "solver.simulation.problem:find_status", changed(_last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
            "solver.simulation.problem:find_status", _stays_closed),
@@ -405,6 +427,19 @@ MUTANTS = (
            changed(lambda asked: replace(asked, form=replace(asked.form, sweeps=2)))),
     Mutant("covered-share", "partly covered faces have 0.1 % too much of covered area", UNCOVERED,
            "solver.simulation.operators:gap_operator", changed(_more_covered)),
+    Mutant("zone-interference", "every zone has the interference 0.02", TUBES,
+           "solver.simulation.operators:_initial_gaps",
+           given(lambda zone, *rest: (replace(zone, interference=0.02), *rest))),
+    Mutant("mixed-weight", "the mixed form is 1 % too stiff against a change of volume", MIXED,
+           "solver.mechanics.fem.mixed:_integrals",
+           changed(lambda found: (*found[:2], 0.99 * found[2]))),
+    Mutant("normals-rolled", "nodes of a face have the normals of its other end", NODAL_NORMALS,
+           "solver.simulation.operators:with_nodal_normals", changed(_normals_rolled)),
+    Mutant("chords", "curved faces count as straight", RATIO,
+           "solver.simulation.operators:facets",
+           changed(lambda f: replace(f, affine=np.ones(len(f.affine), dtype=bool)))),
+    Mutant("first-status", "what is open in the first step stays open", SIDES,
+           "solver.simulation.problem:find_status", _first_status_kept),
 )  # fmt: skip
 
 

@@ -8,7 +8,9 @@ import pytest
 from solver.case.reader import parse_case
 from solver.mechanics.linear.direct import force_solver
 from solver.simulation.attributes import Attributes
+from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
+from solver.studies.infsup.constant import inf_sup_constant
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
 from tests.faults.mutants import CASES
@@ -79,6 +81,26 @@ def test_corner_with_multigrid():
     assert "multigrid" in solution.linear_solver
     for zone, pressure in zip(solution.zones, (10.0, 15.0, 25.0), strict=True):
         assert np.abs(zone.multiplier / pressure - 1).max() < 1e-12
+
+
+def at_the_corner(n, treatment):
+    """β_h of a seat with n slave faces on the wall and 2n on the floor, master faces far longer."""
+    block = f"cells: QUAD4, divisions: [{n // 2}, 1]"
+    text = CORNER.replace("cells: TRIA6, divisions: [3, 3]", block)
+    for sizes in ("[2, 2]", "[4, 2]"):
+        text = text.replace(f"divisions: {sizes}", f"divisions: [{n * int(sizes[1]) // 2}, {n}]")
+    for name in ("under}", "side}"):
+        text = text.replace(f"master: {name}", f"master: {name[:-1]}, treatment: {treatment}}}")
+    text = text.replace("transform: {perturb: 0.15}", "").replace("young: 2000.0", "young: 1.0")
+    case = parse_case(text, Path("shared.yaml"))
+    return inf_sup_constant(build_scene(case, mesh_of(case)))
+
+
+def test_the_inf_sup_constant_at_a_corner():
+    """It is that of one zone, and levels off; without the cut it halves with the mesh."""
+    assert [at_the_corner(n, "lac") for n in (4, 8)] == pytest.approx([0.594, 0.579], abs=1e-3)
+    coarse, fine = (at_the_corner(n, "uncut") for n in (4, 8))
+    assert fine / coarse == pytest.approx(0.5, abs=0.02)
 
 
 def mean_gaps(solution):

@@ -28,7 +28,7 @@ from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .indenter import Indenter
 from .manufactured import Parabola2d, Paraboloid3d
 from .meridian import Meridian
-from .nested import NestedCylinders, NestedSpheres, NestedTubes
+from .nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
 from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
@@ -52,6 +52,7 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     NestedCylinders,
     NestedTubes,
     NestedSpheres,
+    CompoundTube,
     OvalCylinders,
     Parabola2d,
     Paraboloid3d,

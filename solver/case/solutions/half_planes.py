@@ -8,7 +8,7 @@ its integral Ẑ and derivative Z′, in plane strain and with v pointing away f
 
 hold in each body with its own μ, ν: there is no shear at the interface, and the pressure −Re Z is
 the same from both sides. With 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂ and the initial gap g₀, the gap is
-g₀ + (2/E*) Im Ẑ; Im Ẑ is zero in the middle of the contact. With these fields as displacement and
+g₀ + (2/E*) Im Ẑ; Ẑ is zero in the middle of the contact. With these fields as displacement and
 traction on the outside of two blocks, their contact is an exact problem of linear elasticity.
 Sources: H. M. Westergaard, J. Appl. Mech. 6 (1939) A49–A53; K. L. Johnson, Contact Mechanics
 (1985), §2.7, §5.2, §13.2; the punch: M. Ciavarella, D. A. Hills, G. Monno, Proc. IMechE C 212
@@ -57,7 +57,7 @@ class HalfPlanes(ElasticSolution):
         raise NotImplementedError
 
     def closed(self, x: np.ndarray) -> np.ndarray:
-        """Where (n,) the bodies touch, at places (n,) along the interface."""
+        """Whether (n,) the bodies touch at places (n,) along the interface."""
         raise NotImplementedError
 
     def initial_gap(self, x: np.ndarray) -> np.ndarray:

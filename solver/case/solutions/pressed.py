@@ -1,9 +1,9 @@
 """Contacts of half-planes that are symmetric about x = 0: waves, Hertz's, a punch, a wedge.
 
-The contact is |x| < a. With R = √(z − a) √(z + a), L = ln((z + R)/a) the functions of `half_planes`
-are
+The contact is |x| < a. With R = √(z − a) √(z + a) and L = ln((z + R)/(i a)) the functions of
+`half_planes` are
 
-    waves   Z = −2i p̄ cos ψ/(w + r),   Ẑ = −i (p̄ λ/π) (w/(w + r) + ln((w + r)/s))
+    waves   Z = −2i p̄ cos ψ/(w + r),   Ẑ = −i (p̄ λ/π) (w/(w + r) + ln((w + r)/(i s)))
     Hertz   Z = −i p₀ a/(z + R),       Ẑ = −i (p₀ a/2) (z/(z + R) + L)
     punch   Z = −i K (z B − b A − α R),
             Ẑ = −i K ((z² + b²) B/2 − b z A − α (z R − a² L)/2 − b d L/2)
@@ -92,7 +92,7 @@ class PartialWaves(Pressed):
         angle = pi / (2 * self.size)
         w, cos, s = np.sin(angle * z), np.cos(angle * z), self._share
         r = np.sqrt(w - s) * np.sqrt(w + s)
-        whole = w / (w + r) + np.log((w + r) / s)
+        whole = w / (w + r) + np.log((w + r) / (1j * s))
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = 2j * self.mean_pressure * angle * (w + cos**2 / r) / (w + r)
         stress = -2j * self.mean_pressure * cos / (w + r)
@@ -182,7 +182,7 @@ class HertzHalfPlanes(_Given):
         a, root = self.end, self._root(z)
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = 1j * self.peak * a / (root * (z + root))
-        whole = z / (z + root) + np.log((z + root) / a)
+        whole = z / (z + root) + np.log((z + root) / (1j * a))
         return -0.5j * self.peak * a * whole, -1j * self.peak * a / (z + root), slope
 
     def initial_gap(self, x: np.ndarray) -> np.ndarray:
@@ -240,11 +240,11 @@ class RoundedPunch(_Given):
         a, b, d, alpha = self.end, self.flat, self._rise, self._angle
         root = self._root(z)
         # R² + d² = z² − b² and b² R² + d² z² = a² (z² − b²): near z = b their logarithms cancel.
-        shared = np.log((z - b) * (z + b)) / 2
+        shared = (np.log(z - b) + np.log(z + b)) / 2
         one = 1j * (shared - np.log(root + 1j * d))
         two = 1j * (shared - np.log((b * root + 1j * d * z) / a))
         factor = -1j * self.modulus / (pi * self.radius)
-        log = np.log((z + root) / a)
+        log = np.log((z + root) / (1j * a))
         whole = (z**2 + b**2) * two / 2 - b * z * one - b * d * log / 2
         whole -= alpha * (z * root - a**2 * log) / 2
         stress = z * two - b * one - alpha * root
@@ -286,7 +286,7 @@ class Wedge(_Given):
         a, root = self.end, self._root(z)
         factor = -1j * self.modulus * self.slope / pi
         angle = -1j * (np.log(1j * a + root) - np.log(z))
-        whole = z * angle + a * np.log((z + root) / a)
+        whole = z * angle + a * np.log((z + root) / (1j * a))
         with np.errstate(divide="ignore", invalid="ignore"):
             change = -factor * a / (z * root)
         return factor * whole, factor * angle, change

@@ -72,6 +72,19 @@ def test_the_conditions_of_contact(solution):
     np.testing.assert_allclose(solution.initial_gap(x[:, 0]) + jump, gap, atol=1e-15)
 
 
+@pytest.mark.parametrize("solution", ALL[1:], ids=lambda solution: solution.name)
+@both
+def test_symmetry(solution, part):
+    """The middle plane stays where it is and has no shear; the left side mirrors the right one."""
+    y = (1 if part else -1) * np.linspace(0.0, 2.0, 9)
+    middle = np.c_[0 * y, y]
+    np.testing.assert_allclose(solution.displacement(middle, part)[:, 0], 0.0, atol=1e-14)
+    np.testing.assert_allclose(solution.stress(middle, part)[:, 3], 0.0, atol=1e-11)
+    x = inside(part)
+    mirrored = solution.displacement(x * [-1, 1], part) * [-1, 1]
+    np.testing.assert_allclose(solution.displacement(x, part), mirrored, atol=1e-14)
+
+
 def test_the_edge():
     """p = C √ξ before the end, g = 4 C ξ^{3/2}/(3 E*) behind it."""
     x = np.array([[0.05, 0.0], [0.34, 0.0]])
