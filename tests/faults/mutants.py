@@ -50,7 +50,7 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
 )
 SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
-UNLOADING = "loads/unloading"
+UNLOADING, SECTOR = "loads/unloading", "lame/rings-sector"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
 ENDING, EDGE, CYLINDER = "partial-waves/tria6", "contact-edge/tria3", "half-planes/hertz-quad4"
@@ -348,6 +348,9 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared equally among the nodes of a face", BENT,
            "solver.mechanics.fem.loads:surface_vectors",
            changed(lambda found: (np.full(found[0].shape, 1 / found[0].shape[1]), found[1]))),
+    Mutant("sector-turn", "the copied side is turned by the angle and back again", SECTOR,
+           "solver.simulation.attributes:copies_of", changed(
+               lambda found: {k: replace(c, turn=c.turn.T) for k, c in found.items()})),
     Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
            "solver.simulation.probes:locate", changed(
                lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
