@@ -3,8 +3,6 @@
 import logging
 import resource
 from dataclasses import replace
-from functools import partial
-from typing import TypeVar
 
 import meshio
 import numpy as np
@@ -38,10 +36,7 @@ from .scene import Scene, ZoneScene, build_scene
 from .solution import (
     Line,
     NodalContact,
-    Reaction,
     RecoveredPressure,
-    Resultants,
-    RigidMotion,
     Solution,
     StepResult,
     ZoneResult,
@@ -52,9 +47,6 @@ from .validity import remarks, validity
 _LOG = logging.getLogger(__name__)
 # Half, but for round-off.
 _HALF = 0.5 - 1e-9
-# Forces below this share of the largest are printed as zeros.
-_NOISE = 1e-11
-_Forces = TypeVar("_Forces", Resultants, Reaction, RigidMotion)
 
 
 def simulate(
@@ -105,19 +97,14 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
 
 def _tell_forces(solution: Solution) -> None:
     """Log the forces of each step, and the largest displacement and strain of the last."""
-    every: list[Resultants | Reaction | RigidMotion] = []
-    for step in solution.steps:
-        every += [*step.resultants.values(), *step.reactions, *step.rigid]
-    largest = max((float(np.abs(forces.force).max()) for forces in every), default=0.0)
-    shown = partial(_without_noise, least=_NOISE * largest, length=solution.length)
     for step, given in zip(solution.steps, solution.case.steps, strict=True):
         of_step = f"{_called(given, step.factor)}, " if len(solution.steps) > 1 else ""
         for name, forces in step.resultants.items():
-            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, shown(forces))
+            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, forces)
         for reaction in step.reactions:
-            _LOG.log(OUTCOME, "%sreaction of %s: %s", of_step, reaction.group, shown(reaction))
+            _LOG.log(OUTCOME, "%sreaction of %s: %s", of_step, reaction.group, reaction)
         for body in step.rigid:
-            _LOG.log(OUTCOME, "%scontact on rigid body %s: %s", of_step, body.body, shown(body))
+            _LOG.log(OUTCOME, "%scontact on rigid body %s: %s", of_step, body.body, body)
     for name, probe in solution.probes.items():
         for line in probe.lines():
             _LOG.log(OUTCOME, "probe %s %s", name, line)
@@ -126,16 +113,6 @@ def _tell_forces(solution: Solution) -> None:
     told = largest, at, solution.validity.strain, solution.strain_energy
     text = "largest displacement %.6g at (%s), largest strain %.3g, strain energy %.6g"
     _LOG.log(OUTCOME, text, *told)
-
-
-def _without_noise(forces: _Forces, least: float, length: float) -> _Forces:
-    """Forces for readers: components below the `least` size are zero, moments below it × length."""
-    force, moment = forces.force, forces.moment
-    return replace(
-        forces,
-        force=np.where(np.abs(force) > least, force, 0.0),
-        moment=np.where(np.abs(moment) > least * length, moment, 0.0),
-    )
 
 
 def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
