@@ -73,7 +73,7 @@ class Zone:
 
     `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
     gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
-    quadratic, smooth or automatic.
+    quadratic, smooth or automatic. `stabilised`: contact gives way to pressures that scatter.
     """
 
     slave: str
@@ -86,6 +86,7 @@ class Zone:
     points: int | None = None
     clearance: Scalar | None = None
     recovery: str = "none"
+    stabilised: bool = False
 
 
 @dataclass(frozen=True)

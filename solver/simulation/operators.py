@@ -8,14 +8,19 @@ from ..case.model import Zone
 from ..mechanics.fem.faces import FaceBlock, surface_points
 from ..mechanics.mortar.cut import SubFaces
 from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
+from ..mechanics.mortar.master_normals import sharpest, with_master_normals
 from ..mechanics.mortar.multipliers import constants
 from ..mechanics.mortar.operator import GapOperator, gap_operator
 from ..mechanics.mortar.reconstruction import form_of, vertex_neighbours
 from ..mechanics.mortar.recovery import Asked
 from ..mechanics.mortar.treatments import scheme_of
 from ..mesh.catalogue import BY_NAME
+from ..system.errors import InputError
 from .attributes import Attributes, CutZone
 from .options import Options
+
+# Half of the largest angle between neighbouring faces of a master whose normals contact follows.
+_SMOOTH = np.radians(30)
 
 
 def operator_of(
@@ -34,6 +39,9 @@ def operator_of(
         slaves = with_nodal_normals(slaves, points)
     materials = groups.materials_behind(master_faces)
     masters = _master_facets(points, master_faces, materials, around)
+    if zone.normal == "master":
+        _refuse_sharp(groups, zone, masters)
+        slaves = with_master_normals(slaves, masters, points)
     if not options.shortcuts.quadrature:
         slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
@@ -41,6 +49,18 @@ def operator_of(
     asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
     operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
     return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
+
+
+def _refuse_sharp(groups: Attributes, zone: Zone, masters: list[Facets]) -> None:
+    angle, place = sharpest(masters, groups.points)
+    if angle > _SMOOTH:
+        at = ", ".join(f"{x:.6g}" for x in place + groups.origin)
+        allowed = (
+            f"the master {zone.master} is not smooth: its faces turn by more than "
+            f"{np.degrees(2 * _SMOOTH):.0f}° at ({at}); allowed there: element, nodal"
+        )
+        key = f"contact[{groups.case.zones.index(zone)}].normal"
+        raise InputError(groups.case.path, key, zone.normal, allowed)
 
 
 def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> Asked:
@@ -53,7 +73,10 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> A
     for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
         material[block.number] = number
     form = form_of(zone.recovery, order, corners)
-    return Asked(form, vertex_neighbours(vertices, count), material)
+    softness = None
+    if zone.stabilised:
+        softness = np.array([1 / m.young for m in groups.case.materials.values()] + [0.0])
+    return Asked(form, vertex_neighbours(vertices, count), material, softness)
 
 
 def _as_bent(block: Facets) -> Facets:

@@ -114,6 +114,17 @@ def estimated(solution: Solution) -> Iterator[Line]:
             yield Line(what, "too few closed neighbours to recover it from")
 
 
+def yielding(solution: Solution) -> Iterator[Line]:
+    """A note where contact gives way to pressures that scatter."""
+    for given, zone in zip(solution.case.zones, solution.zones, strict=True):
+        if given.stabilised:
+            largest = float(np.abs(zone.gap[zone.closed]).max(initial=0.0))
+            what = f"{zone.name}: stabilised, average gaps of up to {largest:.1e} in contact"
+            yield Line(
+                what, "so far contact gives way to pressures that differ from their neighbours"
+            )
+
+
 def strained(solution: Solution) -> Iterator[Line]:
     """A note where strains or rotations are not small."""
     if max(solution.strain, solution.rotation) > NOTED_STRAIN:

@@ -21,7 +21,7 @@ from .consistency import inconsistency
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
-from .plan import decided, estimated, noted, strained
+from .plan import decided, estimated, noted, strained, yielding
 from .problem import ContactProblem, Equilibrium
 from .recovery import Recovered, RecoveredZone, recovered
 from .resultants import resultants
@@ -87,7 +87,7 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     at = ", ".join(f"{x:.5g}" for x in place)
     told = largest, at, solution.strain_energy
     _LOG.log(OUTCOME, "largest displacement %.6g at (%s), strain energy %.6g", *told)
-    solution.plan += [*estimated(solution), *strained(solution)]
+    solution.plan += [*estimated(solution), *strained(solution), *yielding(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..case import job_name
 from ..simulation.accuracy import Accuracy, beyond_small_strain
+from .scatter import oscillating
 from .verdict import (
     FAILED,
     PASSED,
@@ -69,13 +70,13 @@ def judge(
 
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
-    relative error that rounding alone may cause, is the first reason) or where strain or rotation
-    is beyond small strain. `result` is the name of the result file beside the verdict and `sha256`
-    its hash.
+    relative error that rounding alone may cause, is the first reason), where strain or rotation is
+    beyond small strain, or where the pressure oscillates. `result` is the name of the result file
+    beside the verdict and `sha256` its hash.
     """
     accuracy = Accuracy(solution.accuracy)
     large = beyond_small_strain(solution.case, solution.strain, solution.rotation)
-    unreliable = [reason for reason in (accuracy.reason, large) if reason]
+    unreliable = [reason for reason in (accuracy.reason, large, oscillating(solution)) if reason]
     reasons = unreliable + [check.reason for check in checks if not check.passed]
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:

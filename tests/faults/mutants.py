@@ -50,6 +50,7 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
 SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 UNLOADING = "loads/unloading"
+STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -348,6 +349,12 @@ MUTANTS = (
     Mutant("hoop-halved", "the hoop strain of axisymmetric cells is half of what it is", RINGS,
            "solver.mechanics.fem.elasticity:hoop_values",
            changed(lambda found: (0.5 * found[0], found[1]))),
+    Mutant("stabilisation-lost", "stabilised contact does not give way", STIFF,
+           "solver.mechanics.mortar.stabilisation:Stabilisation.compliance",
+           changed(lambda compliance: 0 * compliance)),
+    Mutant("normal-of-slave", "contact follows the slave's normals, not the master's", OBSTACLE,
+           "solver.simulation.operators:with_master_normals",
+           lambda _: lambda slaves, masters, points: slaves),
 )  # fmt: skip
 
 
