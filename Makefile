@@ -1,6 +1,7 @@
 # Everything is run from here: `make help` lists the targets.
 # Settings: CORES=4 (all), CASES=folder (case files of yours join the batch), MKL=no (without Intel
-# MKL), QUIET=yes (failures and the outcome alone), PYTHON=python3.12; for Snakemake:
+# MKL), QUIET=yes (failures and the outcome alone), PYTHON=python3.12; what to run: FAMILY='hertz*',
+# CASE='ssnp170-e*', FAILED=yes (what has not passed, once more); for Snakemake:
 # CONFIG='variants=true', ARGS='--dry-run'.
 
 PYTHON ?= python3
@@ -26,7 +27,8 @@ INSTALL := $(PYTHON) -Es workflow/install --mkl "$(MKL)"
 # numbers, and spaces.
 FROM = $(if $(filter-out $(CURDIR),$(PWD)),$(if $(filter /% ~%,$(CASES)),,$(PWD)/))
 SETTINGS = $(strip $(CONFIG) $(if $(CASES),"cases=$(FROM)$(CASES)"))
-CHOICE = $(if $(FAMILY),"family='$(FAMILY)'") $(if $(CASE),"case='$(CASE)'")
+CHOICE = $(if $(FAMILY),"family='$(FAMILY)'") $(if $(CASE),"case='$(CASE)'") \
+	$(if $(FAILED),failed=true)
 SILENCE = $(if $(QUIET),--quiet rules progress reason host)
 SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
@@ -41,6 +43,7 @@ help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
 
 all-cases: override CONFIG += $(CHOICE)
+all-cases: override ARGS += $(if $(FAILED),--forcerun solve)
 all-cases: environment ## mesh, solve and check what is not up to date, then report
 	@$(SNAKEMAKE) all_cases
 

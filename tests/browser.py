@@ -82,12 +82,16 @@ class Browser:
 
 @contextmanager
 def browser():
-    """A browser, ended with its driver."""
+    """A browser, ended with its driver. All that it writes is in a temporary folder."""
     command = [DRIVER, "--port=0", "--log-level=WARNING"]
     with (
-        tempfile.TemporaryDirectory() as folder,
+        # Crash handlers of the browser outlive it, and write into the folder for a moment.
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
         subprocess.Popen(
-            command, stdout=subprocess.PIPE, text=True, env=os.environ | {"TMPDIR": folder}
+            command,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"TMPDIR": folder, "HOME": folder, "XDG_CONFIG_HOME": folder},
         ) as driver,
     ):
         try:

@@ -22,6 +22,7 @@ _RECIPES = (
     "solver.mesh.recipes.blocks",
     "solver.mesh.recipes.hybrid",
     "solver.mesh.recipes.mapped",
+    "solver.mesh.recipes.bricks",
 )
 
 

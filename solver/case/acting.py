@@ -1,4 +1,4 @@
-"""The keys of a case file for what acts on the bodies: supports, loads, and groups for them."""
+"""The keys of a case file for what acts on the bodies: supports, loads; groups, and probes."""
 
 from typing import Annotated, Literal
 
@@ -68,6 +68,27 @@ class SelectionKeys(Section, frozen=True):
         if sum(value is not None for value in given) != 1:
             problem = "must be {of, within, and exactly one of plane, sphere, box, where}"
             raise FieldError((), problem)
+
+
+class ProbeKeys(Section, frozen=True):
+    """A place whose displacement and stress, or contact pressure, are results.
+
+    at: this point
+    group: the nodes of this group
+    within: of several bodies at the point, the one with these cells
+    zone: the contact pressure there, on the slave surface of this zone
+    """
+
+    at: Vector | None = None
+    group: Groups | None = None
+    within: Groups | None = None
+    zone: Name | None = None
+
+    def __post_init__(self) -> None:
+        if (self.at is None) == (self.group is None):
+            raise FieldError((), "must be {exactly one of at, group; zone or within}")
+        if self.within and (self.at is None or self.zone):
+            raise FieldError(("within",), "only for a displacement and stress at a point")
 
 
 _Axis = Literal["x", "y", "z", "normal"]

@@ -52,13 +52,15 @@ _UNARY: dict[type, Callable] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
 class Expression:
     """A scalar function of position, written in x, y, z and r = √(x² + y² (+ z²)).
 
-    `where` and `key` (file and key that hold the text) serve the messages of `InputError`, raised
-    for a text that is not on the whitelist and for a value that is not finite.
+    `axisymmetric`: r is the radius x, of a point of the meridian plane. `where` and `key` (file and
+    key that hold the text) serve the messages of `InputError`, raised for a text that is not on the
+    whitelist and for a value that is not finite.
     """
 
     text: str
     where: str = field(default="expression", compare=False)
     key: str = field(default="text", compare=False)
+    axisymmetric: bool = False
     _tree: ast.expr = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -78,7 +80,8 @@ class Expression:
         names = dict(zip(_COORDINATES, points.T, strict=False))
         if "z" in self.names and "z" not in names:
             raise self._error("z in a plane case; allowed are x, y and r")
-        names |= {"r": np.linalg.norm(points, axis=1), "pi": np.float64(math.pi)}
+        radius = points[:, 0] if self.axisymmetric else np.linalg.norm(points, axis=1)
+        names |= {"r": radius, "pi": np.float64(math.pi)}
         with np.errstate(all="ignore"):
             values = np.broadcast_to(_value(self._tree, names), len(points)).astype(float)
         bad = np.flatnonzero(~np.isfinite(values))

@@ -4,11 +4,15 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, field
 
-from .acting import LoadKeys, SelectionKeys, SupportKeys
-from .kinds import Group, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
+from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
+from .bodies import BodyKeys
+from .kinds import Group, GroupList, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
-FORM = "{file: MESH} alone, or {recipe: NAME, …}"
+FORM = "{file: MESH, refine: 2}, or {recipe: NAME, …}"
+HALVINGS = (1, 2, 4, 8, 16, 32, 64)
+"""How often finer a mesh file can be made: by halving all edges, once or several times."""
+HALVINGS_TEXT = "1, 2, 4, 8, 16, 32 or 64"
 
 Angle = Annotated[Number, Meta(description="an angle in degrees")]
 Poisson = Annotated[
@@ -20,8 +24,9 @@ CheckName = Literal[
     "displacement", "stress_components", "integration_stress", "balance", "counts", "observation",
     "observation_gap",
     "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2", "pressure_max",
-    "pressure_means", "pressure_oscillation", "half_width", "peak",
-    "force", "reaction", "contact_area", "strain_energy",
+    "pressure_means", "pressure_oscillation", "pressure_inner", "half_width", "peak",
+    "force", "reaction", "moment", "contact_area", "strain_energy",
+    "displacement_at", "stress_at", "pressure_at",
 ]  # fmt: skip
 
 
@@ -46,7 +51,7 @@ class Perturbation(Section, frozen=True):
 
     amplitude: Positive
     seed: Whole = 0
-    group: Group | None = None
+    group: Groups | None = None
 
 
 class Shift(Section, frozen=True):
@@ -56,7 +61,7 @@ class Shift(Section, frozen=True):
     by: the vector of the move
     """
 
-    group: Group
+    group: Groups
     by: Vector
 
 
@@ -67,14 +72,14 @@ class Turn(Section, frozen=True):
     angle: the angle of rotation
     """
 
-    group: Group
+    group: Groups
     angle: Angle
 
 
 class Pick(Section, frozen=True):
     """A group made of the cells of another that are in a box."""
 
-    source: Group = field(name="from")
+    source: Groups = field(name="from")
     low: Vector
     high: Vector
     name: Group
@@ -159,16 +164,6 @@ class MaterialKeys(Section, frozen=True):
             raise FieldError(("poisson",), "must be greater than 0 in the mixed form")
 
 
-class BodyKeys(Section, frozen=True):
-    """A body.
-
-    rigid: the body neither moves nor deforms; it takes no load or displacement, and a rigid side
-      is always master
-    """
-
-    rigid: bool = False
-
-
 class ZoneKeys(Section, frozen=True):
     """A contact zone.
 
@@ -181,6 +176,7 @@ class ZoneKeys(Section, frozen=True):
     normal: the direction of gaps: normals of the slave's faces, their means at its nodes, or the
       normals of a plane or smooth master
     recovery: how a pressure of higher order is recovered from the constants
+    sweeps: solves with the loads of the recovered pressure; each brings it nearer to their limit
     stabilised: contact gives way to pressures that scatter from face to face
     interference: initial overlap of bodies that are modelled without it; subtracted from the gap
     clearance: the initial gap, which replaces the gap between the meshed faces
@@ -195,6 +191,7 @@ class ZoneKeys(Section, frozen=True):
     )
     normal: Literal["element", "nodal", "master"] = "element"
     recovery: Literal["none", "linear", "quadratic", "smooth", "automatic"] = "none"
+    sweeps: Annotated[int, Meta(ge=2, le=100, description="a number from 2 to 100")] | None = None
     stabilised: bool = False
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
@@ -226,6 +223,10 @@ class CodeKeys(Section, frozen=True):
 _UNCERTAINTY = "a positive number: the possible relative error of the reference"
 _SOLUTION = "the name of a documented solution, or {name: NAME, …} with its parameters"
 _STRESS = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions, or `solution`"
+_MOMENT = "a number (plane) or a list of three numbers"
+_Three = Annotated[tuple[Number, ...], Meta(min_length=3, max_length=3)]
+_Moment = Annotated[Number | _Three, Meta(description=_MOMENT)]
+_Components = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
 _Stress = Annotated[dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar], Meta(min_length=1)]
 
 
@@ -245,8 +246,14 @@ class ReferenceKeys(Section, frozen=True):
     force: contact force on the surface that is listed as slave, around the full circle if
       axisymmetric
     contact_area: area of contact of each zone
+    coverage: covered share of the slave faces, at their centres; left out: covered in full
     reaction: the forces with which supports hold groups
+    moment: the moment of contact on rigid bodies about their reference points; one number in 2D,
+      three in 3D
     strain_energy: of all bodies
+    displacement_at: displacement at probes
+    stress_at: components of the stress at probes, xx, yy, zz, xy, yz, xz
+    pressure_at: contact pressure at probes
     stress: components of the stress at all nodes
     """
 
@@ -261,8 +268,13 @@ class ReferenceKeys(Section, frozen=True):
     displacement: Scalars | None = None
     force: Vector | None = None
     contact_area: Number | None = None
+    coverage: Scalar | None = None
     reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
+    moment: Annotated[dict[Group, _Moment], Meta(min_length=1)] | None = None
     strain_energy: Number | None = None
+    displacement_at: Annotated[dict[Name, _Components], Meta(min_length=1)] | None = None
+    stress_at: Annotated[dict[Name, _Stress], Meta(min_length=1)] | None = None
+    pressure_at: Annotated[dict[Name, Scalar], Meta(min_length=1)] | None = None
     stress: Annotated[_Stress | Literal["solution"], Meta(description=_STRESS)] | None = None
 
     def __post_init__(self) -> None:
@@ -322,13 +334,14 @@ class CaseFile(Section, frozen=True):
     title: one line for the report
     description: free text for readers
     mesh: either `file`, a mesh file (.med, .msh, .inp, .vtu, .vtkhdf), relative to the case file,
-      or `recipe`, a recipe that generates the mesh, and the keys of the recipe
+      and `refine` to halve its edges (2: once, 4: twice), or `recipe`, a recipe that generates the
+      mesh, and the keys of the recipe
     transform: changes of the mesh, in the order of the keys
     plane: plane strain, plane stress, or a section of axisymmetric bodies with x as the radius and
       y along the axis; only for 2D meshes
     units: the units of the numbers, only labels of fields and pictures
     materials: the material of each group of cells, or of `all`
-    groups: groups that the case makes on the mesh, by name
+    groups: groups that the case makes on the mesh, by name; a list of groups makes one of them all
     supports: imposed displacements
     loads: loads on the bodies
     bodies: further properties of bodies
@@ -337,8 +350,11 @@ class CaseFile(Section, frozen=True):
     steps: load factors, solved one after the other in any order, or the factors of named loads and
       supports
     observe: macro-elements to report at every step
+    probes: points and nodes whose displacement and stress, or contact pressure, are results
     reference: what the result is compared with
     tolerance: the tolerance of the relative checks, or one for each check
+    expected: the error of a check that a refinement ladder predicts for this mesh, in place of its
+      tolerance; 1.5 times as much is allowed
     counts: the expected numbers of cells and contact faces of a body
     """
 
@@ -353,7 +369,7 @@ class CaseFile(Section, frozen=True):
     transform: Transform | None = None
     plane: Literal["strain", "stress", "axisymmetric"] | None = None
     units: Units | None = None
-    groups: dict[Group, SelectionKeys] = field(default_factory=dict)
+    groups: dict[Group, SelectionKeys | GroupList] = field(default_factory=dict)
     loads: tuple[LoadKeys, ...] = ()
     bodies: dict[Group, BodyKeys] = field(default_factory=dict)
     contact: tuple[ZoneKeys, ...] = ()
@@ -362,17 +378,21 @@ class CaseFile(Section, frozen=True):
         1.0,
     )
     observe: tuple[ObservationKeys, ...] = ()
+    probes: dict[Name, ProbeKeys] = field(default_factory=dict)
     reference: ReferenceKeys | None = None
     tolerance: (
         Annotated[_Tolerance | dict[CheckName, _Tolerance], Meta(description=_TOLERANCE)] | None
     ) = None
+    expected: Annotated[dict[CheckName, _Tolerance], Meta(min_length=1)] | None = None
     counts: dict[Group, CountKeys] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         keys = self.mesh.keys() & {"file", "recipe"}
-        if len(keys) != 1 or ("file" in keys and len(self.mesh) > 1):
+        if len(keys) != 1 or ("file" in keys and self.mesh.keys() - {"file", "refine"}):
             raise FieldError(("mesh",), f"must be {FORM}")
+        if "file" in keys and self.mesh.get("refine", 1) not in HALVINGS:
+            raise FieldError(("mesh", "refine"), f"must be {HALVINGS_TEXT}")
         for key in keys:
             if not isinstance(self.mesh[key], str) or not self.mesh[key]:
                 problem = "the path of a mesh file" if key == "file" else "the name of a recipe"

@@ -17,8 +17,8 @@ Name = Annotated[
 _GROUP = "the name of a group of the mesh (in quotes if it is a number)"
 Group = Annotated[str, Meta(min_length=1, max_length=200, description=_GROUP)]
 _GROUPS = f"{_GROUP}, or a list of such names"
-_GroupList = Annotated[tuple[Group, ...], Meta(min_length=1)]
-Groups = Annotated[Group | _GroupList, Meta(description=_GROUPS)]
+GroupList = Annotated[tuple[Group, ...], Meta(min_length=1)]
+Groups = Annotated[Group | GroupList, Meta(description=_GROUPS)]
 _UNIT = "the name of a unit, 20 letters, digits, `/`, `*`, `^`, `²` and the like at most"
 Unit = Annotated[str, Meta(pattern=r"^[\w/*^·²³µ%()-]{1,20}$(?!\n)", description=_UNIT)]
 Whole = Annotated[int, Meta(ge=0, lt=2**31, description="a whole number, not negative, below 2^31")]

@@ -25,6 +25,8 @@ Vector = tuple[Scalar, ...]
 Step = float | dict[str, float]
 LOAD_KINDS = ("pressure", "traction", "body_force", "force")
 SWAPPED = "-swapped"
+# A discretisation error may exceed the expected one by this factor.
+MARGIN = 1.5
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ class Zone:
 
     `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
     gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
-    quadratic, smooth or automatic. `stabilised`: contact gives way to pressures that scatter.
+    quadratic, smooth or automatic, with so many `sweeps`; None: by the form. `stabilised`:
+    contact gives way to pressures that scatter.
     """
 
     slave: str
@@ -86,7 +89,37 @@ class Zone:
     points: int | None = None
     clearance: Scalar | None = None
     recovery: str = "none"
+    sweeps: int | None = None
     stabilised: bool = False
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """A rigid body: its motion about a reference point, and its surface if it has no cells.
+
+    `surface`: plane, sphere, cylinder or parabola, with its `values` by key; empty: as meshed.
+    `move`: the imposed displacement by component, x … rz; `force`: force or moment by component,
+    in which the body is free to move. It is held in all others.
+    """
+
+    surface: str = ""
+    values: dict[str, Any] = field(default_factory=dict)
+    reference: tuple[float, ...] | None = None
+    move: dict[str, float] = field(default_factory=dict)
+    force: dict[str, float] = field(default_factory=dict)
+    name: str = ""
+
+    @property
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        """Its points and directions by key."""
+        given = {"reference": self.reference}
+        given |= {f"{self.surface}.{key}": value for key, value in self.values.items()}
+        return [(key, value) for key, value in given.items() if isinstance(value, tuple)]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a motion, imposed or free."""
+        return bool(self.move or self.force)
 
 
 @dataclass(frozen=True)
@@ -98,14 +131,30 @@ class Observation:
 
 
 @dataclass(frozen=True)
+class Probe:
+    """A place whose displacement and stress are results; of a `zone`, its contact pressure.
+
+    A point `at` a place (dim,), of several bodies there the one with the cells `within`; or the
+    nodes of a `group`.
+    """
+
+    name: str
+    at: tuple[float, ...] = ()
+    group: str = ""
+    within: str = ""
+    zone: str = ""
+
+
+@dataclass(frozen=True)
 class Case:
     """A case: one file, ready to be solved once its mesh is there.
 
     `materials` in plane stress are those of `Material.in_plane_stress`. `mesh` is the file's
     mapping, the key `file` replaced by `path`, relative to the case file. `tolerance` holds the
-    overrides by check name, under `all` where one number was given. `units` names those of length
-    and stress, for labels alone. `source` is the file's text. `family` is the name of the file's
-    folder. `reference_uncertainty` is relative, `reference_code` has the keys name and version.
+    overrides by check name, under `all` where one number was given; that of a check with
+    an `expected` error follows from it. `units` names those of length and stress, for labels alone.
+    `source` is the file's text. `family` is the name of the file's folder. `reference_uncertainty`
+    is relative, `reference_code` has the keys name and version.
     `swapped`, `hexahedra` and `recovery`: how the case is solved, as `as_solved` was told.
     """
 
@@ -119,12 +168,13 @@ class Case:
     supports: tuple[Support, ...]
     loads: tuple[Load, ...] = ()
     zones: tuple[Zone, ...] = ()
-    rigid: frozenset[str] = frozenset()
+    rigid: dict[str, Rigid] = field(default_factory=dict)
     transform: dict[str, Any] | None = None
     plane: str | None = None
     directions: str = "first"
     steps: tuple[Step, ...] = (1.0,)
     observe: tuple[Observation, ...] = ()
+    probes: tuple[Probe, ...] = ()
     reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
     reference_kind: str | None = None
     reference_uncertainty: float | None = None
@@ -132,6 +182,7 @@ class Case:
     reference_remark: str = ""
     solution: "ExactSolution | None" = None
     tolerance: dict[str, float] = field(default_factory=dict)
+    expected: dict[str, float] = field(default_factory=dict)
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     selections: tuple[Selection, ...] = ()

@@ -15,10 +15,23 @@ from msgspec import structs
 
 from ..system.errors import InputError, key_path
 from ..system.files import is_file
+from .bodies import BodyKeys
 from .expressions import Expression
 from .file import CaseFile
 from .material import Material
-from .model import EXACT, LOAD_KINDS, Case, Load, Observation, Selection, Support, Zone
+from .model import (
+    EXACT,
+    LOAD_KINDS,
+    MARGIN,
+    Case,
+    Load,
+    Observation,
+    Probe,
+    Rigid,
+    Selection,
+    Support,
+    Zone,
+)
 from .rules import check_rules
 from .typed import read_as
 from .yaml import parse_mapping, read_text
@@ -37,8 +50,11 @@ _QUANTITY = {
     "traction": "stress",
     "body_force": "body_force",
 }
-# Keys of the reference for numbers of the whole case, which no solution gives.
-_RESULTANTS = ("force", "contact_area", "reaction", "strain_energy")
+# Other keys of the reference, which no solution gives.
+_OTHERS = (
+    *("force", "contact_area", "reaction", "moment", "strain_energy", "coverage"),
+    *("displacement_at", "stress_at", "pressure_at"),
+)
 
 
 def load_case(path: str | Path) -> Case:
@@ -80,7 +96,7 @@ class _Reader:
 
     def case(self, source: str) -> Case:
         file, reference = self.file, self.file.reference
-        tolerance = file.tolerance if isinstance(file.tolerance, dict) else {"all": file.tolerance}
+        tolerance, expected = self.tolerances()
         mesh = dict(file.mesh)
         if "file" in mesh:
             mesh["path"] = self.path.parent / mesh.pop("file")
@@ -95,27 +111,44 @@ class _Reader:
             supports=tuple(map(self.support, range(len(file.supports)))),
             loads=tuple(map(self.load, range(len(file.loads)))),
             zones=self.zones,
-            rigid=frozenset(group for group, body in file.bodies.items() if body.rigid),
+            rigid={
+                g: _rigid(body) for g, body in file.bodies.items() if body.rigid or body.surface
+            },
             transform=self.content.get("transform"),
             plane=file.plane,
             directions=file.directions,
             steps=file.steps,
+            probes=tuple(map(self.probe, file.probes)),
             observe=tuple(Observation(item.zone, item.nearest) for item in file.observe),
             reference={
                 key: self.value_or_exact("reference", key)
                 for key in self.content.get("reference", ())
-                if key in (*_QUANTITY, *_RESULTANTS)
+                if key in (*_QUANTITY, *_OTHERS)
             },
             reference_kind=reference.kind if reference else None,
             reference_uncertainty=reference.uncertainty if reference else None,
             reference_code=structs.asdict(reference.code) if reference and reference.code else None,
             reference_remark=reference.remark if reference else "",
             solution=self.solution,
-            tolerance={check: value for check, value in tolerance.items() if value is not None},
+            tolerance=tolerance,
+            expected=expected,
             counts=self.content.get("counts", {}),
             units=self.content.get("units", {}),
             selections=tuple(self.selections.values()),
         )
+
+    def tolerances(self) -> tuple[dict[str, float], dict[str, float]]:
+        """The tolerances by check, and the expected errors from which some of them follow."""
+        given = self.file.tolerance
+        stated: dict[str, float] = {"all": given} if isinstance(given, float) else {}
+        if isinstance(given, dict):
+            stated = {str(check): value for check, value in given.items()}
+        expected = {str(check): error for check, error in (self.file.expected or {}).items()}
+        for check, error in expected.items():
+            if check == "all" or check in stated:
+                allowed = "must be the name of a check without a tolerance of its own"
+                raise InputError(self.path, f"expected.{check}", error, allowed)
+        return stated | {check: MARGIN * error for check, error in expected.items()}, expected
 
     def thin(self, group: str, material: Material) -> Material:
         """The material in plane stress; its equivalent in plane strain needs ν > -0.5."""
@@ -127,6 +160,9 @@ class _Reader:
     def select(self, name: str) -> None:
         """Add a group that the file makes."""
         item, keys = self.file.groups[name], ("groups", name)
+        if isinstance(item, tuple):
+            self.selections[name] = Selection(name, key_path(keys), "groups", item)
+            return
         within = () if item.within is None else item.within
         shape = next(s for s in ("plane", "sphere", "box", "where") if getattr(item, s))
         given = getattr(item, shape)
@@ -183,6 +219,12 @@ class _Reader:
         group = self.group((*keys, "group"), item.group, item.at)
         return Load(group, kind, self.value_or_exact(*keys, kind), item.name or "")
 
+    def probe(self, name: str) -> Probe:
+        item = self.file.probes[name]
+        given = {key: getattr(item, key) for key in ("group", "within")}
+        groups = {k: self.group(("probes", name, k), v) if v else "" for k, v in given.items()}
+        return Probe(name, item.at or (), **groups, zone=item.zone or "")
+
     def exact_solution(self) -> ExactSolution | None:
         """The solution that the reference names, made with what the case says already."""
         given = self.file.reference.solution if self.file.reference else None
@@ -227,8 +269,20 @@ class _Reader:
         if isinstance(value, dict):
             return {key: self.value(*keys, key) for key in value}
         if isinstance(value, str):
-            return Expression(value, where=str(self.path), key=key_path(keys))
+            around = self.file.plane == "axisymmetric"
+            return Expression(value, str(self.path), key_path(keys), axisymmetric=around)
         return float(value)
+
+
+def _rigid(body: BodyKeys) -> Rigid:
+    return Rigid(
+        surface=body.surface,
+        values=structs.asdict(getattr(body, body.surface)) if body.surface else {},
+        reference=body.reference,
+        move={str(key): value for key, value in (body.move or {}).items()},
+        force={str(key): value for key, value in (body.force or {}).items()},
+        name=body.name or "",
+    )
 
 
 def _only(values: Iterable[Any]) -> float | None:

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..system.errors import InputError, hint
 from .expressions import Expression
-from .model import SWAPPED, Case, Load, Scalar, Support
+from .model import SWAPPED, Case, Load, Rigid, Scalar, Support
 
 # The errors of `solver.verification.norms`, and what a solution must have for each to be known.
 ERRORS: dict[str, str] = {
@@ -17,11 +17,14 @@ ERRORS: dict[str, str] = {
     "pressure_max": "contact_pressure",
     "pressure_means": "contact_pressure",
     "pressure_oscillation": "contact_pressure",
+    "pressure_inner": "contact_pressure",
     "half_width": "half_width",
     "peak": "peak",
 }
 # Keys of the reference that need contact.
-_OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area"}
+_OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
+# Keys of the reference for values at probes.
+PROBED = ("displacement_at", "stress_at", "pressure_at")
 # The vectors of a selection.
 _PARTS = {"plane": ("point", "normal"), "sphere": ("centre",), "box": ("low", "high")}
 
@@ -34,8 +37,10 @@ def check_rules(case: Case) -> None:
     _check_names(case)
     _check_steps(case)
     _check_listed_twice(case)
+    _check_probes(case)
     _check_errors(case)
     _check_reference(case)
+    _check_rigid(case)
     if case.plane:
         check_dimension(case, 2)
     for group, material in case.materials.items():
@@ -46,9 +51,10 @@ def check_rules(case: Case) -> None:
 
 def _check_steps(case: Case) -> None:
     """Steps are all factors, or all factors of the same names; only these have the names."""
-    acting: dict[str, Support | Load] = {
+    acting: dict[str, Support | Load | Rigid] = {
         **{f"supports[{i}].name": s for i, s in enumerate(case.supports) if s.name},
         **{f"loads[{i}].name": load for i, load in enumerate(case.loads) if load.name},
+        **{f"bodies.{group}.name": body for group, body in case.rigid.items() if body.name},
     }
     names = {one.name for one in acting.values()}
     for i, step in enumerate(case.steps):
@@ -58,7 +64,7 @@ def _check_steps(case: Case) -> None:
             raise InputError(case.path, f"steps[{i}]", step, allowed)
         if given - names:
             name = min(given - names)
-            allowed = f"no load or support has this name; {hint(name, names)}"
+            allowed = f"no load, support or rigid body has this name; {hint(name, names)}"
             raise InputError(case.path, f"steps[{i}].{name}", None, allowed)
         if names - given:
             allowed = f"gives no factor of {min(names - given)}"
@@ -81,6 +87,9 @@ def _check_names(case: Case) -> None:
         if zone.points and zone.treatment != "quadrature":
             allowed = "only the treatment quadrature has points"
             raise InputError(case.path, f"contact[{i}].points", zone.points, allowed)
+        if zone.sweeps and zone.recovery == "none":
+            allowed = "only a recovery has sweeps"
+            raise InputError(case.path, f"contact[{i}].sweeps", zone.sweeps, allowed)
         if zone.normal != "element" and zone.treatment in ("quadrature", "node_to_segment"):
             allowed = f"the treatment {zone.treatment} has normals of its own; allowed: element"
             raise InputError(case.path, f"contact[{i}].normal", zone.normal, allowed)
@@ -93,6 +102,23 @@ def _check_names(case: Case) -> None:
         if item.zone not in names:
             allowed = f"no such zone; {hint(item.zone, names)}"
             raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
+
+
+def _check_probes(case: Case) -> None:
+    """Probes are on zones of the case; references are those of probes that have such a value."""
+    zones = {zone.name for zone in case.zones}
+    for probe in case.probes:
+        if probe.zone and probe.zone not in zones:
+            allowed = f"no such zone; {hint(probe.zone, zones)}"
+            raise InputError(case.path, f"probes.{probe.name}.zone", probe.zone, allowed)
+    for key in PROBED:
+        names = {p.name for p in case.probes if bool(p.zone) == (key == "pressure_at")}
+        given = case.reference.get(key)
+        for name in given if isinstance(given, dict) else ():
+            if name not in names:
+                kind = "with a zone" if key == "pressure_at" else "without a zone"
+                allowed = f"no probe {kind} has this name; {hint(name, names)}"
+                raise InputError(case.path, f"reference.{key}.{name}", None, allowed)
 
 
 def _check_errors(case: Case) -> None:
@@ -118,6 +144,9 @@ def _check_reference(case: Case) -> None:
     for key in case.reference.keys() & _OF_CONTACT if not case.zones else ():
         allowed = "cannot be compared: the case has no contact"
         raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+    if "coverage" in case.reference and "contact_pressure" not in case.reference:
+        allowed = "needs contact_pressure: it says where that acts"
+        raise InputError(case.path, "reference.coverage", case.reference["coverage"], allowed)
     if case.reference_kind and not case.reference and case.solution is None:
         allowed = "gives no value to compare with, such as contact_pressure"
         raise InputError(case.path, "reference.kind", case.reference_kind, allowed)
@@ -148,6 +177,44 @@ def _check_listed_twice(case: Case) -> None:
             seen.add((group, what))
 
 
+def _check_rigid(case: Case) -> None:
+    """A rigid surface without a mesh is the master of a zone, and nothing else."""
+    masters = {zone.master for zone in case.zones}
+    for name, body in case.rigid.items():
+        if body.surface and name not in masters | {zone.slave for zone in case.zones}:
+            allowed = "has no mesh and is the master of no contact zone"
+            raise InputError(case.path, f"bodies.{name}", body.surface, allowed)
+        for i, zone in enumerate(case.zones) if body.surface else ():
+            if name == zone.slave or (name == zone.master and case.directions == "both"):
+                allowed = f"is a rigid {body.surface}; a rigid side is always the master"
+                key, side = ("slave", zone.slave) if name == zone.slave else ("master", name)
+                allowed += ", so directions must be `first`" * (key == "master")
+                raise InputError(case.path, f"contact[{i}].{key}", side, allowed)
+
+
+def _check_motion(case: Case, dim: int) -> None:
+    """The components in which rigid bodies move, and the shapes that they have."""
+    known = ["x", "y", "z", "rx", "ry", "rz"] if dim == 3 else ["x", "y", "rz"]
+    known = ["y"] if case.axisymmetric else known
+    for name, body in case.rigid.items():
+        for key in ("move", "force"):
+            for component in getattr(body, key):
+                if component not in known:
+                    allowed = f"allowed here: {', '.join(known)}"
+                    raise InputError(case.path, f"bodies.{name}.{key}", component, allowed)
+        if body.surface == "cylinder" and dim == 2:
+            allowed = "is 3D: a circle is a `sphere` here, the side of a shaft a `plane`"
+            raise InputError(case.path, f"bodies.{name}", body.surface, allowed)
+    moments = case.reference.get("moment", {})
+    for name, value in moments.items() if isinstance(moments, dict) else ():
+        if name not in case.rigid:
+            allowed = f"is no rigid body; {hint(name, case.rigid)}"
+            raise InputError(case.path, f"reference.moment.{name}", None, allowed)
+        if isinstance(value, tuple) != (dim == 3):
+            allowed = f"must be {'a list of three numbers' if dim == 3 else 'a number'} here"
+            raise InputError(case.path, f"reference.moment.{name}", value, allowed)
+
+
 def check_dimension(case: Case, dim: int) -> None:
     """Raise `InputError` for a vector, direction or expression that does not fit the dimension."""
     allowed = f"must have {dim} components, as the mesh has"
@@ -155,6 +222,7 @@ def check_dimension(case: Case, dim: int) -> None:
         if len(vector) != dim:
             shown = [v.text if isinstance(v, Expression) else v for v in vector]
             raise InputError(case.path, key, shown, allowed)
+    _check_motion(case, dim)
     if dim == 3:
         return
     for i, support in enumerate(case.supports):
@@ -170,21 +238,33 @@ def check_dimension(case: Case, dim: int) -> None:
 
 def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
     """Every vector of the case, with its key."""
+    yield from _placed(case)
     for i, load in enumerate(case.loads):
         if isinstance(load.value, tuple):
             yield f"loads[{i}].{load.kind}", load.value
+    for key, value in case.reference.items():
+        if isinstance(value, tuple):
+            yield f"reference.{key}", value
+        if key in ("reaction", "displacement_at") and isinstance(value, dict):
+            for name, vector in value.items():
+                assert isinstance(vector, tuple)
+                yield f"reference.{key}.{name}", vector
+
+
+def _placed(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
+    """Every vector of the case that says where something is."""
     for i, item in enumerate(case.observe):
         yield f"observe[{i}].nearest", item.nearest
+    for probe in case.probes:
+        if probe.at:
+            yield f"probes.{probe.name}.at", probe.at
     for made in case.selections:
         if made.shape == "at":
             yield made.key, made.values
         for key, value in zip(_PARTS.get(made.shape, ()), made.values, strict=False):
             yield f"{made.key}.{made.shape}.{key}", value
-    for key, value in case.reference.items():
-        if isinstance(value, tuple):
-            yield f"reference.{key}", value
-        if key == "reaction" and isinstance(value, dict):
-            yield from ((f"reference.reaction.{group}", v) for group, v in value.items())
+    for name, body in case.rigid.items():
+        yield from ((f"bodies.{name}.{key}", vector) for key, vector in body.vectors)
 
 
 def _expressions(case: Case) -> Iterable[Expression]:

@@ -61,6 +61,7 @@ contact:
     interference: 0.0                    # initial overlap of bodies that are modelled without it
     recovery: none                       # of a pressure of higher order from constants: none,
                                          # linear, quadratic, smooth, or automatic by the cells
+    # sweeps: 24                         # solves with its loads: more bring it nearer to its limit
     stabilised: false                    # true: contact gives way to pressures that scatter
 #   clearance: 0.0                       # the initial gap, a number or an expression; replaces
                                          # the gap between the meshed faces
@@ -84,6 +85,7 @@ reference:
   displacement: solution                 # or expressions: [0.00375 * x, …]
 
 tolerance: 1.0e-3                        # or by check: {{multiplier: 1.0e-6, element_gap: 1.0e-8}}
+# expected: {{displacement: 2.0e-4}}     # or an expected error (see the command expect)
 """
 
 

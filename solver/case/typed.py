@@ -258,7 +258,9 @@ def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
             for key in own.keys:
                 value = value.get(key) if isinstance(value, dict) else value[key]
             return FieldError((*keys, *own.keys), own.problem, value)
-    return FieldError(keys, f"must be {described(kind)}", value)
+    # `2,5`, as some countries write it, is text.
+    point = "; write numbers with a point" * bool(re.fullmatch(r"-?\d+,\d+", str(value)))
+    return FieldError(keys, f"must be {described(kind)}{point}", value)
 
 
 def _is_like(kind: Any, value: object) -> bool:

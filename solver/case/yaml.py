@@ -60,7 +60,7 @@ def parse_mapping(text: str, where: Path) -> dict[str, Any]:
     try:
         content = _Builder(where, text).document()
     except yaml.YAMLError as error:
-        raise InputError(where, *_place(error)) from None
+        raise InputError(where, *_place(error, text)) from None
     if not isinstance(content, dict):
         raise InputError(where, "file", content, "must be a mapping of keys to values")
     return content
@@ -71,11 +71,16 @@ def read_mapping(path: Path) -> dict[str, Any]:
     return parse_mapping(read_text(path), path)
 
 
-def _place(error: yaml.YAMLError) -> tuple[str, None, str]:
+def _place(error: yaml.YAMLError, text: str) -> tuple[str, None, str]:
     """Key, value and remedy for a text that is no YAML."""
     mark = getattr(error, "problem_mark", None)
     reason = getattr(error, "problem", None) or getattr(error, "reason", None) or "syntax error"
-    return f"line {mark.line + 1}" if mark else "file", None, f"must be YAML ({reason})"
+    if mark is None:
+        return "file", None, f"must be YAML ({reason})"
+    line = (text.splitlines() or [""])[min(mark.line, len(text.splitlines()) - 1)]
+    if "\t" in line[: len(line) - len(line.lstrip())]:
+        return f"line {mark.line + 1}", None, "a tab indents this line: indent with spaces"
+    return f"line {mark.line + 1}", None, f"must be YAML ({reason})"
 
 
 class _Builder:
@@ -123,7 +128,10 @@ class _Builder:
                 raise self.error(keys, event, "a list or mapping cannot be a key")
             key = self.value(event, keys)
             if not isinstance(key, str):
-                raise self.error(keys, event, f"the key {key!r} is not text: put it in quotes")
+                cause = f"the key {key!r} is not text: put it in quotes"
+                if isinstance(key, int) and items:
+                    cause += ", or write numbers with a point, as in 2.5"
+                raise self.error(keys, event, cause)
             if key in items:
                 raise self.error((*keys, key), event, "the key is given twice")
             items[key] = self.value(next(self.events), (*keys, key))

@@ -153,6 +153,10 @@ def _refuse(case: Case) -> None:
         raise UnsupportedError("groups that move as one: not written for codes")
     if any(support.spring for support in case.supports):
         raise UnsupportedError("springs and elastic foundations: not written for codes")
+    for name, body in case.rigid.items():
+        if body.moves or body.surface:
+            what = f"a rigid {body.surface}" if body.surface else "a rigid body that moves"
+            raise UnsupportedError(f"{name} is {what}: not written for codes")
     if case.plane == "axisymmetric":
         raise UnsupportedError("axisymmetric bodies: not written for other codes")
     for zone in case.zones:

@@ -15,17 +15,25 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import codes, jobs, results, studies
+from . import codes, jobs, look, results, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
     from ..verification.run import Job
     from ..verification.verdict import CheckResult, Verdict
 
+_EXAMPLES = f"""examples:
+  {PROGRAM} new my-block -o my-block.yaml
+  {PROGRAM} solve my-block.yaml -o my-block.vtkhdf
+  {PROGRAM} inspect part.med --gap lower_face upper_face
+  {PROGRAM} check-result my-block.yaml other-code.vtu
+
+Exit status: 0 all checks hold; 1 a check fails; 2 the input is refused; 3 there is no solution.
+Batches and studies are targets of make: make help."""
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
 
@@ -51,7 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return REFUSED
     except SolveError as error:
-        print(error, file=sys.stderr)
+        case = getattr(options, "case", None)
+        print(f"{case}: {error}" if case else error, file=sys.stderr)
         return NO_RESULT
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -72,10 +81,35 @@ def _unexpected(error: Exception) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=PROGRAM, description="Verified contact solves.")
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description="Verified contact solves.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--version", nargs=0, action=_Version, help="print the version and end")
     parser.set_defaults(threads=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    # In the order of use: help lists them in this order.
+    _add_cases(commands)
+    look.add_commands(commands)
+    results.add_commands(commands)
+    codes.add_commands(commands)
+    _add_batch(commands)
+    jobs.add_commands(commands)
+    studies.add_commands(commands)
+    return parser
+
+
+def _add_cases(commands: Any) -> None:
+    """Add the commands that work on one case."""
+    command = add_command(commands, "new", _new, "write a commented case file to start from")
+    command.add_argument("name", nargs="?", metavar="NAME", help="default: as FILE")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: NAME.yaml")
+
+    command = add_command(commands, "validate", _validate, "check whether case files are valid")
+    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
+    command.add_argument("--mesh", action="store_true", help="also mesh them and check the groups")
 
     command = add_command(commands, "mesh", _mesh, "write the mesh of a case, after its transform")
     command.add_argument("case", type=Path, metavar="CASE.yaml")
@@ -97,17 +131,13 @@ def _parser() -> argparse.ArgumentParser:
         "--no-memory-check", action="store_true", help="start even if memory cannot suffice"
     )
 
-    command = add_command(commands, "crashed", _crashed, "write the verdict of a solve that died")
-    _add_job(command)
-    command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
-    command.add_argument("--log", type=Path, help="its last line is the reason")
-    command.add_argument("--status", type=int, metavar="N", help="its exit status")
-    command.add_argument("--refusal", help="it was not started, for this reason: refused")
-
     command = add_command(commands, "check", _check, "run the checks of stored results again")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
     command.add_argument("--json", action="store_true", help="print a list of verdicts")
 
+
+def _add_batch(commands: Any) -> None:
+    """Add the commands that work on the results of many cases."""
     command = add_command(commands, "report", _report, "write the report of many verdicts")
     command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
@@ -120,6 +150,14 @@ def _parser() -> argparse.ArgumentParser:
         help="descriptions of families; default: those in cases/",
     )
 
+    command = add_command(commands, "compare", _compare, "compare with another batch")
+    command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
+    command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
+    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
+
+    command = add_command(commands, "accept", _accept, "store results as the accepted values")
+    command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+
     command = add_command(
         commands, "gallery", _gallery, "draw results with PyVista and write a page"
     )
@@ -127,32 +165,23 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
 
-    command = add_command(commands, "compare", _compare, "compare with another batch")
-    command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
-    command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
-    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
-
-    results.add_commands(commands)
-    studies.add_commands(commands)
-    jobs.add_commands(commands)
-    codes.add_commands(commands)
-
-    command = add_command(commands, "validate", _validate, "check whether case files are valid")
-    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
-    command.add_argument("--mesh", action="store_true", help="also mesh them and check the groups")
-
-    command = add_command(commands, "new", _new, "write a commented case file to start from")
-    command.add_argument("name", nargs="?", metavar="NAME", help="default: as FILE")
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: NAME.yaml")
-
-    command = add_command(commands, "accept", _accept, "store results as the accepted values")
-    command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+    command = add_command(
+        commands, "crashed", _crashed, "write the verdict of a solve that died", listed=False
+    )
+    _add_job(command)
+    command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
+    command.add_argument("--log", type=Path, help="its last line is the reason")
+    command.add_argument("--status", type=int, metavar="N", help="its exit status")
+    command.add_argument("--refusal", help="it was not started, for this reason: refused")
 
     command = add_command(
-        commands, "serve", _serve, "keep a warm process and fork it for each command of a batch"
+        commands,
+        "serve",
+        _serve,
+        "keep a warm process and fork it for each command of a batch",
+        listed=False,
     )
     command.add_argument("socket", type=int, metavar="FD", help="an open, listening socket")
-    return parser
 
 
 class _Version(argparse.Action):
@@ -177,7 +206,7 @@ def _add_job(command: argparse.ArgumentParser) -> None:
         help="how to recover a pressure of higher order, instead of the case's own setting",
     )
     command.add_argument(
-        "--refine", type=int, default=1, metavar="N", help="multiply the recipe's divisions"
+        "--refine", type=int, default=1, metavar="N", help="a mesh so many times finer"
     )
 
 

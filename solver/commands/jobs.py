@@ -156,7 +156,8 @@ def _printable(text: str, strict: bool = False) -> str:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add the command `jobs`."""
-    command = add_command(commands, "jobs", _jobs, "list the jobs of folders of cases, as JSON")
+    purpose = "list the jobs of folders of cases, as JSON"
+    command = add_command(commands, "jobs", _jobs, purpose, listed=False)
     command.add_argument("folders", type=Path, nargs="+", metavar="DIR")
     command.add_argument("--variants", action="store_true", help="with the other cut of hexahedra")
 

@@ -7,11 +7,19 @@ from typing import Any
 
 
 def add_command(
-    commands: Any, name: str, run: Callable[[argparse.Namespace], int], purpose: str
+    commands: Any,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    purpose: str,
+    listed: bool = True,
 ) -> argparse.ArgumentParser:
-    """Add a command by its name, what runs it, and its purpose in words."""
+    """Add a command by its name, what runs it, and its purpose in words.
+
+    Commands of the workflow are not `listed` in the help.
+    """
     text = f"{purpose[0].upper()}{purpose[1:]}."
-    command: argparse.ArgumentParser = commands.add_parser(name, help=purpose, description=text)
+    shown = {"help": purpose} if listed else {}
+    command: argparse.ArgumentParser = commands.add_parser(name, description=text, **shown)
     command.set_defaults(run=run)
     return command
 

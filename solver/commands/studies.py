@@ -1,4 +1,7 @@
-"""The commands of the studies: each measures points, or writes the page of what was measured."""
+"""The commands of the studies: each measures points, or writes the page of what was measured.
+
+The workflow runs them, so the help of the program does not list them.
+"""
 
 import argparse
 import sys
@@ -17,9 +20,10 @@ RECORD, FOLDER = "RECORD.json", "DIR"
 def add_commands(commands: Any) -> None:
     """Add the commands of all studies to those of the program."""
     _add_orders(commands)
-    study = commands.add_parser("study", help="error against run time: points and their page")
+    _add_expect(commands)
+    study = commands.add_parser("study", description="Error against run time.")
     _add_study(study.add_subparsers(title="commands", metavar="COMMAND", required=True))
-    scaling = commands.add_parser("scaling", help="scaling: points and their page")
+    scaling = commands.add_parser("scaling", description="Cost against size.")
     _add_scaling(scaling.add_subparsers(title="commands", metavar="COMMAND", required=True))
     _add_benchmark(commands)
     _add_stability(commands)
@@ -49,10 +53,34 @@ def _quick(command: argparse.ArgumentParser, what: str) -> None:
 
 
 def _add_orders(commands: Any) -> None:
-    command = add_command(commands, "orders", _orders, "write the page of orders of convergence")
+    command = add_command(
+        commands, "orders", _orders, "write the page of orders of convergence", listed=False
+    )
     command.add_argument("ladders", type=Path, nargs="+", metavar="ORDERS.yaml")
     command.add_argument("--results", type=Path, required=True, metavar=FOLDER, help="the levels")
     _output(command, FOLDER)
+
+
+def _add_expect(commands: Any) -> None:
+    purpose = "the errors that refined meshes predict for a case's own: its `expected`"
+    command = add_command(commands, "expect", _expect, purpose)
+    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument(
+        "--levels",
+        type=int,
+        nargs="+",
+        metavar="N",
+        help="factors of divisions (1 2 4)",
+    )
+
+
+def _expect(options: argparse.Namespace) -> int:
+    from ..studies.orders.expected import LEVELS, expected_errors
+
+    print("expected:")
+    for name, error in expected_errors(options.case, options.levels or LEVELS).items():
+        print(f"  {name}: {error:.1e}")
+    return 0
 
 
 def _orders(options: argparse.Namespace) -> int:
@@ -137,7 +165,9 @@ def _scaling_page(options: argparse.Namespace) -> int:
 
 
 def _add_benchmark(commands: Any) -> None:
-    command = add_command(commands, "benchmark", _benchmark, "measure time ratios side by side")
+    command = add_command(
+        commands, "benchmark", _benchmark, "measure time ratios side by side", listed=False
+    )
     command.add_argument("benchmark", type=Path, metavar="BENCHMARK.yaml")
     command.add_argument("--quick", action="store_true", help="tiny meshes, for a first look")
     _output(command, RECORD)
@@ -160,12 +190,12 @@ def _benchmark(options: argparse.Namespace) -> int:
 
 def _add_stability(commands: Any) -> None:
     purpose = "run a case over the values of one quantity"
-    command = add_command(commands, "sweep", _sweep, purpose)
+    command = add_command(commands, "sweep", _sweep, purpose, listed=False)
     command.add_argument("sweep", type=Path, metavar="SWEEP.yaml")
     _quick(command, "only some of the values")
 
     purpose = "write the page of numerical stability"
-    command = add_command(commands, "stability", _stability, purpose)
+    command = add_command(commands, "stability", _stability, purpose, listed=False)
     command.add_argument("records", type=Path, nargs="+", metavar=RECORD)
     _output(command, FOLDER)
     command.add_argument(
@@ -197,12 +227,12 @@ def _stability(options: argparse.Namespace) -> int:
 
 def _add_infsup(commands: Any) -> None:
     purpose = "run the inf-sup test and the half-loaded block"
-    command = add_command(commands, "infsup", _infsup, purpose)
+    command = add_command(commands, "infsup", _infsup, purpose, listed=False)
     command.add_argument("ladders", type=Path, metavar="INFSUP.yaml")
     _quick(command, "fewer levels")
 
     purpose = "write the page of the inf-sup test"
-    command = add_command(commands, "infsup-page", _infsup_page, purpose)
+    command = add_command(commands, "infsup-page", _infsup_page, purpose, listed=False)
     command.add_argument("record", type=Path, metavar=RECORD)
     _output(command, FOLDER)
 

@@ -35,9 +35,11 @@ class MeshFileKeys(Section, frozen=True):
     """A mesh of your own.
 
     file: .med, .msh, .inp, .vtu or .vtkhdf, relative to the case file
+    refine: 2 halves all edges, 4 does so twice, and so on
     """
 
     file: Text
+    refine: Literal[1, 2, 4, 8, 16, 32, 64] = 1
 
 
 class BlockKeys(Section, frozen=True):
@@ -215,7 +217,48 @@ class PunchKeys(Recipe, frozen=True, kw_only=True):
         each(self.top_size, self.dim, "top_size")
 
 
-RECIPES: dict[str, type[Recipe]] = {
+class BrickKeys(Section, frozen=True, kw_only=True):
+    """A rectangular block.
+
+    name: of its body
+    low: the corner with the smallest coordinates
+    high: the corner opposite
+    block: its cells, as of a block
+    """
+
+    name: Text
+    low: tuple[Number, ...]
+    high: tuple[Number, ...]
+    block: BlockKeys
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        dim = BY_NAME[self.block.cells].dim
+        for key in ("low", "high"):
+            if len(getattr(self, key)) != dim:
+                raise FieldError((key,), f"must be a list of {dim} numbers for {self.block.cells}")
+        if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
+            raise FieldError(("high",), "must be greater than low along each axis")
+
+
+class BricksKeys(Section, frozen=True, kw_only=True):
+    """Bodies put together from rectangular blocks, anywhere.
+
+    bricks: the blocks; those of one name that touch share their nodes
+    refine: multiplies all divisions
+    """
+
+    recipe: Literal["bricks"]
+    bricks: Annotated[tuple[BrickKeys, ...], Meta(min_length=1, description="a list of blocks")]
+    refine: Pieces = 1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len({len(brick.low) for brick in self.bricks}) > 1:
+            raise FieldError(("bricks",), "all must be of one dimension")
+
+
+RECIPES: dict[str, type[Recipe] | type[BricksKeys]] = {
     "blocks": BlocksKeys,
     "rings": RingsKeys,
     "shells": ShellsKeys,
@@ -223,4 +266,5 @@ RECIPES: dict[str, type[Recipe]] = {
     "parabola": ParabolaKeys,
     "hertz": HertzKeys,
     "punch": PunchKeys,
+    "bricks": BricksKeys,
 }

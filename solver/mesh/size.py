@@ -134,12 +134,16 @@ def of_mesh(mesh: object, folder: Path, refine: int = 1) -> Size:
     """
     if not isinstance(mesh, Mapping):
         return Size(0.0, 3)
+    refine *= mesh["refine"] if isinstance(mesh.get("refine"), int) else 1
     if "file" in mesh:
         file = folder / str(mesh["file"])
         length = file.stat().st_size if file.is_file() else 0
-        return Size(length / _BYTES.get(file.suffix.lower(), _BYTES_ELSE), 3)
-    refine *= mesh["refine"] if isinstance(mesh.get("refine"), int) else 1
-    return of_bodies([of_body(*body, refine) for body in map(_body, mesh.values()) if body])
+        return Size(refine**3 * length / _BYTES.get(file.suffix.lower(), _BYTES_ELSE), 3)
+    bricks: object = mesh.get("bricks")
+    parts = bricks if isinstance(bricks, Sequence) else ()
+    blocks = [brick.get("block") for brick in parts if isinstance(brick, Mapping)]
+    bodies = map(_body, [*mesh.values(), *blocks])
+    return of_bodies([of_body(*body, refine) for body in bodies if body])
 
 
 def _body(section: Any) -> tuple[str, list[int]] | None:

@@ -9,6 +9,7 @@ reference: |
   Where the right answer comes from. A paragraph whose lines are all indented is a formula:
 
       p(x) = E (c + κ x²)
+tolerance: What the tolerances of the cases are made of.
 figures:                       # the solves whose pressure is drawn along the interface;
   - {job: block-quad8}         # left out: the first of each kind of reference and dimension
   - {job: block-hexa8, along: sqrt(x**2 + y**2), caption: what to look at}
@@ -76,6 +77,7 @@ class FamilyFile(Section, frozen=True):
     order: Annotated[int, Meta(description="a whole number: the place in the report")] | None = None
     problem: str = ""
     reference: str = ""
+    tolerance: str = ""
     figures: tuple[Figure, ...] = ()
     reference_code: tuple[CodeError, ...] = ()
 

@@ -38,6 +38,11 @@ def _near_zero(value: float | None, scale: float | None) -> str:
     return f"{value:.1e}" if near else number(value)
 
 
+def vector(values: Sequence[float], scale: float = 0.0) -> str:
+    """Numbers in six digits, those below 1e-9 of the scale as zero."""
+    return ", ".join(number(value if abs(value) > 1e-9 * scale else 0.0) for value in values)
+
+
 def seconds(value: float | None) -> str:
     """Hundredths; more than a hundred seconds are whole."""
     if value is None or math.isnan(value):

@@ -90,6 +90,12 @@ class Row:
         return next((c.tolerance for c in self.verdict.checks if c.name in names), None)
 
     @cached_property
+    def expected(self) -> float | None:
+        """The expected error of that check."""
+        names = self.accuracy[1:] if self.accuracy else ()
+        return next((c.expected for c in self.verdict.checks if c.name in names), None)
+
+    @cached_property
     def norms(self) -> Mapping[str, float]:
         """Errors against the exact solution by their names in `solver.verification.norms`."""
         errors = self.verdict.errors.items()
@@ -129,6 +135,7 @@ class Row:
             "family": [self.group.replace(" ", "_")],
             "cells": sorted({name for body in self.sides for name in body.cells}),
             "verdict": [self.word],
+            "judged": [self.verdict.judged.replace(" ", "_") or "none"],
             "reference": [self.verdict.reference_kind or "none"],
         }
 

@@ -59,7 +59,12 @@ def _camera(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     The eye is above a slave that looks up and below one that looks down, so that the slave's
     surface, where cells are cut, is seen.
     """
-    tilt = ELEVATION if mean_normal(solution)[2] >= 0 else -ELEVATION
+    return axonometry(mean_normal(solution))
+
+
+def axonometry(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Screen axes (right, up) (2, 3) and the direction towards an eye (3,) that sees a surface."""
+    tilt = ELEVATION if normal[2] >= 0 else -ELEVATION
     flat = np.array([np.cos(AZIMUTH), np.sin(AZIMUTH), 0.0])
     eye = np.cos(tilt) * flat + np.sin(tilt) * np.array([0.0, 0.0, 1.0])
     right = np.array([-flat[1], flat[0], 0.0])
@@ -79,7 +84,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     ]
     for number in sorted(numbers, key=distance.__getitem__):
         body = solution.bodies[number]
-        for polygons in _far_to_near([p[owner == number] for p, owner in faces], eye):
+        for _, polygons in far_to_near([p[owner == number] for p, owner in faces], eye):
             light = float(normals(polygons[:1])[0] @ np.array([0.25, -0.45, 0.85]))
             drawing.polygons(
                 place(polygons @ screen.T),
@@ -96,16 +101,19 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
         drawing.text(at, middle + 20, body.role, color=edge_color(body))
 
 
-def _far_to_near(groups: list[np.ndarray], eye: np.ndarray) -> list[np.ndarray]:
-    """Faces (n, corners, 3) turned to the eye, in runs of one shape and direction, far first."""
+def far_to_near(groups: list[np.ndarray], eye: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Faces (n, corners, 3) turned to the eye, in runs of one direction with their group's number.
+
+    Far ones come first.
+    """
     runs = []
-    for polygons in groups:
+    for number, polygons in enumerate(groups):
         seen = polygons[normals(polygons) @ eye > 1e-6] if len(polygons) else polygons
         directions = np.round(normals(seen), 1) if len(seen) else np.empty((0, 3))
         for direction in np.unique(directions, axis=0):
             run = seen[(directions == direction).all(axis=1)]
-            runs.append((float((run.mean(axis=1) @ eye).mean()), run))
-    return [run for _, run in sorted(runs, key=lambda entry: entry[0])]
+            runs.append((float((run.mean(axis=1) @ eye).mean()), number, run))
+    return [(number, run) for _, number, run in sorted(runs, key=lambda entry: entry[0])]
 
 
 def _macro_outlines(

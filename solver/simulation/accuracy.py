@@ -1,4 +1,4 @@
-"""The accuracy of a solve by its own estimate: digits lost to rounding, strains that are large.
+"""The accuracy of a solve by its own estimate: digits lost to rounding.
 
 Each term of `Accuracy` is a size at which something is rounded, times the unit of rounding, turned
 into a pressure by what it acts on; it is relative to the largest pressure:
@@ -23,7 +23,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..case.model import Case
 from ..mechanics.fem import shape_functions
 from ..mechanics.fem.elasticity import Block, steepness
 from ..mechanics.fem.faces import FaceBlock, area_vectors
@@ -36,8 +35,6 @@ EPSILON = float(np.finfo(float).eps)
 EPSILON_EXTENDED = float(np.finfo(np.longdouble).eps)
 LEAST_DIGITS = 4
 """A result with fewer digits is unreliable."""
-NOTED_STRAIN, SMALL_STRAIN = 1e-2, 1e-1
-"""A strain or rotation above the first is reported, one above the second is unreliable."""
 
 # Pressures and gaps below this share of their scales are round-off and change no status; gaps below
 # the second share of the displacements they are the difference of, or below so many roundings of
@@ -80,19 +77,6 @@ class Accuracy:
             f"rounding alone may change the result by {self.estimate:.0e} of itself: "
             f"{_REASONS[cause]}"
         )
-
-
-def beyond_small_strain(case: Case, strain: float, rotation: float) -> str:
-    """Why a result with these largest strain and rotation is unreliable; empty where it is not.
-
-    A case that names an exact solution asks for one of small strain, whatever the strain.
-    """
-    if case.solution is not None or not max(strain, rotation) > SMALL_STRAIN:
-        return ""
-    return (
-        f"strain {strain:.2g} with rotation {rotation:.2g} is beyond small strain: above "
-        f"{SMALL_STRAIN:g} linear theory does not describe the bodies"
-    )
 
 
 def pressure_of_forces(gaps: sparse.csr_matrix, noise: np.ndarray) -> float:

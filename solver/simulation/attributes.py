@@ -1,6 +1,6 @@
 """Materials, supports and loads of a case on the groups of the cut mesh."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,20 +24,22 @@ from ..mechanics.fem.faces import (
 from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
 from ..mechanics.fem.supports import (
-    SAME,
     Fixed,
     FreeMotion,
     SupportClashError,
     TieError,
     free_motion,
+    released,
     tied,
 )
 from ..mechanics.mortar.cut import CutMesh, SubFaces
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
+from . import rigid
 from .exact import node_parts
 from .groups import ALL
 from .relations import ties_of
+from .rigid import Frame
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,11 @@ class CutZone:
 
     slave_faces: list[FaceBlock]
     sub_faces: list[SubFaces]
+
+    @property
+    def count(self) -> int:
+        """How many macro-elements there are."""
+        return sum(len(block.nodes) for block in self.slave_faces)
 
 
 def faces_of(mesh: meshio.Mesh, group: str, case: Case, key: str) -> list[FaceBlock]:
@@ -93,29 +100,24 @@ class Attributes:
 
     def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
         """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
-        found: list[tuple[str, np.ndarray]] = []
-        for block in faces_of(self.mesh, group, self.case, key):
-            plain = np.ones(len(block.nodes), dtype=bool)
-            for zone in self.zones:
-                plain &= ~self._swap_sub_faces(block, zone, found)
-            found.append((block.type.name, block.nodes[plain]))
-        return [(name, nodes) for name, nodes in found if len(nodes)]
+        blocks = self.as_cut(faces_of(self.mesh, group, self.case, key))
+        return [(block.type.name, block.nodes) for block in blocks]
 
-    @staticmethod
-    def _swap_sub_faces(
-        block: FaceBlock, zone: CutZone, found: list[tuple[str, np.ndarray]]
-    ) -> np.ndarray:
-        """Mark the faces that are cut slave faces of the zone; append their sub-faces."""
-        hit = np.zeros(len(block.nodes), dtype=bool)
-        for slave in zone.slave_faces:
-            if slave.owner_type is block.owner_type and slave.type is block.type:
-                mine, theirs = (10 * b.owner + b.local for b in (block, slave))
-                hit |= np.isin(mine, theirs)
-                macro = slave.number[np.isin(theirs, mine)]
-                found += [
-                    (sub.type.name, sub.nodes[np.isin(sub.macro, macro)]) for sub in zone.sub_faces
-                ]
-        return hit
+    def as_cut(self, faces: Sequence[FaceBlock]) -> list[FaceBlock]:
+        """The faces as meshed, slave faces replaced by their sub-faces."""
+        found: list[FaceBlock] = []
+        for block in faces:
+            whole = np.ones(len(block.nodes), dtype=bool)
+            for zone in self.zones:
+                for slave in zone.slave_faces:
+                    mine, theirs = block.common(slave)
+                    if len(mine):
+                        whole[mine] = False
+                        number = np.full(zone.count, -1)
+                        number[slave.number[theirs]] = mine
+                        found += [_part(block, sub, number) for sub in zone.sub_faces]
+            found.append(block.of(whole))
+        return [block for block in found if len(block.nodes)]
 
     def nodes(self, group: str, key: str) -> np.ndarray:
         """All nodes of a group: of its volume cells, faces, edges and points."""
@@ -169,12 +171,14 @@ class Attributes:
     ) -> tuple[list[Block], MeanStress]:
         """Cells with their materials, and the mean stress of those in mixed form.
 
-        Cells of rigid bodies, which need no material, get a unit one. Without `mixed_form` none is
+        Cells of rigid bodies, which need no material, get a unit one; they are left out where the
+        body moves. Without `mixed_form` none is
         in it, whatever the case says; `plain`: cells with straight edges have plain quadrature.
         """
         young = self.by_material(lambda m: m.young, 1.0)
         poisson = self.by_material(lambda m: m.poisson, 0.0)
         mixed = self.by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
+        moving = rigid.moving_nodes(self)
         blocks = [
             Block(
                 BY_NAME[name],
@@ -189,12 +193,18 @@ class Attributes:
         for name, cells in volume_cells(self.mesh).items():
             meshed[name] = number + np.arange(len(cells))
             number += len(cells)
-        return split(
+        blocks, mean = split(
             self.points,
             blocks,
-            [(mixed[name] > 0) & mixed_form for name in self.cut.cells],
+            [
+                (mixed[name] > 0) & mixed_form & ~moving[cells].all(axis=1)
+                for name, cells in self.cut.cells.items()
+            ],
             [self.cut.members(name, meshed) for name in self.cut.cells],
         )
+        if moving.any():
+            blocks = [block.of(~moving[block.cells].all(axis=1)) for block in blocks]
+        return [block for block in blocks if len(block.cells)], mean
 
     def by_material(
         self, value: Callable[[Material], float], otherwise: float
@@ -227,28 +237,27 @@ class Attributes:
         return found
 
     @cached_property
+    def frames(self) -> dict[str, Frame]:
+        """The rigid bodies by name."""
+        return rigid.frames_of(self)
+
+    @cached_property
     def fixed(self) -> dict[str, Fixed]:
         """What the axis, supports and rigid bodies hold, by the key of the case file."""
         fixed = dict(self._fixed())
-        self._refuse_moved(fixed)
+        rigid.refuse_moved(self, fixed)
         dim = self.points.shape[1]
         on_axis = np.flatnonzero(self.points[:, 0] == 0) if self.axisymmetric else np.empty(0, int)
         # The circles of points on the axis have no radius, and keep it.
         held = Fixed(on_axis, np.tile(np.eye(dim)[0], (len(on_axis), 1)), np.zeros(len(on_axis)))
-        fixed = {"plane": held, **fixed}
-        for group in sorted(self.case.rigid):
-            nodes = self.nodes(group, f"bodies.{group}")
-            for name, axis in zip("xyz", np.eye(dim), strict=False):
-                directions = np.tile(axis, (len(nodes), 1))
-                fixed[f"bodies.{group}.{name}"] = Fixed(nodes, directions, np.zeros(len(nodes)))
-        return fixed
+        return {"plane": held, **fixed, **rigid.held(self)}
 
     def supports(self) -> FreeMotion:
         """The motion that supports and rigid bodies leave free."""
         ties = ties_of(self)
         try:
             free = free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
-            return tied(free, list(ties.values()))
+            return released(tied(free, list(ties.values())), rigid.free_motions(self))
         except TieError as error:
             raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
         except SupportClashError as clash:
@@ -275,28 +284,13 @@ class Attributes:
                     values = self.field(value)(self.points[nodes])
                 yield key, Fixed(nodes, directions, values)
 
-    def _refuse_moved(self, fixed: Mapping[str, Fixed]) -> None:
-        """Refuse displacements given to rigid bodies."""
-        largest = max((float(np.abs(f.values).max(initial=0)) for f in fixed.values()), default=0.0)
-        for group in sorted(self.case.rigid):
-            nodes = self.nodes(group, f"bodies.{group}")
-            for key, support in fixed.items():
-                given = support.values[np.isin(support.nodes, nodes)]
-                if (np.abs(given) > SAME * largest).any():
-                    allowed = (
-                        f"given to {len(given)} nodes of the rigid body {group}, which is fixed; "
-                        "allowed there: 0 (move the other body instead)"
-                    )
-                    value = float(given[np.abs(given).argmax()])
-                    raise InputError(self.case.path, key, value, allowed)
-
     def _normals(self, group: str, nodes: np.ndarray, key: str) -> np.ndarray:
         """Unit normals (n, dim) of a group's faces at its nodes, the mean over the faces there."""
         return nodal_normals(self.points, self.faces(group, key))[nodes]
 
     def forces(self) -> np.ndarray:
         """Nodal forces (n, dim) of all loads at load factor 1."""
-        total = np.zeros_like(self.points)
+        total = rigid.forces(self)
         for i, load in enumerate(self.case.loads):
             total += self._force(load, f"loads[{i}].group")
         return total
@@ -309,11 +303,12 @@ class Attributes:
 
     def _history(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         mine = [f"supports[{i}]." for i, s in enumerate(self.case.supports) if s.name == name]
+        mine += [f"bodies.{group}." for group, b in self.case.rigid.items() if b.name == name]
         fixed = {
             key: replace(f, values=f.values * key.startswith(tuple(mine)))
             for key, f in self.fixed.items()
         }
-        force = np.zeros_like(self.points)
+        force = rigid.forces(self, name)
         for i, load in enumerate(self.case.loads):
             if load.name == name:
                 force += self._force(load, f"loads[{i}].group")
@@ -383,6 +378,12 @@ class Attributes:
             kind == "pressure",
             self.axisymmetric,
         )
+
+
+def _part(block: FaceBlock, sub: SubFaces, number: np.ndarray) -> FaceBlock:
+    """The sub-faces of a block's faces, which `number` (m,) gives by macro-element, or −1."""
+    face = number[sub.macro]
+    return replace(block.of(face[face >= 0]), type=sub.type, nodes=sub.nodes[face >= 0])
 
 
 def _type_name(meshio_name: str) -> str:

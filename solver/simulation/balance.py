@@ -8,7 +8,7 @@ from ..mechanics.fem.faces import face_integrals
 from ..mechanics.fem.supports import DEPENDENT
 from .problem import Equilibrium
 from .scene import Scene, ZoneScene
-from .solution import Reaction
+from .solution import Reaction, RigidMotion
 
 # A macro-element of which the segments miss less than this share is covered in full.
 _COVERED = 1e-6
@@ -54,17 +54,13 @@ def _unbalanced(
     return unbalanced.reshape(contact.shape) - free_part, free_part
 
 
-def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
+def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndarray]:
     """The reactions of each group that supports hold, of rigid bodies, the axis, springs and ties.
 
-    A support gets the force along its direction, without the part in those of supports before it:
-    all forces sum to what is held.
+    With the forces (n, dim) of all of them at nodes. A support gets the force along its direction,
+    without the part in those of supports before it: all forces sum to what is held.
     """
-    contact = state.correction.copy()
-    for zone in scene.zones:
-        force = zone.operator.matrix.T @ state.pressure[zone.numbers]
-        contact += force.reshape(contact.shape)
-    left, _ = _unbalanced(scene, state, contact)
+    left, _ = _unbalanced(scene, state, _contact(scene, state))
     found: dict[str, np.ndarray] = {}
     spanned = np.zeros((*left.shape, left.shape[1]))
     for key, fixed in scene.fixed.items():
@@ -82,7 +78,38 @@ def reactions(scene: Scene, state: Equilibrium) -> list[Reaction]:
         found["together"] = found.get("together", 0.0) + left
     if state.iterate.springs.any():
         found["springs"] = found.get("springs", 0.0) + _of_springs(state)
-    return [_resultant(scene, name, force) for name, force in found.items()]
+    at_nodes = sum(found.values(), np.zeros_like(left))
+    return [_resultant(scene, name, force) for name, force in found.items()], at_nodes
+
+
+def _contact(scene: Scene, state: Equilibrium) -> np.ndarray:
+    """The contact forces (n, dim) of all zones."""
+    contact = state.correction.copy()
+    for zone in scene.zones:
+        force = zone.operator.matrix.T @ state.pressure[zone.numbers]
+        contact += force.reshape(contact.shape)
+    return contact
+
+
+def rigid_bodies(scene: Scene, state: Equilibrium) -> list[RigidMotion]:
+    """The motion of each rigid body, and the contact force on it."""
+    contact, found = _contact(scene, state), []
+    for name, frame in scene.rigid.items():
+        moved = frame.amount(state.displacement[frame.nodes])
+        force = frame.resultant(contact[frame.nodes])
+        axes = "xyz"[: contact.shape[1]]
+        turn, moment = (np.array([of.get(f"r{a}", 0.0) for a in "xyz"]) for of in (moved, force))
+        found.append(
+            RigidMotion(
+                body=name,
+                point=frame.point + scene.origin,
+                translation=np.array([moved[axis] for axis in axes]),
+                rotation=turn,
+                force=np.array([force[axis] for axis in axes]),
+                moment=moment,
+            )
+        )
+    return found
 
 
 def _of_springs(state: Equilibrium) -> np.ndarray:

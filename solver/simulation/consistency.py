@@ -6,12 +6,12 @@ solve and in a file that is read back.
 """
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, product
 
 import numpy as np
 
 from ..mechanics.mortar.reconstruction import FORMS
-from .solution import NodalContact, RecoveredPressure, Solution, ZoneResult
+from .solution import NodalContact, RecoveredPressure, Resultants, Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
 # roundings of coordinates and displacements, a pressure by its estimated error and by what so many
@@ -44,18 +44,19 @@ def _all(solution: Solution) -> Iterator[str]:
         yield "the contact zones are not those of the case"
     if solution.strain_energy is not None:
         yield from _values("strain energy", np.array([solution.strain_energy]), (1,))
-    for one in solution.reactions:
-        yield from _values(f"the force on {one.group}", one.force, (dim,))
-        yield from _values(f"the moment on {one.group}", one.moment, (3,))
-    yield from _steps(solution)
+    if solution.reaction is not None:
+        yield from _values("reaction", solution.reaction, (n, dim))
+    if solution.probes.keys() - {probe.name for probe in solution.case.probes}:
+        yield "the probes are not those of the case"
+    yield from _steps(solution, dim)
     for zone in solution.zones:
-        for fault in chain(_zone(zone, n, dim), _resultants(zone, dim)):
+        for fault in chain(_zone(zone, n, dim), _edges(zone, dim)):
             yield f"zone {zone.name}: {fault}"
     for zone in solution.zones:
         yield from _status(zone, solution)
 
 
-def _steps(solution: Solution) -> Iterator[str]:
+def _steps(solution: Solution, dim: int) -> Iterator[str]:
     sizes = {zone.name: len(zone.multiplier) for zone in solution.zones}
     wanted = [item.zone for item in solution.case.observe]
     if [step.factor for step in solution.steps] != list(solution.case.factors):
@@ -69,6 +70,17 @@ def _steps(solution: Solution) -> Iterator[str]:
             yield from _numbers("observed macro-element", number, (1,), sizes[item["zone"]])
         known = [step.residual, *(item[k] for item in seen for k in ("pressure", "gap"))]
         yield from _values("steps", np.array(known), (len(known),))
+        if step.resultants.keys() - sizes.keys():
+            yield "the contact forces of a step are not those of the zones"
+        for name, found in step.resultants.items():
+            yield from _resultants(f"of contact in {name}", found, dim)
+        for one in step.reactions:
+            yield from _values(f"the force on {one.group}", one.force, (dim,))
+            yield from _values(f"the moment on {one.group}", one.moment, (3,))
+        shapes = {"point": (dim,), "translation": (dim,), "force": (dim,)}
+        shapes |= {"rotation": (3,), "moment": (3,)}
+        for body, (name, shape) in product(step.rigid, shapes.items()):
+            yield from _values(f"{name} of {body.body}", getattr(body, name), shape)
 
 
 def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
@@ -107,11 +119,17 @@ def _recovered(field: RecoveredPressure, n: int, m: int, dim: int) -> Iterator[s
         yield from _values(f"{name} of the recovered pressure", getattr(field, name), shape)
 
 
-def _resultants(zone: ZoneResult, dim: int) -> Iterator[str]:
+def _resultants(where: str, found: Resultants, dim: int) -> Iterator[str]:
+    for name, shape in {"area": (3,), "force": (dim,), "moment": (3,)}.items():
+        yield from _values(f"{name} {where}", getattr(found, name), shape)
+    if found.pressure is not None:
+        yield from _values(f"pressure {where}", found.pressure, (2,))
+
+
+def _edges(zone: ZoneResult, dim: int) -> Iterator[str]:
     if (found := zone.resultants) is None:
         return
-    for name, shape in {"area": (3,), "force": (dim,), "moment": (3,)}.items():
-        yield from _values(f"{name} of contact", getattr(found, name), shape)
+    yield from _resultants("of contact", found, dim)
     if edges := found.edges:
         e = len(edges.macro)
         yield from _numbers("macro-elements of edges", edges.macro, (e,), len(zone.area))

@@ -43,7 +43,7 @@ class ContactConstraints:
     @cached_property
     def dependent(self) -> np.ndarray:
         """The numbers of eligible multipliers without a free unknown of their own."""
-        _, _, found = choose_pivots(self.on_free[self.eligible], self.own)
+        _, found = choose_pivots(self.on_free[self.eligible], self.own)
         return np.flatnonzero(self.eligible)[~found]
 
 
@@ -136,10 +136,23 @@ def refuse_unsolvable(
             at = ", ".join(f"{x:.6g}" for x in place)
             allowed = (
                 f"{len(mine)} macro-elements of zone {zone.zone.name} (the first, number "
-                f"{mine[0]}, at ({at})) have no free unknown of their own: supports or "
-                "another zone hold their inner nodes"
+                f"{mine[0]}, at ({at})) have no free unknown of their own: {_holding(scene)}"
             )
             raise InputError(scene.case.path, "supports", None, allowed)
+
+
+def _holding(scene: Scene) -> str:
+    """What may hold the inner nodes of macro-elements: a tie of slave nodes, or something else."""
+    slaves = [f.nodes.ravel() for zone in scene.zones for f in zone.sub_faces]
+    dim = scene.points.shape[1]
+    basis = scene.free.basis.tocsc()
+    tied = np.repeat(np.diff(basis.indptr) > dim, np.diff(basis.indptr))
+    if np.isin(basis.indices[tied] // dim, np.concatenate(slaves)).any():
+        return (
+            "their nodes move together; name the other surface as slave (solve --swap), or tie the "
+            "other side of the body"
+        )
+    return "supports or another zone hold their inner nodes"
 
 
 def _refuse_surfaces(scene: Scene, touching: np.ndarray) -> None:

@@ -83,7 +83,11 @@ def _apart(
     displacement: Displacement, gaps: sparse.csr_matrix, rows: np.ndarray, dim: int
 ) -> np.ndarray:
     """For each entry of the gap operator, its displacement minus that of its row's first node."""
-    whole = (displacement.motions @ displacement.amount).astype(Extended)
-    whole += displacement.deformation.astype(Extended).sum(axis=0)
     first = gaps.indices[np.minimum(gaps.indptr[:-1], len(gaps.indices) - 1)] // dim
-    return whole[gaps.indices] - whole[dim * first[rows] + gaps.indices % dim]
+    other = dim * first[rows] + gaps.indices % dim
+    seen = np.zeros(gaps.shape[1], dtype=bool)
+    seen[gaps.indices] = seen[other] = True
+    whole = np.zeros(gaps.shape[1], dtype=Extended)
+    whole[seen] = displacement.deformation[:, seen].astype(Extended).sum(axis=0)
+    whole[seen] += (displacement.motions @ displacement.amount)[seen]
+    return whole[gaps.indices] - whole[other]

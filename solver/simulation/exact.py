@@ -36,28 +36,38 @@ def deformable(solution: Solution) -> np.ndarray:
 
 
 def computed_pressure(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
-    """The computed pressure (k,) at the `surface_points` of a zone on the mesh's `points`.
+    """The computed pressure (k,) at the `surface_points` of a zone on the mesh's `points`."""
+    return np.concatenate(
+        [
+            pressure_on(points, zone, name, nodes, owner, gauss_rule(name, FACE_POINTS)[0]).ravel()
+            for name, nodes, owner in zone.faces
+        ]
+    )
+
+
+def pressure_on(
+    points: np.ndarray,
+    zone: ZoneResult,
+    name: str,
+    nodes: np.ndarray,
+    owner: np.ndarray,
+    reference: np.ndarray,
+) -> np.ndarray:
+    """The pressure (s, q) on faces (s, n_nodes) of macro-elements (s,), at reference points (q, t).
 
     The recovered one, or that of each macro-element, or, between multipliers at nodes, linear (or
     what the shape functions make of it where all nodes of a face have one).
     """
-    parts = []
-    for name, nodes, owner in zone.faces:
-        kind = cell_type(name)
-        reference, weights = gauss_rule(kind.name, FACE_POINTS)
-        if zone.recovered is not None:
-            places = shape_functions(kind.name).values(reference) @ points[nodes]
-            parts.append(zone.recovered.values(zone.multiplier, owner, places).ravel())
-            continue
-        if zone.nodal is None:
-            parts.append(np.repeat(zone.multiplier[owner], len(weights)))
-            continue
-        at_all = np.isin(nodes, zone.nodal.nodes).all()
-        shape = kind.name if at_all else kind.skeleton
-        own = nodes if at_all else nodes[:, : kind.n_vertices]
-        pressure = zone.nodal.multiplier[np.searchsorted(zone.nodal.nodes, own)]
-        parts.append((pressure @ shape_functions(shape).values(reference).T).ravel())
-    return np.concatenate(parts)
+    if zone.recovered is not None:
+        places = shape_functions(name).values(reference) @ points[nodes]
+        return zone.recovered.values(zone.multiplier, owner, places)
+    if zone.nodal is None:
+        return np.repeat(zone.multiplier[owner][:, None], len(reference), axis=1)
+    kind = cell_type(name)
+    at_all = np.isin(nodes, zone.nodal.nodes).all()
+    own = nodes if at_all else nodes[:, : kind.n_vertices]
+    pressure = zone.nodal.multiplier[np.searchsorted(zone.nodal.nodes, own)]
+    return pressure @ shape_functions(name if at_all else kind.skeleton).values(reference).T
 
 
 class ExactValues:

@@ -38,6 +38,7 @@ def check_groups(case: Case, mesh: meshio.Mesh) -> None:
     for i, zone in enumerate(case.zones):
         groups.check_zone(i, zone)
     groups.check_loads()
+    groups.check_probes()
 
 
 def _refuse_beyond_axis(case: Case, points: np.ndarray) -> None:
@@ -91,7 +92,8 @@ def _named(case: Case) -> set[str]:
     sides = [side for zone in case.zones for side in (zone.slave, zone.master)]
     held = [support.group for support in case.supports]
     loaded = [load.group for load in case.loads]
-    return {*case.materials, *case.rigid, *case.counts, *sides, *held, *loaded}
+    probed = [name for probe in case.probes for name in (probe.group, probe.within)]
+    return {*case.materials, *case.rigid, *case.counts, *sides, *held, *loaded, *probed}
 
 
 class _Groups:
@@ -183,11 +185,11 @@ class _Groups:
     def check_supports(self) -> None:
         for i, support in enumerate(self.case.supports):
             key = f"supports[{i}].group"
-            if support.spring and not self.of_nodes(key, support.group):
+            if support.spring and support.group != ALL and not self.of_nodes(key, support.group):
                 self.cells(key, support.group, self.dim - 1)
             if support.group == ALL:
-                if "normal" in support.fix:
-                    allowed = "normal needs a group of faces; `all` is fixed along x, y and z"
+                if "normal" in {*support.fix, *support.spring}:
+                    allowed = "normal needs a group of faces; `all` is held along x, y and z"
                     raise self.error(key, ALL, allowed)
                 continue
             self.require(key, support.group)
@@ -248,6 +250,13 @@ class _Groups:
             self.cells(f"bodies.{group}", group, self.dim)
         for group in self.case.counts:
             self.cells(f"counts.{group}", group, self.dim)
+
+    def check_probes(self) -> None:
+        for probe in self.case.probes:
+            if probe.group and probe.group != ALL:
+                self.require(f"probes.{probe.name}.group", probe.group)
+            if probe.within:
+                self.cells(f"probes.{probe.name}.within", probe.within, self.dim)
 
     def check_zone(self, number: int, zone: Zone) -> None:
         """Two surfaces without a common face, the slave's not on a rigid body."""

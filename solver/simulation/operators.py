@@ -1,23 +1,28 @@
 """The gap operator of a zone from its faces: initial gaps, and the recovery of its pressure."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..case.model import Zone
-from ..mechanics.fem.faces import FaceBlock, surface_points
+from ..mechanics.fem.faces import FACE_POINTS, FaceBlock, surface_points
 from ..mechanics.mortar.cut import SubFaces
 from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
-from ..mechanics.mortar.master_normals import sharpest, with_master_normals
+from ..mechanics.mortar.master_normals import sharpest, with_directions, with_master_normals
 from ..mechanics.mortar.multipliers import constants
-from ..mechanics.mortar.operator import GapOperator, gap_operator
+from ..mechanics.mortar.operator import GapOperator, Scheme, gap_operator
+from ..mechanics.mortar.points import gauss
+from ..mechanics.mortar.quadric import Quadric, frame, meet_quadric
 from ..mechanics.mortar.reconstruction import form_of, vertex_neighbours
 from ..mechanics.mortar.recovery import Asked
+from ..mechanics.mortar.surface_points import face_samples
 from ..mechanics.mortar.treatments import scheme_of
 from ..mesh.catalogue import BY_NAME
 from ..system.errors import InputError
 from .attributes import Attributes, CutZone
 from .options import Options
+from .rigid import quadric_of
 
 # Half of the largest angle between neighbouring faces of a master whose normals contact follows.
 _SMOOTH = np.radians(30)
@@ -32,23 +37,36 @@ def operator_of(
     options: Options,
 ) -> GapOperator:
     """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
-    points, count = groups.points, sum(len(block.nodes) for block in faces.slave_faces)
+    points, count = groups.points, faces.count
     around = groups.axisymmetric
     slaves = [facets(points, f.type, f.nodes, f.macro, around) for f in faces.sub_faces]
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
-    materials = groups.materials_behind(master_faces)
-    masters = _master_facets(points, master_faces, materials, around)
-    if zone.normal == "master":
-        _refuse_sharp(groups, zone, masters)
-        slaves = with_master_normals(slaves, masters, points)
-    if not options.shortcuts.quadrature:
-        slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     scheme = scheme_of(zone.treatment, zone.points)
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
+    if surface := quadric_of(groups.case, zone.master, groups.origin):
+        masters = [frame(points, groups.nodes(zone.master, "contact"))]
+        if zone.normal == "master":
+            slaves = with_directions(slaves, -surface.gradient(points))
+        scheme = _without_segments(scheme, surface)
+    else:
+        materials = groups.materials_behind(master_faces)
+        masters = _master_facets(points, master_faces, materials, around)
+        if zone.normal == "master":
+            _refuse_sharp(groups, zone, masters)
+            slaves = with_master_normals(slaves, masters, points)
+        if not options.shortcuts.quadrature:
+            slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
     operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
     return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
+
+
+def _without_segments(scheme: Scheme, surface: Quadric) -> Scheme:
+    """The scheme for a rigid surface without a mesh: points of whole faces in place of segments."""
+    sample = partial(gauss, n=FACE_POINTS) if scheme.sample is face_samples else scheme.sample
+    meet = partial(meet_quadric, surface)
+    return replace(scheme, sample=sample, meet=meet, closure=False, nearest=False)
 
 
 def _refuse_sharp(groups: Attributes, zone: Zone, masters: list[Facets]) -> None:
@@ -73,6 +91,8 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> A
     for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
         material[block.number] = number
     form = form_of(zone.recovery, order, corners)
+    if form.sweeps and zone.sweeps:
+        form = replace(form, sweeps=zone.sweeps)
     softness = None
     if zone.stabilised:
         softness = np.array([1 / m.young for m in groups.case.materials.values()] + [0.0])

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..mechanics.fem.mixed import AUTOMATIC_ABOVE
 from ..mechanics.mortar.cut import needs_cut
-from .accuracy import NOTED_STRAIN
 from .constraints import MIN_COVERAGE
 from .naming import body_names
 from .options import Options
@@ -123,10 +122,3 @@ def yielding(solution: Solution) -> Iterator[Line]:
             yield Line(
                 what, "so far contact gives way to pressures that differ from their neighbours"
             )
-
-
-def strained(solution: Solution) -> Iterator[Line]:
-    """A note where strains or rotations are not small."""
-    if max(solution.strain, solution.rotation) > NOTED_STRAIN:
-        what = f"largest strain {solution.strain:.1e}, rotation {solution.rotation:.1e}"
-        yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")

@@ -12,6 +12,7 @@ from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.loads import Field
 from ..mechanics.fem.springs import at_nodes, foundation
 from ..system.errors import InputError
+from .groups import ALL
 
 if TYPE_CHECKING:
     from .attributes import Attributes
@@ -49,8 +50,8 @@ def _spring(
     groups: Attributes, group: str, direction: str, value: Scalar, key: str
 ) -> sparse.csr_matrix:
     points, axis, stiffness = groups.points, "xyz".find(direction), _stiffness(groups, value, key)
-    if group in groups.mesh.point_sets:
-        nodes = np.asarray(groups.mesh.point_sets[group], dtype=int)
+    if group == ALL or group in groups.mesh.point_sets:
+        nodes = groups.nodes(group, key)
         return at_nodes(points, nodes, stiffness(points[nodes]), axis)
     along = None if axis < 0 else np.eye(points.shape[1])[axis]
     return sum(

@@ -19,7 +19,8 @@ def resultants(
     field: RecoveredZone | None,
 ) -> Resultants:
     """Area and edges of the `closed` macro-elements (m,), and the forces on the slave."""
-    edges, area = _extent(scene, zone, zone.by_macro_element(state.pressure), closed)
+    mean = zone.by_macro_element(state.pressure)
+    edges, area = _extent(scene, zone, mean, closed)
     forces = zone.operator.matrix.T @ state.pressure[zone.numbers]
     if field is not None:
         forces = forces + field.force
@@ -29,7 +30,13 @@ def resultants(
     moment = np.cross(places, np.pad(force, ((0, 0), (0, 3 - force.shape[1])))).sum(axis=0)
     if scene.case.axisymmetric:
         moment = np.zeros(3)
-    return Resultants(area=area, force=force.sum(axis=0), moment=moment, edges=edges)
+    return Resultants(
+        area=area,
+        force=force.sum(axis=0),
+        moment=moment,
+        edges=edges,
+        pressure=np.array([mean.min(), mean.max()]),
+    )
 
 
 def _extent(

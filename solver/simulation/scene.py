@@ -25,6 +25,7 @@ from .groups import ON_AXIS, check_groups, named_parts
 from .operators import operator_of
 from .options import LEAN, Options
 from .relations import springs_of
+from .rigid import Frame
 from .selections import with_groups
 from .surfaces import Surfaces, surfaces_of
 
@@ -103,9 +104,9 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `fixed`: the displacements that are held, by key of the case file. `springs` (n_dofs,
-    n_dofs) is the stiffness of springs to the ground. `force` (n, dim) and `free.offset` are for
-    load factor 1.
+    up for it. `fixed`: the displacements that are held, by key of the case file, `rigid`: the rigid
+    bodies. `springs` (n_dofs, n_dofs) is the stiffness of springs to the ground. `probed`: nodes by
+    probe. `force` (n, dim) and `free.offset` are for load factor 1.
     """
 
     case: Case
@@ -120,9 +121,11 @@ class Scene:
     blocks: list[Block]
     mean: MeanStress
     fixed: dict[str, Fixed]
+    rigid: dict[str, Frame]
     free: FreeMotion
     force: np.ndarray
     springs: sparse.csr_matrix
+    probed: dict[str, np.ndarray]
     histories: dict[str, tuple[np.ndarray, np.ndarray]]
     zones: list[ZoneScene]
     rest: Rest
@@ -172,6 +175,8 @@ def build_scene(
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
     ]
     groups = Attributes(case, local, cut_mesh, cut_zones, origin)
+    # The master surface of a zone may be the slave surface of another, and cut.
+    surfaces = [(slave, groups.as_cut(master)) for slave, master in surfaces]
     with stage(clock, "pairing"):
         noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
         operators = [
@@ -202,9 +207,11 @@ def build_scene(
         blocks=blocks,
         mean=mean,
         fixed=groups.fixed,
+        rigid=groups.frames,
         free=free,
         force=force,
         springs=springs,
+        probed={p.name: groups.nodes(p.group, "probes") for p in case.probes if p.group},
         histories=groups.histories(),
         zones=zones,
         rest=Rest(
@@ -222,18 +229,23 @@ def _zones(
     operators: Sequence[GapOperator],
     free: FreeMotion,
 ) -> list[ZoneScene]:
-    """The zones, multipliers of fixed nodes merged with others where the treatment does so."""
+    """The zones; multipliers of nodes that are fixed, or have one of another zone, are merged."""
     found: list[ZoneScene] = []
-    first = 0
+    first, taken = 0, None
+    if sum(operator.nodes is not None for operator in operators) > 1:
+        dim = operators[0].surface.centre.shape[1]
+        taken = np.zeros((free.basis.shape[0] // dim, dim, dim))
     for i, zone in enumerate(case.zones):
         operator, (slave, master) = operators[i], surfaces[i]
-        if TREATMENTS[zone.treatment].joins:
-            operator = merge_fixed_multipliers(operator, free.basis)
+        joins = TREATMENTS[zone.treatment].joins
+        if joins or (taken is not None and operator.nodes is not None):
+            basis = free.basis if joins else sparse.identity(free.basis.shape[0], format="csr")
+            operator = merge_fixed_multipliers(operator, basis, taken)
         found.append(
             ZoneScene(
                 zone=zone,
                 first=first,
-                count=sum(len(block.nodes) for block in slave),
+                count=cut_zones[i].count,
                 slave_faces=slave,
                 master_faces=master,
                 sub_faces=cut_zones[i].sub_faces,

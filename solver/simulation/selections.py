@@ -13,15 +13,19 @@ from ..mechanics.fem.faces import corner_sets
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError, hint
 from .groups import ALL, with_cells
+from .rigid import with_rigid_surfaces
 
 # A node is at a place where it is nearer than this share of the mesh's extent.
 _NEAR = 1e-6
 
 
 def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
-    """The mesh with the groups that the case makes; raises InputError where one is empty."""
+    """The mesh with the groups and rigid surfaces that the case makes.
+
+    Raises InputError where one is empty.
+    """
     if not case.selections:
-        return mesh
+        return with_rigid_surfaces(case, mesh)
     check_dimension(case, mesh.points.shape[1])
     mesh = meshio.Mesh(
         mesh.points,
@@ -38,7 +42,8 @@ def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
             raise InputError(case.path, selection.key, selection.name, allowed)
         _add(case, mesh, selection)
     mesh.cell_sets.pop(_OUTER, None)
-    return with_cells(mesh, [np.arange(len(b.data)) < given.get(b.type, 0) for b in mesh.cells])
+    mesh = with_cells(mesh, [np.arange(len(b.data)) < given.get(b.type, 0) for b in mesh.cells])
+    return with_rigid_surfaces(case, mesh)
 
 
 def _add(case: Case, mesh: meshio.Mesh, selection: Selection) -> None:

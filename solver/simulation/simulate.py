@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 
 from ..case.model import Case, Step
-from ..mechanics.fem.elasticity import largest_strain, nodal_stress
+from ..mechanics.fem.elasticity import nodal_stress
 from ..mechanics.fem.faces import nodal_normals
 from ..mechanics.fem.stress import normal_stress
 from ..mesh.catalogue import BY_NAME
@@ -16,12 +16,19 @@ from ..system.clock import Clock, processor_time
 from ..system.errors import SolveError
 from ..system.memory import peak_mb
 from ..system.progress import OUTCOME, stage
-from .balance import imbalances, pressures_of_forces, reactions, strain_energy
+from .balance import (
+    imbalances,
+    pressures_of_forces,
+    reactions,
+    rigid_bodies,
+    strain_energy,
+)
 from .consistency import inconsistency
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
-from .plan import decided, estimated, noted, strained, yielding
+from .plan import decided, estimated, noted, yielding
+from .probes import probed
 from .problem import ContactProblem, Equilibrium
 from .recovery import Recovered, RecoveredZone, recovered
 from .resultants import resultants
@@ -35,6 +42,7 @@ from .solution import (
     ZoneResult,
 )
 from .unloaded import without_unloaded
+from .validity import remarks, validity
 
 _LOG = logging.getLogger(__name__)
 # Half, but for round-off.
@@ -75,43 +83,58 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
     with stage(clock, "solve"):
-        states, recovered = _walk(problem)
+        states, fields = _walk(problem)
     plan += noted(problem, states)
     with stage(clock, "recovery"):
-        solution = _recover(problem, states, recovered, plan)
-    for zone in solution.zones:
-        _LOG.log(OUTCOME, "zone %s: %s", zone.name, zone.resultants)
-    for reaction in solution.reactions:
-        _LOG.log(OUTCOME, "reaction of %s: %s", reaction.group, reaction)
-    largest, place = solution.largest_displacement
-    at = ", ".join(f"{x:.5g}" for x in place)
-    told = largest, at, solution.strain_energy
-    _LOG.log(OUTCOME, "largest displacement %.6g at (%s), strain energy %.6g", *told)
-    solution.plan += [*estimated(solution), *strained(solution), *yielding(solution)]
+        solution = _recover(problem, states, fields, plan)
+    _tell_forces(solution)
+    solution.plan += [*estimated(solution), *remarks(solution.validity), *yielding(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
     return solution
 
 
-def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], Recovered]:
+def _tell_forces(solution: Solution) -> None:
+    """Log the forces of each step, and the largest displacement and strain of the last."""
+    for step, given in zip(solution.steps, solution.case.steps, strict=True):
+        of_step = f"{_called(given, step.factor)}, " if len(solution.steps) > 1 else ""
+        for name, forces in step.resultants.items():
+            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, forces)
+        for reaction in step.reactions:
+            _LOG.log(OUTCOME, "%sreaction of %s: %s", of_step, reaction.group, reaction)
+        for body in step.rigid:
+            _LOG.log(OUTCOME, "%scontact on rigid body %s: %s", of_step, body.body, body)
+    for name, probe in solution.probes.items():
+        for line in probe.lines():
+            _LOG.log(OUTCOME, "probe %s %s", name, line)
+    largest, place = solution.largest_displacement
+    at = ", ".join(f"{x:.5g}" for x in place)
+    told = largest, at, solution.validity.strain, solution.strain_energy
+    text = "largest displacement %.6g at (%s), largest strain %.3g, strain energy %.6g"
+    _LOG.log(OUTCOME, text, *told)
+
+
+def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
     """Solve the steps in turn, each from the status of the one before.
 
-    With the states the pressure recovered in the last one.
+    With each state the pressure recovered in it.
     """
     states: list[Equilibrium] = []
-    fields: Recovered = {}
+    fields: list[Recovered] = []
     case = problem.scene.case
     for factor, step in zip(case.factors, case.steps, strict=True):
         start = states[-1].status.closed if states else None
         state = problem.solve(step, start)
         if (state.trial.offence(state.iterate.closed) > 1).any():
             raise SolveError(f"{_called(step, factor)}: contact bears tension or surfaces overlap")
-        state, fields = recovered(problem, state, step)
+        state, field = recovered(problem, state, step)
         states.append(state)
+        fields.append(field)
         closed = int(state.status.closed.sum())
-        told = _called(step, factor), state.status.iterations, closed, state.residual
-        _LOG.log(OUTCOME, "%s: %d iterations, %d closed, residual %.1e", *told)
+        count = state.status.iterations
+        told = _called(step, factor), count, "" if count == 1 else "s", closed, state.residual
+        _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *told)
     return states, fields
 
 
@@ -122,7 +145,7 @@ def _called(step: Step, factor: float) -> str:
 
 
 def _recover(
-    problem: ContactProblem, states: list[Equilibrium], fields: Recovered, plan: list[Line]
+    problem: ContactProblem, states: list[Equilibrium], fields: list[Recovered], plan: list[Line]
 ) -> Solution:
     scene = problem.scene
     last = states[-1]
@@ -132,10 +155,10 @@ def _recover(
     stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
     if scene.case.thin:
         stress[:, 2] = 0.0
-    scale = _stress_scale(scene, stress)
-    strain, rotation = largest_strain(scene.points, scene.blocks, last.displacement)
+    scale = _stress_scale(scene, states, stress)
+    steps, at_nodes = _step_results(scene, states, fields, scale)
     zones = [
-        _zone_result(scene, zone, last, stress, forces, fields.get(zone.zone.name))
+        _zone_result(scene, zone, last, stress, forces, fields[-1].get(zone.zone.name), steps[-1])
         for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
     ]
     return Solution(
@@ -148,7 +171,7 @@ def _recover(
         zones=zones,
         nodal_normal_stress=normal_stress(stress, _contact_direction(scene)),
         balance=imbalances(scene, last),
-        steps=_step_results(scene, states, scale),
+        steps=steps,
         length=scene.length,
         load_scale=scale,
         dofs=scene.n_dofs,
@@ -158,10 +181,10 @@ def _recover(
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
         plan=plan,
-        strain=strain,
-        rotation=rotation,
+        validity=validity(scene, states),
         strain_energy=strain_energy(last),
-        reactions=reactions(scene, last),
+        reaction=at_nodes,
+        probes=probed(scene, zones, last.displacement, stress),
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
     )
@@ -198,6 +221,7 @@ def _zone_result(
     stress: np.ndarray,
     pressure_of_forces: np.ndarray | None,
     field: RecoveredZone | None,
+    step: StepResult,
 ) -> ZoneResult:
     surface = zone.operator.surface
     slave_nodes, slave_normal = _nodal_normals(
@@ -205,7 +229,6 @@ def _zone_result(
     )
     master = [(b.type.name, b.nodes) for b in zone.master_faces]
     master_nodes, master_normal = _nodal_normals(scene, master)
-    closed = _closed(zone, state)
     return ZoneResult(
         name=zone.zone.name,
         faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
@@ -215,7 +238,7 @@ def _zone_result(
         area=surface.area,
         multiplier=zone.by_macro_element(state.pressure),
         gap=zone.by_macro_element(state.gap),
-        closed=closed,
+        closed=_closed(zone, state),
         coverage=surface.covered / surface.area,
         stress_slave=normal_stress(stress[slave_nodes], slave_normal),
         stress_master=normal_stress(stress[master_nodes], master_normal),
@@ -225,7 +248,7 @@ def _zone_result(
         pressure_of_forces=pressure_of_forces,
         pressure_error=None if field is None else field.error,
         recovered=_recovered_pressure(scene, zone, state, field),
-        resultants=resultants(scene, zone, state, closed, field),
+        resultants=step.resultants[zone.zone.name],
     )
 
 
@@ -278,9 +301,12 @@ def _nodal_normals(
     return nodes, total[nodes]
 
 
-def _step_results(scene: Scene, states: list[Equilibrium], scale: float) -> list[StepResult]:
-    results = []
-    for factor, state in zip(scene.case.factors, states, strict=True):
+def _step_results(
+    scene: Scene, states: list[Equilibrium], fields: list[Recovered], scale: float
+) -> tuple[list[StepResult], np.ndarray]:
+    """The steps, and the reactions at nodes (n, dim) in the last one."""
+    results, at_nodes = [], np.zeros(0)
+    for factor, state, field in zip(scene.case.factors, states, fields, strict=True):
         seen = []
         for wanted in scene.case.observe:
             zone = next(z for z in scene.zones if z.zone.name == wanted.zone)
@@ -297,6 +323,7 @@ def _step_results(scene: Scene, states: list[Equilibrium], scale: float) -> list
                     "coverage": float(surface.covered[local] / surface.area[local]),
                 }
             )
+        held, at_nodes = reactions(scene, state)
         product = float(np.abs(state.pressure * state.gap).max(initial=0.0))
         results.append(
             StepResult(
@@ -306,16 +333,29 @@ def _step_results(scene: Scene, states: list[Equilibrium], scale: float) -> list
                 residual=state.residual,
                 complementarity=product / (scale * scene.length),
                 observations=seen,
+                resultants={
+                    (name := zone.zone.name): resultants(
+                        scene, zone, state, _closed(zone, state), field.get(name)
+                    )
+                    for zone in scene.zones
+                },
+                reactions=held,
+                rigid=rigid_bodies(scene, state),
             )
         )
-    return results
+    return results, at_nodes
 
 
-def _stress_scale(scene: Scene, stress: np.ndarray) -> float:
-    """The largest pressure among the loads (as a number), else the largest stress, else 1."""
+def _stress_scale(scene: Scene, states: list[Equilibrium], stress: np.ndarray) -> float:
+    """The largest pressure of any step among the loads (as a number).
+
+    Else the largest contact pressure of any step or `stress` (n, 6), else 1.
+    """
     values = [
-        abs(load.value)
+        abs(load.value * (step.get(load.name, 1.0) if isinstance(step, dict) else step))
         for load in scene.case.loads
+        for step in scene.case.steps
         if load.kind == "pressure" and isinstance(load.value, float)
     ]
-    return max(values, default=0.0) or float(np.abs(stress).max(initial=0.0)) or 1.0
+    largest = [np.abs(field).max(initial=0.0) for field in (stress, *(s.pressure for s in states))]
+    return max(values, default=0.0) or float(max(largest)) or 1.0

@@ -7,7 +7,7 @@ open, stress is positive in tension.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -108,24 +108,55 @@ class Reaction:
 
 
 @dataclass
+class RigidMotion:
+    """A rigid body: its motion, and the contact force on it.
+
+    `translation` (dim,) and `rotation` (3,) in radians at the reference `point` (dim,); `force`
+    (dim,) of contact on the body and its `moment` (3,) about the point. Axisymmetric bodies turn by
+    nothing and have no moment.
+    """
+
+    body: str
+    point: np.ndarray
+    translation: np.ndarray
+    rotation: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+
+    def __str__(self) -> str:
+        names = "point", "translation", "rotation", "force", "moment"
+        shown = {name: ", ".join(f"{x:.6g}" for x in getattr(self, name)) for name in names}
+        return (
+            f"force ({shown['force']}), moment ({shown['moment']}) about ({shown['point']}), "
+            f"moved by ({shown['translation']}), turned by ({shown['rotation']})"
+        )
+
+
+@dataclass
 class Resultants:
     """The resultants of contact in a zone.
 
     `area` (3,): that of contact, and bounds below and above; `force` (dim,) on the slave and its
     `moment` (3,) about the origin of the coordinates; `edges`: where contact ends in 2D. In 3D the
     edge is known to one macro-element only: the area is that of the closed ones, its bounds those
-    without their rim and with the open ones around it.
+    without their rim and with the open ones around it. `pressure` (2,): the smallest and the
+    largest of the macro-elements; None in files of earlier versions.
     """
 
     area: np.ndarray
     force: np.ndarray
     moment: np.ndarray
     edges: Edges | None = None
+    pressure: np.ndarray | None = None
 
     def __str__(self) -> str:
         area, low, high = (f"{value:.5g}" for value in self.area)
-        force = ", ".join(f"{value:.6g}" for value in self.force)
-        text = f"contact area {area} ({low} to {high}), force ({force}) on the slave"
+        force, moment = (", ".join(f"{x:.6g}" for x in v) for v in (self.force, self.moment))
+        text = f"contact area {area} ({low} to {high}), force ({force}) on the slave, "
+        text += f"moment ({moment})"
+        if self.pressure is not None:
+            low, high = (f"{value:.6g}" for value in self.pressure)
+            text = f"pressure {low} to {high}, {text}"
         if self.edges is None or not len(self.edges.better):
             return text
         places = (
@@ -133,6 +164,31 @@ class Resultants:
             for place, better in zip(self.edges.position, self.edges.better, strict=True)
         )
         return f"{text}, edge at {' and '.join(places)}"
+
+
+@dataclass
+class ProbeResult:
+    """The values at the `place` (k, dim) of a probe: `displacement` (k, dim) and `stress` (k, 6).
+
+    Or the contact `pressure` (k,). NaN where the probe asks for the other kind.
+    """
+
+    place: np.ndarray
+    displacement: np.ndarray
+    stress: np.ndarray
+    pressure: np.ndarray
+
+    def lines(self, most: int = 10) -> Iterator[str]:
+        """Each place with its values, `most` of them at most."""
+        for i, place in enumerate(self.place[:most]):
+            given = (
+                f"{name} ({', '.join(f'{x:.6g}' for x in np.atleast_1d(values[i]))})"
+                for name, values in vars(self).items()
+                if name != "place" and np.isfinite(values[i]).all()
+            )
+            yield f"at ({', '.join(f'{x:.5g}' for x in place)}): {', '.join(given)}"
+        if len(self.place) > most:
+            yield f"{len(self.place) - most} further places are in the result file"
 
 
 @dataclass
@@ -201,6 +257,22 @@ def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
 
 
 @dataclass
+class Validity:
+    """How far a solve is from what it takes for granted, the largest of all load steps.
+
+    `strain` (principal) and `rotation` (radians), in the middle of the cells; `slip` of closed
+    contact, a mean over the macro-element, by the size of that; `pushed_past`: the number of cells
+    inside another body; `partly_covered`: of closed macro-elements under the end of the master.
+    """
+
+    strain: float = float("nan")
+    rotation: float = float("nan")
+    slip: float = float("nan")
+    pushed_past: int = 0
+    partly_covered: int = 0
+
+
+@dataclass
 class StepResult:
     """One load step: load factor, cost of the status iteration, and what was observed.
 
@@ -208,7 +280,8 @@ class StepResult:
     macro-element, relative to the scale of stress times the model's length.
 
     `observations` holds one mapping per observed macro-element, in the order of the case file:
-    zone, macro_element (number), pressure, gap, status (0 or 1), coverage.
+    zone, macro_element (number), pressure, gap, status (0 or 1), coverage. `resultants` of contact
+    by zone, `reactions` and motions of `rigid` bodies; all empty in files of earlier versions.
     """
 
     factor: float
@@ -217,6 +290,9 @@ class StepResult:
     residual: float
     complementarity: float
     observations: list[dict[str, Any]]
+    resultants: dict[str, Resultants] = field(default_factory=dict)
+    reactions: list[Reaction] = field(default_factory=list)
+    rigid: list[RigidMotion] = field(default_factory=list)
 
 
 @dataclass
@@ -228,11 +304,12 @@ class Solution:
     `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
     `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
     the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
-    largest stress. `strain` and `rotation` (radians) are the largest of the last load factor.
+    largest stress. `validity`: see there.
     `accuracy` are the relative errors that rounding alone may cause, by cause (see
     `solver.simulation.accuracy`). `mean_stress` holds, by cell type, the stress s of cells in mixed
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
-    `reactions` of supports and `strain_energy` are those of the last load factor.
+    `strain_energy` is that of the last load factor, and so is `reaction` (n, dim), the forces at
+    nodes with which supports, rigid bodies, springs and ties hold the bodies; `probes` by name.
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
     `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
     the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
@@ -259,10 +336,10 @@ class Solution:
     plan: list[Line]
     matrix_entries: int = 0
     linear_iterations: int = 0
-    strain: float = float("nan")
-    rotation: float = float("nan")
+    validity: Validity = field(default_factory=Validity)
     strain_energy: float | None = None
-    reactions: list[Reaction] = field(default_factory=list)
+    reaction: np.ndarray | None = None
+    probes: dict[str, ProbeResult] = field(default_factory=dict)
     accuracy: dict[str, float] = field(default_factory=dict)
     mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
@@ -282,9 +359,21 @@ class Solution:
         return self.case.hexahedra
 
     @property
+    def reactions(self) -> list[Reaction]:
+        """What holds each group in the last step."""
+        return self.steps[-1].reactions
+
+    @property
+    def rigid(self) -> list[RigidMotion]:
+        """The rigid bodies in the last step."""
+        return self.steps[-1].rigid
+
+    @property
     def largest_displacement(self) -> tuple[float, np.ndarray]:
-        """The length of the largest displacement, and its place (dim,)."""
-        size = np.linalg.norm(self.displacement, axis=1)
+        """The length of the largest displacement of deformable bodies, and its place (dim,)."""
+        from .exact import deformable
+
+        size = np.linalg.norm(self.displacement, axis=1) * deformable(self)
         node = int(size.argmax())
         return float(size[node]), self.mesh.points[node]
 

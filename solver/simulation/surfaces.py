@@ -3,7 +3,6 @@
 from typing import TypeAlias
 
 import meshio
-import numpy as np
 
 from ..case.model import Case, Zone
 from ..mechanics.fem.faces import FaceBlock
@@ -19,10 +18,9 @@ def surfaces_of(case: Case, mesh: meshio.Mesh) -> Surfaces:
     """Slave and master faces of each zone.
 
     Raises InputError where a treatment does not exist for a slave face, where a slave face of an
-    axisymmetric body lies on the axis, and where two zones share a slave node.
+    axisymmetric body lies on the axis, and where two zones share a slave face.
     """
-    owner: dict[int, str] = {}
-    surfaces = []
+    surfaces: Surfaces = []
     for i, zone in enumerate(case.zones):
         slave, master = (
             faces_of(mesh, getattr(zone, side), case, case.zone_key(i, side))
@@ -31,17 +29,7 @@ def surfaces_of(case: Case, mesh: meshio.Mesh) -> Surfaces:
         _refuse_untreated(case, i, zone, slave)
         if case.axisymmetric:
             _refuse_on_axis(case, mesh, i, slave)
-        nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave])).tolist()
-        shared = [n for n in nodes if n in owner]
-        if shared:
-            raise InputError(
-                case.path,
-                case.zone_key(i, "slave"),
-                zone.slave,
-                f"{len(shared)} of its nodes are slave nodes of zone {owner[shared[0]]} too; "
-                "a node may be a slave in one zone only",
-            )
-        owner |= dict.fromkeys(nodes, zone.name)
+        _refuse_common_faces(case, i, slave, surfaces)
         surfaces.append((slave, master))
     return surfaces
 
@@ -56,6 +44,17 @@ def _refuse_untreated(case: Case, i: int, zone: Zone, slave: list[FaceBlock]) ->
                 f"{treatment.why}; allowed there: {', '.join(others)}"
             )
             raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
+
+
+def _refuse_common_faces(case: Case, i: int, slave: list[FaceBlock], others: Surfaces) -> None:
+    """A face has one multiplier, the pressure of one zone."""
+    for zone, (faces, _) in zip(case.zones, others, strict=False):
+        if common := sum(len(a.common(b)[0]) for a in slave for b in faces):
+            allowed = (
+                f"{common} of its faces are slave faces of zone {zone.name} too: give one zone "
+                "both master surfaces, as a list"
+            )
+            raise InputError(case.path, case.zone_key(i, "slave"), case.zones[i].slave, allowed)
 
 
 def _refuse_on_axis(case: Case, mesh: meshio.Mesh, i: int, slave: list[FaceBlock]) -> None:

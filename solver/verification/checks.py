@@ -69,6 +69,10 @@ class Check:
                 return overrides[name]
         return overrides.get("all", RELATIVE) if self.tolerance is None else self.tolerance
 
+    def expected_in(self, expected: Mapping[str, float]) -> float | None:
+        """The expected error by a case's; None where a tolerance is stated."""
+        return expected.get(self.name, expected.get(self.like))
+
 
 def block_size(solution: Solution) -> float:
     """The extent of the smallest body."""
@@ -95,10 +99,15 @@ def _elongation(solution: Solution) -> float:
 
 
 def _total_force(solution: Solution) -> float:
-    """The largest reaction or contact force; one where nothing acts."""
-    forces = [r.force for r in solution.reactions]
-    forces += [zone.resultants.force for zone in solution.zones if zone.resultants]
+    """The largest reaction or contact force of any step; one where nothing acts."""
+    forces = [one.force for step in solution.steps for one in step.reactions]
+    forces += [one.force for step in solution.steps for one in step.resultants.values()]
     return max((float(np.abs(force).max()) for force in forces), default=0.0) or 1.0
+
+
+def _total_moment(solution: Solution) -> float:
+    """The largest force times the extent of the smallest body."""
+    return _total_force(solution) * block_size(solution)
 
 
 def _unit(_: Solution) -> float:
@@ -139,6 +148,17 @@ CHECKS: tuple[Check, ...] = (
     Check("force", None, "force", samples.contact_force, _total_force),
     Check("contact_area", None, "contact_area", samples.contact_area, _unit),
     Check("reaction", None, "reaction", samples.reaction, _total_force, by_zone=False),
+    Check("moment", None, "moment", samples.moment, _total_moment, by_zone=False),
+    Check(
+        "displacement_at",
+        None,
+        "displacement_at",
+        samples.probed("displacement"),
+        _elongation,
+        by_zone=False,
+    ),
+    Check("stress_at", None, "stress_at", samples.probed("stress"), _load, by_zone=False),
+    Check("pressure_at", None, "pressure_at", samples.probed("pressure"), _load, by_zone=False),
     Check("strain_energy", None, "strain_energy", samples.strain_energy, _unit, by_zone=False),
     Check("counts", None, None, samples.counts, _unit, 0.0, fixed=True, by_zone=False),
     Check("observation", "OBSERVATION/PRES", _PRESSURE, samples.observed("pressure"), _load),
@@ -225,6 +245,7 @@ def _judge(
         scale=scale,
         error=error,
         tolerance=tolerance,
+        expected=check.expected_in(solution.case.expected),
         regression=regression,
         passed=error <= tolerance and (regression is None or regression.passed),
         verifies=check.verifies,

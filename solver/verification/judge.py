@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,16 +11,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..case import job_name
-from ..simulation.accuracy import Accuracy, beyond_small_strain
+from ..simulation.accuracy import Accuracy
+from ..simulation.validity import limits_passed
 from .scatter import oscillating
 from .verdict import (
+    EXACT,
+    EXPECTED,
     FAILED,
     PASSED,
     SOLVED,
+    STATED,
     UNRELIABLE,
     Body,
     CheckError,
     CheckResult,
+    Force,
     Sides,
     Verdict,
 )
@@ -42,7 +47,13 @@ ACCURACY = (
     "displacement",
     "stress_components",
     "integration_stress",
+    "displacement_at",
+    "stress_at",
+    "pressure_at",
 )
+# Checks whose tolerance is round-off whatever the mesh: they say nothing of a solve's strictness.
+OF_STATUS = ("element_gap", "observation_gap", "element_status", "coverage")
+_ROUND_OFF = 1e-10
 # Fields that a verdict copies from a solution.
 _OF_SOLUTION = (
     *("dofs", "macro_elements", "iterations", "linear_solver", "linear_iterations"),
@@ -50,8 +61,7 @@ _OF_SOLUTION = (
         "matrix_entries",
         "length",
         "load_scale",
-        "strain",
-        "rotation",
+        "strain_energy",
         "stage_cpu_seconds",
         "cpu_seconds",
     ),
@@ -70,13 +80,13 @@ def judge(
 
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
-    relative error that rounding alone may cause, is the first reason), where strain or rotation is
-    beyond small strain, or where the pressure oscillates. `result` is the name of the result file
-    beside the verdict and `sha256` its hash.
+    relative error that rounding alone may cause, is the first reason), where the solve is beyond
+    what linear theory takes for granted, or where the pressure oscillates. `result` is the name of
+    the result file beside the verdict and `sha256` its hash.
     """
     accuracy = Accuracy(solution.accuracy)
-    large = beyond_small_strain(solution.case, solution.strain, solution.rotation)
-    unreliable = [reason for reason in (accuracy.reason, large, oscillating(solution)) if reason]
+    unreliable = [reason for reason in (accuracy.reason, oscillating(solution)) if reason]
+    unreliable += limits_passed(solution.case, solution.validity)
     reasons = unreliable + [check.reason for check in checks if not check.passed]
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:
@@ -87,10 +97,12 @@ def judge(
         **_identity(solution.case, (solution.swapped, solution.hexahedra, solution.case.recovery)),
         verdict=word,
         passed=word == PASSED,
+        judged=_judged(checks) if word == PASSED else "",
         reason=_first_of(reasons) or (NOT_VERIFIED if word == SOLVED else ""),
         result=result,
         result_sha256=sha256,
         **{name: getattr(solution, name) for name in _OF_SOLUTION},
+        **asdict(solution.validity),
         seconds={**seconds, "total": seconds.get("total", sum(seconds.values()))},
         pressure=_extremes(zone.multiplier for zone in zones),
         stress=_extremes([solution.nodal_normal_stress[solution.body >= 0]]),
@@ -102,6 +114,8 @@ def judge(
         bodies=_bodies(solution),
         plan=[list(entry) for entry in solution.plan],
         checks=list(checks),
+        forces=list(_forces(solution)),
+        largest_displacement=solution.largest_displacement[0],
         attainable=accuracy.estimate,
         provenance=dict(provenance or {}),
     )
@@ -147,6 +161,15 @@ def _identity(case: Case | Path, told: Told) -> dict[str, Any]:
     return found | {"case": name, "family": family, "job": job_name(name, *told)}
 
 
+def _judged(checks: Iterable[CheckResult]) -> str:
+    """How strict the tolerances of the checks against a reference are."""
+    strict = [check for check in checks if check.verifies and check.name not in OF_STATUS]
+    loose = [check for check in strict if check.tolerance > _ROUND_OFF]
+    if not loose:
+        return EXACT
+    return STATED if any(check.expected is None for check in loose) else EXPECTED
+
+
 def _bodies(solution: Solution) -> list[Body]:
     counts = solution.case.counts
     return [
@@ -157,6 +180,20 @@ def _bodies(solution: Solution) -> list[Body]:
         )
         for body in solution.bodies
     ]
+
+
+def _forces(solution: Solution) -> Iterator[Force]:
+    """The forces of all steps: of each zone, of what holds each group, on each rigid body."""
+    for number, step in enumerate(solution.steps, start=1):
+        named: list[tuple[str, Any]]
+        named = [(f"zone {name}", one) for name, one in step.resultants.items()]
+        named += [(held.group, held) for held in step.reactions]
+        named += [(f"{one.body}, about its reference point", one) for one in step.rigid]
+        for name, one in named:
+            keys = ("force", "moment", "area", "pressure")
+            given = ((key, getattr(one, key, None)) for key in keys)
+            lists = {key: value.tolist() for key, value in given if value is not None}
+            yield Force(step=number, factor=step.factor, name=name, **lists)
 
 
 def _first_of(reasons: Sequence[str]) -> str:

@@ -25,7 +25,7 @@ def oscillation(
     """
     if zone.nodal is None:
         smooth = exact.regular(zone.centre)
-        return second_difference(_macro_elements(zone), zone.multiplier - mean, smooth)
+        return second_difference(macro_neighbours(zone), zone.multiplier - mean, smooth)
     place = points[zone.nodal.nodes]
     error = zone.nodal.multiplier - exact.contact_pressure(place)
     return second_difference(_nodes(zone, zone.nodal), error, exact.regular(place))
@@ -43,7 +43,17 @@ def second_difference(neighbours: Neighbours, error: np.ndarray, smooth: np.ndar
     return float(2 * np.abs(total[chosen] / count[chosen]).max(initial=0.0))
 
 
-def _macro_elements(zone: ZoneResult) -> Neighbours:
+def grown(neighbours: Neighbours, chosen: np.ndarray, times: int) -> np.ndarray:
+    """The chosen places (m,) and their neighbours, `times` over."""
+    pairs, _ = neighbours
+    for _ in range(times):
+        chosen = chosen.copy()
+        beside = chosen[pairs].any(axis=1)
+        chosen[pairs[beside]] = True
+    return chosen
+
+
+def macro_neighbours(zone: ZoneResult) -> Neighbours:
     """Macro-elements that share an edge of their sub-faces, or in 2D an end."""
     sides, owner = [], []
     for name, nodes, macro in zone.faces:

@@ -12,7 +12,11 @@ that the checks need, so that it can be judged without solving:
                    of nodes where the treatment has its multipliers there; in `recovered` the
                    coefficients of a recovered pressure and its values at nodes; in `resultants`
                    area, force and moment of contact, in `edges` where it ends in 2D
-    /bodies /balance /reactions /steps /observation /plan /timings /checks
+    /reactions /resultants /rigid
+                   what holds each group; area, force and moment of contact in each zone; motion of
+                   rigid bodies and contact on them; by step (counted from 0)
+    /probes        by name: places with displacement and stress, or pressure
+    /bodies /balance /steps /observation /plan /timings /checks
                    tables, a data set a column
     /provenance    versions, revision, hashes, machine
 
@@ -41,13 +45,13 @@ from ..simulation.consistency import inconsistency
 from ..simulation.solution import (
     BodyInfo,
     Line,
-    Reaction,
     Solution,
-    StepResult,
+    Validity,
 )
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
-from ..system.hdf5 import column, new_file, read_file, read_table, write_table
+from ..system.hdf5 import new_file, read_file, read_table, write_table
+from .steps import read_probes, read_steps, write_probes, write_steps
 from .units import label_fields
 from .verdict import CheckResult
 from .zones import read_zone, write_zone
@@ -72,7 +76,6 @@ _ON_FACES = {
     "coverage": "coverage",
     "pressure_error_estimate": "pressure_error_estimate",
 }
-_OBSERVED = ("pressure", "gap", "status", "coverage")
 
 
 @dataclass
@@ -107,11 +110,11 @@ def _write(
     _write_grid(file.create_group(GRID), solution)
     _write_case(file.create_group("case"), solution)
     file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
-    file["solve"].attrs.update(strain=solution.strain, rotation=solution.rotation)
     if solution.strain_energy is not None:
         file["solve"].attrs["strain_energy"] = solution.strain_energy
-    write_table(file.create_group("reactions"), [asdict(one) for one in solution.reactions])
+    write_probes(file.create_group("probes"), solution.probes)
     file.create_group("accuracy").attrs.update(solution.accuracy)
+    file.create_group("validity").attrs.update(asdict(solution.validity))
     file.create_group("errors").attrs.update(solution.errors)
     mean_stress = file.create_group("mean_stress")
     for kind, values in solution.mean_stress.items():
@@ -120,13 +123,21 @@ def _write(
     for number, zone in enumerate(solution.zones):
         write_zone(contact.create_group(zone.name), zone, number)
     _write_bodies(file.create_group("bodies"), solution.bodies)
-    _write_steps(file, solution.steps)
+    write_steps(file, solution.steps)
     write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
     write_table(file.create_group("timings"), _timings(solution))
     write_table(file.create_group("plan"), [line._asdict() for line in solution.plan])
     write_table(file.create_group("checks"), [_flat(check) for check in checks])
     file.create_group("provenance").attrs.update(provenance)
     label_fields(file[GRID], contact, solution.case.units)
+    file.attrs["objects"] = _objects(file)
+
+
+def _objects(file: h5py.File) -> int:
+    """The number of groups and datasets of a file: some need not be there, but none gets lost."""
+    names: list[str] = []
+    file.visit(names.append)
+    return len(names)
 
 
 def read_result(path: str | Path) -> Result:
@@ -136,8 +147,11 @@ def read_result(path: str | Path) -> Result:
     try:
         with read_file(path) as file:
             file.visititems(_refuse_complex)
+            lost = int(file.attrs["objects"]) - _objects(file)
             result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)
+        if not fault and lost > 0:
+            fault = f"{lost} of its HDF5 objects are missing"
     except InputError:
         raise
     except Exception as error:
@@ -182,12 +196,14 @@ def _read_solution(file: h5py.File) -> Solution:
         ],
         nodal_normal_stress=point_data["normal_stress"],
         balance=dict(_read_pairs(file["balance"], "name", "value")),
-        steps=_read_steps(file),
+        steps=read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
-        strain=float(file["solve"].attrs.get("strain", np.nan)),
-        rotation=float(file["solve"].attrs.get("rotation", np.nan)),
+        validity=Validity(**(_plain(file["validity"].attrs) if "validity" in file else {})),
         strain_energy=_plain(file["solve"].attrs).get("strain_energy"),
-        reactions=_read_reactions(file),
+        reaction=point_data["reaction"][:, : grid.points.shape[1]]
+        if "reaction" in point_data
+        else None,
+        probes=read_probes(file),
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
@@ -218,6 +234,8 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
         "normal_stress": solution.nodal_normal_stress,
         "body": solution.body,
     }
+    if solution.reaction is not None:
+        point_data["reaction"] = np.pad(solution.reaction, ((0, 0), (0, 3 - dim)))
     if any(zone.recovered for zone in solution.zones):
         point_data["recovered_pressure"] = _recovered_at_nodes(solution)
     write_grid(
@@ -316,43 +334,6 @@ def _read_bodies(group: h5py.Group) -> list[BodyInfo]:
             cells={cell["type"]: cell["count"] for cell in cells if cell["body"] == number},
         )
         for number, row in enumerate(read_table(group))
-    ]
-
-
-def _read_reactions(file: h5py.File) -> list[Reaction]:
-    rows = read_table(file["reactions"]) if "reactions" in file else []
-    return [Reaction(r["group"], np.array(r["force"]), np.array(r["moment"])) for r in rows]
-
-
-def _write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
-    """The cost of every step, and what was observed as arrays (steps, observed places)."""
-    rows = [asdict(step) for step in steps]
-    observed = [row.pop("observations") for row in rows]
-    write_table(file.create_group("steps"), rows)
-    group = file.create_group("observation")
-    group["factor"] = [step.factor for step in steps]
-    first = observed[0] if observed else []
-    group["zone"] = column([o["zone"] for o in first])
-    group["macro_element"] = np.array([o["macro_element"] for o in first], dtype=int)
-    for name in _OBSERVED:
-        values = [[float(o[name]) for o in row] for row in observed]
-        group[name] = np.reshape(values, (len(steps), len(first)))
-
-
-def _read_steps(file: h5py.File) -> list[StepResult]:
-    group = file["observation"]
-    zones, elements = group["zone"].asstr()[()], group["macro_element"][()].tolist()
-    values = {name: group[name][()] for name in _OBSERVED}
-    return [
-        StepResult(
-            **row,
-            observations=[
-                {"zone": zone, "macro_element": element}
-                | {name: float(values[name][i, j]) for name in _OBSERVED}
-                for j, (zone, element) in enumerate(zip(zones, elements, strict=True))
-            ],
-        )
-        for i, row in enumerate(read_table(file["steps"]))
     ]
 
 

@@ -8,11 +8,14 @@ from pathlib import Path
 
 import meshio
 
+from ..case.file import HALVINGS, HALVINGS_TEXT
 from ..case.model import Case
 from ..case.reader import check_mesh_file, load_case
+from ..mechanics.fem.refine import refined as refined_mesh
 from ..mesh import generate, read_mesh, transform
 from ..mesh.files.vtkhdf import check_name
 from ..mesh.size import check_memory, of_mesh
+from ..mesh.tidy import tidy
 from ..simulation.options import LEAN, Options
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
@@ -72,12 +75,11 @@ class Job:
 
 
 def refined(case: Case, factor: int) -> Case:
-    """The case with the divisions of its recipe multiplied by `factor`, and no counts to meet."""
+    """The case on a mesh that is finer by `factor`, and no counts to meet."""
     if factor == 1:
         return case
-    if "path" in case.mesh:
-        allowed = "cannot be refined: only the mesh of a recipe can"
-        raise InputError(case.path, "mesh.file", str(case.mesh["path"]), allowed)
+    if "path" in case.mesh and factor not in HALVINGS:
+        raise InputError(case.path, "--refine", factor, f"of a mesh file must be {HALVINGS_TEXT}")
     mesh = {**case.mesh, "refine": factor * case.mesh.get("refine", 1)}
     return replace(case, mesh=mesh, counts={})
 
@@ -91,6 +93,8 @@ def mesh_of(case: Case, memory_check: bool = True, limited: bool = False) -> mes
     if "path" in case.mesh:
         check_mesh_file(case)
         mesh = read_mesh(case.mesh["path"])
+        for _ in range(HALVINGS.index(case.mesh.get("refine", 1))):
+            mesh = tidy(refined_mesh(mesh), case.mesh["path"])
     else:
         if memory_check:
             size = of_mesh(case.mesh, case.path.parent)

@@ -29,6 +29,8 @@ from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
 
 Reference = Any
+# Pressures and gaps below this share of load and length are none.
+_TOUCHING = 1e-12
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.
 _CHUNK = 1 << 17
 
@@ -56,15 +58,31 @@ def expected_pressure(zone: ZoneResult, reference: Reference) -> np.ndarray:
     return evaluate(reference, zone.centre)
 
 
-def pressure(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+def expected_coverage(solution: Solution, zone: ZoneResult, reference: Reference) -> np.ndarray:
+    """The coverage (m,) of every macro-element: the reference's; else in full under pressure."""
+    given: Any = solution.case.reference.get("coverage")
+    if given is not None:
+        return evaluate(given, zone.centre)
+    if isinstance(reference, ExactValues):
+        return np.where(reference.pressure(zone) > 0, 1.0, zone.coverage)
+    return np.ones(len(zone.coverage))
+
+
+def _covered(solution: Solution, zone: ZoneResult, reference: Reference) -> np.ndarray:
+    """The reference's pressure (m,), none where nothing is covered."""
+    expected = expected_pressure(zone, reference)
+    return np.where(expected_coverage(solution, zone, reference) > 0, expected, 0.0)
+
+
+def pressure(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The multiplier of every macro-element."""
-    return _at_macro_elements(zone.multiplier, expected_pressure(zone, reference))
+    return _at_macro_elements(zone.multiplier, _covered(solution, zone, reference))
 
 
-def pressure_of_forces(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+def pressure_of_forces(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The pressure by forces at slave nodes; the multiplier where they do not determine it."""
     found = zone.multiplier if zone.pressure_of_forces is None else zone.pressure_of_forces
-    return _at_macro_elements(found, expected_pressure(zone, reference))
+    return _at_macro_elements(found, _covered(solution, zone, reference))
 
 
 def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
@@ -74,26 +92,31 @@ def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     return _at_macro_elements(zone.gap, evaluate(reference, zone.centre))
 
 
-def status(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
-    """Closed where the reference presses; either status is right at the edge of contact."""
+def status(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+    """Closed where the reference presses.
+
+    Either status is right at the edge of contact, and where surfaces touch without pressure.
+    """
     found = zone.closed.astype(float)
-    expected = (expected_pressure(zone, reference) > 0).astype(float)
+    expected = (_covered(solution, zone, reference) > 0).astype(float)
+    touching = zone.multiplier <= _TOUCHING * solution.load_scale
+    touching &= zone.gap <= _TOUCHING * solution.length
+    expected = np.where(touching & (expected == 0), found, expected)
     if isinstance(reference, ExactValues):
         expected = np.where(reference.ends_within(zone), found, expected)
     return _at_macro_elements(found, expected)
 
 
-def coverage(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
-    """Covered in full wherever there is a pressure to compare."""
-    expected = np.ones(len(zone.coverage))
-    if isinstance(reference, ExactValues):
-        expected = np.where(reference.pressure(zone) > 0, 1.0, zone.coverage)
-    return _at_macro_elements(zone.coverage, expected)
+def coverage(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+    """The reference's; without one, covered in full wherever there is a pressure to compare."""
+    return _at_macro_elements(zone.coverage, expected_coverage(solution, zone, reference))
 
 
-def covered_pressure(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
+def covered_pressure(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The multiplier times the coverage."""
     expected = expected_pressure(zone, reference)
+    if "coverage" in solution.case.reference:
+        expected = expected * expected_coverage(solution, zone, reference)
     return _at_macro_elements(zone.coverage * zone.multiplier, expected)
 
 
@@ -286,6 +309,48 @@ def reaction(solution: Solution, _: None, reference: Reference) -> Sample | None
     return Sample(values, np.concatenate(list(reference.values())), lambda i: places[i])
 
 
+def moment(solution: Solution, _: None, reference: Reference) -> Sample | None:
+    """The moments of contact on rigid bodies about their reference points."""
+    found = {one.body: one.moment for one in solution.rigid}
+    if not found:
+        return None
+    rows: list[tuple[float, float, str]] = []
+    for body, given in reference.items():
+        axes = "xyz" if isinstance(given, tuple) else "z"
+        values = found[body]["xyz".index(axes[0]) :].tolist()
+        wanted = np.atleast_1d(given).tolist()
+        rows += zip(values, wanted, [f"{body} about {axis}" for axis in axes], strict=True)
+    values, expected = np.array([row[:2] for row in rows]).T
+    return Sample(values, expected, lambda i: rows[i][2])
+
+
+def probed(quantity: str) -> Sampler:
+    """Sample a quantity at the probes that the reference names."""
+
+    def sample(solution: Solution, _: None, reference: Reference) -> Sample | None:
+        found = []
+        for name, expected in reference.items():
+            if (probe := solution.probes.get(name)) is None:
+                return None
+            values = getattr(probe, quantity).reshape(len(probe.place), -1)
+            names = COMPONENTS if quantity == "stress" else ("x", "y", "z")
+            for key, value in _components(quantity, expected).items():
+                found_there = values[:, names.index(key or "x")]
+                rows = zip(found_there, evaluate(value, probe.place), strict=True)
+                found += [(*row, f"probe {name}{key and f' ({key})'}") for row in rows]
+        got, wanted, places = zip(*found, strict=True)
+        return Sample(np.array(got), np.array(wanted), lambda i: places[i])
+
+    return sample
+
+
+def _components(quantity: str, expected: Any) -> dict[str, Any]:
+    """The expected components by name."""
+    if quantity == "displacement":
+        return dict(zip("xyz", expected, strict=False))
+    return {"": expected} if quantity == "pressure" else expected
+
+
 def strain_energy(solution: Solution, _: None, reference: Reference) -> Sample | None:
     """The strain energy of all bodies together."""
     if solution.strain_energy is None:
@@ -314,7 +379,10 @@ def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
 
 
 def observed(quantity: str) -> Sampler:
-    """Sample the observations in a zone at every step; pressure grows with the load factor."""
+    """Sample the observations in a zone at every step; pressure grows with the load factor.
+
+    The reference is that of the last step; where nothing acts in it, no other step is compared.
+    """
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
         rows = [
@@ -323,8 +391,8 @@ def observed(quantity: str) -> Sampler:
             for o in step.observations
             if o["zone"] == zone.name
         ]
-        if solution.case.histories:  # the reference is that of the last step
-            last = len(solution.steps)
+        last = solution.steps[-1].factor
+        if solution.case.histories or not last:
             rows = [(1.0, *row[1:]) for row in rows if row[0] == last]
         elif isinstance(reference, ExactValues):  # of the whole load
             rows = [row for row in rows if row[0] == 1.0]
@@ -336,7 +404,7 @@ def observed(quantity: str) -> Sampler:
         else:
             expected = evaluate(reference, zone.centre[elements])
             if quantity == "pressure":
-                expected = expected * factors
+                expected = expected * factors / (1.0 if solution.case.histories else last or 1.0)
         return Sample(
             values, expected, lambda i: f"macro-element {elements[i]}, load factor {factors[i]:g}"
         )

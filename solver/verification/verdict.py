@@ -23,6 +23,8 @@ from ..system.files import seal_of, write_text
 
 PASSED, SOLVED, FAILED, UNRELIABLE = "passed", "solved", "failed", "unreliable"
 REFUSED, CRASHED = "refused", "crashed"
+# How strictly a solve that passed was judged.
+EXACT, EXPECTED, STATED = "exact", "expected error", "stated tolerance"
 # The worst first, as in every table.
 WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, SOLVED, PASSED)
 T = TypeVar("T")
@@ -47,9 +49,10 @@ class CheckResult:
     """One check of one zone (None: of the whole solve).
 
     `value` and `reference` are those of the place `where` the deviation is largest; `regression` is
-    None while no value has been accepted. `verifies`: the solution is compared with a reference
-    rather than with itself. `passed` asks that the error be within the tolerance and that no
-    accepted value has changed. Numbers are NaN where the solve has none.
+    None while no value has been accepted. `expected`: the discretisation error from which the
+    tolerance follows; None where it is stated. `verifies`: the solution is compared with a
+    reference rather than with itself. `passed` asks that the error be within the tolerance and that
+    no accepted value has changed. Numbers are NaN where the solve has none.
     """
 
     name: str
@@ -64,6 +67,7 @@ class CheckResult:
     scale: float = math.nan
     error: float = math.nan
     tolerance: float = math.nan
+    expected: float | None = None
     regression: Regression | None = None
     passed: bool = False
     verifies: bool = True
@@ -96,6 +100,23 @@ class CheckResult:
                 f"{old.tolerance:.1e}"
             )
         return ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Force:
+    """A force of a step: on the slave of a zone, of what holds a group, or on a rigid body.
+
+    `moment` (3,) about the origin, or a rigid body's reference point; `area` (3,) of contact with
+    its bounds, and `pressure` (2,), the smallest and the largest of the macro-elements, of zones.
+    """
+
+    step: int
+    factor: float
+    name: str
+    force: list[float]
+    moment: list[float]
+    area: list[float] | None = None
+    pressure: list[float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,11 +153,15 @@ class Body:
 class Verdict:
     """The verdict of one solve; None and empty without a result.
 
-    `worst` is the check with the largest relative error, `closest_to_tolerance` the one nearest to
-    its tolerance or furthest past it. Pairs are minimum and maximum over all zones; `seconds` has
-    wall times by stage and their `total`. `pressure_error_estimate` is relative and in L2: how far
-    constant pressures are from a reconstruction. `transient`: the machine is the reason (memory,
-    disk, a kill), so that the same solve may succeed another time.
+    `judged` says how strictly a solve that passed was judged: `exact`, if all tolerances but those
+    of gap, status and coverage are at most 1e-10; `expected error`, if the others follow from
+    expected errors; else `stated tolerance`. `worst` is the check with the largest relative error,
+    `closest_to_tolerance` the one nearest to its tolerance or furthest past it. Pairs are minimum
+    and maximum over all zones; `seconds` has wall times by stage and their `total`.
+    `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
+    reconstruction. `strain` to `partly_covered`: see `solver.simulation.solution.Validity`.
+    `transient`: the machine is the reason (memory, disk, a kill), so that the same solve may
+    succeed another time.
 
     Of the result of another code: `code`, its version and `settings`; `printed_digits` are the
     significant ones of its values, where a file has fewer than a number; `not_given` are the checks
@@ -159,6 +184,7 @@ class Verdict:
     reference_solution: str | None = None
     verdict: str
     passed: bool = False
+    judged: str = ""
     reason: str = ""
     result: str | None = None
     result_sha256: str | None = None
@@ -173,6 +199,9 @@ class Verdict:
     pressure_error_estimate: float | None = None
     strain: float | None = None
     rotation: float | None = None
+    slip: float | None = None
+    pushed_past: int | None = None
+    partly_covered: int | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float | None = None
@@ -187,6 +216,9 @@ class Verdict:
     bodies: list[Body] = field(default_factory=list)
     plan: list[list[str]] = field(default_factory=list)
     checks: list[CheckResult] = field(default_factory=list)
+    forces: list[Force] = field(default_factory=list)
+    largest_displacement: float | None = None
+    strain_energy: float | None = None
     accuracy: dict[str, float] = field(default_factory=dict)
     attainable: float | None = None
     errors: dict[str, float] = field(default_factory=dict)
@@ -211,6 +243,10 @@ class Verdict:
         if self.reason:
             return f"{line}: {self.reason}"
         error = f", worst error {self.worst.error:.1e} ({self.worst.name})" if self.worst else ""
+        error += ", exact" if self.judged == EXACT else ""
+        worst = next((c for c in self.checks if self.worst and c.name == self.worst.name), None)
+        if worst and worst.expected:
+            error += f", expected {worst.expected:.1e}"
         if (self.pressure_error_estimate or 0.0) > _NEGLIGIBLE:
             error += f", constant pressures within {self.pressure_error_estimate:.1e} (estimated)"
         missing = f", not given: {', '.join(self.not_given)}" if self.not_given else ""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from solver.case.expressions import Expression
 from solver.case.file import CaseFile, CheckName
 from solver.case.material import Material
-from solver.case.model import Case, Load, Observation, Support, Zone
+from solver.case.model import Case, Load, Observation, Rigid, Support, Zone
 from solver.case.reader import check_mesh_file, load_case, parse_case
 from solver.case.solutions.uniform import Hydrostatic
 from solver.case.typed import described, fields, is_section
@@ -96,7 +96,7 @@ def test_every_key_arrives():
             Zone("S", "M", "interface", "hexahedra", "lac", "element", 1.0),
             Zone("S2", "M2", "second"),
         ),
-        rigid=frozenset({"die"}),
+        rigid={"die": Rigid()},
         transform={"scale": 2.0},
         plane="strain",
         directions="first",
@@ -171,6 +171,7 @@ def test_needed_keys(key):
 SOLUTION_ALONE = (
     "reference: {kind: analytical, solution: {name: hydrostatic, pressure: 1, material: all}}"
 )
+PLANE = "plane: {point: [0, 0], normal: [0, 1]}"
 REFUSED = [
     # unknown keys, with the nearest allowed one
     ('"a\\nb": 1', "'a\\nb' = 1: unknown key; allowed: "),
@@ -193,8 +194,57 @@ REFUSED = [
         "contact: [{name: a, slave: S, master: M, normals: element}]",
         "contact[0].normals = 'element': unknown key; did you mean normal?",
     ),
-    ("bodies: {die: {stiff: true}}", "bodies.die.stiff = True: unknown key; allowed: rigid"),
+    (
+        "bodies: {die: {stiff: true}}",
+        "bodies.die.stiff = True: unknown key; allowed: cylinder, force",
+    ),
     ("bodies: {die: {rigid: 1}}", "bodies.die.rigid = 1: must be true or false"),
+    ("bodies: {die: {sphere: {centre: [0, 0]}}}", "bodies.die.sphere.radius: this key is needed"),
+    (
+        "bodies: {die: {sphere: {centre: [0, 0], radius: 0}}}",
+        "die.sphere.radius = 0: must be a posi",
+    ),
+    (
+        "bodies: {die: {cone: {angle: 3}}}",
+        "bodies.die.cone = {'angle': 3}: unknown key; allowed: c",
+    ),
+    (
+        "bodies: {die: {move: {y: 1}}}",
+        "bodies.die.move = {'y': 1}: only a rigid body has it: add `r",
+    ),
+    ("bodies: {die: {rigid: true, name: push}}", "bodies.die.name = 'push': only a body with `mov"),
+    (
+        "bodies: {die: {rigid: true, move: {y: 1, rz: 0}, force: {rz: 0}}}",
+        "bodies.die.force.rz = 0: `move` gives this component too",
+    ),
+    (
+        "bodies: {die: {rigid: true, move: {w: 1}}}",
+        "bodies.die.move.w",
+    ),
+    (
+        "bodies: {die: {plane: {point: [0, 0], normal: [0, 0]}}}",
+        "bodies.die.plane.normal = [0, 0]: must have a direction",
+    ),
+    (
+        "bodies: {die: {cylinder: {point: [0, 0, 0], axis: [0, 0, 0], radius: 1}}}",
+        "bodies.die.cylinder.axis = [0, 0, 0]: must have a direction",
+    ),
+    (
+        f"bodies: {{die: {{{PLANE}, sphere: {{centre: [0, 0], radius: 1}}}}}}",
+        "bodies.die = {'plane'",
+    ),
+    (
+        f"bodies: {{die: {{{PLANE}}}}}",
+        "bodies.die = 'plane': has no mesh and is the master of no contact zone",
+    ),
+    (
+        f"bodies: {{die: {{{PLANE}}}}}\ncontact: [{{slave: die, master: M}}]",
+        "contact[0].slave = 'die': is a rigid plane; a rigid side is always the master",
+    ),
+    (
+        f"bodies: {{die: {{{PLANE}}}}}\ndirections: both\ncontact: [{{slave: S, master: die}}]",
+        "contact[0].master = 'die': is a rigid plane; a rigid side is always the master, so direc",
+    ),
     # values out of a list
     (
         "contact: [{slave: S, master: M, hexahedra: prisms}]",
@@ -213,6 +263,14 @@ REFUSED = [
             "contact[0].normal = 'nodal': the treatment node_to_segment has normals of its own; "
             "allowed: element"
         ),
+    ),
+    (
+        "expected: {all: 1.0e-3}",
+        "expected.all = 0.001: must be the name of a check without a tolerance of its own",
+    ),
+    (
+        "contact: [{slave: S, master: M, sweeps: 4}]",
+        "contact[0].sweeps = 4: only a recovery has sweeps",
     ),
     (
         "contact: [{slave: S, master: M, points: 4}]",
@@ -279,10 +337,10 @@ REFUSED = [
     ("steps: [-1, 1]", "steps[0] = -1: must be a factor from 0 to 1e30, or a mapping"),
     ("steps: 1", "steps = 1: must be a list of load factors, none negative, or of mappings"),
     ("steps: [1, {press: 1}]", "steps[1] = {'press': 1.0}: steps are factors, or mappings"),
-    ("steps: [{press: 1}]", "steps[0].press: no load or support has this name"),
+    ("steps: [{press: 1}]", "steps[0].press: no load, support or rigid body has this name"),
     (
         "loads: [{group: Top, pressure: 1, name: press}]\nsteps: [{pres: 1, press: 2}]",
-        "steps[0].pres: no load or support has this name",
+        "steps[0].pres: no load, support or rigid body has this name",
     ),
     (
         "loads: [{group: Top, pressure: 1, name: press}]",
@@ -318,7 +376,7 @@ REFUSED = [
     ),
     (
         "reference: {kind: analytical, pressure: 1}",
-        "reference.pressure = 1: unknown key; did you mean contact_pressure?",
+        "reference.pressure = 1: unknown key; did you mean pressure_at?",
     ),
     ("tolerance: 0", "tolerance = 0: must be a positive number of at most 1, or a mapping of"),
     ("tolerance: {multiplier: -1}", "tolerance.multiplier = -1: must be a positive number"),
@@ -373,10 +431,10 @@ CHANGED = [
     ("[x, y, z]", "{w: 1}", "supports[0].fix.w = 1: unknown key; allowed: normal, x, y, z"),
     ("[x, y, z]", "{x: 1/}", "supports[0].fix.x = '1/': must be a number or an expression"),
     ("z]}]", "z]}, {group: base, fix: [z]}]", "supports[1].group = 'base': the group is listed"),
-    ("recipe: blocks, size: 1.0", "size: 1.0", "mesh = {'size': 1.0}: must be {file: MESH}"),
-    ("recipe: blocks, ", "recipe: blocks, file: a.med, ", "must be {file: MESH} alone, or {rec"),
-    ("recipe: blocks, ", "file: a.med, ", "must be {file: MESH} alone, or {recipe: NAME, …}"),
-    ("{recipe: blocks, size: 1.0}", "a.med", "mesh = 'a.med': must be {file: MESH} alone, or"),
+    ("recipe: blocks, size: 1.0", "size: 1.0", "mesh = {'size': 1.0}: must be {file: MESH, ref"),
+    ("recipe: blocks, ", "recipe: blocks, file: a.med, ", "must be {file: MESH, refine: 2}, or {"),
+    ("recipe: blocks, ", "file: a.med, ", "must be {file: MESH, refine: 2}, or {recipe: NAME, …}"),
+    ("{recipe: blocks, size: 1.0}", "a.med", "mesh = 'a.med': must be {file: MESH, refine: 2}, or"),
 ]
 
 

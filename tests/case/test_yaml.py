@@ -55,6 +55,8 @@ def test_values(text, value):
         ("a: !!python/object:os.system 1", r"^c.yaml: a: the tag .* is not allowed"),
         ("a: !!binary aGk=", r"^c.yaml: a: the tag .* is not allowed"),
         ("1: a", r"^c.yaml: line 1: the key 1 is not text: put it in quotes"),
+        ("a: {b: 1,5}", r"the key 5 is not text: .*, or write numbers with a point"),
+        ("a:\n\tb: 1", r"^c.yaml: line 2: a tab indents this line: indent with spaces$"),
         ("a: {[1]: b}", r"^c.yaml: a: a list or mapping cannot be a key"),
         ('a: "x\\0"', r"^c.yaml: a: control characters are not allowed"),
         ("a: 1e999", r"^c.yaml: a: 1e999 is too large a number"),

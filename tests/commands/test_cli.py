@@ -125,7 +125,7 @@ def test_a_solve_that_fails_is_3_with_one_line(small, capsys, monkeypatch):
     monkeypatch.setattr(solver.verification.run, "simulate", _raising(SolveError("no convergence")))
     status, verdict = solve(small)
     assert (status, verdict["verdict"], verdict["reason"]) == (3, "failed", "no convergence")
-    assert capsys.readouterr().err == "no convergence\n"
+    assert capsys.readouterr().err == f"{small / 'c.yaml'}: no convergence\n"
     assert [file.name for file in (small / "out").iterdir()] == ["v.json"]
 
 

@@ -17,6 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from scipy.sparse import diags_array
 
 from solver.case.model import Material
 from solver.case.reader import load_case
@@ -50,6 +51,13 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
 SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 UNLOADING = "loads/unloading"
+CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
+
+ENDING, EDGE, CYLINDER = "partial-waves/tria6", "contact-edge/tria3", "half-planes/hertz-quad4"
+TUBES = "axisymmetric/compound-tube"
+MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
+RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
+BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
@@ -132,6 +140,11 @@ def _first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
     return values
 
 
+def _first_nodes_exchanged(found: Any) -> Any:
+    order = [1, 0, *range(2, found.on_reference.shape[1])]
+    return replace(found, on_reference=found.on_reference[:, order])
+
+
 def _one_dropped(parts: list) -> list:
     """Without the smallest segment that is more than round-off."""
     sizes = [part.area for part in parts]
@@ -147,6 +160,19 @@ def _one_dropped(parts: list) -> list:
 def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     kept = pairs[1] != 3
     return pairs[0][kept], pairs[1][kept]
+
+
+def _shared_nodes_free(true: Wrapped) -> Wrapped:
+    def zones(*given: Any) -> list[Any]:
+        first, *others = true(*given)
+        kept = np.ones((first.operator.matrix.shape[1] // 2, 2))
+        for faces in first.sub_faces:
+            kept[faces.nodes] = 0.0
+        cut_off = diags_array(kept.ravel())
+        rest = [replace(z.operator, matrix=z.operator.matrix @ cut_off) for z in others]
+        return [first, *(replace(z, operator=o) for z, o in zip(others, rest, strict=True))]
+
+    return zones
 
 
 def _never_closing(true: Wrapped) -> Wrapped:
@@ -191,6 +217,12 @@ def _stays_closed(true: Wrapped) -> Wrapped:
     return status
 
 
+def _last_opened(found: Any) -> Any:
+    closed = found.closed.copy()
+    closed[np.flatnonzero(closed)[-1:]] = False
+    return replace(found, closed=closed)
+
+
 def _every_third_off(stress: np.ndarray) -> np.ndarray:
     stress[::3, 0] -= 9e-4 * 25  # between the extremes: accepted values notice nothing
     return stress
@@ -225,6 +257,29 @@ def _template_piece_lost(result: Any) -> Any:
     return replace(result, pieces=result.pieces[1:])
 
 
+def _first_status_kept(true: Wrapped) -> Wrapped:
+    """What is open in the first step stays so."""
+    kept: list[np.ndarray] = []
+
+    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
+        found = true(solve, start, kept[0] if kept else eligible, *more)
+        kept.append(found.closed)
+        return found
+
+    return status
+
+
+def _normals_rolled(blocks: list) -> list:
+    turned = [b.directions if b.directions is None else b.directions[:, ::-1] for b in blocks]
+    return [replace(b, directions=d) for b, d in zip(blocks, turned, strict=True)]
+
+
+def _more_covered(operator: Any) -> Any:
+    at = operator.surface
+    more = np.where(at.covered < 0.999 * at.area, 1.001, 1.0) * at.covered
+    return replace(operator, covered=more, surface=replace(at, covered=more))
+
+
 MUTANTS = (
     Mutant("gap-sign", "the initial gap has the wrong sign", CLOSING,
            "solver.mechanics.mortar.operator:integrals",
@@ -256,11 +311,10 @@ MUTANTS = (
     Mutant("template-piece-lost", "the cut loses a piece of the cell", SOLID,
            "solver.mechanics.mortar.cut:_template", changed(_template_piece_lost)),
     Mutant("jacobian", "the Jacobian of one cell is 1 % too large", PLANE,
-           "solver.mechanics.fem.elasticity:physical_gradients",
-           changed(lambda found: (found[0], _first_scaled(found[1], 1.01)))),
+           "solver.mechanics.fem.elasticity:shapes_in",
+           changed(lambda found: replace(found, measure=_first_scaled(found.measure, 1.01)))),
     Mutant("node-order", "the first two nodes of every cell are exchanged", PLANE,
-           "solver.mechanics.fem.elasticity:physical_gradients",
-           changed(lambda found: (found[0][:, :, [1, 0, *range(2, found[0].shape[2])]], found[1]))),
+           "solver.mechanics.fem.elasticity:shapes_in", changed(_first_nodes_exchanged)),
     Mutant("quadrature-weight", "one quadrature weight of the cells is 10 % off", BENT,
            "solver.mechanics.fem.elasticity:volume_rule",
            changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
@@ -287,6 +341,11 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared equally among the nodes of a face", BENT,
            "solver.mechanics.fem.loads:surface_vectors",
            changed(lambda found: (np.full(found[0].shape, 1 / found[0].shape[1]), found[1]))),
+    Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
+           "solver.simulation.probes:locate", changed(
+               lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
+    Mutant("traction-lost", "the exact solution's traction does not act", CYLINDER,
+           "solver.simulation.attributes:Attributes._exact_force", changed(np.zeros_like)),
     Mutant("force-share", "a force on a group is 1 % too large", FORCES,
            "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
     Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
@@ -300,6 +359,11 @@ MUTANTS = (
     Mutant("history-lost", "every load acts in full in every step", UNLOADING,
            "solver.simulation.scene:Scene.acting",
            lambda made: lambda scene, step: made(scene, dict.fromkeys(step, 1.0))),
+    Mutant("zone-ends", "a zone has no force at nodes that an earlier zone has", CORNER,
+           "solver.simulation.scene:_zones", _shared_nodes_free),
+    Mutant("zone-twice", "a node in two zones has a multiplier in each", SPLIT,
+           "solver.mechanics.mortar.held:_held",
+           given(lambda operator, nodes, basis, _: (operator, nodes, basis, None))),
     Mutant("area-lost", "segments lose 3 % of every macro-element", PLANE,
            "solver.simulation.operators:gap_operator",
            changed(lambda o: replace(o, matrix=0.97 * o.matrix))),
@@ -326,6 +390,10 @@ MUTANTS = (
            changed(lambda p: -p)),
     Mutant("never-closes", "the contact status never closes a macro-element", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
+    Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
+           ENDING, "solver.simulation.problem:find_status", _stays_closed),
+    Mutant("end-too-early", "the last macro-element of the contact stays open", EDGE,
+           "solver.simulation.problem:find_status", changed(_last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
            "solver.simulation.problem:find_status", _stays_closed),
     Mutant("support-lost", "a support loses its last node", PLANE,
@@ -349,6 +417,27 @@ MUTANTS = (
     Mutant("hoop-halved", "the hoop strain of axisymmetric cells is half of what it is", RINGS,
            "solver.mechanics.fem.elasticity:hoop_values",
            changed(lambda found: (0.5 * found[0], found[1]))),
+    Mutant("recovered-load", "the loads of the recovered pressure are 0.1 % too small", BENDING,
+           "solver.mechanics.mortar.operator:recovery",
+           changed(lambda r: r and replace(r, loads=0.999 * r.loads))),
+    Mutant("sweeps-lost", "a recovery makes the sweeps of its form alone", BENDING,
+           "solver.simulation.operators:_recovery",
+           changed(lambda asked: replace(asked, form=replace(asked.form, sweeps=2)))),
+    Mutant("covered-share", "partly covered faces have 0.1 % too much of covered area", UNCOVERED,
+           "solver.simulation.operators:gap_operator", changed(_more_covered)),
+    Mutant("zone-interference", "every zone has the interference 0.02", TUBES,
+           "solver.simulation.operators:_initial_gaps",
+           given(lambda zone, *rest: (replace(zone, interference=0.02), *rest))),
+    Mutant("mixed-weight", "the mixed form is 1 % too stiff against a change of volume", MIXED,
+           "solver.mechanics.fem.mixed:_integrals",
+           changed(lambda found: (*found[:2], 0.99 * found[2]))),
+    Mutant("normals-rolled", "nodes of a face have the normals of its other end", NODAL_NORMALS,
+           "solver.simulation.operators:with_nodal_normals", changed(_normals_rolled)),
+    Mutant("chords", "curved faces count as straight", RATIO,
+           "solver.simulation.operators:facets",
+           changed(lambda f: replace(f, affine=np.ones(len(f.affine), dtype=bool)))),
+    Mutant("first-status", "what is open in the first step stays open", SIDES,
+           "solver.simulation.problem:find_status", _first_status_kept),
     Mutant("stabilisation-lost", "stabilised contact does not give way", STIFF,
            "solver.mechanics.mortar.stabilisation:Stabilisation.compliance",
            changed(lambda compliance: 0 * compliance)),

@@ -78,7 +78,7 @@ def without_nodes(mesh):
     ("change", "message"),
     [
         (cylindrical, "coordinates: must be Cartesian"),
-        (without_nodes, "no nodes in the layout of MED 3 or later"),
+        (without_nodes, "no nodes in the layout of MED 2.2 or later; for older files: medimport"),
     ],
 )
 def test_med_files_of_other_kinds(tmp_path, change, message):

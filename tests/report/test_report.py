@@ -222,6 +222,20 @@ def test_pages_show_the_estimated_error(report):
     )
 
 
+def test_pages_list_the_forces_of_each_step(tmp_path):
+    """Round-off beside the largest force of 1250 is shown as zero."""
+    base = {"factor": 0.5, "moment": [0, 0, -1e-13], "step": 2}
+    contact = base | {"name": "zone a", "force": [1e-12, -1250], "area": [50, 50, 50]}
+    forces = [base | {"step": 1, "name": "zone a", "force": [0, -625]}, contact]
+    forces += [base | {"name": "floor", "force": [0, 1250]}]
+    path = put(tmp_path / "a" / "verdict.json", verdict("a", "passed", forces=forces))
+    write_report([path], tmp_path / "report", [])
+    page = (tmp_path / "report" / "fam.html").read_text()
+    table = re.sub(r"<[^>]*>", " ", page[page.index("class=forces") :])
+    for row in ("2 0.5 zone a 0, -1250 0, 0, 0 50 –", "2 0.5 floor 0, 1250 0, 0, 0 – –"):
+        assert row in " ".join(table.split())
+
+
 def test_numbers_keep_their_digits_in_csv(report):
     folder, _ = report
     with (folder / "summary.csv").open(newline="") as stream:
@@ -238,6 +252,16 @@ def test_a_batch_that_passed_leaves_no_failures(tmp_path):
     logged = write_report([path], tmp_path / "report")
     assert (tmp_path / "report" / "failures.txt").read_text() == ""
     assert logged.startswith("The one solve passed.")
+
+
+def test_a_badge_says_how_strictly_a_solve_was_judged(tmp_path):
+    check = CHECK | {"error": 1e-3, "tolerance": 1.5e-3, "expected": 1.2e-3, "passed": True}
+    made = verdict("fam-a", "passed") | {"judged": "expected error", "checks": [check]}
+    write_report([put(tmp_path / "fam-a" / "verdict.json", made)], tmp_path / "report")
+    page = (tmp_path / "report" / "fam.html").read_text()
+    badges = '<span class="badge passed">passed</span> <span class="badge expected-error">'
+    assert f"{badges}expected error</span>" in page
+    assert "<td class=n>1.2e-03</td>\n<td class=n>1.5e-03</td>" in page
 
 
 def test_a_solve_without_a_reference_has_its_own_word_and_is_no_failure(tmp_path):

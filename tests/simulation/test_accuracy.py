@@ -99,15 +99,15 @@ def pressed(pressure):
 def test_large_strain_is_noted_or_unreliable(pressure, noted, unreliable, tmp_path):
     found = pressed(pressure)
     strain = (1 - POISSON**2) * pressure / YOUNG
-    assert found.strain == pytest.approx(strain, rel=1e-12)
-    assert found.rotation < 1e-13 * strain
+    assert found.validity.strain == pytest.approx(strain, rel=1e-12)
+    assert found.validity.rotation < 1e-13 * strain
     assert any(line.what.startswith("largest strain") for line in found.plan) == noted
     file = tmp_path / "r.vtkhdf"
     write_result(file, found, [], {})
     for solution in (found, read_result(file).solution):
         verdict = judge(solution, [])
         assert (verdict.verdict == "unreliable") == unreliable
-        assert verdict.strain == found.strain
+        assert verdict.strain == found.validity.strain
         assert ("strain 1.1e+02 with rotation" in verdict.reason) == unreliable
 
 

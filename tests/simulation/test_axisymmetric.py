@@ -166,3 +166,10 @@ def test_contact_of_the_macro_element_at_the_axis():
     assert closed.sum() == 1
     assert edges.lower == pytest.approx(np.array([[0.0, 0.0]]), abs=1e-12)
     assert area == pytest.approx(np.pi * 0.0625 * np.array([1, 0, 4]), abs=1e-12)
+
+
+def test_r_is_the_radius_in_expressions():
+    """A pressure of 25 r² presses with ∫ 25 r² 2πr dr = 12.5 π on the disc of radius 1."""
+    uneven = case(**{"pressure: 25.0": "pressure: 25*r**2"})
+    found = simulate(uneven, mesh("QUAD4", "QUAD8", 0.0))
+    assert found.zones[0].resultants.force == pytest.approx([0, -12.5 * np.pi], abs=1e-11)

@@ -98,7 +98,7 @@ def support_on_the_slave(mesh):
     return mesh, [("loads:", "  - {group: bottom_contact, fix: [y]}\nloads:")]
 
 
-def shared_slave_nodes(mesh):
+def shared_slave_faces(mesh):
     second = "contact:\n  - {name: two, slave: bottom_contact, master: press}\n"
     return mesh, [("contact:\n", second)]
 
@@ -141,7 +141,7 @@ REFUSED = [
     (facing_away, "contact[0].master = 'press': does not lie over bottom_contact anywhere along"),
     (deep_overlap, "contact[0].slave = 'bottom_contact': the surfaces overlap by 0.4 at multiplie"),
     (support_on_the_slave, "supports: 3 macro-elements of zone interface (the first, number 0, at"),
-    (shared_slave_nodes, "contact[1].slave = 'bottom_contact': 4 of its nodes are slave nodes of"),
+    (shared_slave_faces, "contact[1].slave = 'bottom_contact': 3 of its faces are slave faces of"),
     (a_part_apart, "supports: nothing keeps body 3 from a free motion (move along x), even with"),
     (nothing_holds, "supports: nothing keeps bottom from a free motion (move along y), even with"),
     (glued, "contact[0].master = 'top_contact': 2 of its faces are slave faces too; a slave"),

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
+from solver.mesh import transform
 from solver.simulation.selections import with_groups
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -214,3 +215,33 @@ def test_faces_that_selections_do_not_take_leave_no_trace():
     found = with_groups(case, bare)
     assert {*found.cell_sets} == {"top", "bottom", "low", "left", "slave", "master", "cells"}
     assert [len(block.data) for block in found.cells if block.type == "line"] == [12]
+
+
+def test_a_list_makes_a_group_for_keys_that_name_groups():
+    """`both` has the material of both blocks, `lower` is a rigid body in name only."""
+    text = CASE.replace("materials: {all: {", "materials: {both: {").replace(
+        "contact:",
+        "bodies: {both: {rigid: false}}\ngroups: {both: [top, bottom], up: [press]}\ncontact:",
+    )
+    text = text.replace(
+        "slave: slave, master: master", "slave: bottom_contact, master: top_contact"
+    )
+    text = text.replace("group: low", "group: base").replace("group: left", "group: symx")
+    text = text.replace("group: press", "group: up")
+    solution = simulate(parsed(text), block_mesh("QUAD8", "QUAD4", (2, 3)))
+    assert solution.zones[0].multiplier == pytest.approx(PRESSURE, rel=1e-12)
+    with pytest.raises(InputError, match=r"groups\.both.*no such group in the mesh"):
+        with_groups(
+            parsed(text.replace("[top, bottom]", "[top, bottoms]")), block_mesh("QUAD4", "QUAD4")
+        )
+
+
+def test_transforms_move_lists_of_groups():
+    """Both blocks moved by lists of their groups; the lower one alone moves by its own."""
+    mesh = block_mesh("QUAD4", "QUAD4", (1, 1))
+    both = transform(mesh, {"shift": {"group": ["bottom", "top"], "by": [1, 2]}})
+    assert both.points == pytest.approx(mesh.points + np.array([1, 2]))
+    picked = transform(
+        mesh, {"pick": {"from": ["base", "press"], "low": [-1, -2], "high": [2, 2], "name": "ends"}}
+    )
+    assert sum(map(len, picked.cell_sets["ends"])) == 2

@@ -146,3 +146,16 @@ def test_soft_springs_beside_stiff_ones_hold_a_body():
     )
     found = solved(text)
     assert found.zones[0].multiplier == pytest.approx(PRESSURE, rel=1e-6)
+
+
+def test_springs_at_all_nodes_hold_a_body_that_nothing_presses():
+    """Under forces that balance, weak springs hold what else would float, and bear nothing."""
+    text = CASE.replace(
+        "[{group: base, spring: {normal: 40.0}}, {group: symx, fix: [x]}]",
+        "[{group: all, spring: {x: 1.0e-6, y: 1.0e-6}}]",
+    ).replace("pressure: 25.0}", "pressure: 25.0}, {group: base, pressure: 25.0}")
+    solution = solved(text)
+    assert solution.zones[0].multiplier == pytest.approx(PRESSURE, rel=1e-6)
+    assert solution.stress[:, 1] == pytest.approx(-PRESSURE, rel=1e-6)
+    with pytest.raises(InputError, match="normal needs a group of faces; `all` is held along x"):
+        solved(text.replace("x: 1.0e-6,", "normal: 1.0e-6,"))

@@ -12,6 +12,9 @@ from solver.case.reader import parse_case
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
+from solver.verification.checks import run_checks
+from solver.verification.judge import judge
+from solver.verification.results import read_result, write_result
 from tests.scenes import POISSON, YOUNG, block_mesh
 
 CASE = """\
@@ -92,3 +95,62 @@ def test_what_no_code_is_given_and_what_is_refused():
             Path("steps.yaml"),
         )
     assert np.isfinite(case.factors).all()
+
+
+@pytest.fixture(scope="module")
+def unloaded():
+    """Pressures of 25, 75 and none; the reference is the last state, of which the factor is 0."""
+    reference = """
+reference: {kind: analytical, contact_pressure: 0, normal_stress: 0, displacement: [0, 0],
+  reaction: {base: [0, 0]}, force: [0, 0], contact_area: 1}
+tolerance: 1.0e-11
+"""
+    text = CASE.replace(", name: press", "").replace(", name: weight", "")
+    text = text.replace("  - {group: press, traction: [0, -8.0]}\n", "")
+    return solved(text + "steps: [1, 3, 0]" + reference)[0]
+
+
+def test_forces_of_every_step_also_stored(unloaded, tmp_path):
+    """The base bears the pressure on its length of 1, at x = 1/2: no force in the last step."""
+    write_result(tmp_path / "r.vtkhdf", unloaded, [], {})
+    for one in (unloaded, read_result(tmp_path / "r.vtkhdf").solution):
+        forces = [step.resultants["zone"] for step in one.steps]
+        held = [{r.group: r for r in step.reactions}["base"] for step in one.steps]
+        for p, contact, base in zip((25, 75, 0), forces, held, strict=True):
+            assert contact.force == pytest.approx([0, -p], abs=1e-11)
+            assert contact.moment == pytest.approx([0, 0, -p / 2], abs=1e-11)
+            assert contact.pressure == pytest.approx([p, p], abs=1e-11)
+            assert contact.area[0] == pytest.approx(1)
+            assert base.force == pytest.approx([0, p], abs=1e-11)
+        assert one.reactions == one.steps[-1].reactions
+    rows = judge(unloaded, []).forces
+    assert [(r.step, r.name) for r in rows[:4]] == [
+        (1, "zone zone"), (1, "base"), (1, "symx"), (2, "zone zone")]  # fmt: skip
+    assert rows[3].force == pytest.approx([0, -75])
+
+
+def test_reactions_at_nodes_sum_to_the_resultants():
+    solution, _ = solved(CASE + "steps: [{press: 1, weight: 1}]\n")
+    assert solution.reaction.sum(axis=0) == pytest.approx([0, 33], abs=1e-10)
+    low = solution.mesh.points[:, 1] == -1
+    assert solution.reaction[low, 1].sum() == pytest.approx(33)
+    assert np.abs(solution.reaction[~low, 1]).max() < 1e-10
+
+
+def test_what_is_left_after_unloading_is_compared_with_the_largest_step(unloaded):
+    """A remaining pressure of 1e-9 is 1.3e-11 of 75, and too much; so is a force."""
+    assert all(check.passed for check in run_checks(unloaded))
+    for left, fails in ((1e-10, False), (1e-9, True)):
+        unloaded.zones[0].multiplier[:] = left
+        unloaded.steps[-1].reactions[0].force[1] = left
+        found = {c.name: c.passed for c in run_checks(unloaded)}
+        assert (found["multiplier"], found["reaction"]) == (not fails, not fails)
+
+
+def test_places_are_observed_against_the_last_factor():
+    """The reference of 8.25 is that of the factor 1/4; at 1/2 it is 16.5."""
+    text = CASE.replace(", name: press", "").replace(", name: weight", "")
+    text += "steps: [0.5, 0.25]\nreference: {kind: analytical, contact_pressure: 8.25}\n"
+    found = {check.name: check for check in run_checks(solved(text)[0])}
+    assert found["observation"].error < 1e-12
+    assert found["observation"].maximum == pytest.approx(16.5)

@@ -86,10 +86,12 @@ def test_a_tie_resists_turning_and_is_refused_where_it_cannot_be():
         ("press, together: [y]", "press, together: [y, y]", "must be a list of x, y, z, each once"),
         ("press, together: [y]", "press, together: [w]", "supports[2].together[0] = 'w'"),
         ("press, together: [y]", "top_contact, together: [y]", ""),
+        ("press, together: [y]", "bottom_contact, together: [y]",
+         "have no free unknown of their own: their nodes move together; name the other"),
         ("group: press", "at: [0, 1]", "together needs a group"),
         ("together: [y]", "fix: [x], together: [y]", "exactly one of fix, spring, together"),
     ],
-)
+)  # fmt: skip
 def test_refusals(old, new, message):
     text = CASE.replace(old, new)
     if not message:  # a master that moves as one: the solution is another, but balanced

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from solver.case.material import Material
+from solver.case.model import Rigid
 from solver.case.solutions import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
@@ -59,6 +60,7 @@ def test_the_exact_state_has_none(handmade):
     assert found.keys() == {
         *("displacement_l2", "displacement_h1", "stress_l2", "stress_max"),
         *("pressure_l2", "pressure_max", "pressure_means", "pressure_oscillation"),
+        "pressure_inner",
     }
     assert max(found.values()) < 1e-14
 
@@ -69,7 +71,9 @@ def test_a_share_too_much_is_that_share(handmade):
     handmade.zones[0].multiplier = 0.97 * handmade.zones[0].multiplier
     found = errors(handmade)
     expected = dict.fromkeys(("displacement_l2", "displacement_h1", "stress_l2"), 0.02)
-    expected |= dict.fromkeys(("pressure_l2", "pressure_max", "pressure_means"), 0.03)
+    expected |= dict.fromkeys(
+        ("pressure_l2", "pressure_max", "pressure_means", "pressure_inner"), 0.03
+    )
     expected |= {"stress_max": 0.01, "pressure_oscillation": 0.0}
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=1e-10, abs=1e-14), name
@@ -88,7 +92,7 @@ def test_a_macro_element_counts_as_far_as_it_is_covered(handmade):
 
 
 def test_rigid_bodies_are_left_out(handmade):
-    handmade.case = replace(handmade.case, rigid=frozenset({"bottom"}))
+    handmade.case = replace(handmade.case, rigid={"bottom": Rigid()})
     handmade.displacement[handmade.body == 0] = 7.0
     handmade.stress[handmade.body == 0] = 7.0
     assert max(errors(handmade).values()) < 1e-14
@@ -171,6 +175,20 @@ def test_a_slope_and_a_jump_at_the_end_of_a_contact_do_not(handmade):
     zone.multiplier[outside] += 100 * (-1.0) ** np.arange(outside.sum())
     assert errors(solution)["pressure_oscillation"] == pytest.approx(smooth, abs=1e-12)
     assert smooth < 5e-3
+
+
+def test_the_last_two_macro_elements_of_a_contact_are_left_out(handmade):
+    """Elements of 0.1; the contact ends at 0.95, in the 30th of 40."""
+    unit = HertzCylinder(force=1.0, radius=1.0, lower=UNIT, upper=UNIT)
+    exact = replace(unit, force=(0.95 / unit.half_width) ** 2)
+    solution = on_line(handmade, exact, 40, -2.0, 2.0)
+    zone, found = solution.zones[0], {}
+    exactly = zone.multiplier
+    for number in (28, 29, 30, 31):
+        zone.multiplier = exactly + exact.peak / 2 * (np.arange(40) == number - 1)
+        found[number] = errors(solution)["pressure_inner"]
+    assert found[28] == pytest.approx(0.5, rel=0.02)
+    assert max(found[number] for number in (29, 30, 31)) < 0.005  # centres instead of means
 
 
 def test_half_width_and_peak_of_a_half_ellipse(handmade):

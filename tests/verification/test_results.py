@@ -228,6 +228,10 @@ def lose_group(file):
     del file["balance"]
 
 
+def lose_what_need_not_be_there(file):
+    del file["probes"]
+
+
 def lose_zone(file):
     del file["contact/interface"]
 
@@ -264,6 +268,7 @@ def other_attributes(file):
         (not_a_number, "zone interface: gap holds values that are not finite numbers"),
         (node_beyond_the_end, "zone interface: slave_nodes holds numbers outside 0"),
         (complex_numbers, "observation/gap holds complex numbers"),
+        (lose_what_need_not_be_there, "1 of its HDF5 objects are missing"),
         (other_attributes, "the solve's own numbers holds"),
     ],
 )

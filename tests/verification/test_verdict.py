@@ -1,6 +1,7 @@
 """The verdict: strict JSON with the same keys whatever happened."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -250,3 +251,34 @@ def test_the_verdict_says_where_the_reference_comes_from(tmp_path):
     assert verdict["reference_kind"] == "other_code"
     assert verdict["reference_code"] == {"name": "solver", "version": "14"}
     assert verdict["reference_uncertainty"] == 0.01
+
+
+def judged(solution, tolerance, expected=()):
+    case = replace(solution.case, tolerance=tolerance, expected=dict(expected))
+    return judge(replace(solution, case=case), run_checks(replace(solution, case=case)))
+
+
+def test_a_verdict_says_how_strict_its_tolerances_are(tmp_path):
+    solution = plane(tmp_path)
+    strict = {"all": 1e-10, "element_gap": 1e-3}
+    assert judged(solution, strict).judged == "exact"
+    assert judged(solution, {"all": 1e-3}).judged == "stated tolerance"
+    fitted = judged(solution, strict | {"multiplier": 1.5e-3}, {"multiplier": 1e-3})
+    assert fitted.judged == "expected error"
+    by_name = {check.name: check for check in fitted.checks}
+    assert (by_name["multiplier"].expected, by_name["displacement"].expected) == (1e-3, None)
+    solution.zones[0].multiplier[0] += 25 * 1.6e-3
+    failed = judged(solution, strict | {"multiplier": 1.5e-3}, {"multiplier": 1e-3})
+    assert (failed.verdict, failed.judged) == ("failed", "")
+
+
+def test_the_line_of_a_verdict_has_the_expected_error(tmp_path):
+    solution = plane(tmp_path)
+    solution.zones[0].multiplier[0] += 25 * 1.2e-3
+    solution.zones[0].pressure_of_forces = np.array([25.0, 25.0])
+    fitted = judged(solution, {"all": 1e-2, "multiplier": 1.5e-3}, {"multiplier": 1e-3})
+    assert fitted.summary.startswith(
+        "two-blocks: passed, worst error 1.2e-03 (multiplier), expected 1.0e-03, "
+    )
+    solution.zones[0].multiplier[0] = 25.0
+    assert ", exact, " in judged(solution, {"all": 1e-10}).summary

@@ -1,10 +1,13 @@
 """Copies of the project with tiny cases, and real Snakemake in them."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -28,16 +31,40 @@ def write_case(folder, name, directions="first", pressure=25.0):
     (folder / f"{name}.yaml").write_text(text)
 
 
+# Importing Snakemake takes most of the time of a small run: one process has done so, and forks.
+FORKS = """
+import json, os, runpy, signal, sys
+import jsonschema, snakemake.cli
+snakemake.cli.get_argument_parser()  # which imports its plugins
+for line in sys.stdin:
+    environment, folder, output, *arguments = json.loads(line)
+    if not (run := os.fork()):
+        signal.alarm(300)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        os.dup2(os.open(output, os.O_WRONLY), 1)
+        os.dup2(1, 2)
+        os.environ.clear()
+        os.environ.update(environment)
+        os.chdir(folder)
+        sys.argv[1:] = arguments
+        runpy.run_module("snakemake", run_name="__main__", alter_sys=True)
+    print(os.waitstatus_to_exitcode(os.waitpid(run, 0)[1]), flush=True)
+"""
+
+
+@cache
+def _forks():
+    command = [sys.executable, "-c", FORKS]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
 def snakemake(project, *arguments):
     """The finished process of a run, its output and errors as one text."""
-    return subprocess.run(
-        [sys.executable, "-m", "snakemake", *map(str, arguments)],
-        cwd=project,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=300,
-    )
+    with tempfile.NamedTemporaryFile("r") as output:
+        told = [dict(os.environ), str(project), output.name, *map(str, arguments)]
+        print(json.dumps(told), file=_forks().stdin, flush=True)
+        status = int(_forks().stdout.readline())
+        return subprocess.CompletedProcess(told[3:], status, output.read())
 
 
 def jobs(project, *arguments):

@@ -95,6 +95,21 @@ def test_one_case_again_is_one_case(project):
     assert jobs(project, *forced) == {"solve tiny-b"} | REPORT
 
 
+def test_cases_are_chosen_by_pattern(project):
+    forced = ("--forcerun", "solve", "--config", "case=tiny-a*")
+    assert jobs(project, *forced) == {"solve tiny-a", "solve tiny-a-swapped"} | REPORT
+
+
+def test_what_has_not_passed_runs_once_more(project):
+    failed = ("--forcerun", "solve", "--config", "failed=true")
+    done = snakemake(project, *failed)
+    assert done.returncode == 0
+    assert done.stdout.splitlines()[-1] == "Nothing to be done: all chosen cases have passed."
+    verdict = project / "results/tiny/tiny-b/verdict.json"
+    verdict.unlink()
+    assert jobs(project, *failed) == {"solve tiny-b"} | REPORT
+
+
 def test_another_family_joins_what_was_solved(project):
     write_case(project / "cases" / "other", "other-a")
     expected = {"mesh other-a", "solve other-a"} | REPORT
@@ -156,9 +171,10 @@ def test_a_batch_with_every_kind_of_ending(project, tmp_path):
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("family=tinny", "family = tinny: unknown; there are tiny"),
+        ("family=tinny", "family = tinny: unknown; did you mean tiny? (allowed: tiny)"),
         ("famly=tiny", "'famly' was unexpected"),
-        ("case=tiny-c", "case = tiny-c: unknown"),
+        ("case=tiny-c", "case = tiny-c: unknown; did you mean tiny-b?"),
+        ("case=tiny-c*", "case = tiny-c*: unknown"),
         ("cases=/nowhere", "/nowhere: cases: no such folder"),
         ("cases=workflow", "workflow: cases: no case file"),
         ("variants=maybe", "variants: 'maybe' is not one of"),
@@ -269,8 +285,9 @@ def test_a_dry_run_changes_nothing(project):
 )
 def test_a_damaged_verdict_or_a_lost_result_is_solved_again(project, damage):
     damage(project / "results" / "tiny" / "tiny-b")
-    assert jobs(project) >= {"solve tiny-b"} | REPORT
-    assert not jobs(project) & {"solve tiny-a", "solve tiny-a-swapped"}
+    planned = jobs(project)
+    assert planned >= {"solve tiny-b"} | REPORT
+    assert not planned & {"solve tiny-a", "solve tiny-a-swapped"}
 
 
 def test_what_is_damaged_is_solved_again_in_a_batch_that_fails(project):

@@ -1,5 +1,6 @@
 """The jobs that the solver lists, and the inputs of each of them."""
 
+import fnmatch
 import hashlib
 import json
 import os
@@ -152,25 +153,29 @@ def find_jobs():
     return {(job.folder, job.name): job for job in jobs}
 
 
+def chosen(key, known):
+    """The names that a setting chooses by names and patterns such as `hertz-*`; all if it is empty."""
+    from solver.system.errors import hint
+
+    found = {pattern: fnmatch.filter(known, pattern) for pattern in listed(config[key])}
+    for pattern in found:
+        if not found[pattern]:
+            refuse(f"{key} = {pattern}: unknown; {hint(pattern, known)}")
+    return set().union(*found.values()) if found else set(known)
+
+
 def choose_jobs():
-    """The jobs of this run: of the configured families, or the one case."""
-    families = {job.family for job in BATCH.values()}
-    chosen = listed(config["family"])
-    if unknown := sorted(set(chosen) - families):
-        refuse(
-            f"family = {', '.join(unknown)}: unknown; there are {', '.join(sorted(families))}"
-        )
-    jobs = {
-        key: job for key, job in BATCH.items() if not chosen or job.family in chosen
-    }
-    jobs = {key: job for key, job in jobs.items() if config["case"] in ("", job.name)}
-    if not jobs:
-        refuse(f"case = {config['case']}: unknown; a case is named as in its file")
+    """The jobs of this run: of the configured families and cases, and of these, if it is configured,
+    those that have not passed."""
+    jobs = {key: job for key, job in BATCH.items() if job.family in FAMILIES}
+    names = chosen("case", {job.name for job in jobs.values()})
+    jobs = {key: job for key, job in jobs.items() if job.name in names}
+    if config["failed"] in (True, "true"):
+        jobs = {key: job for key, job in jobs.items() if not has_passed(job)}
+        if not jobs and workflow.is_main_process:
+            print("Nothing to be done: all chosen cases have passed.")
+            sys.exit(0)
     return jobs
-
-
-BATCH = find_jobs()
-RUN = choose_jobs()
 
 
 def results_of(job):
@@ -181,6 +186,28 @@ def verdict_of(job):
     return f"{results_of(job)}/verdict.json"
 
 
+def read_verdict_of(folder):
+    """The verdict in a folder of results; None if it is missing or damaged."""
+    from solver.system.errors import InputError
+    from solver.verification.verdict import read_verdict
+
+    try:
+        return read_verdict(Path(folder, "verdict.json"))
+    except InputError:
+        return None
+
+
+def has_passed(job):
+    """Whether a solve has a verdict, and it is sound."""
+    verdict = read_verdict_of(results_of(job))
+    return verdict is not None and verdict.sound
+
+
+BATCH = find_jobs()
+FAMILIES = chosen("family", {job.family for job in BATCH.values()})
+RUN = choose_jobs()
+
+
 def verdicts_there(jobs):
     """The verdicts of those jobs that have one."""
     return [verdict for verdict in map(verdict_of, jobs) if os.path.isfile(verdict)]
@@ -189,12 +216,8 @@ def verdicts_there(jobs):
 def is_kept(folder):
     """Whether a solve's verdict can be kept: it is undamaged, its result exists, and the solve was not
     ended by the machine (memory, disk, a kill)."""
-    from solver.system.errors import InputError
-    from solver.verification.verdict import read_verdict
-
-    try:
-        verdict = read_verdict(Path(folder, "verdict.json"))
-    except InputError:
+    verdict = read_verdict_of(folder)
+    if verdict is None:
         return False
     there = verdict.result is None or Path(folder, verdict.result).is_file()
     return there and not verdict.transient

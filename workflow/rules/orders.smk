@@ -1,8 +1,6 @@
 # Refinement ladders: each level is a solve of its own, so that what is there is not solved again.
 LADDER_FILES = sorted(
-    str(f)
-    for f in Path("cases").glob("*/orders.yaml")
-    if f.parent.name in (listed(config["family"]) or [f.parent.name])
+    str(f) for f in Path("cases").glob("*/orders.yaml") if f.parent.name in FAMILIES
 )
 
 

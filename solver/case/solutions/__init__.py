@@ -22,13 +22,16 @@ from .base import (
     ParameterError,
     Part,
 )
+from .bending import Bending
+from .half_planes import ContactEdge
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .indenter import Indenter
 from .manufactured import Parabola2d, Paraboloid3d
 from .meridian import Meridian
-from .nested import NestedCylinders, NestedSpheres, NestedTubes
+from .nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
+from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
 from .uniform import Hydrostatic, UniformCompression
 from .waves import Waves2d, Waves3d
 
@@ -45,9 +48,11 @@ __all__ = [
 _CLASSES: tuple[type[ExactSolution], ...] = (
     UniformCompression,
     Hydrostatic,
+    Bending,
     NestedCylinders,
     NestedTubes,
     NestedSpheres,
+    CompoundTube,
     OvalCylinders,
     Parabola2d,
     Paraboloid3d,
@@ -57,6 +62,11 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     Indenter,
     Waves2d,
     Waves3d,
+    PartialWaves,
+    ContactEdge,
+    HertzHalfPlanes,
+    RoundedPunch,
+    Wedge,
     PolynomialPressure2d,
     PolynomialPressure3d,
 )

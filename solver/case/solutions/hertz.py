@@ -18,6 +18,25 @@ from .base import ExactSolution, parameter
 _REGULAR = 0.8
 
 
+def half_ellipse(
+    distance: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray, share: float
+) -> dict[str, float]:
+    """Half-width and peak of the half ellipse of a computed pressure, from this alone.
+
+    The mean of ρ² over the forces (n,) at distances ρ (n,) is `share` a². Within 0.8 of that a,
+    p² = p₀² − (p₀/a)² ρ² is a straight line in ρ²: p₀ by least squares over the means (m,) of
+    macro-elements at distances `centre` (m,). Neither is known where fewer than three are there.
+    """
+    whole = force.sum()
+    square = force @ distance**2 / whole if whole > 0 else 0.0
+    half_width = float(np.sqrt(square / share))
+    inside = centre <= _REGULAR * half_width
+    if np.count_nonzero(inside) < 3:
+        return {}
+    top = np.polyfit(centre[inside] ** 2, mean[inside] ** 2, 1)[1]
+    return {"half_width": half_width, "peak": float(np.sqrt(max(top, 0.0)))}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Hertz(ExactSolution):
     """The common part: half an ellipse of pressure over the contact area."""
@@ -69,22 +88,9 @@ class Hertz(ExactSolution):
     def measured(
         self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
     ) -> dict[str, float]:
-        """Half-width and peak of the half ellipse of a computed pressure, from this alone.
-
-        The mean of ρ² over the forces (n,) at points x (n, dim) is a²/4 in 2D, 2 a²/5 in 3D. Within
-        0.8 of that a, p² = p₀² − (p₀/a)² ρ² is a straight line in ρ²: p₀ by least squares over the
-        means (m,) of macro-elements at their centres. Neither is known where fewer than three are
-        there.
-        """
-        whole = force.sum()
-        square = force @ self._distance(x) ** 2 / whole if whole > 0 else 0.0
-        half_width = float(np.sqrt((4.0 if self.dim == 2 else 2.5) * square))
-        distance = self._distance(centre)
-        inside = distance <= _REGULAR * half_width
-        if np.count_nonzero(inside) < 3:
-            return {}
-        top = np.polyfit(distance[inside] ** 2, mean[inside] ** 2, 1)[1]
-        return {"half_width": half_width, "peak": float(np.sqrt(max(top, 0.0)))}
+        """Those of the half ellipse of a computed pressure: the mean of ρ² is a²/4, in 3D 2a²/5."""
+        share = 0.25 if self.dim == 2 else 0.4
+        return half_ellipse(self._distance(x), force, self._distance(centre), mean, share)
 
     def level(self, x: np.ndarray) -> np.ndarray:
         """Height above the point of contact."""

@@ -1,5 +1,8 @@
 """Lamé's nested cylinders (plane strain) and spheres: different materials, press fit, rotation.
 
+Any number of tubes: each pressure opens the interfaces on both sides of the two tubes that it acts
+on, which gives a linear system for all pressures.
+
 All follow from u = (A + B/r^d − k r²) x, d being 2 around an axis and 3 around a centre: without
 body force k = 0 and σ_rr = (dλ + 2μ) A − 2μ (d − 1) B/r^d. The body force ρω² r of cylinders that
 rotate gives k = ρω²/(8 (λ + 2μ)), and takes (4λ + 6μ) k r² from σ_rr. A and B follow by the
@@ -11,6 +14,7 @@ Elasticity, §28 (cylinders, shrink fit), §32 (rotating discs, here in plane st
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -20,54 +24,48 @@ from .base import ElasticSolution, Part, lame_of, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class NestedCylinders(ElasticSolution):
-    """Two tubes, one in the other, under internal pressure and pressed together: plane strain.
+class _Shells(ElasticSolution):
+    """Shells in one another under internal pressure, pressed together by their overlaps.
 
-    The axis is the origin. A negative interference is an initial gap, and the pressure is zero
-    while it does not close.
+    A pressure is zero where its interface opens.
     """
 
-    name: ClassVar[str] = "nested_cylinders"
-    parts: ClassVar[tuple[str, ...]] = ("inner", "outer")
-    dim: int = field(default=2, init=False)
-
-    radii: tuple[float, ...] = parameter("inner, interface and outer radius")
-    inner: Material = parameter("material of the inner part", source="material")
-    outer: Material = parameter("material of the outer part", source="material")
-    pressure: float = parameter("pressure inside", source="pressure", default=0.0)
-    interference: float = parameter(
-        "what the inner part is too large by", source="interference", default=0.0
-    )
-    spin: float = parameter("ρω² of both parts: their body force over the radius", default=0.0)
     around: ClassVar[int] = 2
 
-    def __post_init__(self) -> None:
-        allowed = "must be three radii that increase: inner, interface, outer"
-        self.require(allowed, radii=len(self.radii) == 3)
-        a, b, c = self.radii
-        self.require(allowed, radii=0 < a < b < c)
+    radii: tuple[float, ...] = parameter("inner, interface and outer radius")
+    pressure: float = parameter("pressure inside", source="pressure", default=0.0)
+    spin: float = parameter("ρω² of all parts: their body force over the radius", default=0.0)
 
     @property
-    def materials(self) -> tuple[Material, ...]:
-        """Inner and outer part."""
-        return self.inner, self.outer
+    def _overlaps(self) -> tuple[float, ...]:
+        """By how much the part inside each interface is too large."""
+        raise NotImplementedError
 
     @cached_property
-    def _interface(self) -> tuple[float, float]:
-        """Contact pressure and gap."""
-        _, b, _ = self.radii
-        inner, outer = self._at(0, b, self.pressure, 0.0), self._at(1, b, 0.0, 0.0)
-        free_gap = outer - inner - self.interference
-        per_pressure = self._at(1, b, 1.0, 0.0, 0.0) - self._at(0, b, 0.0, 1.0, 0.0)
-        pressure = max(-free_gap / per_pressure, 0.0)
-        return pressure, 0.0 if pressure > 0 else free_gap
+    def _interfaces(self) -> tuple[np.ndarray, np.ndarray]:
+        """Contact pressures and gaps (n_parts − 1,)."""
+        n, inside = len(self._overlaps), [self.pressure] + [0.0] * len(self._overlaps)
+        free, opened = np.empty(n), np.zeros((n, n))  # the latter by a unit pressure at each
+        for i, (b, overlap) in enumerate(zip(self.radii[1:-1], self._overlaps, strict=True)):
+            free[i] = self._at(i + 1, b, 0.0, 0.0) - self._at(i, b, inside[i], 0.0) - overlap
+            opened[i, i] = self._at(i + 1, b, 1.0, 0.0, 0.0) - self._at(i, b, 0.0, 1.0, 0.0)
+            if i > 0:
+                opened[i, i - 1] = -self._at(i, b, 1.0, 0.0, 0.0)
+            if i + 1 < n:
+                opened[i, i + 1] = self._at(i + 1, b, 0.0, 1.0, 0.0)
+        # a pressure closes the interfaces beside its own: what is closed once stays so
+        pressure, gap, closed = np.zeros(n), free, np.zeros(n, dtype=bool)
+        while (gap < 0).any():
+            closed |= gap < 0
+            pressure[closed] = np.linalg.solve(opened[np.ix_(closed, closed)], -free[closed])
+            gap = np.where(closed, 0.0, free + opened @ pressure)
+        return pressure, gap
 
     @cached_property
     def _coefficients(self) -> np.ndarray:
         """A and B (2, n_parts)."""
-        pressure, _ = self._interface
-        inner = self._shell(0, self.pressure, pressure)
-        return np.array([inner, self._shell(1, pressure, 0.0)]).T
+        walls = [self.pressure, *self._interfaces[0], 0.0]
+        return np.array([self._shell(i, *walls[i : i + 2]) for i in range(len(walls) - 1)]).T
 
     def _shell(
         self, part: int, inside: float, outside: float, spun: float = 1.0
@@ -100,17 +98,35 @@ class NestedCylinders(ElasticSolution):
         """Which axes (dim,) the radius is measured along, as 0 or 1."""
         return np.arange(self.dim) < self.around
 
+    def _radius(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray(np.linalg.norm(x * self._axes, axis=1))
+
+    def _interface_of(self, x: np.ndarray) -> np.ndarray:
+        """The number (n,) of the interface next to each point."""
+        return np.abs(self._radius(x)[:, None] - np.array(self.radii[1:-1])).argmin(axis=1)
+
     def level(self, x: np.ndarray) -> np.ndarray:
         """Distance outside of the interface."""
-        return np.linalg.norm(x * self._axes, axis=1) - self.radii[1]
+        return self._radius(x) - np.array(self.radii[1:-1])[self._interface_of(x)]
+
+    def body_part(self, nodes: np.ndarray) -> int:
+        """The part between whose walls the nodes (n, dim) are."""
+        middle = self._radius(nodes).mean()
+        return int(np.searchsorted(self.radii[1:-1], middle))
+
+    def part_of(self, x: np.ndarray, part: Part) -> np.ndarray:
+        """The part (n,) of each point; where it is not given, by place."""
+        if part is None:
+            return np.searchsorted(self.radii[1:-1], self._radius(x))
+        return np.broadcast_to(part, len(x))
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """The same all round."""
-        return np.full(len(x), self._interface[0])
+        return self._interfaces[0][self._interface_of(x)]
 
     def gap(self, x: np.ndarray) -> np.ndarray:
         """Zero unless the parts do not touch."""
-        return np.full(len(x), self._interface[1])
+        return self._interfaces[1][self._interface_of(x)]
 
     def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
         """(A + B/r^d − k r²) x."""
@@ -131,6 +147,83 @@ class NestedCylinders(ElasticSolution):
     def body_force(self, x: np.ndarray, part: Part = None) -> np.ndarray:
         """ρω² x."""
         return self.spin * x * self._axes
+
+
+@dataclass(frozen=True, kw_only=True)
+class NestedCylinders(_Shells):
+    """Two tubes, one in the other, under internal pressure and pressed together: plane strain.
+
+    The axis is the origin. A negative interference is an initial gap, and the pressure is zero
+    while it does not close.
+    """
+
+    name: ClassVar[str] = "nested_cylinders"
+    parts: ClassVar[tuple[str, ...]] = ("inner", "outer")
+    dim: int = field(default=2, init=False)
+
+    inner: Material = parameter("material of the inner part", source="material")
+    outer: Material = parameter("material of the outer part", source="material")
+    interference: float = parameter(
+        "what the inner part is too large by", source="interference", default=0.0
+    )
+
+    def __post_init__(self) -> None:
+        allowed = "must be three radii that increase: inner, interface, outer"
+        self.require(allowed, radii=len(self.radii) == 3)
+        a, b, c = self.radii
+        self.require(allowed, radii=0 < a < b < c)
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """Inner and outer part."""
+        return self.inner, self.outer
+
+    @property
+    def _overlaps(self) -> tuple[float, ...]:
+        return (self.interference,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompoundTube(_Shells):
+    """Any number of tubes in one another, under internal pressure and pressed together.
+
+    The axis is the origin in 2D (plane strain); in 3D it is the last axis, and the ends are held. A
+    negative interference is an initial gap; the pressure of an interface is zero while it is open.
+    """
+
+    name: ClassVar[str] = "compound_tube"
+    dim: int = parameter("2 or 3", source="dimension")
+
+    radii: tuple[float, ...] = parameter("of all walls, the bore first")
+    young: tuple[float, ...] = parameter("Young's modulus of each tube")
+    poisson: tuple[float, ...] = parameter("Poisson's ratio of each tube")
+    interferences: tuple[float, ...] = parameter(
+        "what the tubes inside each interface are too large by"
+    )
+
+    def __post_init__(self) -> None:
+        walls = (0.0, *self.radii)
+        increase = len(walls) > 3 and all(a < b for a, b in pairwise(walls))
+        self.require("must be at least three positive radii that increase", radii=increase)
+        n = len(self.radii) - 1
+        self.require("must have one for each tube", young=len(self.young) == n)
+        self.require("must have one for each tube", poisson=len(self.poisson) == n)
+        fits = len(self.interferences) == n - 1
+        self.require("must have one for each interface", interferences=fits)
+
+    @property
+    def parts(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The tubes by number."""
+        return tuple(f"tube {i}" for i in range(1, len(self.radii)))
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """Of the tubes."""
+        return tuple(map(Material, self.young, self.poisson))
+
+    @property
+    def _overlaps(self) -> tuple[float, ...]:
+        return self.interferences
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,7 +34,7 @@ class OvalCylinders(NestedCylinders):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        mean = self._interface[0]
+        mean = self._interfaces[0][0]
         self.require(f"must be less than the mean pressure, {mean:g}", wave=abs(self.wave) < mean)
 
     @cached_property

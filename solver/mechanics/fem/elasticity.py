@@ -8,6 +8,7 @@ Source: Bathe, Finite Element Procedures, §5.3. Works on arrays alone.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -15,7 +16,7 @@ from scipy import sparse
 from ...mesh.catalogue import CellType
 from ...system.errors import SolveError
 from . import shape_functions, volume_rule
-from .assembly import CellSum, degrees_of_freedom
+from .assembly import CellSum
 from .faces import circumference
 from .small_matrices import invert
 
@@ -63,15 +64,33 @@ def physical_gradients(
 
     Raises SolveError where a Jacobian is not positive, naming how many cells.
     """
-    dn = shape_functions(kind.name).gradients(reference)
+    gradients = shape_functions(kind.name).gradients(reference)
+    determinant, inverse = _inverse_jacobian(points, cells, kind, gradients)
+    return _physical(gradients, inverse), determinant
+
+
+def _inverse_jacobian(
+    points: np.ndarray, cells: np.ndarray, kind: CellType, gradients: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     corner = points[cells]
-    corner = corner - corner[:, :1]
-    jacobian = np.einsum("cai,qaj->cqij", corner, dn, optimize=True)
-    determinant, inverse = invert(jacobian)
+    determinant, inverse = invert(_slopes(corner - corner[:, :1], gradients))
     bad = (determinant <= 0).any(axis=1)
     if bad.any():
         raise SolveError(f"{int(bad.sum())} {kind.name} cells are inverted or degenerate")
-    return np.matmul(dn, inverse), determinant
+    return determinant, inverse
+
+
+def _slopes(nodal: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+    """Slopes (n, q, d, dim) of nodal values (n, n_nodes, d), given gradients (q, n_nodes, dim).
+
+    Each component is contiguous in memory: what follows runs along cells and points.
+    """
+    by_component = np.ascontiguousarray(np.moveaxis(nodal, 2, 0))[:, None]
+    return np.moveaxis(by_component @ np.ascontiguousarray(gradients.T), (0, 1), (2, 3))
+
+
+def _physical(gradients: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+    return np.matmul(gradients, np.ascontiguousarray(inverse))
 
 
 def hoop_values(
@@ -97,13 +116,20 @@ def with_hoop(slope: np.ndarray, strain: np.ndarray) -> np.ndarray:
 class _Shapes:
     """What strains and integrals of n cells are made of at q points.
 
-    `gradient` (n, q, n_nodes, dim); `measure` (n, q) without the weights of quadrature; `hoop` (n,
-    q, n_nodes), N / r of axisymmetric cells.
+    `on_reference` (q, n_nodes, dim), gradients on the reference cell; `inverse` (n, q, dim, dim) of
+    the Jacobians; `measure` (n, q) without the weights of quadrature; `hoop` (n, q, n_nodes), N / r
+    of axisymmetric cells.
     """
 
-    gradient: np.ndarray
+    on_reference: np.ndarray
+    inverse: np.ndarray
     measure: np.ndarray
     hoop: np.ndarray | None
+
+    @cached_property
+    def gradient(self) -> np.ndarray:
+        """Gradients (n, q, n_nodes, dim) in the cells."""
+        return _physical(self.on_reference, self.inverse)
 
     @property
     def divergence(self) -> np.ndarray:
@@ -119,11 +145,12 @@ def shapes_in(
     points: np.ndarray, block: Block, cells: np.ndarray, reference: np.ndarray
 ) -> _Shapes:
     """The shapes of some cells (n, n_nodes) of a block at reference points (q, dim)."""
-    gradient, measure = physical_gradients(points, cells, block.type, reference)
+    gradients = shape_functions(block.type.name).gradients(reference)
+    measure, inverse = _inverse_jacobian(points, cells, block.type, gradients)
     if not block.axisymmetric:
-        return _Shapes(gradient, measure, None)
+        return _Shapes(gradients, inverse, measure, None)
     hoop, around = hoop_values(points, cells, block.type, reference)
-    return _Shapes(gradient, measure * around, hoop)
+    return _Shapes(gradients, inverse, measure * around, hoop)
 
 
 def _chunks(block: Block, dim: int) -> Iterator[slice]:
@@ -199,9 +226,9 @@ def internal_force(
     """
     n, dim = points.shape
     points, displacement = _in_precision(points, displacement, extended)
-    force = np.zeros(n * dim, dtype=points.dtype)
+    force = np.zeros((dim, n), dtype=points.dtype)
     if not displacement.any():
-        return force.reshape(n, dim)
+        return force.T.copy()
     for block in blocks:
         reference, weights = block.rule
         for part in _chunks(block, dim):
@@ -209,12 +236,13 @@ def internal_force(
             found = shapes_in(points, block, cells, reference)
             stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
             stress *= (weights * found.measure)[:, :, None, None]
-            plane = stress[..., :dim, :dim]
-            nodal = np.einsum("cqaj,cqij->cai", found.gradient, plane, optimize=True)
+            pulled = np.einsum("cqij,cqkj->ikcq", stress[..., :dim, :dim], found.inverse)
+            nodal = (pulled @ np.moveaxis(found.on_reference, 2, 0)).sum(axis=1)
             if found.hoop is not None:
-                nodal[..., 0] += np.einsum("cqa,cq->ca", found.hoop, stress[..., 2, 2])
-            np.add.at(force, degrees_of_freedom(cells, dim).ravel(), nodal.ravel())
-    return force.reshape(n, dim)
+                nodal[0] += np.einsum("cqa,cq->ca", found.hoop, stress[..., 2, 2])
+            for component, added in zip(force, nodal, strict=True):
+                np.add.at(component, cells.ravel(), added.ravel())
+    return force.T.copy()
 
 
 def _in_precision(
@@ -320,7 +348,7 @@ def _stress(
     """
     nodal = displacement.reshape(-1, *displacement.shape[-2:])[:, cells]
     difference = (nodal - nodal[:, :, :1]).sum(axis=0)
-    slope = np.einsum("cai,cqaj->cqij", difference, found.gradient, optimize=True)
+    slope = np.einsum("cqij,cqjk->cqik", _slopes(difference, found.on_reference), found.inverse)
     if found.hoop is not None:
         slope = with_hoop(slope, np.einsum("cqa,ca->cq", found.hoop, nodal[..., 0].sum(axis=0)))
     stress = shear[:, None, None, None] * (slope + np.swapaxes(slope, 2, 3))

@@ -1,7 +1,8 @@
 """Faces of a group on the boundary of the bodies: owner cell, outward orientation, geometry."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import meshio
 import numpy as np
@@ -32,6 +33,21 @@ class FaceBlock:
     owner_type: CellType
     owner: np.ndarray
     local: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> Self:
+        """The chosen faces, by mask or numbers."""
+        parts = {
+            name: getattr(self, name)[chosen] for name in ("nodes", "number", "owner", "local")
+        }
+        return replace(self, **parts)
+
+    def common(self, other: "FaceBlock") -> tuple[np.ndarray, np.ndarray]:
+        """The numbers in both blocks (k,) of the faces that both have."""
+        if self.owner_type is not other.owner_type or self.type is not other.type:
+            return np.empty(0, dtype=int), np.empty(0, dtype=int)
+        keys = (10 * block.owner + block.local for block in (self, other))
+        _, mine, theirs = np.intersect1d(*keys, return_indices=True)
+        return mine, theirs
 
 
 def volume_cells(mesh: meshio.Mesh) -> dict[str, np.ndarray]:

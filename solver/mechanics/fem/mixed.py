@@ -87,6 +87,8 @@ class MeanStress:
 
     def cancellation(self, stress: np.ndarray) -> tuple[np.ndarray, float]:
         """As `elasticity.sizes`: the sizes of what `force` sums (n_nodes,), and of s."""
+        if not self.size:
+            return np.zeros(self._shape[0]), 0.0
         size = np.abs(stress)
         sizes = (abs(self.divergence).T @ size).reshape(self._shape)
         return np.linalg.norm(sizes, axis=1), float(size.max(initial=0.0))

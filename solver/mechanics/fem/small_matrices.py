@@ -9,16 +9,17 @@ def invert(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Entries are infinite or NaN where the determinant is zero; the caller looks at it.
     """
     d = matrix.shape[-1]
+    m = np.moveaxis(matrix, (-2, -1), (0, 1))
     if d == 1:
-        determinant, adjugate = matrix[..., 0, 0], np.ones_like(matrix)
+        determinant, adjugate = m[0, 0], np.ones_like(m)
     elif d == 2:
-        (a, b), (c, e) = np.moveaxis(matrix, (-2, -1), (0, 1))
+        (a, b), (c, e) = m
         determinant = a * e - b * c
-        adjugate = np.stack([np.stack([e, -b], -1), np.stack([-c, a], -1)], -2)
+        adjugate = np.stack([np.stack([e, -b]), np.stack([-c, a])])
     else:
-        rows = np.moveaxis(matrix, -2, 0)
-        columns = [np.cross(rows[i - 2], rows[i - 1]) for i in range(3)]
-        determinant = np.einsum("...i,...i->...", rows[0], columns[0])
-        adjugate = np.stack(columns, axis=-1)
+        one, two = [1, 2, 0], [2, 0, 1]  # the next row or column, and the one after it
+        cofactor = m[one][:, one] * m[two][:, two] - m[one][:, two] * m[two][:, one]
+        determinant = np.einsum("i...,i...->...", m[0], cofactor[0])
+        adjugate = cofactor.swapaxes(0, 1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return determinant, adjugate / determinant[..., None, None]
+        return determinant, np.moveaxis(adjugate / determinant, (0, 1), (-2, -1))

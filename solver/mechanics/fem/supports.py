@@ -117,6 +117,26 @@ def tied(free: FreeMotion, ties: Sequence[np.ndarray]) -> FreeMotion:
     return FreeMotion((rows @ merged).tocsr(), free.offset, None)
 
 
+def released(free: FreeMotion, motions: Sequence[tuple[np.ndarray, np.ndarray]]) -> FreeMotion:
+    """What is left free where held degrees of freedom may move together, by their motions.
+
+    `motions`: degrees of freedom (m,), all of which are held, and independent columns (m, k).
+
+    >>> held = free_motion(2, 1, [Fixed(np.arange(2), np.ones((2, 1)), np.zeros(2))])
+    >>> released(held, [(np.arange(2), np.ones((2, 1)))]).basis.toarray().round(4).tolist()
+    [[-0.7071], [-0.7071]]
+    """
+    columns = [free.basis]
+    for dofs, motion in motions:
+        unit, _ = np.linalg.qr(motion)
+        rows, numbers = np.repeat(dofs, unit.shape[1]), np.tile(np.arange(unit.shape[1]), len(dofs))
+        shape = (free.basis.shape[0], unit.shape[1])
+        columns.append(sparse.csr_matrix((unit.ravel(), (rows, numbers)), shape=shape))
+    if len(columns) == 1:
+        return free
+    return FreeMotion(sparse.hstack(columns, format="csr"), free.offset, None)
+
+
 def _parts(held: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return np.einsum("nrd,nd->nr", held, vector)
 

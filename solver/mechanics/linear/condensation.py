@@ -2,7 +2,9 @@
 
 Each closed macro-element owns a degree of freedom that no other constraint contains. The constraint
 expresses it by the others, x = Z v + c, and the multiplier follows from the equilibrium of that
-degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point.
+degree of freedom. ZᵀKZ is symmetric positive definite: there is no saddle point. Where the slave
+surface of a zone is the master surface of another, the other's constraints contain it too: these
+are taken first, and the degree of freedom is the only one's among those that are left.
 """
 
 import logging
@@ -32,6 +34,8 @@ _CONVERGED = 1e-8
 _WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
 # A macro-element's own coefficient must not be smaller than this share of its row's largest.
 _SMALLEST_PIVOT = 1e-6
+# Zones whose slave surface is a master surface, one after another.
+_LAYERS = 4
 
 
 AnyIterate = TypeVar("AnyIterate", bound="Iterate")
@@ -72,13 +76,13 @@ class ConstrainedSystem(Protocol):
 class CondensedSystem:
     """x = Z v + shift · b for constraints G x = b, and the factor of ZᵀKZ.
 
-    `pivot` (m,) the eliminated unknowns, `kept` (n − m,) the others, `coefficient` (m,) of the
-    pivots in G; `coupling` (m, n) the rows of K that belong to them.
+    `pivot` (m,) the eliminated unknowns, `inverse` (m, m) that of their columns of G; `coupling`
+    (m, n) the rows of K that belong to them.
     """
 
     expansion: sparse.csr_matrix
     pivot: np.ndarray
-    coefficient: np.ndarray
+    inverse: sparse.csr_matrix
     factor: LinearSolver
     coupling: sparse.csr_matrix
 
@@ -97,13 +101,13 @@ class CondensedSystem:
     ) -> np.ndarray:
         """The pivots alone meet the constraints; the others then restore equilibrium."""
         change = np.zeros_like(force)
-        change[self.pivot] = (violation.T / self.coefficient).T
+        change[self.pivot] = self.inverse @ violation
         moved = force - self.coupling.T @ change[self.pivot]
         return change + self.expansion @ self.factor.solve(self.expansion.T @ moved, accuracy)
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
-        """From the equilibrium of the pivots: one multiplier acts on each."""
-        return (-force[self.pivot].T / self.coefficient).T
+        """From the equilibrium of the pivots."""
+        return -(self.inverse.T @ force[self.pivot])
 
     def imbalance(self, force: np.ndarray) -> float:
         """The largest force left on the unknowns v."""
@@ -162,30 +166,43 @@ def saddle_point(
     return SaddlePoint(constraints, scaled, size, weight, factor, why)
 
 
-def choose_pivots(
-    constraints: sparse.csr_matrix, own: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """For each row the largest entry in a column that is its own: pivot, coefficient, found (m,).
+def choose_pivots(constraints: sparse.csr_matrix, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For each row the largest entry in a column that is its own: pivot, found (m,).
 
     `own` (n,) marks the columns that may be pivots (unknowns of slave nodes). Rows without a column
-    of their own, or with a negligible coefficient there, have found = False.
+    of their own may have one among themselves, and so on. Rows that are left without, or have a
+    negligible coefficient there, have found = False. Found rows depend on no other ones.
     """
     m, n = constraints.shape
-    seen = np.bincount(constraints.indices, minlength=n)
+    found, pivot = np.zeros(m, dtype=bool), np.zeros(m, dtype=int)
     rows = np.repeat(np.arange(m), np.diff(constraints.indptr))
-    size = np.abs(constraints.data)
-    usable = np.flatnonzero(own[constraints.indices] & (seen[constraints.indices] == 1))
-    # Sorted by row, then size: the last of each row is its largest.
-    order = usable[np.lexsort((size[usable], rows[usable]))]
-    last = np.flatnonzero(np.diff(rows[order], append=m + 1))
-    best = order[last]
-    found, pivot, coefficient = np.zeros(m, dtype=bool), np.zeros(m, dtype=int), np.zeros(m)
+    columns, size = constraints.indices, np.abs(constraints.data)
     largest = np.zeros(m)
     np.maximum.at(largest, rows, size)
-    row = rows[best]
-    found[row] = size[best] > _SMALLEST_PIVOT * largest[row]
-    pivot[row], coefficient[row] = constraints.indices[best], constraints.data[best]
-    return pivot, coefficient, found
+    for _ in range(_LAYERS):
+        seen = np.bincount(columns, minlength=n)
+        usable = np.flatnonzero(own[columns] & (seen[columns] == 1))
+        # Sorted by row, then size: the last of each row is its largest.
+        order = usable[np.lexsort((size[usable], rows[usable]))]
+        best = order[np.flatnonzero(np.diff(rows[order], append=m + 1))]
+        best = best[size[best] > _SMALLEST_PIVOT * largest[rows[best]]]
+        found[rows[best]], pivot[rows[best]] = True, columns[best]
+        if found.all() or not len(best):
+            break
+        left = ~found[rows]
+        rows, columns, size = rows[left], columns[left], size[left]
+    return pivot, found
+
+
+def inverse_of(pivots: sparse.csr_matrix) -> sparse.csr_matrix:
+    """The inverse of the columns (m, m) of `choose_pivots`: D (1 + N) with Nᵏ = 0, k ≤ _LAYERS."""
+    diagonal = pivots.diagonal()
+    beside = (pivots - sparse.diags(diagonal)).tocsr()
+    beside.eliminate_zeros()
+    term = total = sparse.diags(1 / diagonal).tocsr()
+    while (term := -(sparse.diags(1 / diagonal) @ beside @ term)).nnz:
+        total = total + term
+    return total
 
 
 def condense(
@@ -203,7 +220,7 @@ def condense(
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
     n = matrix.shape[0]
-    pivot, coefficient, found = choose_pivots(constraints, own)
+    pivot, found = choose_pivots(constraints, own)
     if not found.all():
         raise SolveError(
             f"{int((~found).sum())} closed macro-elements have no unknown of their own to condense"
@@ -211,8 +228,8 @@ def condense(
     kept = np.ones(n, dtype=bool)
     kept[pivot] = False
     kept_columns, coupling = np.flatnonzero(kept), matrix[pivot]
-    rest = constraints[:, kept_columns]
-    follow = (sparse.diags(-1 / coefficient) @ rest).tocsr() if len(pivot) else rest
+    inverse = inverse_of(constraints[:, pivot])
+    follow = -(inverse @ constraints[:, kept_columns])
     expansion = _expansion(n, kept_columns, pivot, follow)
     condensed: Symmetric = matrix
     if len(pivot):
@@ -220,7 +237,7 @@ def condense(
         added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
         condensed = CondensedMatrix(matrix, kept_columns, added.tocsr())
     factor = prepare(condensed, unknowns and unknowns.of(kept_columns), gave_up)
-    return CondensedSystem(expansion, pivot, coefficient, factor, coupling)
+    return CondensedSystem(expansion, pivot, inverse, factor, coupling)
 
 
 def _expansion(

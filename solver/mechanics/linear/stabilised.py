@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from ...system.errors import SolveError
-from .condensation import choose_pivots
+from .condensation import choose_pivots, inverse_of
 from .direct import Factor, factorise_indefinite
 from .krylov import EPSILON
 
@@ -32,7 +32,7 @@ class StabilisedSystem:
     """The `factor` of the `whole` matrix; see `ConstrainedSystem`.
 
     `scaled` (m, n): G with rows divided by their `size` (m,); `weight` w, `part` P (m, m); `pivot`
-    (m,) an unknown that occurs in no other row, with the `coefficient` (m,).
+    (m,) and `inverse` (m, m) as of the `CondensedSystem`.
     """
 
     whole: sparse.csr_matrix
@@ -42,7 +42,7 @@ class StabilisedSystem:
     weight: float
     part: sparse.csr_matrix
     pivot: np.ndarray
-    coefficient: np.ndarray
+    inverse: sparse.csr_matrix
     factor: Factor
     why: str = _WHY
     doubt: str = "the system of stabilised contact is nearly singular"
@@ -65,8 +65,8 @@ class StabilisedSystem:
         return found[: len(force)]
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
-        """From the equilibrium of the pivots: one multiplier acts on each."""
-        return (-force[self.pivot].T / self.coefficient).T
+        """From the equilibrium of the pivots."""
+        return -(self.inverse.T @ force[self.pivot])
 
     def imbalance(self, force: np.ndarray) -> float:
         """The largest force left with the multipliers acting."""
@@ -84,7 +84,7 @@ def stabilise(
 
     Raises SolveError where a constraint has no unknown of its own, or the system is singular.
     """
-    pivot, coefficient, found = choose_pivots(constraints, own)
+    pivot, found = choose_pivots(constraints, own)
     if not found.all():
         raise SolveError(
             f"{int((~found).sum())} closed macro-elements have no unknown of their own"
@@ -107,6 +107,6 @@ def stabilise(
         weight=weight,
         part=part,
         pivot=pivot,
-        coefficient=coefficient,
+        inverse=inverse_of(constraints[:, pivot]),
         factor=factorise_indefinite(whole),
     )

@@ -31,10 +31,24 @@ def with_master_normals(
     nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slaves]))
     directions = np.zeros_like(points)
     directions[nodes] = -_nearest_normals(points[nodes], masters, normals)
-    differ = max(np.abs(directions[b.nodes] - b.normal[:, None]).max() for b in slaves)
+    return with_directions(slaves, directions)
+
+
+def with_directions(slaves: list[Facets], vectors: np.ndarray) -> list[Facets]:
+    """The faces with directions along vectors (n_points, dim), or as they are if along their own.
+
+    >>> [leaning] = with_directions([slave], np.array([[0.0, 2.0], [0.6, 0.8]]))
+    >>> leaning.directions.tolist()
+    [[[0.6, 0.8], [0.0, 1.0]]]
+    """
+    found = [vectors[block.nodes] for block in slaves]
+    found = [along / np.linalg.norm(along, axis=2, keepdims=True) for along in found]
+    differ = max(
+        np.abs(along - b.normal[:, None]).max() for along, b in zip(found, slaves, strict=True)
+    )
     if differ <= FLAT:
         return slaves
-    return [replace(block, directions=directions[block.nodes]) for block in slaves]
+    return [replace(b, directions=along) for along, b in zip(found, slaves, strict=True)]
 
 
 def sharpest(masters: Sequence[Facets], points: np.ndarray) -> tuple[float, np.ndarray]:

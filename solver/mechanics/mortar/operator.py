@@ -96,13 +96,14 @@ class Scheme:
     """How the gap is integrated: which points, which multipliers, and whether closure is due.
 
     `sample` gives points that measure whole slave faces, `meet` those where the surfaces meet,
-    `space` the multipliers.
+    `space` the multipliers. `nearest`: of several parts of the master surface the nearest counts.
     """
 
     sample: Callable[[list[Facets]], list[Samples]] = face_samples
     meet: Meet = meet_in_segments
     space: Space = constants
     closure: bool = True
+    nearest: bool = True
 
 
 LAC = Scheme()
@@ -139,7 +140,8 @@ def gap_operator(
         scheme = replace(scheme, closure=False)
     samples = scheme.sample(slaves)
     reach = _extent([*slaves, *masters]) if search is None else search
-    found = _in_reach(_search(slaves, samples, masters, reach, scheme.meet), slaves, n_macro)
+    found = _search(slaves, samples, masters, reach, scheme.meet)
+    found = _in_reach(found, slaves, n_macro) if scheme.nearest else found
     data = InterfaceData(slaves=slaves, samples=samples, found=found, n_macro=n_macro)
     space = scheme.space(data)
     parts = [integrals(space, segments) for segments in found]

@@ -7,8 +7,16 @@ from ...case.typed import FieldError
 from .perturb import stepped
 
 
-def cells_of(mesh: meshio.Mesh, group: str, key: str = "group") -> list[np.ndarray]:
-    """The numbers of the cells, block by block, of a group. FieldError names the `key`."""
+def cells_of(
+    mesh: meshio.Mesh, group: str | tuple[str, ...], key: str = "group"
+) -> list[np.ndarray]:
+    """The numbers of the cells, block by block, of a group or of several.
+
+    FieldError names the `key`.
+    """
+    if not isinstance(group, str):
+        of_each = [cells_of(mesh, one, key) for one in group]
+        return [np.unique(np.concatenate(parts)) for parts in zip(*of_each, strict=True)]
     if group not in mesh.cell_sets:
         problem = f"no such group; there are {', '.join(mesh.cell_sets)}"
         raise FieldError((key,), problem, value=group)
@@ -16,8 +24,8 @@ def cells_of(mesh: meshio.Mesh, group: str, key: str = "group") -> list[np.ndarr
     return [none if i is None else np.asarray(i, dtype=int) for i in mesh.cell_sets[group]]
 
 
-def nodes_of(mesh: meshio.Mesh, group: str) -> np.ndarray:
-    """Which nodes (n,) belong to the cells of a group."""
+def nodes_of(mesh: meshio.Mesh, group: str | tuple[str, ...]) -> np.ndarray:
+    """Which nodes (n,) belong to the cells of a group or of several."""
     chosen = np.zeros(len(mesh.points), dtype=bool)
     for block, numbers in zip(mesh.cells, cells_of(mesh, group), strict=True):
         chosen[block.data[numbers].ravel()] = True

@@ -1,6 +1,10 @@
 """MED files, read with plain h5py: a MED file is an HDF5 file of a documented layout.
 
 Read here and not by gmsh, which leaves the groups of nodes out and pads the names of the others.
+
+In version 2 a mesh has no steps: its nodes, cells and families are directly in it. The names of
+groups are one text of 80 characters each, and faces of solids (edges of plane meshes) may have a
+further column behind their nodes.
 """
 
 from pathlib import Path
@@ -19,13 +23,14 @@ _TYPES = {
     "HE8": "HEXA8", "H20": "HEXA20", "H27": "HEXA27", "PE6": "PENTA6", "P15": "PENTA15",
     "PY5": "PYRA5", "P13": "PYRA13",
 }  # fmt: skip
+_NAME = 80  # characters of a group's name
 # MED's node order is the catalogue's with the orientation reversed, which `tidy` puts right; only
 # the face centres of HEXA27 have an order of their own.
 _HEXA27 = [*range(20), 24, 22, 21, 23, 20, 25, 26]
 
 
 def read(path: Path) -> meshio.Mesh:
-    """The mesh of a MED file (version 3 or later), as it stands there.
+    """The mesh of a MED file (version 2.2 or later), as it stands there.
 
     Raises InputError for what has no meaning here: several meshes in one file, another kind of
     coordinates than Cartesian, cell types that are not in the catalogue.
@@ -60,26 +65,33 @@ def _mesh_of(file: h5py.File, path: Path) -> tuple[str, h5py.Group]:
         names = f": {', '.join(meshes)}" if len(meshes) else ""
         raise InputError(path, "meshes", len(meshes), f"the file must hold one mesh{names}")
     name, mesh = next(iter(meshes.items()))
-    if int(mesh.attrs.get("REP", 0)) != 0:
+    steps = [mesh, *(entry for entry in mesh.values() if isinstance(entry, h5py.Group))]
+    found = next((step for step in steps if "NOE" in step), None)
+    if found is None:
+        allowed = "no nodes in the layout of MED 2.2 or later; for older files: medimport OLD NEW"
+        raise InputError(path, "mesh", name, allowed)
+    if any(int(entry.attrs.get("REP", 0)) for entry in (mesh, found["NOE/COO"])):
         raise InputError(path, "coordinates", None, "must be Cartesian")
-    steps = [entry for entry in mesh.values() if isinstance(entry, h5py.Group) and "NOE" in entry]
-    if not steps:
-        raise InputError(path, "mesh", name, "no nodes in the layout of MED 3 or later")
-    return name, steps[0]
+    return name, found
 
 
 def _families(file: h5py.File, mesh: str, entity: str) -> dict[int, list[str]]:
     """The group names of each family number."""
-    folder = file.get(f"FAS/{mesh}/{entity}", {})
+    places = (f"FAS/{mesh}/{entity}", f"ENS_MAA/{mesh}/FAS/{entity}")
     return {
-        int(family.attrs["NUM"]): [_text(row) for row in family["GRO/NOM"][()]]
-        for family in folder.values()
+        int(family.attrs["NUM"]): _names(family["GRO/NOM"][()])
+        for place in places
+        for family in file.get(place, {}).values()
         if "GRO" in family
     }
 
 
-def _text(row: np.ndarray) -> str:
-    return row.tobytes().split(b"\0")[0].decode(errors="replace").strip()
+def _names(stored: np.ndarray | np.bytes_) -> list[str]:
+    """The names of groups in texts of fixed length."""
+    whole = stored.tobytes()
+    rows = (whole[i : i + _NAME] for i in range(0, len(whole), _NAME))
+    names = (row.split(b"\0")[0].decode(errors="replace").strip() for row in rows)
+    return [name for name in names if name]
 
 
 def _members(entry: h5py.Group, families: dict[int, list[str]]) -> dict[str, np.ndarray]:
@@ -105,7 +117,9 @@ def _meshio_type(kind: str, path: Path) -> str:
 def _connectivity(entry: h5py.Group, kind: str) -> np.ndarray:
     count = int(entry["NOD"].attrs["NBR"])
     nodes = entry["NOD"][()].reshape(-1, count).T - 1
-    return nodes[:, _HEXA27] if kind == "H27" else nodes
+    if kind == "PO1":
+        return nodes[:, :1]
+    return nodes[:, _HEXA27 if kind == "H27" else range(BY_NAME[_TYPES[kind]].n_nodes)]
 
 
 def _numbers(entry: h5py.Group, count: int) -> np.ndarray:

@@ -12,11 +12,11 @@ import meshio
 
 from ...case.typed import FieldError, read_as
 from ...system.errors import InputError, hint, key_path
-from ..keys import RECIPES, Recipe
+from ..keys import RECIPES, BricksKeys, Recipe
 from ..tidy import tidy
 
 
-def read_recipe(content: Mapping[str, Any], where: str | Path) -> Recipe:
+def read_recipe(content: Mapping[str, Any], where: str | Path) -> Recipe | BricksKeys:
     """The keys of a case file's `mesh:` mapping with the key `recipe`.
 
     `where` names the case file in the InputError that an unknown recipe, key or value raises.
@@ -32,7 +32,7 @@ def generate(content: Mapping[str, Any], where: str | Path) -> meshio.Mesh:
     """The mesh of a recipe, the same every time; raises as `read_recipe`."""
     recipe = read_recipe(content, where)
     name = content["recipe"]
-    module = import_module(f".{'blocks' if name == 'blocks' else 'mapped'}", __package__)
+    module = import_module(f".{name if name in ('blocks', 'bricks') else 'mapped'}", __package__)
     try:
         raw = getattr(module, name)(recipe)
     except FieldError as fault:

@@ -20,6 +20,7 @@ both blocks, `farx` and `fary` opposite to them. `refine` multiplies all divisio
 `inner` (1).
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import gmsh
@@ -44,15 +45,17 @@ def stacked(recipe: Recipe, size: list[float] | None = None) -> meshio.Mesh:
     """Both blocks, each of a `size` along each axis, by default of edge 1."""
     edges = np.array(size or [1.0] * recipe.dim)
     both = {"bottom": recipe.bottom, "top": recipe.top}
-    return _joined([_block(name, keys, edges, recipe.refine) for name, keys in both.items()])
+    low = {"bottom": -np.eye(len(edges))[-1] * edges, "top": np.zeros(len(edges))}
+    return joined(
+        [block(name, keys, low[name], edges, recipe.refine) for name, keys in both.items()]
+    )
 
 
-def _block(name: str, keys: BlockKeys, size: np.ndarray, refine: int) -> meshio.Mesh:
-    cell = BY_NAME[keys.cells]
-    origin = np.zeros(cell.dim)
-    if name == "bottom":
-        origin[-1] = -size[-1]
-    if cell.name.startswith(("PENTA", "PYRA")):
+def block(
+    name: str, keys: BlockKeys, origin: np.ndarray, size: np.ndarray, refine: int
+) -> meshio.Mesh:
+    """One block with its groups, `bottom` or `top`, from its corner `origin` (dim,) on."""
+    if keys.cells.startswith(("PENTA", "PYRA")):
         from .hybrid import cube
 
         return cube(name, keys, origin, size, refine)
@@ -164,7 +167,7 @@ class _Block:
         return self.origin + np.round(share * steps) * self.size / steps
 
 
-def _joined(meshes: list[meshio.Mesh]) -> meshio.Mesh:
+def joined(meshes: Sequence[meshio.Mesh]) -> meshio.Mesh:
     """The meshes side by side in one; groups of the same name become one."""
     offsets = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     cells = [

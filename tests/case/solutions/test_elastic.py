@@ -5,9 +5,10 @@ import pytest
 
 from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, ParameterError
+from solver.case.solutions.bending import Bending
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.meridian import Meridian
-from solver.case.solutions.nested import NestedCylinders, NestedSpheres, NestedTubes
+from solver.case.solutions.nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes
 from solver.case.solutions.oval import OvalCylinders
 from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
 from solver.case.solutions.uniform import Hydrostatic, UniformCompression
@@ -29,6 +30,8 @@ ALL = [
     UniformCompression(pressure=25.0, base=-50.0, lower=SOFT, upper=HARD, dim=3, interface=1.0),
     Hydrostatic(pressure=25.0, material=SOFT, dim=2),
     Hydrostatic(pressure=25.0, material=SOFT, dim=3),
+    Bending(mean=9.0, slope=(-3.0,), base=-1.0, bottom=SOFT, top=HARD, dim=2),
+    Bending(mean=9.0, slope=(-3.0, 2.0), base=-1.0, bottom=SOFT, top=HARD, dim=3),
     nested(NestedCylinders),
     nested(NestedCylinders, spin=0.002),
     nested(NestedTubes, spin=0.002),
@@ -59,7 +62,7 @@ def points_of(solution: ElasticSolution, part: int) -> np.ndarray:
         return x
     if isinstance(solution, UniformCompression):
         x[:, -1] += 1.0 if part else -1.0
-    if isinstance(solution, (Waves2d, PolynomialPressure2d)):
+    if isinstance(solution, (Bending, Waves2d, PolynomialPressure2d)):
         x[:, -1] *= 1.0 if part else -1.0
     return x
 
@@ -341,3 +344,89 @@ def test_a_solution_in_its_meridian_plane():
 def test_spheres_do_not_rotate():
     with pytest.raises(ParameterError, match="spheres do not rotate"):
         nested(NestedSpheres, spin=0.1)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_bending_leaves_the_sides_free_and_the_rollers_flat(dim):
+    solution = Bending(
+        mean=9.0, slope=(-3.0, 2.0)[: dim - 1], base=-1.0, bottom=SOFT, top=HARD, dim=dim
+    )
+    x = points_of(solution, 1)
+    stress, p = solution.stress(x), 9.0 + x[:, :-1] @ np.array([-3.0, 2.0])[: dim - 1]
+    expected = np.zeros((len(x), 6))
+    expected[:, dim - 1] = -p
+    if dim == 2:
+        expected[:, 2] = -0.2 * p
+    np.testing.assert_allclose(stress, expected, atol=1e-13)
+    x[:, -1] = -1.0
+    assert (solution.displacement(x)[:, -1] == 0).all()
+    # a beam of height 1 + 1 in the plane of x: u_x,zz = s/E' = -3/E'
+    bent = solution.gradient(np.array([[0.5] * dim, [0.5] * (dim - 1) + [1.5]]), 1)[:, 0, -1]
+    young = 70000.0 / (1 - 0.2**2) if dim == 2 else 70000.0
+    assert np.ptp(bent) == pytest.approx(3.0 / young, rel=1e-12)
+
+
+TUBES = {
+    "radii": (20.0, 30.0, 40.0, 50.0),
+    "young": (2000.0, 1000.0, 4000.0),
+    "poisson": (0.3, 0.2, 0.25),
+    "interferences": (0.02, 0.01),
+    "pressure": 0.5,
+}
+
+
+def at_radius(r, dim=2):
+    return np.array([[r, *[0.0] * (dim - 1)]])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_two_tubes_are_a_compound_tube(dim):
+    given = {"pressure": 25.0, "interference": 0.01, "spin": 0.002}
+    cls = {2: NestedCylinders, 3: NestedTubes}[dim]
+    two = cls(radii=RADII, inner=SOFT, outer=HARD, **given)
+    young, poisson = (2000.0, 70000.0), (0.3, 0.2)
+    compound = CompoundTube(
+        radii=RADII, young=young, poisson=poisson, interferences=(0.01,), dim=dim,
+        pressure=25.0, spin=0.002,
+    )  # fmt: skip
+    x = np.concatenate([points_of(two, 0), points_of(two, 1)])
+    np.testing.assert_allclose(compound.stress(x), two.stress(x), rtol=1e-13, atol=1e-13)
+    np.testing.assert_array_equal(compound.part_of(x, None), [0] * 20 + [1] * 20)
+
+
+@pytest.mark.parametrize("spin", [0.0, 1e-3, 4e-3])
+def test_tubes_touch_and_press_at_all_interfaces(spin):
+    tubes = CompoundTube(**TUBES, dim=2, spin=spin)
+    walls = [20.0, 30.0, 40.0, 50.0]
+    pressure = [0.5, *(tubes.contact_pressure(at_radius(b))[0] for b in (30.0, 40.0)), 0.0]
+    for part in range(3):
+        for wall in (part, part + 1):
+            stress = tubes.stress(at_radius(walls[wall]), part)[0, 0]
+            assert stress == pytest.approx(-pressure[wall], abs=1e-12)
+    for b, overlap, part in ((30.0, 0.02, 0), (40.0, 0.01, 1)):
+        x = at_radius(b)
+        jump = (tubes.displacement(x, part + 1) - tubes.displacement(x, part))[0, 0]
+        assert jump - overlap == pytest.approx(tubes.gap(x)[0], abs=1e-13)
+    assert (pressure[1] == 0) == (tubes.gap(at_radius(30.0))[0] > 0) == (spin == 4e-3)
+    assert pressure[2] > 0
+
+
+def test_a_rotating_shrink_fit_is_lost_at_a_known_speed():
+    """p(0) = E δ (b² − a²)(c² − b²)/(2 (1 − ν²) b³ (c² − a²)), lost at ρω² = p(0)/166.6667."""
+    of = {"radii": RADII, "inner": SOFT, "outer": SOFT, "interference": 0.02}
+    still = 2000 * 0.02 * 500 * 700 / (2 * 0.91 * 27000 * 1200)
+    lost = still / (500 / 3)
+    for spin, pressure in ((0.0, still), (lost / 2, still / 2), (1.001 * lost, 0.0)):
+        found = NestedCylinders(**of, spin=spin)
+        assert found.contact_pressure(at_radius(30.0))[0] == pytest.approx(pressure, rel=1e-9)
+    assert found.gap(at_radius(30.0))[0] > 0
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("radii", (20.0, 30.0, 30.0, 50.0)), ("young", (1.0, 2.0)), ("interferences", (0.1,))],
+)
+def test_a_compound_tube_needs_a_number_for_each_part(key, value):
+    with pytest.raises(ParameterError) as refusal:
+        CompoundTube(**TUBES | {key: value}, dim=2)
+    assert refusal.value.parameter == key

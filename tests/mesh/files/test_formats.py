@@ -36,9 +36,33 @@ def write_square(path: Path, version: float = 4.1) -> None:
         gmsh.write(str(path))
 
 
-@pytest.mark.parametrize("name", ["v2.msh", "v4.msh", "square.med"])
+def as_version_2(path: Path) -> None:
+    """Give a MED file the layout of version 2.3, edges with the further column that it may have."""
+    with h5py.File(path, "a") as file:
+        file["INFOS_GENERALES"].attrs.update(MAJ=2, MIN=3, REL=6)
+        (name,) = file["ENS_MAA"]
+        mesh = file["ENS_MAA"][name]
+        (step,) = list(mesh.values())
+        for entity in list(step):
+            mesh.move(f"{step.name}/{entity}", f"{mesh.name}/{entity}")
+        del mesh[step.name]
+        file.move(f"FAS/{name}", f"{mesh.name}/FAS")
+        for family in mesh["FAS/ELEME"].values():
+            text = family["GRO/NOM"][()].tobytes().replace(b"\0", b" ")
+            del family["GRO/NOM"]
+            family["GRO/NOM"] = np.bytes_(text + b"\0")
+        edges = mesh["MAI/SE2/NOD"]
+        count, wider = edges.attrs["NBR"], np.r_[edges[()], np.zeros(edges.attrs["NBR"], int)]
+        del mesh["MAI/SE2/NOD"]
+        mesh["MAI/SE2/NOD"] = wider
+        mesh["MAI/SE2/NOD"].attrs["NBR"] = count
+
+
+@pytest.mark.parametrize("name", ["v2.msh", "v4.msh", "square.med", "v2.med"])
 def test_groups_of_every_dimension(name, tmp_path):
     write_square(tmp_path / name, version=2.2 if name == "v2.msh" else 4.1)
+    if name == "v2.med":
+        as_version_2(tmp_path / name)
     mesh = read_mesh(tmp_path / name)
     assert mesh.points.shape[1] == 2
     lines = mesh.get_cells_type("line")

@@ -5,9 +5,12 @@ from pathlib import Path
 import pytest
 
 from solver.case.reader import load_case
+from solver.case.yaml import parse_mapping
+from solver.commands.cli import main
 from solver.simulation.simulate import simulate
 from solver.studies.fits import fit_order
 from solver.studies.orders.description import read_ladders
+from solver.studies.orders.expected import at_first
 from solver.studies.orders.theory import THEORY, element_size
 from solver.system.errors import InputError
 from solver.verification.norms import errors
@@ -118,3 +121,18 @@ def test_the_mesh_of_a_file_cannot_be_refined(tmp_path):
     assert refined(case, 1) is case
     with pytest.raises(InputError, match=r"mesh.file.*only the mesh of a recipe can"):
         refined(case, 2)
+
+
+def test_an_expected_error_is_on_the_power_law_through_all_levels():
+    """Of errors 8, 1, 1/2 at 1, 1/2, 1/4: slope log₂ 16 / 2 = 2 about the mean, 2^(2/3)."""
+    assert at_first([1, 2, 4], [8.0, 1.0, 0.5]) == pytest.approx(2 ** (2 / 3) * 4)
+
+
+def test_the_expected_errors_of_a_case_are_those_of_its_ladder(capsys):
+    path = MANUFACTURED.parent / "bending" / "tria3-quad4.yaml"
+    assert main(["expect", str(path)]) == 0
+    printed = parse_mapping(capsys.readouterr().out, path)["expected"]
+    given = load_case(path).expected
+    assert printed.keys() == given.keys()
+    for name, error in given.items():
+        assert printed[name] == pytest.approx(error, rel=0.1)

@@ -1,0 +1,300 @@
+"""Contacts of half-planes that are symmetric about x = 0: waves, Hertz's, a punch, a wedge.
+
+The contact is |x| < a. With R = √(z − a) √(z + a) and L = ln((z + R)/(i a)) the functions of
+`half_planes` are
+
+    waves   Z = −2i p̄ cos ψ/(w + r),   Ẑ = −i (p̄ λ/π) (w/(w + r) + ln((w + r)/(i s)))
+    Hertz   Z = −i p₀ a/(z + R),       Ẑ = −i (p₀ a/2) (z/(z + R) + L)
+    punch   Z = −i K (z B − b A − α R),
+            Ẑ = −i K ((z² + b²) B/2 − b z A − α (z R − a² L)/2 − b d L/2)
+    wedge   Z = −i (E* m/π) asin(a/z),   Ẑ = −i (E* m/π) (z asin(a/z) + a L)
+
+with ψ = πz/λ, w = sin ψ, s = sin(πa/λ), r = √(w − s) √(w + s); p₀ = E* a/(2 R₁); K = E*/(π R₁),
+d = √(a² − b²), α = arccos(b/a), A = arctan(d/R), B = arctan(z d/(b R)). The waves are Hertz's
+contact in sin(πx/λ). The punch and the wedge are sums of flat punches of half-widths t, each of the
+load P′(t) dt: P′ = E* t arccos(b/t)/R₁ and E* m. Sources: `half_planes`.
+"""
+
+from dataclasses import dataclass
+from math import acos, asin, pi, sqrt
+from typing import ClassVar
+
+import numpy as np
+
+from .base import parameter
+from .half_planes import Functions, HalfPlanes
+from .hertz import half_ellipse
+
+# The pressure has a vertical tangent at the end of the contact.
+_REGULAR = 0.8
+# A point at a singularity of Z is moved by this share of the half-width.
+_ASIDE = 1e-14
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pressed(HalfPlanes):
+    """The common part: a contact from −a to a."""
+
+    quantities: ClassVar[frozenset[str]] = HalfPlanes.quantities | {"half_width"}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("must be positive", half_width=self.half_width > 0)
+
+    def closed(self, x: np.ndarray) -> np.ndarray:
+        """Within the half-width."""
+        return np.abs(x) < self.half_width
+
+    def regular(self, x: np.ndarray) -> np.ndarray:
+        """Within 0.8 a."""
+        return np.abs(x[:, 0]) <= _REGULAR * self.half_width
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartialWaves(Pressed):
+    """Waves of the height 2Δ that a mean pressure closes in part (Westergaard)."""
+
+    name: ClassVar[str] = "partial_waves"
+    quantities: ClassVar[frozenset[str]] = Pressed.quantities | {"peak"}
+
+    size: float = parameter("half a wavelength: from the middle of a contact to that of a gap")
+    amplitude: float = parameter("Δ, half the height of the waves: the gap is Δ (1 − cos(πx/size))")
+    mean_pressure: float = parameter("p̄, below π E* Δ/(2 size), which closes the waves")
+
+    def __post_init__(self) -> None:
+        self.require("must be positive", size=self.size > 0, amplitude=self.amplitude > 0)
+        least = f"must be positive and below {self._closing:g}"
+        self.require(least, mean_pressure=0 < self.mean_pressure < self._closing)
+        super().__post_init__()
+
+    @property
+    def _closing(self) -> float:
+        """The mean pressure that closes the waves."""
+        return pi * self.modulus * self.amplitude / (2 * self.size)
+
+    @property
+    def _share(self) -> float:
+        """S = sin(πa/λ)."""
+        return sqrt(self.mean_pressure / self._closing)
+
+    @property
+    def half_width(self) -> float:
+        """a: half the width of each contact."""
+        return 2 * self.size / pi * asin(self._share)
+
+    @property
+    def peak(self) -> float:
+        """The pressure in the middle of a contact."""
+        return 2 * self.mean_pressure / self._share
+
+    def functions(self, z: np.ndarray) -> Functions:
+        """Those of Hertz's contact in w."""
+        angle = pi / (2 * self.size)
+        w, cos, s = np.sin(angle * z), np.cos(angle * z), self._share
+        r = np.sqrt(w - s) * np.sqrt(w + s)
+        whole = w / (w + r) + np.log((w + r) / (1j * s))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = 2j * self.mean_pressure * angle * (w + cos**2 / r) / (w + r)
+        stress = -2j * self.mean_pressure * cos / (w + r)
+        return -1j * self.mean_pressure / angle * whole, stress, slope
+
+    def initial_gap(self, x: np.ndarray) -> np.ndarray:
+        """Δ (1 − cos(πx/size))."""
+        return self.amplitude * (1 - np.cos(pi * x / self.size))
+
+    def measured(
+        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
+    ) -> dict[str, float]:
+        """Those of the half ellipse of p/cos ψ over sin ψ."""
+        angle = pi / (2 * self.size)
+        place, at = np.abs(np.sin(angle * x[:, 0])), angle * centre[:, 0]
+        found = half_ellipse(place, force, np.abs(np.sin(at)), mean / np.cos(at), 0.25)
+        if found:
+            found["half_width"] = float(np.arcsin(found["half_width"]) / angle)
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Given(Pressed):
+    """A contact whose half-width is given, and with it the force."""
+
+    end: float = parameter("a, half the width of the contact")
+
+    @property
+    def half_width(self) -> float:
+        """a: half the width of the contact."""
+        return self.end
+
+    @property
+    def force(self) -> float:
+        """The whole force per length."""
+        raise NotImplementedError
+
+    @property
+    def moment(self) -> float:
+        """The mean of x² over the contact force, in a²."""
+        raise NotImplementedError
+
+    def measured(
+        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
+    ) -> dict[str, float]:
+        """The half-width of a pressure of this shape with the second moment of the computed one."""
+        whole = force.sum()
+        square = force @ x[:, 0] ** 2 / whole if whole > 0 else 0.0
+        return {"half_width": float(np.sqrt(square / self.moment))}
+
+    def _root(self, z: np.ndarray) -> np.ndarray:
+        """R."""
+        return np.sqrt(z - self.end) * np.sqrt(z + self.end)
+
+    def _aside(self, z: np.ndarray, place: float) -> np.ndarray:
+        """Points (n,), moved where they are at a singular place of the interface."""
+        near = self.end * _ASIDE
+        return np.where(np.abs(z - place) < near, place + near, z)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HertzHalfPlanes(_Given):
+    """Hertz's contact of a parabola x²/(2R₁), without an error of the theory."""
+
+    name: ClassVar[str] = "hertz_half_planes"
+    quantities: ClassVar[frozenset[str]] = Pressed.quantities | {"peak"}
+    moment: ClassVar[float] = 0.25
+
+    radius: float = parameter("R₁ of the parabola x²/(2R₁) that is the initial gap")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("must be positive", radius=self.radius > 0)
+
+    @property
+    def peak(self) -> float:
+        """p₀: the pressure in the middle."""
+        return self.modulus * self.end / (2 * self.radius)
+
+    @property
+    def force(self) -> float:
+        """The whole force per length."""
+        return pi * self.end * self.peak / 2
+
+    def functions(self, z: np.ndarray) -> Functions:
+        """Those of a half ellipse of pressure."""
+        a, root = self.end, self._root(z)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = 1j * self.peak * a / (root * (z + root))
+        whole = z / (z + root) + np.log((z + root) / (1j * a))
+        return -0.5j * self.peak * a * whole, -1j * self.peak * a / (z + root), slope
+
+    def initial_gap(self, x: np.ndarray) -> np.ndarray:
+        """The parabola."""
+        return x**2 / (2 * self.radius)
+
+    def measured(
+        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
+    ) -> dict[str, float]:
+        """Those of the half ellipse of a computed pressure."""
+        return half_ellipse(np.abs(x[:, 0]), force, np.abs(centre[:, 0]), mean, self.moment)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoundedPunch(_Given):
+    """A flat face of half-width b with parabolic shoulders (|x| − b)²/(2R₁)."""
+
+    name: ClassVar[str] = "rounded_punch"
+
+    flat: float = parameter("b, half the width of the flat part")
+    radius: float = parameter("R₁ of the shoulders")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("must be positive", radius=self.radius > 0)
+        self.require("must be positive and below the end", flat=0 < self.flat < self.end)
+
+    @property
+    def _angle(self) -> float:
+        """α = arccos(b/a)."""
+        return acos(self.flat / self.end)
+
+    @property
+    def _rise(self) -> float:
+        """D = √(a² − b²)."""
+        return sqrt(self.end**2 - self.flat**2)
+
+    @property
+    def force(self) -> float:
+        """The whole force per length."""
+        area = self.end**2 * self._angle - self.flat * self._rise
+        return self.modulus * area / (2 * self.radius)
+
+    @property
+    def moment(self) -> float:
+        """Of flat punches of half-widths t, each with the mean t²/2."""
+        a, b, d = self.end, self.flat, self._rise
+        part = a**4 * self._angle - b * (d**3 / 3 + b**2 * d)
+        return part / (4 * a**2 * (a**2 * self._angle - b * d))
+
+    def functions(self, z: np.ndarray) -> Functions:
+        """Those of the sum of flat punches; for x < 0, where A and B are not unique, mirrored."""
+        left = z.real < 0
+        z = self._aside(np.where(left, -z.conj(), z), self.flat)
+        a, b, d, alpha = self.end, self.flat, self._rise, self._angle
+        root = self._root(z)
+        # R² + d² = z² − b² and b² R² + d² z² = a² (z² − b²): near z = b their logarithms cancel.
+        shared = (np.log(z - b) + np.log(z + b)) / 2
+        one = 1j * (shared - np.log(root + 1j * d))
+        two = 1j * (shared - np.log((b * root + 1j * d * z) / a))
+        factor = -1j * self.modulus / (pi * self.radius)
+        log = np.log((z + root) / (1j * a))
+        whole = (z**2 + b**2) * two / 2 - b * z * one - b * d * log / 2
+        whole -= alpha * (z * root - a**2 * log) / 2
+        stress = z * two - b * one - alpha * root
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = factor * (two - alpha * z / root)
+        whole, stress = factor * whole, factor * stress
+        return (
+            np.where(left, -whole.conj(), whole),
+            np.where(left, stress.conj(), stress),
+            np.where(left, -slope.conj(), slope),
+        )
+
+    def initial_gap(self, x: np.ndarray) -> np.ndarray:
+        """The shoulders."""
+        return np.maximum(np.abs(x) - self.flat, 0.0) ** 2 / (2 * self.radius)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wedge(_Given):
+    """A blunt wedge: the pressure has no bound at its tip."""
+
+    name: ClassVar[str] = "wedge"
+    moment: ClassVar[float] = 1 / 6
+
+    slope: float = parameter("m: the initial gap is m |x|")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("must be positive", slope=self.slope > 0)
+
+    @property
+    def force(self) -> float:
+        """The whole force per length."""
+        return self.modulus * self.slope * self.end
+
+    def functions(self, z: np.ndarray) -> Functions:
+        """Those of the sum of equal flat punches."""
+        z = self._aside(z, 0.0)
+        a, root = self.end, self._root(z)
+        factor = -1j * self.modulus * self.slope / pi
+        angle = -1j * (np.log(1j * a + root) - np.log(z))
+        whole = z * angle + a * np.log((z + root) / (1j * a))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = -factor * a / (z * root)
+        return factor * whole, factor * angle, change
+
+    def initial_gap(self, x: np.ndarray) -> np.ndarray:
+        """The wedge."""
+        return self.slope * np.abs(x)
+
+    def regular(self, x: np.ndarray) -> np.ndarray:
+        """Beyond 0.2 a from the tip, too."""
+        return super().regular(x) & (np.abs(x[:, 0]) >= 0.2 * self.end)

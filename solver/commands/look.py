@@ -1,0 +1,120 @@
+"""The commands that look at what is there: cases, mesh files, results."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..system.errors import InputError, hint
+from .options import add_command
+
+if TYPE_CHECKING:
+    from ..simulation.inspection import Group
+
+
+def add_commands(commands: Any) -> None:
+    """Add `list`, `inspect` and `plot`."""
+    command = add_command(commands, "list", _list, "list families, or the cases of a family")
+    command.add_argument("family", nargs="?", metavar="FAMILY", help="default: all families")
+    command.add_argument("--cases", type=Path, default=Path("cases"), metavar="DIR")
+
+    command = add_command(
+        commands, "inspect", _inspect, "show groups, cells and sizes of a mesh file"
+    )
+    command.add_argument("mesh", type=Path, metavar="MESH")
+    command.add_argument(
+        "--gap", nargs=2, metavar=("SLAVE", "MASTER"), help="the gap between two groups of faces"
+    )
+    command.add_argument("-o", "--output", type=Path, metavar="PICTURE.svg")
+
+    command = add_command(commands, "plot", _plot, "draw a result: meshes, contact pressure")
+    command.add_argument("result", type=Path, metavar="RESULT.vtkhdf")
+    command.add_argument("-o", "--output", type=Path, metavar="PICTURE", help="SVG or PNG")
+    command.add_argument(
+        "--profile", action="store_true", help="the pressure along the interface instead"
+    )
+
+
+def _list(options: argparse.Namespace) -> int:
+    from ..report.families import read_family
+    from .jobs import case_files, list_jobs
+
+    folders = {
+        folder.name: folder
+        for folder in sorted(options.cases.glob("*/"))
+        if case_files(folder) and folder.name not in ("study", "scaling")
+    }
+    if not folders:
+        raise InputError(options.cases, "cases", None, "no folders with case files")
+    if options.family is None:
+        for name, folder in folders.items():
+            file = folder / "family.yaml"
+            title = read_family(file).title if file.is_file() else ""
+            print(f"{name:<16}{len(case_files(folder)):>4} cases  {title}")
+        return 0
+    if options.family not in folders:
+        allowed = f"no such family; {hint(options.family, folders)}"
+        raise InputError(options.cases, "family", options.family, allowed)
+    for job in list_jobs([folders[options.family]]):
+        print(f"{job.name:<40}{job.file}")
+    return 0
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    from ..mesh import read_mesh
+    from ..simulation.inspection import gap_between, groups_of
+
+    mesh = read_mesh(options.mesh)
+    gap = gap_between(mesh, options.gap, options.mesh) if options.gap else None
+    for group in groups_of(mesh):
+        print(_row(group))
+    if gap:
+        print(
+            f"gap of {options.gap[0]} to {options.gap[1]}: "
+            f"{gap.smallest:.4g} … {gap.largest:.4g}, mean {gap.mean:.4g}; "
+            f"{100 * gap.covered:.4g} % of the area faces it"
+        )
+    if options.output:
+        from ..report.mesh_picture import draw_mesh
+        from ..system.files import write_text
+
+        write_text(options.output, draw_mesh(mesh, options.mesh.name))
+        print(f"Picture: {options.output}")
+    return 0
+
+
+def _row(group: "Group") -> str:
+    """A group in one line."""
+    cells = ", ".join(f"{number} {kind}" for kind, number in group.cells.items())
+    box = " × ".join(f"[{a:.4g}, {b:.4g}]" for a, b in zip(group.low, group.high, strict=True))
+    parts = [cells or "nodes alone", f"{group.nodes} nodes", box if group.nodes else "empty"]
+    if group.size[2]:
+        least, mean, most = (f"{size:.3g}" for size in group.size)
+        parts.append(f"edges {least} … {most}, mean {mean}")
+    return f"{group.name or 'all cells':<24}{'; '.join(parts)}"
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from ..report.pictures import draw, draw_pressure
+    from ..system.files import replacing, write_text
+    from ..verification.results import read_result
+
+    solution = read_result(options.result).solution
+    output = options.output or options.result.with_suffix(".svg")
+    try:
+        if options.profile:
+            picture = draw_pressure(solution, solution.job).svg()
+        else:
+            picture = str(draw(solution, solution.job))
+    except ValueError as error:
+        raise InputError(options.result, "picture", None, str(error)) from None
+    if output.suffix == ".png":
+        import vl_convert
+
+        with replacing(output) as file:
+            file.write_bytes(vl_convert.svg_to_png(picture, scale=2))
+    elif output.suffix == ".svg":
+        write_text(output, picture)
+    else:
+        raise InputError(output, "output", output.suffix, "allowed: .svg, .png")
+    print(f"Picture: {output}")
+    return 0

@@ -1,0 +1,78 @@
+"""Bodies that lie in one another."""
+
+import numpy as np
+
+from ...mesh.catalogue import CellType, cell_type
+from .pairing import candidate_pairs
+
+
+def inside_others(points: np.ndarray, cells: dict[str, np.ndarray], body: np.ndarray) -> int:
+    """How many cells have their middle inside a cell of another body.
+
+    `cells` by type (n, n_nodes) on `points` (n_points, dim), `body` (n_points,) a number from zero
+    on. Faces of cells are taken as plane. Bodies that touch, and faces of curved surfaces that
+    overlap a little, count as apart: it takes about half a cell.
+
+    Two squares of edge 1 overlap by less than half a cell, then by more:
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> quads = {"QUAD4": np.arange(8).reshape(2, 4)}
+    >>> for x in (0.6, 0.4):
+    ...     inside_others(np.concatenate([square, square + [x, 0.1]]), quads, np.repeat([0, 1], 4))
+    0
+    2
+    """
+    count, dim = int(body.max()) + 1, points.shape[1]
+    low, high = np.full((count, dim), np.inf), np.full((count, dim), -np.inf)
+    np.minimum.at(low, body, points)
+    np.maximum.at(high, body, points)
+    meet = np.all((low[:, None] < high) & (low < high[:, None]), axis=2)
+    meet &= ~np.eye(count, dtype=bool)
+    if not meet.any():
+        return 0
+    blocks = [(cell_type(name), nodes) for name, nodes in cells.items()]
+    vertices = [points[nodes[:, : kind.n_vertices]] for kind, nodes in blocks]
+    middle = np.concatenate([v.mean(axis=1) for v in vertices])
+    radius = np.concatenate(
+        [np.linalg.norm(v - v.mean(axis=1, keepdims=True), axis=2).max(axis=1) for v in vertices]
+    )
+    owner = np.concatenate([body[nodes[:, 0]] for _, nodes in blocks])
+    inside = np.zeros(len(owner), dtype=bool)
+    for a in np.unique(np.nonzero(meet)[0]):
+        boxes = np.flatnonzero(meet[a])
+        mine = np.flatnonzero(owner == a)
+        at = middle[mine][:, None]
+        within = np.all((at > low[boxes]) & (at < high[boxes]), axis=2)
+        mine = mine[np.any(within, axis=1)]
+        if not len(mine):
+            continue
+        near = (middle + radius[:, None] > middle[mine].min(axis=0)) & (owner != a)[:, None]
+        near &= middle - radius[:, None] < middle[mine].max(axis=0)
+        theirs = np.flatnonzero(near.all(axis=1))
+        balls = middle[theirs], radius[theirs]
+        i, j = candidate_pairs(middle[mine], np.zeros(len(mine)), *balls, 0.0)
+        i, j, first = mine[i], theirs[j], 0
+        for kind, nodes in blocks:
+            pick = (j >= first) & (j < first + len(nodes))
+            hit = _contained(points, kind, nodes[j[pick] - first], middle[i[pick]])
+            inside[i[pick][hit]] = True
+            first += len(nodes)
+    return int(inside.sum())
+
+
+def _contained(
+    points: np.ndarray, kind: CellType, nodes: np.ndarray, place: np.ndarray
+) -> np.ndarray:
+    """Which places (n, dim) are inside their cell (n, n_nodes): behind all of its faces."""
+    inside = np.ones(len(nodes), dtype=bool)
+    for face in kind.faces:
+        corner = points[nodes[:, face.nodes[: cell_type(face.type).n_vertices]]]
+        a, b, *rest = np.moveaxis(corner, 1, 0)
+        if kind.dim == 2:
+            normal = (b - a)[:, ::-1] * [1.0, -1.0]
+        else:
+            # of a quadrangle, that of its diagonals
+            one, other = (b - a, rest[0] - a) if len(rest) == 1 else (rest[0] - a, rest[1] - b)
+            normal = np.cross(one, other)
+        inside &= np.einsum("nd,nd->n", place - corner.mean(axis=1), normal) < 0
+    return inside

@@ -1,0 +1,113 @@
+"""What a solve takes for granted, checked on its result: small strain, small sliding, no overlap.
+
+Linear theory has small strains and rotations. Pairs of faces are those of the undeformed bodies, so
+that contact may slide by less than a face. Bodies without a contact zone between them, or beyond
+its reach, may come to lie in one another. A macro-element under the end of the master has the mean
+pressure of the part that is covered.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy import sparse
+
+from ..case.model import Case
+from ..mechanics.fem.elasticity import largest_strain
+from ..mechanics.fem.faces import circumference
+from ..mechanics.mortar.overlap import inside_others
+from .constraints import MIN_COVERAGE
+from .problem import Equilibrium
+from .scene import Scene, ZoneScene
+from .solution import Line, Validity
+
+# A strain or rotation above the first is noted, one above the second is unreliable.
+_NOTED_STRAIN, _SMALL_STRAIN = 1e-2, 1e-1
+# The same for a slip, a share of the size of the macro-element.
+_NOTED_SLIP, _SMALL_SLIP = 0.1, 1.0
+
+
+def validity(scene: Scene, states: Sequence[Equilibrium]) -> Validity:
+    """How far the load steps are from what a solve takes for granted."""
+    found = Validity(strain=0.0, rotation=0.0, slip=0.0)
+    for state in states:
+        moved, closed = state.displacement, state.status.closed
+        strain, rotation = largest_strain(scene.points, scene.blocks, moved)
+        slips = [found.slip, *(_slip(scene, zone, moved, closed) for zone in scene.zones)]
+        past = inside_others(scene.points + moved, scene.mesh.cells, scene.body)
+        partly = sum(_partly_covered(zone, closed) for zone in scene.zones)
+        found = Validity(
+            strain=max(found.strain, strain),
+            rotation=max(found.rotation, rotation),
+            slip=max(slips),
+            pushed_past=max(found.pushed_past, past),
+            partly_covered=max(found.partly_covered, partly),
+        )
+    return found
+
+
+def _slip(scene: Scene, zone: ZoneScene, moved: np.ndarray, closed: np.ndarray) -> float:
+    """The largest mean slip under a closed multiplier, by the size of macro-elements there."""
+    operator, surface = zone.operator, zone.operator.surface
+    mine, dim = closed[zone.numbers], moved.shape[1]
+    size = surface.area
+    if scene.case.axisymmetric:
+        size = size / circumference(surface.centre)
+    weights = operator.mean.T @ sparse.diags_array(surface.area)
+    normal = weights @ surface.normal
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    size = (weights @ size ** (1 / (dim - 1))) / (weights @ np.ones(len(size)))
+    gaps = operator.matrix.tocoo()
+    along = gaps.data * normal[gaps.row, gaps.col % dim]
+    shape = (len(mine), len(moved))
+    shares = sparse.csr_array((along, (gaps.row, gaps.col // dim)), shape=shape)
+    jump = (shares @ moved)[mine] / operator.covered[mine, None]
+    slip = jump - normal[mine] * np.einsum("kd,kd->k", jump, normal[mine])[:, None]
+    return float((np.linalg.norm(slip, axis=1) / size[mine]).max(initial=0.0))
+
+
+def _partly_covered(zone: ZoneScene, closed: np.ndarray) -> int:
+    """How many closed macro-elements the master covers in part."""
+    surface = zone.operator.surface
+    share = surface.covered / surface.area
+    pressed = zone.by_macro_element(closed.astype(float)) > 0
+    return int((pressed & (share > MIN_COVERAGE) & (share < 1 - MIN_COVERAGE)).sum())
+
+
+def remarks(found: Validity) -> Iterator[Line]:
+    """Lines of the plan for what is not small, or not as a user may expect."""
+    if max(found.strain, found.rotation) > _NOTED_STRAIN:
+        what = f"largest strain {found.strain:.1e}, rotation {found.rotation:.1e}"
+        yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")
+    if found.slip > _NOTED_SLIP:
+        what = f"contact slides by up to {found.slip:.2g} of a face"
+        yield Line(what, "pairs of faces are those of the undeformed bodies")
+    if found.partly_covered:
+        what = f"the master ends inside {found.partly_covered} macro-elements in contact"
+        yield Line(what, "their pressure is the mean over the part that it covers")
+
+
+def limits_passed(case: Case, found: Validity) -> list[str]:
+    """Why a result is unreliable; empty where it is not.
+
+    A case that names an exact solution asks for one of linear theory, whatever the size.
+    """
+    if case.solution is not None:
+        return []
+    reasons = []
+    if max(found.strain, found.rotation) > _SMALL_STRAIN:
+        reasons.append(
+            f"strain {found.strain:.2g} with rotation {found.rotation:.2g} is beyond small strain: "
+            f"above {_SMALL_STRAIN:g} linear theory does not describe the bodies"
+        )
+    if found.slip > _SMALL_SLIP:
+        reasons.append(
+            f"contact slides by {found.slip:.2g} of a face: above {_SMALL_SLIP:g} the faces that "
+            "were paired are no longer opposite each other"
+        )
+    if found.pushed_past:
+        reasons.append(
+            f"{found.pushed_past} cells have their middle inside another body: the bodies were "
+            "pushed past each other where no contact zone, or none within its reach, keeps them "
+            "apart"
+        )
+    return reasons

@@ -1,0 +1,103 @@
+"""Values at points and nodes: fields that the cells reproduce are found to the last digit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.case.reader import parse_case
+from solver.simulation.simulate import simulate
+from solver.system.errors import InputError
+from solver.verification.checks import run_checks
+from solver.verification.results import read_result, write_result
+from tests.scenes import block_mesh, changed_case, moved
+
+PROBES = """\
+groups: {rim: {of: nodes, box: {low: [0, 1], high: [1, 1]}}}
+probes:
+  inside: {at: [0.3, -0.7]}
+  both: {at: [0.4, 0], within: top}
+  rim: {group: rim}
+  middle: {at: [0.51, 0], zone: interface}
+reference:
+  kind: analytical
+  displacement_at: {inside: [1.4625e-3, -3.4125e-3], rim: [4.875e-3*x, -0.02275]}
+  stress_at: {inside: {yy: -25, xx: 0}, both: {zz: -7.5}}
+  pressure_at: {middle: 25}
+tolerance: 1.0e-11
+"""
+
+
+def solved(*changes, swapped=False):
+    """The patch test: σ_yy = −25, u = (4.875e-3 x, −11.375e-3 (y + 1))."""
+    text = changed_case(2, extra=PROBES).source
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    case = parse_case(text, Path("probes.yaml")).as_solved(swapped)
+    return simulate(case, moved(block_mesh("QUAD8", "TRIA6", (3, 2)), 0.04))
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_probes_have_the_exact_values_also_stored(swapped, tmp_path):
+    solution = solved(swapped=swapped)
+    write_result(tmp_path / "r.vtkhdf", solution, [], {})
+    for one in (solution, read_result(tmp_path / "r.vtkhdf").solution):
+        found = {check.name: check for check in run_checks(one)}
+        for name in ("displacement_at", "stress_at", "pressure_at"):
+            assert found[name].passed
+            assert found[name].error < 1e-12
+        assert len(one.probes["rim"].place) > 4
+        assert one.probes["both"].stress[0, 1] == pytest.approx(-25)
+        assert np.isnan(one.probes["middle"].stress).all()
+    (line,) = solution.probes["middle"].lines()
+    assert line == "at (0.51, 0): pressure (25)"
+    assert (
+        "2 further places"
+        in list(solution.probes["rim"].lines(len(solution.probes["rim"].place) - 2))[-1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("displacement_at", ("-0.02275]", "-0.02274]")),
+        ("stress_at", ("{zz: -7.5}", "{zz: -7.49}")),
+        ("pressure_at", ("middle: 25}", "middle: 25.01}")),
+    ],
+)
+def test_another_value_does_not_pass(name, wrong):
+    found = {c.name: c.passed for c in run_checks(solved(wrong))}
+    assert [check for check, passed in found.items() if not passed] == [name]
+
+
+def test_a_recovered_pressure_is_read_within_its_macro_element():
+    """Under a load of 25 (1 + x) it is not that of the constant, which is read without recovery."""
+    load = ("pressure: 25.0}", "pressure: 25*(1 + x)}")
+    exact = solved(load, ("{name: interface", "{name: interface, recovery: linear"))
+    zone, plain = exact.zones[0], solved(load)
+    owner = np.abs(zone.centre[:, 0] - 0.51).argmin(keepdims=True)
+    linear = zone.recovered.values(zone.multiplier, owner, np.array([[[0.51, 0.0]]]))[0, 0]
+    assert exact.probes["middle"].pressure[0] == pytest.approx(linear, rel=1e-12)
+    assert abs(linear - zone.multiplier[owner[0]]) > 0.01
+    assert plain.probes["middle"].pressure[0] == plain.zones[0].multiplier[owner[0]]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ((", within: top", ""), r"probes\.both\.at.*bodies meet there; name the cells"),
+        (("[0.3, -0.7]", "[0.3, -1.7]"), r"inside\.at.*no cell is there; the nearest is 0\.7"),
+        (("[0.51, 0], z", "[0.51, 0.5], z"), r"probes\.middle\.at.*is 0\.5 from the slave surface"),
+        (("within: top", "within: bases"), r"probes\.both\.within.*no such group"),
+        (("zone: interface}", "zone: interfaces}"), r"probes\.middle\.zone.*no such zone"),
+        (("{inside: [", "{insider: ["), r"displacement_at\.insider.*no probe without a zone"),
+        (("{middle: 25}", "{inside: 25}"), r"pressure_at\.inside.*no probe with a zone"),
+        (("{at: [0.3, -0.7]}", "{at: [0.3, -0.7, 1]}"), r"probes\.inside\.at.*must have 2 comp"),
+        (("{group: rim}", "{group: rim, at: [0, 0]}"), r"probes\.rim.*exactly one of at, group"),
+        (("{group: rim}", "{group: rim, within: top}"), r"only for a displacement and stress at"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        solved(change)

@@ -1,0 +1,244 @@
+"""Rigid bodies that move, and rigid surfaces without a mesh: patch tests, forces, Lamé."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.case.reader import parse_case
+from solver.codes.deck import UnsupportedError, deck_of
+from solver.mesh import generate
+from solver.simulation.simulate import simulate
+from solver.system.errors import InputError
+from solver.verification.judge import judge
+from solver.verification.results import read_result, write_result
+from tests.scenes import block_mesh
+
+YOUNG, POISSON = 2000.0, 0.3
+# Two blocks between a plane below and one above: y, or z, from −1 to 1.
+CASE = """\
+name: between-planes
+mesh: {recipe: blocks, size: 1.0}
+plane: strain
+materials: {all: {young: 2000.0, poisson: 0.3}}
+bodies:
+  floor: {plane: {point: [0.3, -1], normal: [0, 2]}}
+  die: {plane: {point: [3, 1], normal: [0, -1]}, reference: [3, 1], move: {y: -0.02}}
+supports: [{group: symx, fix: [x]}]
+contact:
+  - {name: interface, slave: bottom_contact, master: top_contact}
+  - {name: above, slave: press, master: die}
+  - {name: below, slave: base, master: floor}
+"""
+STIFF = YOUNG / (1 - POISSON**2)
+
+
+def case(*changes, text=CASE):
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return parse_case(text, Path("rigid.yaml"))
+
+
+def in_space(text=CASE):
+    for old, new in (
+        ("plane: strain\n", ""),
+        ("[0.3, -1], normal: [0, 2]", "[0.3, 0, -1], normal: [0, 0, 2]"),
+        ("[3, 1], normal: [0, -1]", "[3, 2, 1], normal: [0, 0, -1]"),
+        ("reference: [3, 1], move: {y:", "reference: [3, 2, 1], move: {z:"),
+        ("[{group: symx, fix: [x]}]", "[{group: symx, fix: [x]}, {group: symy, fix: [y]}]"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+def around(text=CASE):
+    return text.replace("plane: strain", "plane: axisymmetric")
+
+
+@pytest.mark.parametrize("treatment", ["lac", "nodal", "node_to_segment"])
+@pytest.mark.parametrize(
+    ("text", "cells", "pressure"),
+    [
+        (CASE, ("QUAD4", "TRIA3"), STIFF * 0.01),
+        (in_space(), ("HEXA8", "TETRA4"), YOUNG * 0.01),
+        (around(), ("TRIA3", "QUAD4"), YOUNG * 0.01),
+    ],
+    ids=["plane", "space", "around"],
+)
+def test_a_uniform_state_between_two_rigid_planes(text, cells, pressure, treatment):
+    text = text.replace("master: die", f"master: die, treatment: {treatment}")
+    solution = simulate(case(text=text), block_mesh(*cells, (2, 2)))
+    for zone in solution.zones:
+        assert np.abs(zone.multiplier / pressure - 1).max() < 1e-12
+        assert np.abs(zone.coverage - 1).max() < 1e-12
+    assert max(solution.balance.values()) < 1e-12
+    area = np.pi if "axisymmetric" in text else 1.0
+    floor, die = sorted(solution.rigid, key=lambda body: body.point[-1])
+    assert die.force[-1] == pytest.approx(pressure * area, rel=1e-12)
+    assert np.abs(die.force + floor.force).max() < 1e-12 * pressure
+    assert die.translation[-1] == pytest.approx(-0.02, rel=1e-12)
+
+
+@pytest.mark.parametrize("cells", [("QUAD8", "TRIA6"), ("QUAD9", "QUAD8")])
+def test_a_free_die_under_force_and_moment_tilts_as_a_beam_bends(cells):
+    """p = 20 + 10 x: u_y = −p (y + 1)/E', turned by −2 · 10/E', E' = E/(1 − ν²)."""
+    force, moment = -25.0, 20 * 2.5 + 10 * (3 / 2 - 1 / 3)  # about x = 3: −∫ (x − 3) (−p) dx
+    changes = (
+        *((f"{side}}}", f"{side}, treatment: nodal}}") for side in ("_contact", "die", "floor")),
+        ("move: {y: -0.02}", f"force: {{y: {force}, rz: {moment}}}"),
+        (
+            "{group: symx, fix: [x]}",
+            f"{{at: [0, -1], fix: [x]}}, {{at: [0, 1], fix: {{x: {10 * 4 / 2 / STIFF}}}}}",
+        ),
+    )
+    solution = simulate(case(*changes), block_mesh(*cells, (3, 2)))
+    for zone in solution.zones:
+        assert np.abs(zone.multiplier - 20 - 10 * zone.centre[:, 0]).max() < 1e-11 * 20
+    x, y = solution.mesh.points.T
+    exact = -(20 + 10 * x) * (y + 1) / STIFF
+    elastic = (np.abs(y) <= 1) & (x <= 1) & (solution.body < 2)
+    assert np.abs(solution.displacement[:, 1] - exact)[elastic].max() < 1e-12
+    die = next(body for body in solution.rigid if body.body == "die")
+    assert die.rotation[2] == pytest.approx(-20 / STIFF, rel=1e-11)
+    assert die.translation[1] == pytest.approx(-2 * 50 / STIFF, rel=1e-11)
+    assert -die.force[1] == pytest.approx(force, rel=1e-12)
+    assert -die.moment[2] == pytest.approx(moment, rel=1e-12)
+
+
+def test_a_turn_about_another_point_is_the_same_motion():
+    """A turn of 1e-3 about (3, 1) moves (0.5, 1) by −2.5e-3 along y."""
+    mesh, at = block_mesh("QUAD4", "TRIA3"), "reference: [3, 1], move: {y: -0.02"
+    one = simulate(case((at, f"{at}, rz: 0.001")), mesh)
+    same = "reference: [0.5, 1], move: {y: -0.0225, rz: 0.001"
+    other = simulate(case((at, same)), mesh)
+    for a, b in zip(one.zones, other.zones, strict=True):
+        assert np.abs(a.multiplier - b.multiplier).max() < 1e-12 * a.multiplier.max()
+    first, second = (next(b for b in s.rigid if b.body == "die") for s in (one, other))
+    assert first.force[1] == pytest.approx(second.force[1], rel=1e-12)
+    arm = second.point[0] - first.point[0]
+    assert second.moment[2] == pytest.approx(first.moment[2] - arm * first.force[1], rel=1e-11)
+    held = next(r for r in one.reactions if r.group == "die")
+    assert np.abs(held.force + first.force).max() < 1e-11 * first.force[1]
+
+
+def test_a_die_in_space_bears_the_moments_of_its_force():
+    """A force at (3, 2) on a die over the unit square, free to sink, held against all turns."""
+    text = in_space().replace("move: {z: -0.02}", "move: {rx: 1.0e-4, rz: 0.1}, force: {z: -20}")
+    solution = simulate(case(text=text), block_mesh("HEXA8", "TETRA4", (1, 2)))
+    die = next(body for body in solution.rigid if body.body == "die")
+    zone = next(zone for zone in solution.zones if zone.name == "above")
+    force = zone.multiplier * zone.area
+    x, y, _ = (zone.centre - die.point).T
+    assert die.force == pytest.approx([0, 0, 20], abs=1e-12)
+    # Constant pressures on triangles and quadrangles act at the centres of the faces.
+    assert die.moment == pytest.approx([(y * force).sum(), -(x * force).sum(), 0], rel=1e-11)
+    assert die.rotation == pytest.approx([1e-4, 0, 0.1], abs=1e-15)
+
+
+def test_a_free_die_that_nothing_presses_is_refused():
+    with pytest.raises(InputError, match="nothing keeps die from a free motion"):
+        simulate(case(("move: {y: -0.02}", "force: {x: 0, y: -1}")), block_mesh("QUAD4", "QUAD4"))
+
+
+def test_each_step_has_factors_of_its_own():
+    changes = (
+        ("move: {y: -0.02}", "move: {x: 1, y: -0.02}, name: press"),
+        ("supports:", "steps: [{press: 0.5}, {press: 2}, {press: 0}]\nsupports:"),
+    )
+    solution = simulate(case(*changes), block_mesh("QUAD4", "QUAD4", (1, 1)))
+    found = [step.rigid[0].force[1] for step in solution.steps]
+    assert found == pytest.approx([0.5 * STIFF * 0.01, 2 * STIFF * 0.01, 0.0], abs=1e-12)
+    assert solution.steps[1].rigid[0].translation == pytest.approx([2.0, -0.04])
+
+
+RING = """\
+name: shaft
+mesh: {recipe: rings, radii: [1, 2, 3], bottom: {cells: QUAD9, divisions: [6, 6]}, top: {cells: QUAD9, divisions: [5, 6]}}
+plane: strain
+materials: {all: {young: 2000.0, poisson: 0.3}}
+bodies: {shaft: {sphere: {centre: [0, 0], radius: 1}}}
+supports: [{group: symx, fix: [x]}, {group: farx, fix: [y]}]
+contact:
+  - {name: interface, slave: bottom_contact, master: top_contact}
+  - {name: bore, slave: base, master: shaft, interference: 0.01}
+"""  # noqa: E501
+
+
+def test_a_shaft_with_oversize_opens_a_tube_as_lame_has_it():
+    """u(a) = p a (1 + ν)/E ((1 − 2ν) a² + b²)/(b² − a²), plane strain, a = 1, b = 3."""
+    found = case(text=RING)
+    solution = simulate(found, generate(found.mesh, "test"))
+    flexible = (1 + POISSON) / YOUNG * ((1 - 2 * POISSON) + 9) / (9 - 1)
+    bore = next(zone for zone in solution.zones if zone.name == "bore")
+    assert np.abs(bore.multiplier / (0.01 / flexible) - 1).max() < 1e-3
+    (shaft,) = solution.rigid
+    # A quarter of the circle: the force along each axis is p a, and has no moment about its centre.
+    assert -shaft.force == pytest.approx([0.01 / flexible] * 2, rel=1e-3)
+    assert abs(shaft.moment[2]) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ([("{y: -0.02}", "{z: 1}")], "bodies.die.move = 'z': allowed here: x, y, rz"),
+        (
+            [("plane: strain", "plane: axisymmetric"), ("{y: -0.02}", "{rz: 1}")],
+            "bodies.die.move = 'rz': allowed here: y",
+        ),
+        (
+            [("plane: {point: [3, 1], normal", "cylinder: {radius: 1, point: [3, 1], axis")],
+            "bodies.die = 'cylinder': is 3D: a circle is a `sphere` here",
+        ),
+        ([("[3, 1], normal", "[3, 1, 0], normal")], "bodies.die.plane.point = [3.0, 1.0, 0.0]: mu"),
+        ([("[3, 1], move", "[3, 1, 0], move")], "bodies.die.reference = [3.0, 1.0, 0.0]: must ha"),
+        (
+            [
+                ("  die:", "  press:"),
+                ("master: die", "master: press"),
+                ("slave: press", "slave: top"),
+            ],
+            "bodies.press: the mesh has a group of this name; give the body another one",
+        ),
+        (
+            [("group: symx, fix: [x]", "group: all, fix: [x]")],
+            "supports[0].fix.x: 3 of its nodes belong to the rigid body die, which moves by `move`",
+        ),
+        (
+            [("supports:", "reference: {kind: analytical, moment: {top: 1}}\nsupports:")],
+            "reference.moment.top: is no rigid body; allowed: die, floor",
+        ),
+        (
+            [("supports:", "reference: {kind: analytical, moment: {die: [0, 0, 1]}}\nsupports:")],
+            "reference.moment.die = (0.0, 0.0, 1.0): must be a number here",
+        ),
+        (
+            [
+                (
+                    "die: {plane: {point: [3, 1], normal: [0, -1]}",
+                    "die: {plane: {point: [3, 1], normal: [0, 1]}",
+                )
+            ],
+            "contact[1].master = 'die': does not lie over press anywhere",
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_refused(changes, said):
+    with pytest.raises(InputError) as refusal:
+        simulate(case(*changes), block_mesh("QUAD4", "QUAD4", (1, 1)))
+    assert said in str(refusal.value)
+
+
+def test_a_result_file_keeps_rigid_bodies(tmp_path):
+    solution = simulate(case(), block_mesh("QUAD4", "QUAD4", (1, 1)))
+    write_result(tmp_path / "r.vtkhdf", solution, [], {})
+    again = read_result(tmp_path / "r.vtkhdf").solution
+    assert [str(body) for body in again.rigid] == [str(body) for body in solution.rigid]
+    assert judge(again, []).forces[-1].name == "floor, about its reference point"
+
+
+def test_other_codes_are_given_no_such_bodies():
+    with pytest.raises(UnsupportedError, match="floor is a rigid plane: not written for codes"):
+        deck_of(case(), block_mesh("QUAD4", "QUAD4", (1, 1)))

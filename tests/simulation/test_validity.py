@@ -1,0 +1,118 @@
+"""What a solve takes for granted: slip, overlap and covered parts by hand, and the verdict."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.case.reader import parse_case
+from solver.mechanics.mortar.overlap import inside_others
+from solver.mesh.catalogue import BY_NAME
+from solver.simulation import validity
+from solver.simulation.simulate import simulate
+from solver.verification.judge import judge
+from solver.verification.results import read_result, write_result
+from solver.verification.run import mesh_of
+
+# Two blocks with ν = 0, of width 1.5 and WIDE; the upper one is pushed along both axes.
+CASE = """\
+name: pushed
+mesh:
+  recipe: bricks
+  bricks:
+    - {name: lower, low: [0, -1], high: [1.5, 0], block: {cells: QUAD4, divisions: [3, 2]}}
+    - {name: upper, low: [0, LOW], high: [WIDE, HIGH], block: {cells: QUAD4, divisions: [4, 2]}}
+plane: strain
+materials: {all: {young: 1000.0, poisson: 0.0}}
+groups:
+  base: {plane: {point: [0, -1], normal: [0, 1]}}
+  left: {plane: {point: [0, 0], normal: [1, 0]}, within: lower}
+  side: {plane: {point: [0, 0], normal: [1, 0]}, within: upper}
+  top: {plane: {point: [0, HIGH], normal: [0, 1]}}
+  floor: {plane: {point: [0, 0], normal: [0, 1]}, within: lower}
+  under: {plane: {point: [0, LOW], normal: [0, 1]}, within: upper}
+supports:
+  - {group: base, fix: [y]}
+  - {group: left, fix: [x]}
+  - {group: side, fix: {x: ALONG}}
+  - {group: top, fix: {y: DOWN}}
+contact:
+  - {name: interface, slave: floor, master: under}
+steps: [1, 0]
+"""
+SLIDING = {"LOW": "0", "HIGH": "1", "WIDE": "1.5", "DOWN": "-0.001"}
+
+
+def solved(text=CASE, **values):
+    for name, value in (SLIDING | values).items():
+        text = text.replace(name, value)
+    case = parse_case(text, Path("pushed.yaml"))
+    return simulate(case, mesh_of(case))
+
+
+def lines(solution):
+    return " ".join(line.what for line in solution.plan)
+
+
+@pytest.mark.parametrize(
+    ("along", "noted", "unreliable"), [(0.04, False, False), (0.4, True, False), (-0.6, True, True)]
+)
+@pytest.mark.parametrize("treatment", ["lac", "nodal"])
+def test_slip_over_the_size_of_a_face(along, noted, unreliable, treatment, tmp_path):
+    """The upper block moves along x as a whole, slave faces are 0.5 long; then it is at rest."""
+    text = CASE.replace("master: under", f"master: under, treatment: {treatment}")
+    found = solved(text, ALONG=str(along))
+    assert found.validity.slip == pytest.approx(abs(along) / 0.5, rel=1e-12)
+    assert found.validity.strain == pytest.approx(0.0005, rel=1e-12)
+    assert ("contact slides by up to" in lines(found)) == noted
+    write_result(tmp_path / "r.vtkhdf", found, [], {})
+    for solution in (found, read_result(tmp_path / "r.vtkhdf").solution):
+        verdict = judge(solution, [])
+        assert (verdict.verdict == "unreliable") == unreliable
+        assert ("contact slides by 1.2 of a face" in verdict.reason) == unreliable
+        assert verdict.slip == found.validity.slip
+
+
+def test_closing_is_no_slip(monkeypatch):
+    """A gap of 0.6, more than a face, is closed along the normal."""
+    given = {"LOW": "0.6", "HIGH": "1.6", "DOWN": "-0.601", "ALONG": "0.0"}
+    assert solved(**given).validity.slip < 1e-12
+    monkeypatch.setattr(validity, "_slip", lambda *_: 1.2)
+    assert judge(solved(**given), []).verdict == "unreliable"
+
+
+@pytest.mark.parametrize(("wide", "partly"), [("1.25", 1), ("1.5", 0), ("1.0", 0)])
+def test_a_master_that_ends_inside_a_macro_element(wide, partly):
+    """Slave faces end at 0.5, 1 and 1.5."""
+    found = solved(WIDE=wide, ALONG="0.0")
+    assert found.validity.partly_covered == partly
+    assert ("the master ends inside 1 macro-elements" in lines(found)) == bool(partly)
+    assert judge(found, []).partly_covered == partly
+
+
+@pytest.mark.parametrize(("down", "inside"), [("-0.3", 0), ("-0.85", 7)])
+def test_bodies_pushed_past_each_other(down, inside):
+    """The gap is 0.2, and no zone keeps the blocks apart.
+
+    With −0.85 the upper block reaches from −0.65 to 0.35: 4 of its middles are at y = −0.4, 3 of
+    the lower block at −0.25.
+    """
+    start = CASE.index("contact:")
+    text = CASE[:start] + CASE[CASE.index("steps:") :]
+    found = solved(text, LOW="0.2", HIGH="1.2", DOWN=down, ALONG="0.01")
+    assert found.validity.pushed_past == inside
+    verdict = judge(found, [])
+    assert (verdict.verdict == "unreliable") == bool(inside)
+    assert ("7 cells have their middle inside another body" in verdict.reason) == bool(inside)
+
+
+@pytest.mark.parametrize("name", [name for name, cell in BY_NAME.items() if cell.dim > 1])
+def test_cells_in_one_another(name):
+    """The middle of a cell is in its copy next to it, not in one that is a whole cell away."""
+    kind = BY_NAME[name]
+    nodes = np.arange(2 * kind.n_nodes).reshape(2, -1)
+    for away, wanted in ((0.05, 2), (1.05, 0)):
+        shift = away * np.eye(kind.dim)[0] * np.ptp(kind.nodes[:, 0])
+        points = np.concatenate([kind.nodes, kind.nodes + shift])
+        assert inside_others(points, {name: nodes}, np.repeat([0, 1], kind.n_nodes)) == wanted
+        assert inside_others(points, {name: nodes}, np.zeros(len(points), dtype=int)) == 0
