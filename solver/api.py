@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -93,7 +94,7 @@ def solve_case(
     return Solved(solution, checks, provenance)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Solved:
     """A solve that came to its end, with its checks.
 
@@ -167,6 +168,42 @@ class Solved:
         """Average gap (m,) of the macro-elements, ≥ 0 where open."""
         return np.concatenate([np.empty(0), *(zone.gap for zone in self.solution.zones)])
 
+    @property
+    def contact_force(self) -> np.ndarray:
+        """The force (dim,) on the slaves of all zones, in the last step."""
+        resultants = self.solution.steps[-1].resultants.values()
+        return sum((each.force for each in resultants), np.zeros(self.points.shape[1]))
+
+    @property
+    def contact_area(self) -> float:
+        """The area in contact, of all zones, in the last step."""
+        return float(sum(each.area[0] for each in self.solution.steps[-1].resultants.values()))
+
+    @property
+    def table(self) -> dict[str, np.ndarray]:
+        """The macro-elements as columns (m,), for `pandas.DataFrame(solved.table)`."""
+        zones = self.solution.zones
+        columns = {"zone": [np.full(len(zone.multiplier), zone.name) for zone in zones]}
+        for i, axis in enumerate("xyz"[: self.points.shape[1]]):
+            columns[axis] = [zone.centre[:, i] for zone in zones]
+        names = {"pressure": "multiplier"} | {n: n for n in ("gap", "closed", "area", "coverage")}
+        for name, of in names.items():
+            columns[name] = [getattr(zone, of) for zone in zones]
+        return {name: np.concatenate([np.empty(0), *parts]) for name, parts in columns.items()}
+
+    def to_pyvista(self) -> Any:
+        """The result as PyVista reads its file; raises ImportError where PyVista is missing."""
+        import pyvista
+
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "result.vtkhdf"
+            self.save(file)
+            return pyvista.read(file)
+
+    def plot(self, scalars: str = "pressure", **options: Any) -> Any:
+        """Show a field in PyVista's window; `options` are those of its `plot`."""
+        return self.to_pyvista().plot(scalars=scalars, **options)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the result file, as `solve -o` does: whole or not at all, named `.vtkhdf`."""
         write_result(Path(path), self.solution, self.checks, self.provenance)
@@ -191,8 +228,11 @@ class Solved:
     def __str__(self) -> str:
         return self.outcome.summary
 
+    def __repr__(self) -> str:
+        return f"<Solved {self.outcome.summary}>"
+
     def _repr_html_(self) -> str:
-        """What a notebook shows: the picture, and the verdict in one line."""
+        """For notebooks: the picture, and the verdict in one line."""
         from markupsafe import escape
 
         return f"<figure>{self.picture()}<figcaption>{escape(self)}</figcaption></figure>"

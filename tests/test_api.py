@@ -149,6 +149,34 @@ def test_a_saved_result_is_that_of_the_command_line(tmp_path):
     assert again.verdict == "passed"
 
 
+def test_what_people_ask_first():
+    solved = patch()
+    side = np.ptp(solved.points[:, 0])
+    np.testing.assert_allclose(np.abs(solved.contact_force), [0.0, side * PRESSURE], atol=1e-10)
+    assert solved.contact_area == pytest.approx(side)
+    table = solved.table
+    assert list(table) == ["zone", "x", "y", "pressure", "gap", "closed", "area", "coverage"]
+    np.testing.assert_array_equal(table["pressure"], solved.pressure)
+    assert table["area"].sum() == pytest.approx(side)
+    assert repr(solved).startswith("<Solved patch: passed, ")
+    assert len(repr(solved)) < 120
+
+
+def test_only_public_names_are_listed():
+    import solver
+
+    assert dir(solver) == sorted([*solver.__all__, "__version__"])
+
+
+def test_pyvista_reads_what_was_solved():
+    pytest.importorskip("pyvista", reason="installed by `make gallery`")
+    solved = patch()
+    grid = solved.to_pyvista()
+    assert grid.n_points == len(solved.points)
+    pressure = grid.cell_data["pressure"]
+    assert pressure[~np.isnan(pressure)].max() == pytest.approx(PRESSURE)
+
+
 def test_figures_are_svg_and_a_notebook_shows_one():
     solved = patch()
     for figure in (solved.picture(), solved.profile(), solved.profile("x", zone="interface")):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Exact(Enum):
-    """`solution` in place of a value: what the case's exact solution has there."""
+    """`solution` in place of a value: the value of the case's exact solution."""
 
     VALUE = "solution"
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def add_commands(commands: Any) -> None:
-    """Add the commands of other codes to those of the program."""
+    """Add the commands of other codes to the program."""
     command = add_command(commands, "export", _export, "write the input of another code")
     _add_case(command)
     command.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")

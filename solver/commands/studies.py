@@ -18,7 +18,7 @@ RECORD, FOLDER = "RECORD.json", "DIR"
 
 
 def add_commands(commands: Any) -> None:
-    """Add the commands of all studies to those of the program."""
+    """Add the commands of all studies to the program."""
     _add_orders(commands)
     _add_expect(commands)
     study = commands.add_parser("study", description="Error against run time.")

@@ -243,7 +243,7 @@ def interaction(field: str = "series") -> list[Spec]:
 
 
 def tooltip(records: Sequence[Record], titles: Mapping[str, str]) -> list[Spec]:
-    """What is shown under the pointer: fields that records have, numbers to four digits."""
+    """Tooltips: fields that records have, numbers to four digits."""
     found = []
     for field, title in titles.items():
         values = [record[field] for record in records if record.get(field) is not None]

@@ -1,4 +1,4 @@
-"""What changed between two batches: verdicts, numbers, times.
+"""Differences of two batches: verdicts, numbers, times.
 
 A number has changed when it moved by more than accepted values may: 1e-9 of the check's scale. What
 round-off does is no change. Times are shown and never judged.
@@ -119,7 +119,7 @@ class Pair:
 
     @property
     def change(self) -> str:
-        """What became of the verdict: worse, better, still (not passed), new, vanished, or ""."""
+        """Change of the verdict: worse, better, still (not passed), new, vanished, or ""."""
         if self.this is None:
             return "vanished"
         if self.step:
@@ -157,7 +157,7 @@ class Comparison:
 
     @cached_property
     def changes(self) -> list[Change]:
-        """What changed in solves that both have; what is no number first, then by size."""
+        """Changes in solves that both have: those without a number first, then by size."""
         found = [change for base, this in self._solved for change in _changes(base, this)]
         return sorted(found, key=lambda c: (c.size is not None, -(c.size or 0)))
 

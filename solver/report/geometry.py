@@ -1,4 +1,4 @@
-"""What a picture draws of a mesh: cell outlines, outlines of macro-elements, normals."""
+"""The lines of a picture: outlines of cells and macro-elements, normals."""
 
 from collections.abc import Iterable, Iterator
 

@@ -1,4 +1,4 @@
-"""What all pages of the report share: templates, style, and the words for kinds and checks."""
+"""Common to all pages: templates, style, and the words for kinds and checks."""
 
 from functools import cache
 from pathlib import Path

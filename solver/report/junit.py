@@ -67,7 +67,7 @@ def _started(rows: Sequence[Row]) -> str:
 
 
 def _properties(rows: Sequence[Row]) -> dict[str, str]:
-    """What the solves were made with; Jenkins' schema wants one property at least."""
+    """Versions behind the solves; Jenkins' schema wants one property at least."""
     verdicts = ", ".join(f"{n} {word}" for word, n in counted(rows).items())
     found = {"verdicts": verdicts}
     for key in _PROPERTIES:

@@ -1,4 +1,4 @@
-"""What the pictures share: colours of the two sides, bodies drawn apart, coordinates to pixels."""
+"""Common to all pictures: colours of both sides, bodies drawn apart, coordinates to pixels."""
 
 from collections.abc import Callable, Sequence
 

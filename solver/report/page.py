@@ -99,7 +99,7 @@ def _links(folder: Path) -> dict[str, str]:
 
 
 def left_out(rows: Sequence[Row]) -> list[tuple[str, str, int]]:
-    """What solves left out: by switch its title, the reasons given, and in how many solves."""
+    """Shortcuts by switch: title, reasons given, number of solves."""
     found = []
     for switch, title in LEFT_OUT.items():
         lines = [(row.name, line) for row in rows for line in row.verdict.plan]

@@ -171,7 +171,7 @@ def _of_elements(
 def _of_nodes(
     solution: Solution, zone: ZoneResult, place: Place, flat: bool
 ) -> list[dict[str, Any]]:
-    """What belongs to nodes: multipliers, p* in 3D, and in 2D the stress on both surfaces."""
+    """Values at nodes: multipliers, p* in 3D, and in 2D the stress on both surfaces."""
     given = []
     if zone.nodal:
         given.append((NODES, zone.nodal.nodes, zone.nodal.multiplier))
@@ -231,7 +231,7 @@ def _reference(solution: Solution) -> float | Expression | ExactValues | None:
 
 
 def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:
-    """What the pressure is drawn over: its name, and its value (n,) at points (n, dim)."""
+    """The abscissa: its name, and its value (n,) at points (n, dim)."""
     if along is not None:
         return mathematics(along.text), along
     if zone.centre.shape[1] == 3:

@@ -27,7 +27,7 @@ class Row:
 
     @property
     def case(self) -> str:
-        """The name of the solve without that of the code."""
+        """The name of the solve without the code's name."""
         code = self.verdict.code
         return self.name.removesuffix(f"@{code}") if code else self.name
 
@@ -130,7 +130,7 @@ class Row:
 
     @property
     def tags(self) -> dict[str, list[str]]:
-        """What rows are chosen by: family, cell types, verdict, kind of reference."""
+        """Filters of rows: family, cell types, verdict, kind of reference."""
         return {
             "family": [self.group.replace(" ", "_")],
             "cells": sorted({name for body in self.sides for name in body.cells}),

@@ -134,7 +134,7 @@ def _plan(
     limits: tuple[float, float],
     colors: Sequence[str],
 ) -> None:
-    """What is pressed: sub-faces coloured by a value (m,), macro-elements and master in outline."""
+    """Sub-faces coloured by a value (m,), macro-elements and master in outline."""
     axes, names = plan_axes(zone)
     flat = solution.mesh.points @ axes.T
     used = np.concatenate([nodes.ravel() for _, nodes, _ in zone.faces])
@@ -171,7 +171,7 @@ def _plan(
 def _ends(
     drawing: Drawing, low: np.ndarray, high: np.ndarray, flat: np.ndarray, names: tuple[str, str]
 ) -> None:
-    """What the plan's sides are: the two directions, with the coordinates at their ends."""
+    """The axes of the plan: two directions, with the coordinates at their ends."""
     first, last = flat.min(axis=0), flat.max(axis=0)
     first = np.where(np.abs(first) < 1e-9 * (last - first), 0.0, first)
     drawing.text(low[0], high[1] + 15, f"{first[0]:.4g}", color=MUTED)

@@ -44,7 +44,7 @@ class Drawing:
 
     @contextmanager
     def clipped(self, x: float, y: float, width: float, height: float) -> Iterator[None]:
-        """What is added meanwhile is seen inside this rectangle alone."""
+        """Clip all that is added meanwhile to this rectangle."""
         box = f'x="{x * 10:g}" y="{y * 10:g}" width="{width * 10:g}" height="{height * 10:g}"'
         seen = " ".join(f"{10 * length:g}" for length in (x, y, width, height))
         self._parts.append(f'<svg {box} viewBox="{seen}">')

@@ -165,7 +165,7 @@ def _tilts(points: np.ndarray, faces: FaceBlock, noise: float) -> np.ndarray:
 
 
 def terms_of(blocks: Sequence[Block]) -> int:
-    """The most terms of a stress at a node: nodes of a cell, those of its gradients, points."""
+    """The most terms of a stress at a node: nodes of a cell, twice, and quadrature points."""
     dim = blocks[0].type.dim
     return max(2 * dim * block.type.n_nodes + len(block.rule[1]) for block in blocks)
 

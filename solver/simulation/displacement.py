@@ -82,7 +82,7 @@ class Displacement:
 def _apart(
     displacement: Displacement, gaps: sparse.csr_matrix, rows: np.ndarray, dim: int
 ) -> np.ndarray:
-    """For each entry of the gap operator, its displacement minus that of its row's first node."""
+    """The displacement of each entry of the gap operator, relative to its row's first node."""
     first = gaps.indices[np.minimum(gaps.indptr[:-1], len(gaps.indices) - 1)] // dim
     other = dim * first[rows] + gaps.indices % dim
     seen = np.zeros(gaps.shape[1], dtype=bool)

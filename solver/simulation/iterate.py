@@ -77,7 +77,7 @@ class ContactIterate:
         return self.displacement.opening_size(self.constraints.gaps, dim)
 
     def residual(self) -> np.ndarray:
-        """The forces (n_free,) that internal ones leave, without those of contact."""
+        """Loads less internal forces (n_free,), contact forces left out."""
         return self.scene.free.basis.T @ (self.force - self.internal).astype(float).ravel()
 
     def condensed(self, force: np.ndarray) -> np.ndarray:

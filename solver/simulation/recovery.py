@@ -40,7 +40,7 @@ class _Zone:
         return np.asarray(self.reconstruction.matrix @ pressure[self.numbers])
 
     def read(self, pressure: np.ndarray, applied: np.ndarray) -> np.ndarray:
-        """C (m · k,) as read: of a quadratic the one applied, else that of the last pressures.
+        """C (m · k,) as read: of a quadratic the one applied, else by the last pressures.
 
         Three sweeps settle what is applied; after two the last pressures are a sweep ahead of it.
         """

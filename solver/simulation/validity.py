@@ -28,12 +28,12 @@ _NOTED_SLIP, _SMALL_SLIP = 0.1, 1.0
 
 def validity(scene: Scene, states: Sequence[Equilibrium]) -> Validity:
     """How far the load steps are from what a solve takes for granted."""
-    found = Validity(strain=0.0, rotation=0.0, slip=0.0)
+    found, solid = Validity(strain=0.0, rotation=0.0, slip=0.0), meshed(scene)
     for state in states:
         moved, closed = state.displacement, state.status.closed
         strain, rotation = largest_strain(scene.points, scene.blocks, moved)
         slips = [found.slip, *(_slip(scene, zone, moved, closed) for zone in scene.zones)]
-        past = inside_others(scene.points + moved, scene.mesh.cells, scene.body)
+        past = inside_others(scene.points + moved, solid, scene.body)
         partly = sum(_partly_covered(zone, closed) for zone in scene.zones)
         found = Validity(
             strain=max(found.strain, strain),
@@ -43,6 +43,16 @@ def validity(scene: Scene, states: Sequence[Equilibrium]) -> Validity:
             partly_covered=max(found.partly_covered, partly),
         )
     return found
+
+
+def meshed(scene: Scene) -> dict[str, np.ndarray]:
+    """The cells by type, without those that carry the motion of a surface given by the case."""
+    hidden = [scene.given.groups[name] for name, body in scene.case.rigid.items() if body.surface]
+    kept = {}
+    for kind, cells in scene.mesh.cells.items():
+        parts = [scene.mesh.members(kind, group) for group in hidden]
+        kept[kind] = cells[~np.any([np.zeros(len(cells), dtype=bool), *parts], axis=0)]
+    return kept
 
 
 def _slip(scene: Scene, zone: ZoneScene, moved: np.ndarray, closed: np.ndarray) -> float:

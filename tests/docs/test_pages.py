@@ -15,7 +15,7 @@ from solver.case.typed import fields
 from solver.mesh.keys import RECIPES
 from solver.report.html import NORMS
 from solver.verification.checks import CHECKS
-from tests.case.test_case import sections
+from tests.case.test_keys import sections
 
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"

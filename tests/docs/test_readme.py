@@ -1,10 +1,11 @@
-"""The README's commands, run from top to bottom as a newcomer would.
+"""The commands of the README and of the tutorial, run from top to bottom as a newcomer would.
 
 They run as they stand, in a copy of the project where long ones are short: `cases/` holds only the
 case that the README names, a study and a scaling family of one point each, and `tests/` a single
 test. The installation is left out: the copy borrows this environment.
 """
 
+import json
 import os
 import re
 import shutil
@@ -17,7 +18,7 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-BLOCKS = FENCE.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorial.md"
 LEFT_OUT = {".git", ".venv", ".snakemake", "cases", "results", "tests"}
 
 
@@ -109,18 +110,22 @@ def project(tmp_path: Path) -> Path:
         "def test_start():\n    import solver.commands.cli\n"
     )
     (tmp_path / "my-cases").mkdir()
-    [text] = [text for language, text in BLOCKS if language == "yaml"]
-    (tmp_path / "my-cases" / "part.yaml").write_text(text)
-    case = yaml.safe_load(text)
-    write_part(case, tmp_path / "my-cases" / case["mesh"]["file"])
     return tmp_path
 
 
-def test_every_command_works_in_its_order(project: Path):
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """The blocks of code of a page, by language."""
+    return FENCE.findall(page.read_text(encoding="utf-8"))
+
+
+def run_all(page: Path, project: Path) -> None:
+    """Run the blocks of a page; those in YAML are added to the case `part`."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST")}
     environment["MAKEFLAGS"] = "INSTALL=:"
-    for language, text in BLOCKS:
+    for language, text in blocks(page):
         if language == "yaml":
+            with (project / "my-cases" / "part.yaml").open("a") as case:
+                case.write(text)
             continue
         command = ["bash", "-ec"] if language == "sh" else [sys.executable, "-c"]
         run = subprocess.run(
@@ -133,8 +138,13 @@ def test_every_command_works_in_its_order(project: Path):
             text=True,
         )
         assert run.returncode == 0, f"{text}\n{run.stdout}"
+
+
+def test_every_command_works_in_its_order(project: Path):
+    run_all(README, project)
     assert (project / "results" / "report" / "workflow.html").is_file()
     assert (project / "results" / "my-cases" / "my-block" / "result.vtkhdf").is_file()
+    environment = os.environ | {"MAKEFLAGS": "INSTALL=:"}
     made = subprocess.run(
         ["make", "gallery"], cwd=project, env=environment, capture_output=True, text=True
     )
@@ -143,6 +153,19 @@ def test_every_command_works_in_its_order(project: Path):
     assert drawn or "cannot draw here (EGL" in made.stdout + made.stderr
 
 
+def test_the_tutorial_ends_with_a_verdict_in_the_batch(project: Path):
+    case = yaml.safe_load(next(text for language, text in blocks(TUTORIAL) if language == "yaml"))
+    write_part(case, project / "my-cases" / case["mesh"]["file"])
+    run_all(TUTORIAL, project)
+    verdict = json.loads((project / "results" / "my-cases" / "part" / "verdict.json").read_text())
+    assert verdict["verdict"] == "passed"
+    assert "force" in {check["name"] for check in verdict["checks"]}
+
+
+def test_the_readme_is_short():
+    assert len(README.read_text(encoding="utf-8").split()) <= 900
+
+
 def test_links_lead_to_files():
-    for target in re.findall(r"\]\(([^)#]+)\)", (ROOT / "README.md").read_text(encoding="utf-8")):
+    for target in re.findall(r"\]\(([^)#]+)\)", README.read_text(encoding="utf-8")):
         assert (ROOT / target).exists(), target

@@ -58,6 +58,7 @@ TUBES = "axisymmetric/compound-tube"
 MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
 RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
+DIE, SHAFT, LINES = "rigid/tilted-die", "rigid/shaft-in-tube", "rigid/lines-of-the-mesh"
 STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
@@ -438,6 +439,18 @@ MUTANTS = (
            changed(lambda f: replace(f, affine=np.ones(len(f.affine), dtype=bool)))),
     Mutant("first-status", "what is open in the first step stays open", SIDES,
            "solver.simulation.problem:find_status", _first_status_kept),
+    Mutant("moment-sign", "moments on rigid bodies have the wrong sign", DIE,
+           "solver.simulation.simulate:rigid_bodies",
+           changed(lambda bodies: [replace(body, moment=-body.moment) for body in bodies])),
+    Mutant("reference-point", "rigid bodies turn about another point", DIE,
+           "solver.simulation.rigid:_frame",
+           changed(lambda f: replace(f, motions={**f.motions, "rz": f.motions["rz"] + 1.0}))),
+    Mutant("rigid-radius", "a rigid circle is too flat by 0.1 %", SHAFT,
+           "solver.simulation.operators:quadric_of",
+           changed(lambda q: q and replace(q, curvature=0.999 * q.curvature))),
+    Mutant("layer-side", "rigid lines look away from the slave", LINES,
+           "solver.simulation.rigid:turned",
+           changed(lambda faces: {name: nodes[:, ::-1] for name, nodes in faces.items()})),
     Mutant("stabilisation-lost", "stabilised contact does not give way", STIFF,
            "solver.mechanics.mortar.stabilisation:Stabilisation.compliance",
            changed(lambda compliance: 0 * compliance)),

@@ -307,3 +307,23 @@ def test_a_curved_interface_is_drawn_over_its_arc_length():
 def test_an_expression_is_shown_as_mathematics():
     assert mathematics("sqrt(x**2 + y**2)") == "√(x² + y²)"
     assert mathematics("2*pi*r**12 - (x - 0.5)**2") == "2·π·r^12 − (x − 0.5)²"
+
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+@pytest.mark.parametrize("file", sorted(CASES.glob(f"*/{FILE_NAME}")), ids=lambda f: f.parent.name)
+def test_each_family_says_what_its_tolerances_are_made_of(file):
+    family = read_family(file)
+    assert not family.complaint
+    assert family.tolerance or "tolerance" in family.reference
+
+
+def test_the_page_has_the_text_on_tolerances(tmp_path):
+    (tmp_path / "fam").mkdir()
+    (tmp_path / "fam" / FILE_NAME).write_text("title: A family\ntolerance: Round-off, 1e-10.\n")
+    path = put(tmp_path / "results" / "a" / "verdict.json", verdict("a", "passed"))
+    out = tmp_path / "report"
+    write_report([path], out, [tmp_path / "fam" / FILE_NAME])
+    page = " ".join((out / "fam.html").read_text().split())
+    assert "<h3>The tolerances</h3> <p>Round-off, 1e-10.</p>" in page

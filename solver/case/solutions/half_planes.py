@@ -57,7 +57,7 @@ class HalfPlanes(ElasticSolution):
         raise NotImplementedError
 
     def closed(self, x: np.ndarray) -> np.ndarray:
-        """Where (n,) the bodies touch, at places (n,) along the interface."""
+        """Whether (n,) the bodies touch at places (n,) along the interface."""
         raise NotImplementedError
 
     def initial_gap(self, x: np.ndarray) -> np.ndarray:

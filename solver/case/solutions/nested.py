@@ -95,7 +95,7 @@ class _Shells(ElasticSolution):
 
     @property
     def _axes(self) -> np.ndarray:
-        """Which axes (dim,) the radius is measured along, as 0 or 1."""
+        """The axes (dim,) of the radius, as 0 or 1."""
         return np.arange(self.dim) < self.around
 
     def _radius(self, x: np.ndarray) -> np.ndarray:

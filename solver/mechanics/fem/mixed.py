@@ -77,7 +77,7 @@ class MeanStress:
         return sum(len(part.cells) for part in self._parts)
 
     def stiffness(self) -> sparse.csr_matrix:
-        """What s adds to the stiffness (n_dofs, n_dofs) when it is eliminated: Bᵀ C⁻¹ B."""
+        """The part (n_dofs, n_dofs) of s in the stiffness once it is eliminated: Bᵀ C⁻¹ B."""
         scaled = sparse.diags(1 / self.compliance) @ self.divergence
         return (self.divergence.T @ scaled).tocsr()
 
@@ -107,7 +107,7 @@ class MeanStress:
         return defect
 
     def condensed_force(self, defect: np.ndarray) -> np.ndarray:
-        """What a defect (size,) weighs in the equations (n_dofs,) that are left: Bᵀ C⁻¹ defect."""
+        """The part (n_dofs,) of a defect (size,) in the equations that are left: Bᵀ C⁻¹ defect."""
         return self.divergence.T @ (defect / self.compliance)
 
     def change(self, displacement: np.ndarray, defect: np.ndarray) -> np.ndarray:
@@ -126,7 +126,7 @@ class MeanStress:
         return values
 
     def nodal_stress(self, stress: np.ndarray, blocks: Sequence[Block]) -> np.ndarray:
-        """What s adds to the stress at nodes (n_nodes, 6), the mean over all cells around each."""
+        """The part of s in the stress at nodes (n_nodes, 6), averaged over the cells around."""
         n = self._shape[0]
         total, count = np.zeros(n), np.zeros(n)
         for part, nodal in self._nodal(stress):

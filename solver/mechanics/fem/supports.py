@@ -56,7 +56,7 @@ class FreeMotion:
 
 
 def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed]) -> FreeMotion:
-    """What the supports leave free.
+    """The displacements that supports leave free.
 
     Raises SupportClashError where two supports ask a node for different displacements.
     """

@@ -93,7 +93,7 @@ class CondensedSystem:
 
     @property
     def doubt(self) -> str:
-        """A factor of a nearly singular matrix is that of another one."""
+        """The factor of a nearly singular matrix belongs to another one."""
         return self.factor.doubt
 
     def correction(

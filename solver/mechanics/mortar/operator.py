@@ -169,7 +169,7 @@ def gap_operator(
 
 
 def _extent(faces: list[Facets]) -> float:
-    """The extent of surfaces, and that of their largest face."""
+    """The extent of surfaces plus the radius of their largest face."""
     centres = np.concatenate([block.centre for block in faces])
     largest = max(block.radius.max() for block in faces)
     return float(np.linalg.norm(np.ptp(centres, axis=0)) + largest)

@@ -166,7 +166,7 @@ class Reconstruction:
 
 
 def vertex_neighbours(faces: Sequence[tuple[np.ndarray, np.ndarray]], m: int) -> sparse.csr_matrix:
-    """Which of m macro-elements share a vertex (m, m), each with itself too.
+    """Pairs (m, m) of macro-elements that share a vertex, each with itself too.
 
     `faces`, by block: macro-element (n,) and vertices (n, v).
 
@@ -239,7 +239,7 @@ def _useful(at: Moments, near: sparse.csr_matrix, closed: np.ndarray) -> sparse.
 
 
 def _one_sided(at: Moments, useful: sparse.csr_matrix) -> np.ndarray:
-    """Which macro-elements (m,) have their neighbours on one side."""
+    """Whether macro-elements (m,) have their neighbours on one side."""
     i, j = useful.tocoo().coords
     away = at.local.along(at.local.centre[j] - at.local.centre[i], i)
     total, count = np.zeros((len(at.share), away.shape[1])), np.bincount(i, minlength=len(at.share))

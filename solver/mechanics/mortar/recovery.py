@@ -72,7 +72,7 @@ def moments(found: Sequence[Segments], surface: Surface) -> Moments:
 
 @dataclass(frozen=True, kw_only=True)
 class Recovery:
-    """What recovers the pressure on m macro-elements by functions ψ, k on each.
+    """The recovery of the pressure on m macro-elements by functions ψ, k on each.
 
     `near` (m, m): which of them may be neighbours; `loads` (m · k, n_dofs): ∫ ψ (N_master −
     N_slave) n dS, none for a constant ψ; `products` (m, k, k): ∫ ψ ψᵀ dS.
@@ -98,7 +98,7 @@ class Recovery:
 
 
 def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes: int) -> Recovery:
-    """What recovers the pressure of macro-elements from the segments that cover them.
+    """The recovery of the pressure of macro-elements, from the segments that cover them.
 
     A slave edge from 0 to 2 under two master edges, with ψ = (1 − x) / 2: ∫ ψ N is ±1/6 at the two
     slave nodes, 1/6, 0, −1/6 at the three master nodes, and ∫ ψ² is 1/6.
@@ -148,7 +148,7 @@ def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes:
 
 
 def _same_materials(asked: Asked, found: Sequence[Segments]) -> sparse.csr_matrix:
-    """Which macro-elements (m, m) share a vertex, the second between no other materials.
+    """Pairs of macro-elements (m, m) that share a vertex, the second between no other materials.
 
     Where the material of the master changes under a macro-element, it has neighbours on both sides,
     and is itself no neighbour to these.

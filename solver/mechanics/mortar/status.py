@@ -30,7 +30,7 @@ _MAX_CORRECTIONS = 6
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """What a solve with given closed multipliers found, and what is round-off in it; all (k,).
+    """The result of a solve with given closed multipliers, and its round-off; all (k,).
 
     `pressure` is zero where open. Pressures above −`pressure_limit` and gaps above −`gap_limit`
     change no status.

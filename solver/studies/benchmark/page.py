@@ -28,7 +28,7 @@ def _printed(table: TextTable) -> str:
 
 
 def seconds(way: Record, kind: str = "cpu") -> float | None:
-    """The time of a way: the median of its warm repetitions, else that of its whole process."""
+    """The median time of a way's warm repetitions, else the time of its whole process."""
     if way["outcome"] != SOLVED:
         return None
     times = way["times"].get("total")
@@ -36,7 +36,7 @@ def seconds(way: Record, kind: str = "cpu") -> float | None:
 
 
 def ratios(ways: Sequence[Record]) -> list[float | None]:
-    """The time of each way over that of the first; None where either has none."""
+    """The time of each way over the first one's; None where either is unknown."""
     first, *_ = found = [seconds(way) for way in ways]
     return [time / first if time is not None and first else None for time in found]
 

@@ -94,7 +94,7 @@ class LadderFamily(LaddersFile, frozen=True, kw_only=True):
 
     @property
     def name(self) -> str:
-        """The family's name: that of its folder."""
+        """The family's name, from its folder."""
         return self.folder.name
 
 

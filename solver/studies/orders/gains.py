@@ -1,4 +1,4 @@
-"""What recovery gains on each ladder: order and error of the recovered pressure, and the goals."""
+"""The gain of recovery on each ladder: order and error of the recovered pressure, and the goals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -77,7 +77,7 @@ class Gain:
 
     @cached_property
     def gain(self) -> float | None:
-        """The error of constants over that of the recovered pressure, at the finest level."""
+        """The error of constants over the error of the recovered pressure, at the finest level."""
         level = self.curve.solved[-1].folder.name
         same = [row for row in self.constants.solved if row.folder.name == level]
         constant = same[0].norms.get(_PRESSURE) if same else None

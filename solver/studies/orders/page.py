@@ -131,7 +131,7 @@ def _point_rows(curves: Sequence[Curve]) -> list[dict[str, Any]]:
 
 
 def _gain_rows(found: Sequence[Gain]) -> list[dict[str, Any]]:
-    """One row for each ladder with recovery: what it gains, and the goals."""
+    """One row for each ladder with recovery: its gain, and the goals."""
     return [
         {
             "family": gain.curve.family.name,

@@ -1,4 +1,4 @@
-"""The floor: what rounding alone makes of the exact answer, before anything is solved.
+"""The floor: the error of the exact answer by rounding alone, before anything is solved.
 
 The exact displacement at the nodes of the exact geometry is rounded to double precision in the
 form in which the solver keeps it, as rigid motions plus a remainder (one number for each unknown;
@@ -76,7 +76,7 @@ def stress_error(stress: np.ndarray, scene: Scene, state: State) -> float:
 
 
 def upper_nodes(scene: Scene) -> np.ndarray:
-    """Which nodes (n,) of the cut mesh belong to the upper body."""
+    """Whether nodes (n,) of the cut mesh belong to the upper body."""
     upper = np.zeros(len(scene.points), dtype=bool)
     for name, cells in scene.mesh.cells.items():
         upper[cells[scene.mesh.members(name, scene.given.groups[UPPER])].ravel()] = True

@@ -112,15 +112,15 @@ def test_a_small_ladder_shows_the_orders_of_theory(cells, displacement, gradient
     assert slopes["pressure_l2"].value <= 1.1
 
 
-def test_the_mesh_of_a_file_cannot_be_refined(tmp_path):
+def test_the_mesh_of_a_file_is_refined_by_halving_alone(tmp_path):
     text = (MANUFACTURED / "tria3.yaml").read_text()
     start, end = text.index("mesh:"), text.index("plane:")
     path = tmp_path / "case.yaml"
     path.write_text(f"{text[:start]}mesh: {{file: some.med}}\n{text[end:]}")
     case = load_case(path)
     assert refined(case, 1) is case
-    with pytest.raises(InputError, match=r"mesh.file.*only the mesh of a recipe can"):
-        refined(case, 2)
+    with pytest.raises(InputError, match=r"--refine = 3: of a mesh file must be"):
+        refined(case, 3)
 
 
 def test_an_expected_error_is_on_the_power_law_through_all_levels():
