@@ -6,7 +6,7 @@ from msgspec import Meta, field
 
 from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
 from .bodies import BodyKeys
-from .kinds import Group, GroupList, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
+from .kinds import Angle, Group, GroupList, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
 FORM = "{file: MESH, refine: 2}, or {recipe: NAME, …}"
@@ -14,7 +14,6 @@ HALVINGS = (1, 2, 4, 8, 16, 32, 64)
 """How often finer a mesh file can be made: by halving all edges, once or several times."""
 HALVINGS_TEXT = "1, 2, 4, 8, 16, 32 or 64"
 
-Angle = Annotated[Number, Meta(description="an angle in degrees")]
 Poisson = Annotated[
     float, Meta(gt=-1, lt=0.5, description="a number greater than -1 and less than 0.5")
 ]

@@ -255,6 +255,9 @@ def _placed(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
     """Every vector of the case that says where something is."""
     for i, item in enumerate(case.observe):
         yield f"observe[{i}].nearest", item.nearest
+    for i, support in enumerate(case.supports):
+        if support.cyclic and support.cyclic.shift:
+            yield f"supports[{i}].cyclic.shift", support.cyclic.shift
     for probe in case.probes:
         if probe.at:
             yield f"probes.{probe.name}.at", probe.at

@@ -90,10 +90,11 @@ class ContactProblem:
         self.motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         refuse_unsolvable(scene, self.motions, self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
-        self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
-        self.at_rest = Displacement.zero(
-            unsupported(self.motions, scene.free.basis), surface, scene.options.safeguards.remainder
-        )
+        loose = unsupported(self.motions, scene.free.basis)
+        self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
+        self.unsupported = loose
+        if scene.springs.nnz:
+            self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
         self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
