@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import meshio
 import numpy as np
 
 from ..mechanics.fem.faces import FaceBlock
@@ -22,7 +23,8 @@ from ..system.errors import InputError, SolveError
 from ..system.process import cores_for, run_apart
 from .deck import Deck, UnsupportedError
 from .files.read import read_result_files
-from .foreign import ForeignResult
+from .foreign import Field, ForeignResult
+from .shifted import needed, with_layers
 
 PROGRAM = "ccx"
 # Cells whose nodes have the same order here and there.
@@ -30,8 +32,12 @@ ELEMENTS = {
     "TETRA4": "C3D4", "TETRA10": "C3D10", "PENTA6": "C3D6", "PENTA15": "C3D15",
     "HEXA8": "C3D8", "HEXA20": "C3D20",
 }  # fmt: skip
+RINGS = {"TRIA3": "CAX3", "TRIA6": "CAX6", "QUAD4": "CAX4", "QUAD8": "CAX8"}
 # Pressure by overlap, over Young's modulus: the manual advises 5 to 50 for lengths in millimetres.
 STIFFNESS = 50.0
+# Faces that end on the axis carry no contact: a bore of this radius, over the model's extent.
+_BORE = 1e-6
+_CORRECTION = 1e-5
 _NAME = "deck"
 
 
@@ -52,7 +58,8 @@ class CalculiX:
         return {
             "contact": "SURFACE TO SURFACE, frictionless",
             "pressure-overclosure": f"LINEAR, {self.stiffness:g} E",
-            "elements": "C3D4, C3D10, C3D6, C3D15, C3D8, C3D20; plane cases as one layer",
+            "elements": f"{', '.join([*ELEMENTS.values(), *RINGS.values()])}; "
+            "plane cases as one layer",
         }
 
     def version(self) -> str:
@@ -84,25 +91,63 @@ class CalculiX:
         for quantity in ("displacement", "stress", "pressure"):
             if getattr(found, quantity) is None:
                 raise SolveError(f"{file.name}: it holds no {quantity}")
-        return replace(found, step=deck.case.factors[-1])
+        found = replace(self._on_bodies(found, deck), step=deck.case.factors[-1])
+        # It writes zeros for gaps of points that are not in contact.
+        if found.gap is not None and found.pressure is not None:
+            gap = np.where(found.pressure.values > 0, found.gap.values, np.nan)
+            known = bool(np.isfinite(gap).any())
+            found = replace(found, gap=replace(found.gap, values=gap) if known else None)
+        return found
+
+    @staticmethod
+    def _on_bodies(found: ForeignResult, deck: Deck) -> ForeignResult:
+        """The fields at the nodes of the deck: pressures on a layer are those of the node below."""
+        if not any(map(needed, deck.pairs)):
+            return found
+        count, below = len(deck.points), with_layers(deck)[1]
+
+        def on_bodies(field: Field | None, layer: bool = False) -> Field | None:
+            if field is None or field.nodes is None:
+                return None
+            values = np.zeros((count + len(below), *field.values.shape[1:]))
+            kept = field.nodes < len(values)
+            values[field.nodes[kept]] = field.values[kept]
+            if layer:
+                np.add.at(values, below, values[count:])
+            return Field(places=deck.points, values=values[:count], nodes=np.arange(count))
+
+        cells = [(BY_NAME[name].meshio, nodes) for name, nodes in deck.cells.items()]
+        return replace(
+            found,
+            mesh=meshio.Mesh(deck.points, cells),
+            displacement=on_bodies(found.displacement),
+            stress=on_bodies(found.stress),
+            pressure=on_bodies(found.pressure, layer=True),
+            gap=on_bodies(found.gap, layer=True),
+        )
 
 
 def deck_lines(deck: Deck, stiffness: float = STIFFNESS) -> Iterator[str]:
     """The lines of the input; UnsupportedError for cells and gaps that CalculiX lacks."""
     _refuse(deck)
+    deck, below = with_layers(deck)
     yield "*NODE, NSET=NALL"
-    for number, place in enumerate(deck.points.tolist(), start=1):
+    for number, place in enumerate(_places(deck).tolist(), start=1):
         yield f"{number}, " + ", ".join(f"{x:.13e}" for x in place)
     yield from _elements(deck)
     for pair in deck.pairs:
         for group, faces in ((pair.zone.slave, pair.slave), (pair.zone.master, pair.master)):
             yield f"*SURFACE, NAME={group}, TYPE=ELEMENT"
             yield from (f"{element}, S{face}" for element, face in _faces(deck, faces))
+    yield from _equal(deck, below)
+    yield from _oblique(deck)
     yield from _contact(deck, stiffness)
+    if deck.start.any():
+        yield from _closing(deck)
     yield from ("*STEP, INC=1000", "*STATIC", "1., 1.")
-    yield "*BOUNDARY"
-    for node, axis, value in deck.fixed():
-        yield f"{node + 1}, {axis + 1}, {axis + 1}, {value:.13e}"
+    # By default a correction of 1 % of the largest displacement ends the iterations.
+    yield from ("*CONTROLS, PARAMETERS=FIELD", f"0.005, {_CORRECTION:g}", "*BOUNDARY, OP=NEW")
+    yield from _boundary(deck, 1.0)
     if deck.pressures:
         yield "*DLOAD"
         for faces, value in deck.pressures:
@@ -111,17 +156,70 @@ def deck_lines(deck: Deck, stiffness: float = STIFFNESS) -> Iterator[str]:
         yield "*CLOAD"
         for node, axis, value in deck.loaded():
             yield f"{node + 1}, {axis + 1}, {value:.13e}"
-    yield from ("*NODE FILE", "U", "*EL FILE", "S", "*CONTACT FILE", "CDIS, CSTR", "*END STEP")
+    rings = ", OUTPUT=2D" if deck.case.axisymmetric else ""
+    yield from (
+        f"*NODE FILE{rings}",
+        "U",
+        "*EL FILE",
+        "S",
+        "*CONTACT FILE",
+        "CDIS, CSTR",
+        "*END STEP",
+    )
+
+
+def _places(deck: Deck) -> np.ndarray:
+    """The nodes (n, dim), those on the axis of rings beside it."""
+    points = deck.points.copy()
+    if deck.case.axisymmetric:
+        points[:, 0] = np.maximum(points[:, 0], _BORE * np.ptp(points, axis=0).max())
+    return points
+
+
+def _closing(deck: Deck) -> Iterator[str]:
+    """A step that moves bodies which contact alone holds until they touch; the next frees them."""
+    yield from ("*STEP, INC=1000", "*STATIC", "1., 1.", "*BOUNDARY")
+    for node, axis in zip(*map(np.ndarray.tolist, np.nonzero(deck.start)), strict=True):
+        yield f"{node + 1}, {axis + 1}, {axis + 1}, {deck.start[node, axis]:.13e}"
+    yield from (*_boundary(deck, 0.0), "*END STEP")
+
+
+def _boundary(deck: Deck, factor: float) -> Iterator[str]:
+    """Displacements that are given, and those of the auxiliary nodes of oblique supports."""
+    for node, axis, value in deck.fixed():
+        yield f"{node + 1}, {axis + 1}, {axis + 1}, {factor * value:.13e}"
+    for node, of in enumerate(deck.oblique, start=len(deck.points) + 1):
+        yield f"{node}, 1, 1, {factor * of.value:.13e}"
+
+
+def _equal(deck: Deck, below: np.ndarray) -> Iterator[str]:
+    """The nodes of the layers move as those below."""
+    first = len(deck.points) - len(below) + 1
+    for node, other in enumerate((below + 1).tolist(), start=first):
+        for axis in range(1, 1 + deck.points.shape[1]):
+            yield from ("*EQUATION", "2", f"{node}, {axis}, 1., {other}, {axis}, -1.")
+
+
+def _oblique(deck: Deck) -> Iterator[str]:
+    """Supports across the axes: equations, each with an auxiliary node whose value is given."""
+    first = len(deck.points) + 1
+    for node, of in enumerate(deck.oblique, start=first):
+        place = ", ".join(f"{x:.13e}" for x in deck.points[of.node].tolist())
+        yield from ("*NODE", f"{node}, {place}", "*EQUATION", f"{len(of.terms) + 1}")
+        terms = [(of.node + 1, axis + 1, factor) for axis, factor in of.terms]
+        for number, axis, factor in [*terms, (node, 1, -1.0)]:
+            yield f"{number}, {axis}, {factor:.13e}"
+
+
+def _elements_of(deck: Deck) -> dict[str, str]:
+    return RINGS if deck.case.axisymmetric else ELEMENTS
 
 
 def _refuse(deck: Deck) -> None:
     for name in deck.cells:
-        if name not in ELEMENTS:
+        if name not in _elements_of(deck):
             plane = " (of one layer over the plane cells)" if deck.plane else ""
             raise UnsupportedError(f"{name}: CalculiX has no such element{plane}")
-    for pair in deck.pairs:
-        if pair.zone.clearance is None and pair.zone.interference:
-            raise UnsupportedError("interference beside the gap as meshed: not in CalculiX")
 
 
 def _elements(deck: Deck) -> Iterator[str]:
@@ -129,7 +227,7 @@ def _elements(deck: Deck) -> Iterator[str]:
     for name, cells in deck.cells.items():
         for material in np.unique(deck.material[name]).tolist():
             mine = np.flatnonzero(deck.material[name] == material)
-            yield f"*ELEMENT, TYPE={ELEMENTS[name]}, ELSET=PART{material}"
+            yield f"*ELEMENT, TYPE={_elements_of(deck)[name]}, ELSET=PART{material}"
             rows = np.column_stack([deck.starts[name] + mine, cells[mine] + 1])
             for row in rows.tolist():
                 entries = list(map(str, row))

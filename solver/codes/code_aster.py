@@ -60,7 +60,7 @@ def _refuse(deck: Deck) -> None:
     if deck.forces.any():
         raise UnsupportedError("loads other than constant pressures: not written for code_aster")
     for pair in deck.pairs:
-        if pair.zone.clearance is not None or pair.zone.interference:
+        if pair.gap is not None or pair.zone.interference:
             raise UnsupportedError(
                 "an initial gap other than as meshed: not written for code_aster"
             )
@@ -114,14 +114,15 @@ def write_med(deck: Deck, held: Held, path: Path) -> None:
         families[number] = [group]
         for block in blocks:
             add(block.type.name, block.nodes, np.full(len(block.nodes), number))
-    together = np.zeros(len(deck.points), dtype=int)
-    for i, (_, _, nodes) in enumerate(held):
-        together[nodes] += 1 << i
-    points = {
-        int(code): [f"held_{i}" for i in range(len(held)) if code >> i & 1]
-        for code in np.unique(together)
-        if code
-    }
+    named = [(f"held_{i}", nodes) for i, (_, _, nodes) in enumerate(held)]
+    named += [(f"across_{of.node}", np.array([of.node])) for of in deck.oblique]
+    of_node: list[dict[str, None]] = [{} for _ in deck.points]
+    for name, nodes in named:
+        for node in nodes:
+            of_node[node][name] = None
+    codes = {names: i for i, names in enumerate(sorted({tuple(n) for n in of_node if n}), 1)}
+    together = np.array([codes.get(tuple(names), 0) for names in of_node])
+    points = {code: list(names) for names, code in codes.items()}
     mesh = meshio.Mesh(
         deck.points,
         [(kind, np.concatenate(parts)) for kind, parts in cells.items()],
@@ -140,6 +141,12 @@ def _commands(deck: Deck, held: Held, lac: bool) -> str:
         f"_F(GROUP_NO='held_{i}', D{'XYZ'[axis]}={value!r})"
         for i, (axis, value, _) in enumerate(held)
     ]
+    across = [
+        f"_F(GROUP_NO={_tuple([repr(f'across_{of.node}')] * len(of.terms))}, "
+        f"DDL={_tuple(repr('D' + 'XYZ'[axis]) for axis, _ in of.terms)}, "
+        f"COEF_MULT={_tuple(repr(factor) for _, factor in of.terms)}, COEF_IMPO={of.value!r})"
+        for of in deck.oblique
+    ]
     pressed = [
         f"_F(GROUP_MA='press_{i}', PRES={value!r})" for i, (_, value) in enumerate(deck.pressures)
     ]
@@ -150,12 +157,16 @@ def _commands(deck: Deck, held: Held, lac: bool) -> str:
     return _COMMANDS.format(
         cut=f"mesh = CREA_MAILLAGE(MAILLAGE=mesh, {cut})\n" if lac else "",
         surfaces=_tuple(repr(name) for name, _ in _surfaces(deck)),
-        kind="D_PLAN" if deck.points.shape[1] == 2 else "3D",
+        kind="AXIS" if deck.case.axisymmetric else "D_PLAN" if len(deck.points[0]) == 2 else "3D",
         laws="\n".join(
             f"mat_{n} = DEFI_MATERIAU(ELAS={law})" for n, law in zip(materials, laws, strict=True)
         ),
         bodies=_tuple(f"_F(GROUP_MA='body_{n}', MATER=mat_{n})" for n in materials),
-        loads=f"DDL_IMPO={_tuple(fixed)}" + (f", PRES_REP={_tuple(pressed)}" if pressed else ""),
+        loads=", ".join(
+            f"{key}={_tuple(parts)}"
+            for key, parts in (("DDL_IMPO", fixed), ("LIAISON_DDL", across), ("PRES_REP", pressed))
+            if parts
+        ),
         zones=_tuple(f"_F({side}, {algorithm})" for side in sides),
     )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import meshio
 import numpy as np
 
+from ..case.expressions import evaluate
 from ..case.material import Material
 from ..case.model import Case, Load, Zone
 from ..mechanics.fem.faces import FaceBlock, volume_cells
@@ -14,6 +15,7 @@ from ..simulation.attributes import Attributes, faces_of
 from ..simulation.groups import check_groups, named_parts
 from ..simulation.selections import with_groups
 from .layer import as_layer
+from .supports import Oblique, closing, split
 
 # What the cells of a rigid body are made of; all their nodes are held.
 _RIGID = Material(1.0, 0.0)
@@ -25,11 +27,16 @@ class UnsupportedError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class PairedFaces:
-    """One contact zone with its faces, turned outward."""
+    """One contact zone with its faces, turned outward.
+
+    `gap` (n,) at the nodes of the slave is the initial gap that the case prescribes, NaN elsewhere;
+    None: as meshed, less `zone.interference`.
+    """
 
     zone: Zone
     slave: list[FaceBlock]
     master: list[FaceBlock]
+    gap: np.ndarray | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +44,12 @@ class Deck:
     """A case as solved on its mesh: nodes (n, dim), cells by type, values at the last load step.
 
     `material` holds each cell's number (m,) in `materials`, by type. `held` (n, dim) are the
-    displacements given to nodes, NaN where they are free. `pressures`: faces, turned outward, and
-    the constant pressure on them. `forces` (n, dim) are the consistent nodal forces of all other
-    loads, `all_forces` those of the pressures too. `plane`: how many of the nodes are those of the
-    plane mesh under one layer of cells; 0 where the deck is the mesh itself.
+    displacements given to nodes, NaN where they are free, `oblique` the supports across the axes.
+    `start` (n, dim) closes gaps of bodies that contact alone holds (see `supports.closing`).
+    `pressures`: faces, turned outward, and the constant pressure on them. `forces` (n, dim) are the
+    consistent nodal forces of all other loads, `all_forces` those of the pressures too. `plane`:
+    how many of the nodes are those of the plane mesh under one layer of cells; 0 where the deck is
+    the mesh itself.
     """
 
     case: Case
@@ -49,6 +58,8 @@ class Deck:
     materials: list[Material]
     material: dict[str, np.ndarray]
     held: np.ndarray
+    oblique: list[Oblique]
+    start: np.ndarray
     pressures: list[tuple[list[FaceBlock], float]]
     forces: np.ndarray
     all_forces: np.ndarray
@@ -98,13 +109,14 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
     """The deck of a case on its mesh; `layer`: a plane one as one layer of cells in space.
 
     Raises InputError where case and mesh do not fit, UnsupportedError for what no code is given:
-    supports across the axes, an initial gap that varies, axisymmetric bodies.
+    springs, groups that move as one, factors of single loads.
     """
     mesh = with_groups(case, mesh)
     check_groups(case, mesh)
     mesh, _ = named_parts(case, mesh)
     _refuse(case)
-    plane = len(mesh.points) if layer and mesh.points.shape[1] == 2 else 0
+    layer = layer and mesh.points.shape[1] == 2 and not case.axisymmetric
+    plane = len(mesh.points) if layer else 0
     if plane:
         case, mesh = as_layer(case, mesh)
     cells = volume_cells(mesh)
@@ -115,13 +127,20 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
     materials = [*case.materials.values(), _RIGID]
     numbers = given.by_material(lambda m: float(materials.index(m)), len(materials) - 1.0)
     factor = case.factors[-1]
+    held, oblique = split(given.supports(), mesh.points.shape[1])
+    flat = 2 if plane else mesh.points.shape[1]
+    pairs = [_paired(case, mesh, i, flat) for i in range(len(case.zones))]
     return Deck(
         case=case,
         points=mesh.points,
         cells=cells,
         materials=materials,
         material={name: found.astype(int) for name, found in numbers.items()},
-        held=factor * _held(given, mesh),
+        held=factor * held,
+        oblique=[replace(each, value=factor * each.value) for each in oblique],
+        start=closing(
+            mesh.points, cells, held, oblique, [(p.zone, p.slave, p.master) for p in pairs]
+        ),
         pressures=[
             (faces_of(mesh, load.group, case, f"loads[{i}].group"), factor * load.value)
             for i, load in enumerate(case.loads)
@@ -129,16 +148,15 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
         ],
         forces=factor * given.forces(),
         all_forces=factor * Attributes(case, mesh, whole, [], origin).forces(),
-        pairs=[
-            PairedFaces(
-                zone=zone,
-                slave=faces_of(mesh, zone.slave, case, case.zone_key(i, "slave")),
-                master=faces_of(mesh, zone.master, case, case.zone_key(i, "master")),
-            )
-            for i, zone in enumerate(case.zones)
-        ],
+        pairs=pairs,
         plane=plane,
     )
+
+
+def refuse_rings(deck: Deck, code: str) -> None:
+    """Refuse axisymmetric bodies for a code that has or is given none."""
+    if deck.case.axisymmetric:
+        raise UnsupportedError(f"axisymmetric bodies: not written for {code}")
 
 
 def _is_constant(load: Load) -> bool:
@@ -149,7 +167,7 @@ def _is_constant(load: Load) -> bool:
 def _refuse(case: Case) -> None:
     if case.histories:
         raise UnsupportedError("factors of single loads in steps: not written for codes")
-    if any(support.together for support in case.supports):
+    if any(support.together or support.cyclic for support in case.supports):
         raise UnsupportedError("groups that move as one: not written for codes")
     if any(support.spring for support in case.supports):
         raise UnsupportedError("springs and elastic foundations: not written for codes")
@@ -157,17 +175,17 @@ def _refuse(case: Case) -> None:
         if body.moves or body.surface:
             what = f"a rigid {body.surface}" if body.surface else "a rigid body that moves"
             raise UnsupportedError(f"{name} is {what}: not written for codes")
-    if case.plane == "axisymmetric":
-        raise UnsupportedError("axisymmetric bodies: not written for other codes")
-    for zone in case.zones:
-        if zone.clearance is not None and not isinstance(zone.clearance, float):
-            raise UnsupportedError("initial gap given as an expression: the codes take a number")
 
 
-def _held(given: Attributes, mesh: meshio.Mesh) -> np.ndarray:
-    free = given.supports()
-    if free.selection is None:
-        raise UnsupportedError("support across the axes of the coordinates: not written for codes")
-    held = free.offset.copy()
-    held[free.selection] = np.nan
-    return held.reshape(mesh.points.shape)
+def _paired(case: Case, mesh: meshio.Mesh, number: int, flat: int) -> PairedFaces:
+    zone = case.zones[number]
+    slave, master = (
+        faces_of(mesh, getattr(zone, side), case, case.zone_key(number, side))
+        for side in ("slave", "master")
+    )
+    gap = None
+    if zone.clearance is not None:
+        gap = np.full(len(mesh.points), np.nan)
+        nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
+        gap[nodes] = evaluate(zone.clearance, mesh.points[nodes, :flat]) - zone.interference
+    return PairedFaces(zone=zone, slave=slave, master=master, gap=gap)

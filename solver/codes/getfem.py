@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..system.errors import InputError, SolveError
 from ..system.process import printed_by
-from .deck import Deck, UnsupportedError
+from .deck import Deck, UnsupportedError, refuse_rings
 from .files.read import read_result_files
 from .foreign import ForeignResult
 from .plain import Plain
@@ -41,14 +41,12 @@ class GetFEM(Plain):
 
     def write(self, deck: Deck, folder: Path) -> None:
         """Write `deck.json` and the script; UnsupportedError for what they lack."""
+        refuse_rings(deck, "GetFEM")
         for name in deck.cells:
             if name not in CELLS:
                 raise UnsupportedError(f"{name}: not written for GetFEM")
         if len(deck.pairs) != 1:
             raise UnsupportedError("more or less than one contact zone: not written for GetFEM")
-        zone = deck.pairs[0].zone
-        if zone.clearance is not None or zone.interference:
-            raise UnsupportedError("an initial gap other than as meshed: not in GetFEM")
         super().write(deck, folder)
         shutil.copyfile(Path(__file__).with_name("getfem_main.py"), folder / "main.py")
 

@@ -55,6 +55,7 @@ class BodyMesh:
         cells = [cell for cell in cells if cell[1][0] in mine]
         [material] = {material for *_, material in cells}
         law = deck["materials"][material]
+        self.rigid = material == len(deck["materials"]) - 1
         self.young, poisson = law["young"], law["poisson"]
         self.mu = self.young / (2 * (1 + poisson))
         self.lame = 2 * self.mu * poisson / (1 - 2 * poisson)
@@ -128,24 +129,30 @@ def solve(deck):
             if (node, a) in known:
                 force[known[node, a]] = value
         model.add_explicit_rhs(f"u{i}", force)
-        held = [(known[n, a], value) for n, a, value in deck["held"] if (n, a) in known]
+        held = [(n, np.eye(dim)[a], value) for n, a, value in deck["held"]] + deck["oblique"]
+        held = [support for support in held if (support[0], 0) in known]
         if held:
             rows = getfem.Spmat("empty", len(held), len(body.node))
-            for row, (column, _) in enumerate(held):
-                rows.add(row, column, 1.0)
+            for row, (n, direction, _) in enumerate(held):
+                for a, part in enumerate(direction):
+                    rows.add(row, known[n, a], part)
             model.add_variable(f"reaction{i}", len(held))
-            values = np.array([value for _, value in held])
+            values = np.array([value for *_, value in held])
             model.add_constraint_with_multipliers(f"u{i}", f"reaction{i}", rows, values)
+        model.set_variable(f"u{i}", np.array(deck["start"])[body.node, axis])
     slave = bodies[0]
     pressures = getfem.MeshFem(slave.mesh, 1)
     pressures.set_classical_fem(slave.order)
     contact = pressures.basic_dof_on_region(CONTACT)
     model.add_fem_variable("pressure", getfem.MeshFem("partial", pressures, contact))
     model.add_initialized_data("r", min(body.young for body in bodies) / slave.size)
-    add_contact(model, bodies)
+    add_contact(model, bodies, deck["contact"][0], pressures, contact)
     force = sum(abs(value) for *_, value in deck["forces"])
     moved = max((abs(value) for *_, value in deck["held"]), default=0.0)
-    scale = force + slave.young * moved * np.ptp(points, axis=0).max() ** (dim - 2)
+    extent = np.ptp(points, axis=0).max()
+    scale = force + slave.young * moved * extent ** (dim - 2)
+    # Bodies that overlap have a load of their own: the force of a strain of 1e-6.
+    scale = scale or 1e-6 * slave.young * extent ** (dim - 1)
     iterations, converged = model.solve("noisy", *SEARCH, "max_res", 1e-9 * scale)
     if not converged:
         sys.exit(f"GetFEM: no convergence in {iterations} iterations")
@@ -153,20 +160,35 @@ def solve(deck):
     stress = []
     for i, body in enumerate(bodies):
         displacement[body.node, np.arange(len(body.node)) % dim] = model.variable(f"u{i}")
-        stress.append(stress_of(model, body, i))
+        if not body.rigid:
+            stress.append(stress_of(model, body, i))
     places = pressures.basic_dof_nodes(contact).T
     return displacement, np.c_[places, model.variable("pressure")], np.concatenate(stress)
 
 
-def add_contact(model, bodies):
-    """Contact along the normals of the slave's faces as meshed: rays find the master's faces."""
+def add_contact(model, bodies, zone, pressures, contact):
+    """Contact along the normals of the slave's faces as meshed: rays find the master's faces.
+
+    `contact` are the unknowns of `pressures` on these faces: a prescribed gap is given there.
+    """
     extent = np.ptp(bodies[0].points, axis=0).max()
     model.add_raytracing_transformation("ray", REACH * extent)
     for i, (body, side) in enumerate(zip(bodies, ("slave", "master"))):  # noqa: B905
         model.add_initialized_fem_data(f"still{i}", body.fem, np.zeros(len(body.node)))
         add = getattr(model, f"add_{side}_contact_boundary_to_raytracing_transformation")
         add("ray", body.mesh, f"still{i}", CONTACT)
-    gap = "((Interpolate(X,ray)+Interpolate(u1,ray)-X-u0).Normal)"
+    if zone["gap"] is None:
+        model.add_initialized_data("interference", zone["interference"])
+        initial = "((Interpolate(X,ray)-X).Normal)-interference"
+    else:
+        given = dict(zone["gap"])
+        gaps = np.zeros(pressures.nbdof())
+        gaps[contact] = [
+            given[n] for n in bodies[0].nodes_at(pressures.basic_dof_nodes(contact), given)
+        ]
+        model.add_initialized_fem_data("clearance", pressures, gaps)
+        initial = "clearance"
+    gap = f"({initial}+(Interpolate(u1,ray)-u0).Normal)"
     for paired, term in (
         (1, "pressure*((Test_u0-Interpolate(Test_u1,ray)).Normal)"),
         (1, f"-(pressure-pos_part(pressure-r*{gap}))/r*Test_pressure"),

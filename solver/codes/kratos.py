@@ -16,7 +16,7 @@ import numpy as np
 from ..mechanics.fem.faces import FaceBlock
 from ..system.errors import SolveError
 from ..system.process import printed_by
-from .deck import Deck, UnsupportedError
+from .deck import Deck, UnsupportedError, refuse_rings
 from .foreign import Field, ForeignResult
 
 # Its own environment, beside the program's.
@@ -46,6 +46,7 @@ class Kratos:
 
     settings: Mapping[str, str] = {
         "contact": "ALMContactFrictionless, penalty and scale chosen by Kratos",
+        "search": "active_check_factor 1",
         "elements": "SmallDisplacementElement; geometry not updated",
     }
 
@@ -95,14 +96,17 @@ def _field(deck: Deck, rows: np.ndarray, values: np.ndarray) -> Field:
 
 
 def _refuse(deck: Deck) -> None:
+    refuse_rings(deck, "Kratos")
     for name in deck.cells:
         if name not in ELEMENTS:
             reason = (
                 "no such element" if name == "PYRA5" else "no mortar contact on quadratic faces"
             )
             raise UnsupportedError(f"{name}: Kratos has {reason}")
+    if deck.oblique:
+        raise UnsupportedError("supports across the axes: not written for Kratos")
     for pair in deck.pairs:
-        if pair.zone.clearance is not None or pair.zone.interference:
+        if pair.gap is not None or pair.zone.interference:
             raise UnsupportedError("an initial gap other than as meshed: not in Kratos")
 
 
@@ -236,6 +240,9 @@ def _project(deck: Deck) -> dict[str, Any]:
             "contact_model_part": {str(i): [f"contact_{i}"] for i in zones},
             "assume_master_slave": {str(i): [f"slave_{i}"] for i in zones},
             "contact_type": "Frictionless",
+            # Faces nearer than their size are in contact at first; by default 1 % of it, and the
+            # few pairs of a sphere that touches at a point remain the only ones.
+            "search_parameters": {"active_check_factor": 1.0},
         },
     }
     return {

@@ -32,7 +32,8 @@ def as_layer(case: Case, mesh: meshio.Mesh) -> tuple[Case, meshio.Mesh]:
     cells = [(b.type, b.data) for b in mesh.cells]
     count = sum(len(data) for name, data in cells if BY_MESHIO[name].dim == 2)
     thickness = float(np.sqrt(np.ptp(mesh.points, axis=0).prod() / count))
-    raised = [(_over(name).meshio, _raise(BY_MESHIO[name], data, n)) for name, data in cells]
+    kinds = [(BY_MESHIO[name], data) for name, data in cells]
+    raised = [(over(kind).meshio, _raise(kind, data, n)) for kind, data in kinds]
     used = np.zeros(3 * n, dtype=bool)
     used[: 2 * n] = True
     for name, data in raised:
@@ -50,18 +51,23 @@ def as_layer(case: Case, mesh: meshio.Mesh) -> tuple[Case, meshio.Mesh]:
         cell_sets={**mesh.cell_sets, LAYER: whole},
         point_sets={g: np.concatenate([p, p + n]) for g, p in mesh.point_sets.items()},
     )
-    return _in_space(case), layer
+    return _in_space(case, thickness), layer
 
 
-def _in_space(case: Case) -> Case:
+def _in_space(case: Case, thickness: float) -> Case:
     held = (*case.supports, Support(LAYER, {"z": 0.0}))
     solution = case.solution and _Plane(case.solution)
-    loads = tuple(map(_lifted, case.loads))
+    loads = tuple(_lifted(load, thickness) for load in case.loads)
     return replace(case, plane=None, supports=held, loads=loads, solution=solution)
 
 
-def _lifted(load: Load) -> Load:
-    return replace(load, value=(*load.value, 0.0)) if isinstance(load.value, tuple) else load
+def _lifted(load: Load, thickness: float) -> Load:
+    if not isinstance(load.value, tuple):
+        return load
+    # A force is one per unit of depth.
+    depth = thickness if load.kind == "force" else 1.0
+    value = tuple(v * depth if isinstance(v, float) else v for v in load.value)
+    return replace(load, value=(*value, 0.0))
 
 
 class _Plane(ExactSolution):
@@ -83,18 +89,19 @@ class _Plane(ExactSolution):
         return self.plane.body_part(nodes[:, :2])
 
 
-def _over(meshio_name: str) -> CellType:
-    return BY_NAME[_OVER[BY_MESHIO[meshio_name].name]]
+def over(kind: CellType) -> CellType:
+    """The type of the cells of one layer over plane ones or faces."""
+    return BY_NAME[_OVER[kind.name]]
 
 
 def _raise(kind: CellType, data: np.ndarray, n: int) -> np.ndarray:
     """The cells over plane ones (m, nodes); node i is in the faces as i and n + i, else 2 n + i."""
-    columns = [data[:, node] + n * level for node, level in _columns(kind.name)]
-    return np.stack(columns, axis=1)
+    nodes = [data[:, node] + n * level for node, level in columns(kind.name)]
+    return np.stack(nodes, axis=1)
 
 
 @cache
-def _columns(name: str) -> list[tuple[int, int]]:
+def columns(name: str) -> list[tuple[int, int]]:
     """For each node of the raised cell: the plane cell's node, and 0 below, 1 above, 2 between."""
     plane, raised = BY_NAME[name], BY_NAME[_OVER[name]]
     own = {frozenset(owners): i for i, owners in enumerate(plane.owners)}

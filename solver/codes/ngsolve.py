@@ -14,7 +14,7 @@ import numpy as np
 from ..mesh.catalogue import cell_type
 from ..system.errors import SolveError
 from ..system.process import printed_by
-from .deck import Deck, UnsupportedError
+from .deck import Deck, UnsupportedError, refuse_rings
 from .foreign import Field, ForeignResult
 from .plain import FILE, Plain, content
 
@@ -75,6 +75,7 @@ class NGSolve(Plain):
 
 
 def _refuse(deck: Deck) -> None:
+    refuse_rings(deck, "NGSolve")
     straight = deck.points.copy()
     for name, cells in deck.cells.items():
         if name not in LINEAR + QUADRATIC:
@@ -84,6 +85,5 @@ def _refuse(deck: Deck) -> None:
         raise UnsupportedError("curved sides of cells: not written for NGSolve")
     if len({name in LINEAR for name in deck.cells}) == 2:
         raise UnsupportedError("linear and quadratic cells in one mesh: not written for NGSolve")
-    for pair in deck.pairs:
-        if pair.zone.clearance is not None or pair.zone.interference:
-            raise UnsupportedError("an initial gap other than as meshed: not written for NGSolve")
+    if deck.oblique:
+        raise UnsupportedError("supports across the axes: NGSolve's space holds components")

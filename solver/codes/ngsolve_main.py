@@ -145,13 +145,23 @@ class Contact:
         self.slave = mesh.Boundaries(f"s{2 * number}")
         self.master = mesh.Boundaries(f"s{2 * number + 1}")
         self.stiffness, self.kept = deck["stiffness"], []
-        faces = deck["contact"][number]["slave"].values()
+        zone = deck["contact"][number]
+        faces = zone["slave"].values()
         self.used = np.unique(np.concatenate([np.ravel(rows) for rows in faces]))
+        self.interference, self.gap = zone["interference"], None
+        if zone["gap"] is not None:
+            self.gap = GridFunction(H1(mesh, order=nodes.order))
+            values = self.gap.vec.FV().NumPy()
+            nodes.hold(values, np.zeros(len(values), dtype=bool), zone["gap"])
 
     def overlap(self, of):
         """How deep the slave is in the master, in linear theory."""
+        normal = specialcf.normal(self.dim)
+        nearer = (of - of.Other()) * normal
+        if self.gap is not None:
+            return nearer - self.gap
         place = CF((x, y, z)[: self.dim])
-        return (place + of - place.Other() - of.Other()) * specialcf.normal(self.dim)
+        return (place - place.Other()) * normal + self.interference + nearer
 
     def add(self, form, energy=None, integrator=None):
         """Add an energy, or an integrator, to a form; the form needs the pairs to live on."""

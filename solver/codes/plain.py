@@ -2,8 +2,10 @@
 
 Nodes count from 0, axes are 0, 1, 2. `points`: coordinates; `cells`: nodes by type, in the order of
 VTK; `material`: by type, the place of each cell's material in `materials`; `held`: [node, axis,
-displacement]; `forces`: [node, axis, force], all loads; `contact`: pairs with the nodes of slave
-and master faces by type, turned outward, and the initial gap (null: as meshed).
+displacement]; `oblique`: [node, direction, displacement along it]; `forces`: [node, axis, force],
+all loads; `start`: displacements (n, dim) that close open bodies which contact alone holds;
+`contact`: pairs with the nodes of slave and master faces by type, turned outward, and the initial
+gap as [node, gap] (null: as meshed, less `interference`).
 """
 
 import json
@@ -15,7 +17,7 @@ import numpy as np
 
 from ..mechanics.fem.faces import FaceBlock
 from ..system.errors import SolveError
-from .deck import Deck
+from .deck import Deck, PairedFaces, refuse_rings
 from .foreign import ForeignResult
 
 FILE = "deck.json"
@@ -35,7 +37,8 @@ class Plain:
         return ""
 
     def write(self, deck: Deck, folder: Path) -> None:
-        """Write `deck.json` into `folder`."""
+        """Write `deck.json` into `folder`; UnsupportedError for axisymmetric bodies."""
+        refuse_rings(deck, "deck.json")
         text = json.dumps(content(deck))
         (folder / FILE).write_text(text, encoding="ascii")
 
@@ -59,18 +62,27 @@ def content(deck: Deck) -> dict[str, Any]:
         "materials": [{"young": m.young, "poisson": m.poisson} for m in deck.materials],
         "material": {name: of.tolist() for name, of in deck.material.items()},
         "held": list(deck.fixed()),
+        "oblique": [(of.node, of.direction.tolist(), of.value) for of in deck.oblique],
+        "start": deck.start.tolist(),
         "forces": list(zip(nodes.tolist(), axes.tolist(), forces.tolist(), strict=True)),
         "contact": [
             {
                 "name": pair.zone.name,
                 "slave": _faces(pair.slave),
                 "master": _faces(pair.master),
-                "clearance": pair.zone.clearance,
-                "interference": pair.zone.interference,
+                "gap": _gap(pair),
+                "interference": pair.zone.interference if pair.gap is None else 0.0,
             }
             for pair in deck.pairs
         ],
     }
+
+
+def _gap(pair: PairedFaces) -> list[tuple[int, float]] | None:
+    if pair.gap is None:
+        return None
+    nodes = np.flatnonzero(~np.isnan(pair.gap))
+    return list(zip(nodes.tolist(), pair.gap[nodes].tolist(), strict=True))
 
 
 def _faces(blocks: Sequence[FaceBlock]) -> dict[str, list[list[int]]]:

@@ -20,8 +20,10 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from ..case import job_name
 from ..case.typed import ONCE, Positive, Section, Text, Version, read_as
 from ..case.yaml import read_mapping
+from ..system.errors import InputError, hint
 from ..verification.checks import RELATIVE
 from ..verification.verdict import FAILED, PASSED, CheckError, CheckResult, Verdict
 from .files.map import CodeName
@@ -70,14 +72,30 @@ class RecordedFile(Section, frozen=True):
 def recorded_verdicts(family: Path) -> list[Verdict]:
     """The verdicts of all files in `recorded/` of the family's folder.
 
-    Raises InputError for a file that is not valid.
+    Raises InputError for a file that is not valid, or that names a solve which no case file of the
+    folder describes.
     """
-    found = []
-    for path in sorted((family / FOLDER).glob("*.yaml")):
+    found: list[Verdict] = []
+    files = sorted((family / FOLDER).glob("*.yaml"))
+    solves = _solves(family) if files else set()
+    for path in files:
         file = read_as(RecordedFile, read_mapping(path), path)
-        for result in file.results:
+        for i, result in enumerate(file.results):
+            for case in result.cases:
+                if case not in solves:
+                    told = f"not a solve of {family.name}; {hint(case, solves)}"
+                    raise InputError(path, f"results[{i}].cases", case, told)
             found += [_verdict(file, result, case, family.name) for case in result.cases]
     return found
+
+
+def _solves(family: Path) -> set[str]:
+    """The names of the solves of the case files in a folder, both directions."""
+    contents = [read_mapping(path) for path in family.glob("*.yaml")]
+    named = [content for content in contents if "name" in content and "mesh" in content]
+    return {
+        job_name(str(content["name"]), swapped) for content in named for swapped in (False, True)
+    }
 
 
 def _verdict(file: RecordedFile, result: RecordedResult, case: str, family: str) -> Verdict:

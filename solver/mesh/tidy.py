@@ -20,9 +20,10 @@ def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
 
     `raw` has any blocks, groups in its cell and point sets, and, if its file numbers the cells,
     these numbers as cell data `number`. Cells written twice become one. Cells of lower dimension
-    stay when their nodes belong to volume cells and they are faces or in a group; nodes of no cell
-    go. A group none of whose members stay is kept, empty. Point cells become node groups. Raises
-    InputError naming the file `where`.
+    stay when their nodes belong to volume cells and they are faces or in a group; faces in a group
+    also when none of their nodes does (a rigid surface). Nodes of no cell go. A group none of whose
+    members stay is kept, empty. Point cells become node groups. Raises InputError naming the file
+    `where`.
     """
     table = _Table(raw, where)
     dim = max((cell.dim for cell in table.cells), default=0)
@@ -165,6 +166,8 @@ def _attached(blocks: list[_CellBlock], dim: int, n_points: int, where: object) 
                     where, f"group {name}", None, f"{loose} of its {block.cell.name} touch no cell"
                 )
         wanted = on_volume if block.cell.dim >= dim - 1 else on_volume & block.named()
+        if block.cell.dim == dim - 1:
+            wanted |= ~inside[block.nodes].any(axis=1) & block.named()
         if wanted.any():
             kept.append(block.taken(wanted))
     return kept

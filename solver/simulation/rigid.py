@@ -11,9 +11,11 @@ import meshio
 import numpy as np
 
 from ..case.model import Case
+from ..mechanics.fem.faces import FaceError, boundary_faces, nodal_normals, volume_cells
+from ..mechanics.fem.layer import layer, turned
 from ..mechanics.fem.supports import SAME, Fixed
 from ..mechanics.mortar.quadric import Quadric, ball, cylinder, parabola, plane
-from ..mesh.catalogue import BY_MESHIO
+from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,15 +45,89 @@ def quadric_of(case: Case, name: str, origin: np.ndarray) -> Quadric | None:
 
 
 def with_rigid_surfaces(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
-    """The mesh with one simplex, and one face of it, for each rigid body without cells.
+    """The mesh with cells for each rigid body without cells.
 
-    They carry the motion of the body; the contact is that of its surface. The simplex is on the
-    surface, behind it, opposite to the middle of the slave, and as large.
+    They carry its motion. A body whose surface the case gives has one simplex, and one face of it,
+    on the surface, behind it, opposite to the middle of the slave, and as large. A group of faces
+    without cells behind them gets a thin layer. All other faces without cells are left out.
     """
+    attached = _attached(mesh)
     for name, body in case.rigid.items():
         if body.surface:
             mesh = _with_simplex(case, mesh, name)
-    return mesh
+        elif not attached.all():
+            mesh = _with_layer(case, mesh, name, attached)
+    return mesh if attached.all() else _without_loose(mesh)
+
+
+def _attached(mesh: meshio.Mesh) -> np.ndarray:
+    """The nodes (n,) of volume cells."""
+    found = np.zeros(len(mesh.points), dtype=bool)
+    for cells in volume_cells(mesh).values():
+        found[cells.ravel()] = True
+    return found
+
+
+def _without_loose(mesh: meshio.Mesh) -> meshio.Mesh:
+    """The mesh without the nodes of no volume cell, and the faces and edges on them."""
+    attached = _attached(mesh)
+    new = np.cumsum(attached) - 1
+    kept = [attached[block.data].all(axis=1) for block in mesh.cells]
+    place = [np.cumsum(k) - 1 for k in kept]
+    sets = {
+        name: [at[i[k[i]]] for i, k, at in zip(_whole(parts), kept, place, strict=True)]
+        for name, parts in mesh.cell_sets.items()
+    }
+    return meshio.Mesh(
+        mesh.points[attached],
+        [(block.type, new[block.data[k]]) for block, k in zip(mesh.cells, kept, strict=True)],
+        point_sets={name: new[i[attached[i]]] for name, i in mesh.point_sets.items()},
+        cell_sets=sets,
+    )
+
+
+def _whole(parts: Iterable[np.ndarray]) -> list[np.ndarray]:
+    return [np.asarray(part, dtype=int) for part in parts]
+
+
+def _with_layer(case: Case, mesh: meshio.Mesh, name: str, attached: np.ndarray) -> meshio.Mesh:
+    """The mesh with a layer of cells behind the faces of a group that have none."""
+    dim, faces = mesh.points.shape[1], {}
+    for block, part in zip(mesh.cells, _whole(mesh.cell_sets.get(name, [])), strict=False):
+        kind = BY_MESHIO[block.type]
+        if kind.dim == dim - 1 and len(part) and not attached[block.data[part]].any():
+            faces[kind.name] = block.data[part]
+    if not faces:
+        return mesh
+    key = f"bodies.{name}"
+    if name not in {side for zone in case.zones for side in (zone.slave, zone.master)}:
+        allowed = "has no cells and is the master of no contact zone"
+        raise InputError(case.path, key, name, allowed)
+    outward = turned(mesh.points, faces, _slave_normals(case, mesh, name))
+    if outward is None:
+        raise InputError(case.path, key, name, "its surface has one side only")
+    more, cells = layer(mesh.points, outward)
+    if case.axisymmetric:
+        more[:, 0] = np.abs(more[:, 0])
+    points = np.vstack([mesh.points, more])
+    return _with_cells(mesh, points, name, {BY_NAME[k].meshio: c for k, c in cells.items()})
+
+
+def _slave_normals(case: Case, mesh: meshio.Mesh, name: str) -> np.ndarray:
+    """The nodes (k, dim) of the faces that meet a body, each with its normal (k, dim)."""
+    found = [np.hstack([mesh.points.mean(axis=0), np.zeros(mesh.points.shape[1])])[None]]
+    for zone in case.zones:
+        other = {zone.slave: zone.master, zone.master: zone.slave}.get(name, "")
+        if other not in mesh.cell_sets:
+            continue
+        try:
+            faces = boundary_faces(mesh, other)
+        except FaceError as error:
+            raise InputError(case.path, "contact", other, str(error)) from None
+        normals = nodal_normals(mesh.points, [(block.type.name, block.nodes) for block in faces])
+        used = np.flatnonzero(normals.any(axis=1))
+        found.append(np.hstack([mesh.points[used], normals[used]]))
+    return np.concatenate(found[1:] or found)
 
 
 def _with_simplex(case: Case, mesh: meshio.Mesh, name: str) -> meshio.Mesh:
@@ -61,17 +137,25 @@ def _with_simplex(case: Case, mesh: meshio.Mesh, name: str) -> meshio.Mesh:
     first, dim = len(mesh.points), mesh.points.shape[1]
     corners = _simplex(case, name, mesh.points[_opposite(case, mesh, name)])
     nodes = first + np.arange(dim + 1)
-    added = {("triangle", "tetra")[dim - 2]: nodes, ("line", "triangle")[dim - 2]: nodes[:dim]}
-    cells = {block.type: block.data for block in mesh.cells}
-    sets = {group: dict(zip(cells, parts, strict=True)) for group, parts in mesh.cell_sets.items()}
-    sets[name] = {}
-    for kind, cell in added.items():
-        data = cells.get(kind, np.empty((0, len(cell)), dtype=int))
-        sets[name][kind] = np.array([len(data)])
-        cells[kind] = np.vstack([data, cell])
+    volume, face = ("triangle", "tetra")[dim - 2], ("line", "triangle")[dim - 2]
+    points = np.vstack([mesh.points, corners])
+    return _with_cells(mesh, points, name, {volume: nodes[None], face: nodes[None, :dim]})
+
+
+def _with_cells(
+    mesh: meshio.Mesh, points: np.ndarray, name: str, added: Mapping[str, np.ndarray]
+) -> meshio.Mesh:
+    """The mesh with cells by type added, in the group of that name too."""
     none = np.empty(0, dtype=int)
+    cells = {block.type: block.data for block in mesh.cells}
+    sets = {g: dict(zip(cells, _whole(parts), strict=True)) for g, parts in mesh.cell_sets.items()}
+    mine = sets.setdefault(name, {})
+    for kind, new in added.items():
+        data = cells.get(kind, np.empty((0, new.shape[1]), dtype=int))
+        mine[kind] = np.r_[mine.get(kind, none), len(data) + np.arange(len(new))]
+        cells[kind] = np.vstack([data, new])
     return meshio.Mesh(
-        np.vstack([mesh.points, corners]),
+        points,
         list(cells.items()),
         point_sets=mesh.point_sets,
         cell_sets={group: [of.get(kind, none) for kind in cells] for group, of in sets.items()},
@@ -81,13 +165,17 @@ def _with_simplex(case: Case, mesh: meshio.Mesh, name: str) -> meshio.Mesh:
 def _opposite(case: Case, mesh: meshio.Mesh, name: str) -> np.ndarray:
     """The nodes of the faces that meet the body; all if there are none."""
     slaves = {s for z in case.zones if name in (z.slave, z.master) for s in (z.slave, z.master)}
-    found = [np.empty(0, dtype=int)]
-    for group in slaves & mesh.cell_sets.keys():
-        for block, members in zip(mesh.cells, mesh.cell_sets[group], strict=True):
-            if BY_MESHIO[block.type].dim == mesh.points.shape[1] - 1:
-                found.append(block.data[np.asarray(members, dtype=int)].ravel())
-    nodes = np.unique(np.concatenate(found))
+    nodes = np.concatenate([_face_nodes(mesh, group) for group in sorted(slaves)])
     return nodes if len(nodes) else np.arange(len(mesh.points))
+
+
+def _face_nodes(mesh: meshio.Mesh, group: str) -> np.ndarray:
+    """The nodes (k,) of the faces of a group."""
+    found = [np.empty(0, dtype=int)]
+    for block, part in zip(mesh.cells, _whole(mesh.cell_sets.get(group, [])), strict=False):
+        if BY_MESHIO[block.type].dim == mesh.points.shape[1] - 1:
+            found.append(block.data[part].ravel())
+    return np.unique(np.concatenate(found))
 
 
 def _simplex(case: Case, name: str, slave: np.ndarray) -> np.ndarray:
@@ -104,7 +192,10 @@ def _simplex(case: Case, name: str, slave: np.ndarray) -> np.ndarray:
     gap, _ = surface.distance(middle, -out)
     sides = np.linalg.svd(out[None])[2][1:]
     sides *= np.where(sides.sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-    corners = middle - gap * out + size * np.vstack([np.zeros(dim), sides, -out])
+    base = np.vstack([np.zeros(dim), sides])
+    if not case.axisymmetric:
+        base -= base.mean(axis=0)
+    corners = middle - gap * out + size * np.vstack([base, -out])
     if np.linalg.det(corners[1:] - corners[0]) < 0:
         corners[:2] = corners[1::-1]
     return corners
@@ -168,7 +259,9 @@ def _frame(groups: Attributes, name: str) -> Frame:
     elif body.surface:
         point = np.array(body.values[_MIDDLE[body.surface]]) - groups.origin
     else:
-        point = (places.min(axis=0) + places.max(axis=0)) / 2
+        faces = _face_nodes(groups.mesh, name)
+        own = groups.points[faces] if len(faces) else places
+        point = (own.min(axis=0) + own.max(axis=0)) / 2
     arm, dim = places - point, places.shape[1]
     motions = {
         axis: np.tile(e, (len(nodes), 1)) for axis, e in zip("xyz", np.eye(dim), strict=False)

@@ -4,10 +4,16 @@ import json
 from pathlib import Path
 
 from solver.case.reader import parse_case
-from solver.mesh import generate
+from solver.verification.run import mesh_of
 
 CELLS_3D = ("TETRA4", "TETRA10", "HEXA8", "HEXA20")
 CELLS_2D = ("TRIA3", "TRIA6", "QUAD4", "QUAD8")
+
+# Turned by 30°: all supports are across the axes.
+TURNED = {
+    "transform": {"rotate": 30},
+    "supports": [{"group": group, "fix": ["normal"]} for group in ("symx", "base")],
+}
 
 
 def case_of(bottom, top, **more):
@@ -31,4 +37,4 @@ def case_of(bottom, top, **more):
     }
     content |= {"plane": "strain"} if plane else {}
     case = parse_case(json.dumps(content | more), Path("few.yaml"))
-    return case, generate(case.mesh, "few")
+    return case, mesh_of(case)

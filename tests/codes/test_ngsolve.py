@@ -14,10 +14,9 @@ from solver.codes.ngsolve import LINEAR, QUADRATIC, NGSolve
 from solver.codes.run import Limits, run_code
 from solver.mesh.catalogue import BY_NAME
 from solver.system.errors import SolveError
-from tests.codes.blocks import case_of
+from tests.codes.blocks import TURNED, case_of
 
 SCRIPT = Path(solver.codes.__file__).with_name("ngsolve_main.py")
-SIDES = {"name": "i", "slave": "bottom_contact", "master": "top_contact"}
 
 
 def test_middle_nodes_are_those_of_the_catalogue():
@@ -42,17 +41,17 @@ def test_middle_nodes_are_those_of_the_catalogue():
 
 
 @pytest.mark.parametrize(
-    ("bottom", "top", "zone", "reason"),
+    ("bottom", "top", "more", "reason"),
     [
         ("QUAD8", "QUAD8", {}, "QUAD8: not written for NGSolve"),
         ("TRIA6", "QUAD4", {}, "linear and quadratic cells in one mesh: not written for NGSolve"),
-        ("QUAD4", "QUAD4", {"interference": 0.1}, "an initial gap other than as meshed"),
-        ("QUAD4", "QUAD4", {"clearance": 0.1}, "an initial gap other than as meshed"),
+        ("QUAD4", "QUAD4", {"plane": "axisymmetric"}, "axisymmetric bodies: not written"),
+        ("QUAD4", "QUAD4", TURNED, "supports across the axes: NGSolve's space holds components"),
     ],
 )
-def test_what_is_refused(tmp_path, bottom, top, zone, reason):
+def test_what_is_refused(tmp_path, bottom, top, more, reason):
     with pytest.raises(UnsupportedError, match=reason):
-        NGSolve().write(deck_of(*case_of(bottom, top, contact=[SIDES | zone])), tmp_path)
+        NGSolve().write(deck_of(*case_of(bottom, top, **more)), tmp_path)
 
 
 def test_curved_sides_are_refused(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.mesh.tidy import tidy
-from solver.simulation.groups import check_groups
+from solver.simulation.scene import build_scene
 from solver.system.errors import InputError
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
@@ -114,14 +114,14 @@ def test_refusals(points, cells, sets, message):
         tidy(meshio.Mesh(np.array(points, dtype=float), cells, cell_sets=sets), "mesh")
 
 
-def test_a_group_whose_faces_touch_no_cell_is_kept_empty():
-    """So that a case that names it is told this, not that there is no such group."""
+def test_a_group_whose_faces_touch_no_cell_is_empty_unless_it_is_a_rigid_body():
+    """A case that names it is told this, not that there is no such group."""
     points = [*SQUARE, [5, 5], [6, 5]]
     cells = [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [4, 5]])]
     sets = {"low": [[], np.array([0])], "loose": [[], np.array([1])]}
     mesh = tidy(meshio.Mesh(points, cells, cell_sets=sets), "mesh")
     assert {name: [len(i) for i in ids] for name, ids in mesh.cell_sets.items()} == {
-        "loose": [0, 0],
+        "loose": [0, 1],
         "low": [0, 1],
     }
     text = (
@@ -129,4 +129,4 @@ def test_a_group_whose_faces_touch_no_cell_is_kept_empty():
         "supports: [{group: low, fix: [y]}]\nloads: [{group: loose, pressure: 1.0}]\n"
     )
     with pytest.raises(InputError, match="'loose': is empty, or none of its members touches a vol"):
-        check_groups(parse_case(text, Path("a.yaml")), mesh)
+        build_scene(parse_case(text, Path("a.yaml")), mesh)

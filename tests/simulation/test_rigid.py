@@ -1,13 +1,17 @@
 """Rigid bodies that move, and rigid surfaces without a mesh: patch tests, forces, Lamé."""
 
+import re
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.mesh import generate
+from solver.mesh.catalogue import BY_NAME
+from solver.mesh.tidy import tidy
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.judge import judge
@@ -151,6 +155,13 @@ def test_each_step_has_factors_of_its_own():
     found = [step.rigid[0].force[1] for step in solution.steps]
     assert found == pytest.approx([0.5 * STIFF * 0.01, 2 * STIFF * 0.01, 0.0], abs=1e-12)
     assert solution.steps[1].rigid[0].translation == pytest.approx([2.0, -0.04])
+    assert solution.validity.slip < 0.1  # a plane is the same all over
+
+
+def test_a_large_rotation_is_noticed():
+    turned = case(("move: {y: -0.02}", "move: {y: 0.3, rz: 0.2}"))
+    solution = simulate(turned, block_mesh("QUAD4", "QUAD4", (1, 1)))
+    assert solution.validity.rotation == pytest.approx(0.2)
 
 
 RING = """\
@@ -242,3 +253,85 @@ def test_a_result_file_keeps_rigid_bodies(tmp_path):
 def test_other_codes_are_given_no_such_bodies():
     with pytest.raises(UnsupportedError, match="floor is a rigid plane: not written for codes"):
         deck_of(case(), block_mesh("QUAD4", "QUAD4", (1, 1)))
+
+
+def with_die(mesh, kind, hang=0.0):
+    """A die without cells around a circle of curvature `hang` over the top, half of it turned."""
+    dim, shape, n = mesh.points.shape[1], BY_NAME[kind], 3
+    starts = np.stack(np.meshgrid(*[np.arange(n)] * (dim - 1)), axis=-1).reshape(-1, 1, 1, dim - 1)
+    halves = [shape.nodes, 1 - shape.nodes] if shape.name.startswith("TRIA") else [shape.nodes]
+    place = ((starts + np.stack(halves)) / (2 * n) * 3 - 0.25).reshape(-1, dim - 1).round(12)
+    flat, faces = np.unique(place, axis=0, return_inverse=True)
+    faces = faces.reshape(-1, shape.n_nodes)
+    faces[::2] = faces[::2][:, list(shape.mirror)]
+    height = 1 + hang * (flat**2).sum(axis=1) / 2
+    cells = [(block.type, block.data) for block in mesh.cells]
+    sets = {name: [*parts, np.empty(0, int)] for name, parts in mesh.cell_sets.items()}
+    sets["die"] = [np.empty(0, int)] * len(cells) + [np.arange(len(faces))]
+    cells.append((shape.meshio, faces + len(mesh.points)))
+    return tidy(
+        meshio.Mesh(np.vstack([mesh.points, np.c_[flat, height]]), cells, cell_sets=sets), ""
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "cells", "die"),
+    [
+        (CASE, ("QUAD4", "TRIA3"), "SEG2"),
+        (CASE, ("QUAD8", "TRIA6"), "SEG3"),
+        (in_space(), ("HEXA8", "TETRA4"), "QUAD4"),
+        (in_space(), ("TETRA4", "HEXA8"), "TRIA3"),
+        (in_space(), ("HEXA8", "HEXA8"), "TRIA6"),
+        (in_space(), ("HEXA8", "HEXA8"), "QUAD8"),
+        (in_space(), ("HEXA8", "HEXA8"), "QUAD9"),
+    ],
+)
+def test_a_surface_of_the_mesh_without_cells_is_a_rigid_body(text, cells, die):
+    """The force acts at (3, 2), the pressure around (0.5, 0.5)."""
+    text = re.sub(r"die: {plane: {[^}]*}", "die: {rigid: true", text)
+    loads = ("force: {y: -20, rz: 50}", "force: {z: -20, rx: 30, ry: -50}")
+    for axis, load in zip("yz", loads, strict=True):
+        text = text.replace(f"move: {{{axis}: -0.02}}", load)
+    solution = simulate(case(text=text), with_die(block_mesh(*cells, (2, 2)), die))
+    for zone in solution.zones:
+        assert np.abs(zone.multiplier / 20 - 1).max() < 1e-12
+    body = next(body for body in solution.rigid if body.body == "die")
+    assert body.force[-1] == pytest.approx(20, rel=1e-12)
+    assert body.moment[[0, 1, 2]] == pytest.approx(
+        [0, 0, -50] if len(body.force) == 2 else [-30, 50, 0], abs=1e-11
+    )
+
+
+def test_a_line_of_the_mesh_touches_as_the_curve_that_it_follows():
+    """A parabola of 1/R = 0.02 as quadratic lines, whose nodes are on it, and without a mesh."""
+    curve = CASE.replace("plane: {point: [3, 1], normal: [0, -1]}", "CURVE").replace(
+        "0.02}", "0.01}"
+    )
+    line = curve.replace("CURVE", "rigid: true")
+    given = curve.replace("CURVE", "parabola: {point: [0, 1], normal: [0, -1], radius: 50}")
+    mesh = block_mesh("QUAD4", "QUAD4", (2, 4))
+    meshed = simulate(case(text=line), with_die(mesh, "SEG3", 0.02))
+    without = simulate(case(text=given), mesh)
+    for a, b in zip(meshed.zones, without.zones, strict=True):
+        assert (a.closed == b.closed).all()
+        assert np.abs(a.multiplier - b.multiplier).max() < 1e-9 * b.multiplier.max()
+    assert not without.zones[1].closed.all()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            ("master: die", "master: bottom_contact"),
+            "bodies.die = 'die': has no cells and is the m",
+        ),
+        (("slave: press, master: die", "slave: die, master: press"), "lies on the rigid body die"),
+        (("die: {rigid: true", "floor2: {plane: {point: [0, 9], normal: [0, 1]}"), "bodies.floor2"),
+    ],
+    ids=["no-zone", "slave", "not-rigid"],
+)
+def test_refused_surfaces_of_the_mesh(change, said):
+    text = re.sub(r"die: {plane: {[^}]*}", "die: {rigid: true", CASE)
+    with pytest.raises(InputError) as refusal:
+        simulate(case(change, text=text), with_die(block_mesh("QUAD4", "QUAD4", (1, 1)), "SEG2"))
+    assert said in str(refusal.value)

@@ -10,6 +10,7 @@ from solver.mechanics.linear.direct import force_solver
 from solver.simulation.attributes import Attributes
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
+from solver.simulation.validity import meshed
 from solver.studies.infsup.constant import inf_sup_constant
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
@@ -150,3 +151,36 @@ def test_two_zones_with_the_same_two_surfaces_are_refused():
     again = f"{once}\n  - {{name: back, slave: top_contact, master: bottom_contact}}"
     with pytest.raises(InputError, match=r"of zone .* another zone hold their inner"):
         simulate(changed_case(2, (once, again)), block_mesh("QUAD4", "TRIA3"))
+
+
+def test_a_block_in_a_corner_of_two_rigid_planes():
+    """The node in the corner belongs to both zones; what carries a plane is no cell of a body."""
+    text = """\
+name: planes
+mesh:
+  recipe: bricks
+  bricks: [{name: block, low: [0, 0], high: [1, 1], block: {cells: QUAD4, divisions: [2, 3]}}]
+plane: strain
+materials: {all: {young: 2000.0, poisson: 0.3}}
+groups:
+  under: {plane: {point: [0, 0], normal: [0, 1]}}
+  side: {plane: {point: [0, 0], normal: [1, 0]}}
+  top: {plane: {point: [0, 1], normal: [0, 1]}}
+  right: {plane: {point: [1, 0], normal: [1, 0]}}
+bodies:
+  floor: {plane: {point: [0, 0], normal: [0, 1]}}
+  wall: {plane: {point: [0, 0], normal: [1, 0]}}
+supports: [{group: top, together: [y]}]
+loads: [{group: top, pressure: 25.0}, {group: right, pressure: 10.0}]
+contact:
+  - {name: below, slave: under, master: floor}
+  - {name: beside, slave: side, master: wall}
+"""
+    case = parse_case(text, Path("planes.yaml"))
+    for zone, pressure in zip(simulate(case, mesh_of(case)).zones, (25.0, 10.0), strict=True):
+        assert np.abs(zone.multiplier / pressure - 1).max() < 1e-13
+    scene = build_scene(case, mesh_of(case))
+    assert len(scene.mesh.cells["TRIA3"]) == 2
+    kept = meshed(scene)
+    assert len(kept["TRIA3"]) == 0
+    assert len(kept["QUAD4"]) == len(scene.mesh.cells["QUAD4"])
