@@ -172,9 +172,11 @@ class ZoneKeys(Section, frozen=True):
     hexahedra: the cells into which slave hexahedra are cut
     treatment: the treatment of the interface
     points: points per direction on a slave face, only for the treatment quadrature
-    normal: the direction of gaps: normals of the faces, or their means at the nodes
+    normal: the direction of gaps: normals of the slave's faces, their means at its nodes, or the
+      normals of a plane or smooth master
     recovery: how a pressure of higher order is recovered from the constants
     sweeps: solves with the loads of the recovered pressure; each brings it nearer to their limit
+    stabilised: contact gives way to pressures that scatter from face to face
     interference: initial overlap of bodies that are modelled without it; subtracted from the gap
     clearance: the initial gap, which replaces the gap between the meshed faces
     """
@@ -186,9 +188,10 @@ class ZoneKeys(Section, frozen=True):
     treatment: Literal["lac", "uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual"] = (
         "lac"
     )
-    normal: Literal["element", "nodal"] = "element"
+    normal: Literal["element", "nodal", "master"] = "element"
     recovery: Literal["none", "linear", "quadratic", "smooth", "automatic"] = "none"
     sweeps: Annotated[int, Meta(ge=2, le=100, description="a number from 2 to 100")] | None = None
+    stabilised: bool = False
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
     clearance: Scalar | None = None
@@ -316,6 +319,8 @@ _OUT_OF_SCOPE = {
         "hyperelastic"),
     "out of scope: linear elasticity only": (
         "plasticity", "plastic", "yield", "yield_stress", "hardening", "creep", "viscosity"),
+    "thermal and initial strain are out of scope; interference may stand for them": (
+        "temperature", "expansion", "thermal_expansion", "thermal", "initial_strain", "alpha"),
     "dynamics is out of scope: static equilibrium only": (
         "dynamics", "dynamic", "density", "mass", "inertia", "damping", "velocity", "time"),
     "beams, shells and trusses are out of scope: bodies are meshed with plane or solid cells": (

@@ -87,7 +87,8 @@ class Zone:
 
     `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
     gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
-    quadratic, smooth or automatic, with so many `sweeps`; None: by the form.
+    quadratic, smooth or automatic, with so many `sweeps`; None: by the form. `stabilised`:
+    contact gives way to pressures that scatter.
     """
 
     slave: str
@@ -101,6 +102,7 @@ class Zone:
     clearance: Scalar | None = None
     recovery: str = "none"
     sweeps: int | None = None
+    stabilised: bool = False
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,9 @@ class ContactProblem:
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
-        self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
+        stabilised = any(zone.zone.stabilised for zone in scene.zones)
+        soft = self._compliance if stabilised else None
+        self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts, soft)
 
     @cached_property
     def _rough(self) -> Roughness:
@@ -257,6 +259,17 @@ class ContactProblem:
             accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
             correction=correction,
         )
+
+    def _compliance(self, closed: np.ndarray) -> sparse.csr_matrix:
+        """The compliance (c, c) of the closed multipliers (k,); zero in zones without one."""
+        parts = []
+        for zone in self.scene.zones:
+            mine, recovery = closed[zone.numbers], zone.operator.recovery
+            if zone.zone.stabilised and recovery and recovery.stabilisation:
+                parts.append(recovery.stabilisation.compliance(mine))
+            else:
+                parts.append(sparse.csr_matrix((int(mine.sum()),) * 2))
+        return sparse.block_diag(parts, format="csr")
 
     def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
         return self._systems.closed(closed)

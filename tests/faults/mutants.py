@@ -60,6 +60,7 @@ MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
 RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 DIE, SHAFT, LINES = "rigid/tilted-die", "rigid/shaft-in-tube", "rigid/lines-of-the-mesh"
+STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -462,6 +463,12 @@ MUTANTS = (
     Mutant("layer-side", "rigid lines look away from the slave", LINES,
            "solver.simulation.rigid:turned",
            changed(lambda faces: {name: nodes[:, ::-1] for name, nodes in faces.items()})),
+    Mutant("stabilisation-lost", "stabilised contact does not give way", STIFF,
+           "solver.mechanics.mortar.stabilisation:Stabilisation.compliance",
+           changed(lambda compliance: 0 * compliance)),
+    Mutant("normal-of-slave", "contact follows the slave's normals, not the master's", OBSTACLE,
+           "solver.simulation.operators:with_master_normals",
+           lambda _: lambda slaves, masters, points: slaves),
 )  # fmt: skip
 
 
