@@ -167,7 +167,7 @@ def described(kind: Any) -> str:
     """The values that a type allows, in words."""
     if said := _description(kind):
         return said
-    kind = _bare(kind)
+    kind = bare(kind)
     if get_origin(kind) is Literal:
         *rest, last = map(str, get_args(kind))
         return f"{', '.join(rest)} or {last}" if rest else last
@@ -177,7 +177,7 @@ def described(kind: Any) -> str:
         return f"a list of {described(get_args(kind)[0])}"
     if get_origin(kind) is dict:
         return "a mapping of keys to values"
-    parts = [part for part in _parts(kind) if part is not NoneType]
+    parts = [part for part in parts_of(kind) if part is not NoneType]
     return _WORDS.get(kind) or " or ".join(map(described, parts if parts != [kind] else []))
 
 
@@ -197,15 +197,15 @@ def _description(kind: Any) -> str:
     return ""
 
 
-def _bare(kind: Any) -> Any:
-    return _bare(kind.__origin__) if get_origin(kind) is Annotated else kind
+def bare(kind: Any) -> Any:
+    return bare(kind.__origin__) if get_origin(kind) is Annotated else kind
 
 
-def _parts(kind: Any) -> list[Any]:
+def parts_of(kind: Any) -> list[Any]:
     """The members of a union, or the type itself."""
-    kind = _bare(kind)
+    kind = bare(kind)
     if get_origin(kind) in (Union, UnionType):
-        return [part for member in get_args(kind) for part in _parts(member)]
+        return [part for member in get_args(kind) for part in parts_of(member)]
     return [kind]
 
 
@@ -237,7 +237,7 @@ def _fits(convert: Convert, value: object, kind: Any) -> bool:
 
 def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
     """The innermost value that does not fit its type, and why."""
-    for part in _parts(kind):
+    for part in parts_of(kind):
         if not _is_like(part, value):
             continue
         if is_section(part) and (fault := _wrong_key(value, fields(part), keys)):
@@ -245,7 +245,7 @@ def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
         for key, item, inner in _children(convert, value, part):
             if inner is None:
                 of_key = get_args(part)[0]
-                names = get_args(_bare(of_key)) if get_origin(_bare(of_key)) is Literal else ()
+                names = get_args(bare(of_key)) if get_origin(bare(of_key)) is Literal else ()
                 problem = f"unknown key; {hint(str(key), names)}" if names else ""
                 problem = problem or f"the key must be {described(of_key)}"
                 return FieldError((*keys, key), problem, item)
