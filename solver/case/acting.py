@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .kinds import Groups, Name, Scalar, Scalars, Vector
-from .typed import FieldError, Positive, Section, Text
+from .kinds import Angle, Groups, Name, Scalar, Scalars, Vector
+from .typed import FieldError, Number, Positive, Section, Text
 
 
 class PlaneKeys(Section, frozen=True):
@@ -105,8 +105,29 @@ _Directions = Annotated[tuple[Literal["x", "y", "z"], ...], Meta(min_length=1)]
 _TOGETHER = "a list of x, y, z"
 
 
+class CyclicKeys(Section, frozen=True):
+    """The side of a sector, or of a period, that the group is the copy of.
+
+    of: the group of the other side
+    angle: the copy is turned by this angle, about the origin
+    axis: of the turn, in 3D; default z
+    shift: the copy is moved by this vector
+    """
+
+    of: Groups
+    angle: Angle | None = None
+    axis: tuple[Number, Number, Number] = (0.0, 0.0, 1.0)
+    shift: Vector | None = None
+
+    def __post_init__(self) -> None:
+        if (self.angle is None) == (self.shift is None):
+            raise FieldError((), "must be {of, and exactly one of angle, shift}")
+        if not any(self.axis):
+            raise FieldError(("axis",), "must have a direction")
+
+
 class SupportKeys(Section, frozen=True):
-    """Imposed displacements, springs to the ground, or nodes that move as one.
+    """Imposed displacements, springs to the ground, or nodes that move as others do.
 
     group: the nodes of this group, or of `all`
     at: the node at this point
@@ -115,6 +136,7 @@ class SupportKeys(Section, frozen=True):
     spring: stiffness of springs by component: force per area and displacement on faces (an elastic
       foundation), force per displacement at nodes
     together: the components in which all nodes of the group have one displacement, an unknown
+    cyclic: the displacement is that of another side, turned or shifted with it
     name: the name that `steps` gives factors of the imposed values
     """
 
@@ -127,19 +149,22 @@ class SupportKeys(Section, frozen=True):
         _Directions | None,
         Meta(description=_TOGETHER, extra_json_schema={"uniqueItems": True}),
     ] = None
+    cyclic: CyclicKeys | None = None
     name: Name | None = None
     group: Groups | None = None
     at: Vector | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        kinds = (self.fix, self.spring, self.together, self.cyclic)
         if (self.group is None) == (self.at is None):
             raise FieldError((), "must be {fix, spring or together, and exactly one of group, at}")
-        if sum(value is not None for value in (self.fix, self.spring, self.together)) != 1:
-            problem = "must be {group or at, and exactly one of fix, spring, together}"
+        if sum(value is not None for value in kinds) != 1:
+            problem = "must be {group or at, and exactly one of fix, spring, together, cyclic}"
             raise FieldError((), problem)
-        if self.at and self.together:
-            raise FieldError(("at",), "together needs a group")
+        if self.at and (self.together or self.cyclic):
+            kind = "together" if self.together else "cyclic"
+            raise FieldError(("at",), f"{kind} needs a group")
 
 
 class LoadKeys(Section, frozen=True):

@@ -6,7 +6,7 @@ from msgspec import Meta, field
 
 from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
 from .bodies import BodyKeys
-from .kinds import Group, GroupList, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
+from .kinds import Angle, Group, GroupList, Groups, Name, Scalar, Scalars, Unit, Vector, Whole
 from .typed import FieldError, Number, Positive, Section, Text, Version
 
 FORM = "{file: MESH, refine: 2}, or {recipe: NAME, …}"
@@ -14,7 +14,6 @@ HALVINGS = (1, 2, 4, 8, 16, 32, 64)
 """How often finer a mesh file can be made: by halving all edges, once or several times."""
 HALVINGS_TEXT = "1, 2, 4, 8, 16, 32 or 64"
 
-Angle = Annotated[Number, Meta(description="an angle in degrees")]
 Poisson = Annotated[
     float, Meta(gt=-1, lt=0.5, description="a number greater than -1 and less than 0.5")
 ]
@@ -173,9 +172,11 @@ class ZoneKeys(Section, frozen=True):
     hexahedra: the cells into which slave hexahedra are cut
     treatment: the treatment of the interface
     points: points per direction on a slave face, only for the treatment quadrature
-    normal: the direction of gaps: normals of the faces, or their means at the nodes
+    normal: the direction of gaps: normals of the slave's faces, their means at its nodes, or the
+      normals of a plane or smooth master
     recovery: how a pressure of higher order is recovered from the constants
     sweeps: solves with the loads of the recovered pressure; each brings it nearer to their limit
+    stabilised: contact gives way to pressures that scatter from face to face
     interference: initial overlap of bodies that are modelled without it; subtracted from the gap
     clearance: the initial gap, which replaces the gap between the meshed faces
     """
@@ -187,9 +188,10 @@ class ZoneKeys(Section, frozen=True):
     treatment: Literal["lac", "uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual"] = (
         "lac"
     )
-    normal: Literal["element", "nodal"] = "element"
+    normal: Literal["element", "nodal", "master"] = "element"
     recovery: Literal["none", "linear", "quadratic", "smooth", "automatic"] = "none"
     sweeps: Annotated[int, Meta(ge=2, le=100, description="a number from 2 to 100")] | None = None
+    stabilised: bool = False
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
     clearance: Scalar | None = None

@@ -22,6 +22,7 @@ Groups = Annotated[Group | GroupList, Meta(description=_GROUPS)]
 _UNIT = "the name of a unit, 20 letters, digits, `/`, `*`, `^`, `²` and the like at most"
 Unit = Annotated[str, Meta(pattern=r"^[\w/*^·²³µ%()-]{1,20}$(?!\n)", description=_UNIT)]
 Whole = Annotated[int, Meta(ge=0, lt=2**31, description="a whole number, not negative, below 2^31")]
+Angle = Annotated[Number, Meta(description="an angle in degrees")]
 _VECTOR = "a list of two (plane) or three numbers"
 Vector = Annotated[tuple[Number, ...], Meta(min_length=2, max_length=3, description=_VECTOR)]
 _SCALAR = "a number or an expression (numbers from -1e30 to 1e30)"

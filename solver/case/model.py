@@ -46,16 +46,28 @@ class Selection:
 
 
 @dataclass(frozen=True)
+class Cyclic:
+    """The side `of` a sector that another side is the copy of, turned (degrees) or shifted."""
+
+    of: str
+    angle: float | None = None
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+    shift: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
 class Support:
     """Imposed displacements of a group, or the stiffness of its springs: direction to value.
 
-    `together`: the directions in which all of its nodes have one displacement.
+    `together`: the directions in which all of its nodes have one displacement; `cyclic`: the side
+    whose displacement the group has, turned or shifted with it.
     """
 
     group: str
     fix: dict[str, Scalar | Exact]
     spring: dict[str, Scalar] = field(default_factory=dict)
     together: tuple[str, ...] = ()
+    cyclic: Cyclic | None = None
     name: str = ""
 
 
@@ -75,7 +87,8 @@ class Zone:
 
     `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
     gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
-    quadratic, smooth or automatic, with so many `sweeps`; None: by the form.
+    quadratic, smooth or automatic, with so many `sweeps`; None: by the form. `stabilised`:
+    contact gives way to pressures that scatter.
     """
 
     slave: str
@@ -89,6 +102,7 @@ class Zone:
     clearance: Scalar | None = None
     recovery: str = "none"
     sweeps: int | None = None
+    stabilised: bool = False
 
 
 @dataclass(frozen=True)

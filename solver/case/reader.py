@@ -24,6 +24,7 @@ from .model import (
     LOAD_KINDS,
     MARGIN,
     Case,
+    Cyclic,
     Load,
     Observation,
     Probe,
@@ -196,6 +197,9 @@ class _Reader:
     def support(self, index: int) -> Support:
         item, keys = self.file.supports[index], ("supports", index)
         group = self.group((*keys, "group"), item.group, item.at)
+        if item.cyclic is not None:
+            of = self.group((*keys, "cyclic", "of"), item.cyclic.of)
+            return Support(group, {}, cyclic=Cyclic(**structs.asdict(item.cyclic) | {"of": of}))
         if item.together is not None:
             return Support(group, {}, together=item.together, name=item.name or "")
         if item.spring is not None:

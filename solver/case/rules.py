@@ -90,9 +90,13 @@ def _check_names(case: Case) -> None:
         if zone.sweeps and zone.recovery == "none":
             allowed = "only a recovery has sweeps"
             raise InputError(case.path, f"contact[{i}].sweeps", zone.sweeps, allowed)
-        if zone.normal == "nodal" and zone.treatment in ("quadrature", "node_to_segment"):
+        if zone.normal != "element" and zone.treatment in ("quadrature", "node_to_segment"):
             allowed = f"the treatment {zone.treatment} has normals of its own; allowed: element"
             raise InputError(case.path, f"contact[{i}].normal", zone.normal, allowed)
+        if zone.stabilised and zone.treatment not in ("lac", "quadrature"):
+            allowed = f"the treatment {zone.treatment} has no pressure that could be stabilised; "
+            allowed += "allowed there: lac, quadrature"
+            raise InputError(case.path, f"contact[{i}].stabilised", "true", allowed)
         names.add(zone.name)
     for i, item in enumerate(case.observe):
         if item.zone not in names:
@@ -251,6 +255,9 @@ def _placed(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
     """Every vector of the case that says where something is."""
     for i, item in enumerate(case.observe):
         yield f"observe[{i}].nearest", item.nearest
+    for i, support in enumerate(case.supports):
+        if support.cyclic and support.cyclic.shift:
+            yield f"supports[{i}].cyclic.shift", support.cyclic.shift
     for probe in case.probes:
         if probe.at:
             yield f"probes.{probe.name}.at", probe.at

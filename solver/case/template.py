@@ -46,7 +46,8 @@ supports:
 loads:
   - {{group: press, pressure: 25.0}}
 
-# Contact zones. The finer surface, or the surface of the softer body, is the better slave.
+# Contact zones. The softer body's surface is the better slave; of bodies alike, the finer one, if
+# not much finer.
 contact:
   - name: interface
     slave: bottom_contact
@@ -55,11 +56,13 @@ contact:
     treatment: lac                       # or uncut, nodal, nodal_dual, node_to_segment, quadrature
     # points: 4                          # per direction on a slave face, only for quadrature
     normal: element                      # gaps are measured along: element (normals of faces),
-                                         # nodal (their means at the nodes)
+                                         # nodal (their means at the nodes), or master: normals
+                                         # of a plane or smooth master
     interference: 0.0                    # initial overlap of bodies that are modelled without it
     recovery: none                       # of a pressure of higher order from constants: none,
                                          # linear, quadratic, smooth, or automatic by the cells
     # sweeps: 24                         # solves with its loads: more bring it nearer to its limit
+    stabilised: false                    # true: contact gives way to pressures that scatter
 #   clearance: 0.0                       # the initial gap, a number or an expression; replaces
                                          # the gap between the meshed faces
 

@@ -167,7 +167,7 @@ def _is_constant(load: Load) -> bool:
 def _refuse(case: Case) -> None:
     if case.histories:
         raise UnsupportedError("factors of single loads in steps: not written for codes")
-    if any(support.together for support in case.supports):
+    if any(support.together or support.cyclic for support in case.supports):
         raise UnsupportedError("groups that move as one: not written for codes")
     if any(support.spring for support in case.supports):
         raise UnsupportedError("springs and elastic foundations: not written for codes")

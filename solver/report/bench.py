@@ -18,6 +18,7 @@ from ..simulation.solution import Solution
 from ..system.errors import InputError
 from ..system.files import write_text
 from ..verification.results import read_result
+from ..verification.verdict import REFUSED
 from . import formats
 from .charts import (
     BLUE,
@@ -101,6 +102,21 @@ class Cell:
         return "" if self.row.sound else self.row.why
 
     @property
+    def brief(self) -> str:
+        """The reason in a few words: of several checks that fail, the one that is furthest off."""
+        failed = [check for check in self.row.verdict.checks if not check.passed]
+        if self.row.sound or not failed or not math.isfinite(sum(c.error for c in failed)):
+            return self.reason
+        worst = max(failed, key=lambda check: check.error / check.tolerance)
+        name = worst.name.replace("_", " ")
+        return f"{name}: error {worst.error:.1e}, allowed {worst.tolerance:.1e}"
+
+    @property
+    def seconds(self) -> float | None:
+        """Wall time of the run; None where there was none."""
+        return None if self.row.word == REFUSED else self.row.total
+
+    @property
     def record(self) -> dict[str, Any]:
         """The cell as a record for spreadsheets and programs."""
         verdict = self.row.verdict
@@ -114,7 +130,7 @@ class Cell:
             "stress_digits": self.stress,
             "pressure_error": self._error(PRESSURES),
             "stress_error": self._error(STRESSES),
-            "seconds": self.row.total,
+            "seconds": self.seconds,
             "cpu_seconds": verdict.cpu_seconds,
             "peak_memory_mb": verdict.peak_memory_mb,
             "recorded": verdict.recorded.get("source", ""),
@@ -163,11 +179,13 @@ class Bench:
 
     @property
     def outcome(self) -> str:
-        """How many cases each code passes."""
+        """How many cases each code passes, of those that it can express."""
         words = []
         for code in self.codes:
             of = [cells[code].row for cells in self.cells.values() if code in cells]
-            words.append(f"{code} passes {sum(row.sound for row in of)} of {len(of)}")
+            refused = sum(row.word == REFUSED for row in of)
+            told = f"{code} passes {sum(row.sound for row in of)} of {len(of) - refused}"
+            words.append(told + (f" and cannot express {refused}" if refused else ""))
         return f"{'; '.join(words)}."
 
     @property

@@ -24,10 +24,12 @@ from ..mechanics.fem.faces import (
 from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
 from ..mechanics.fem.supports import (
+    CopyError,
     Fixed,
     FreeMotion,
     SupportClashError,
     TieError,
+    copied,
     free_motion,
     released,
     tied,
@@ -38,7 +40,7 @@ from ..system.errors import InputError
 from . import rigid
 from .exact import node_parts
 from .groups import ALL
-from .relations import ties_of
+from .relations import copies_of, ties_of
 from .rigid import Frame
 
 
@@ -254,10 +256,14 @@ class Attributes:
 
     def supports(self) -> FreeMotion:
         """The motion that supports and rigid bodies leave free."""
-        ties = ties_of(self)
+        ties, copies = ties_of(self), copies_of(self)
         try:
             free = free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
-            return released(tied(free, list(ties.values())), rigid.free_motions(self))
+            free = tied(copied(free, list(copies.values())), list(ties.values()))
+            return released(free, rigid.free_motions(self))
+        except CopyError as error:
+            key = list(copies)[error.number]
+            raise InputError(self.case.path, key, None, str(error)) from None
         except TieError as error:
             raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
         except SupportClashError as clash:
@@ -314,6 +320,7 @@ class Attributes:
                 force += self._force(load, f"loads[{i}].group")
         try:
             free = free_motion(len(self.points), self.points.shape[1], list(fixed.values()))
+            free = copied(free, list(copies_of(self).values()))
         except SupportClashError as clash:
             allowed = f"{clash}, of another name in steps"
             key = list(fixed)[clash.number]

@@ -74,8 +74,10 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
         if len(nodes):
             force = found.setdefault(_holder(scene, key), np.zeros_like(left))
             force[nodes] += part
-    if any(support.together for support in scene.case.supports):
-        found["together"] = found.get("together", 0.0) + left
+    for name in ("together", "cyclic"):
+        if any(getattr(support, name) for support in scene.case.supports):
+            found[name] = found.get(name, 0.0) + left
+            break  # what both of them hold is not told apart
     if state.iterate.springs.any():
         found["springs"] = found.get("springs", 0.0) + _of_springs(state)
     at_nodes = sum(found.values(), np.zeros_like(left))

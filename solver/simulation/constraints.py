@@ -95,10 +95,12 @@ def _slave_dofs(scene: Scene) -> np.ndarray:
 
 
 def unit_springs(scene: Scene) -> sparse.csr_matrix:
-    """The rows (n_dofs, n_dofs) of the stiffness of springs, the largest entry of each one.
+    """The rows (k, n_dofs) of the stiffness of springs, the largest entry of each one.
 
-    They resist the same motions, soft springs beside stiff ones too.
+    They resist the same motions, soft springs beside stiff ones too. None where there are none.
     """
+    if not scene.springs.nnz:
+        return scene.springs[:0]
     largest = abs(scene.springs).max(axis=1).toarray().ravel()
     return (sparse.diags_array(1 / np.where(largest > 0, largest, 1.0)) @ scene.springs).tocsr()
 

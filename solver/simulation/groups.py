@@ -91,6 +91,7 @@ def _named(case: Case) -> set[str]:
     """All groups that a case names."""
     sides = [side for zone in case.zones for side in (zone.slave, zone.master)]
     held = [support.group for support in case.supports]
+    held += [support.cyclic.of for support in case.supports if support.cyclic]
     loaded = [load.group for load in case.loads]
     probed = [name for probe in case.probes for name in (probe.group, probe.within)]
     return {*case.materials, *case.rigid, *case.counts, *sides, *held, *loaded, *probed}
@@ -193,6 +194,8 @@ class _Groups:
                     raise self.error(key, ALL, allowed)
                 continue
             self.require(key, support.group)
+            if support.cyclic:
+                self.require(f"supports[{i}].cyclic.of", support.cyclic.of)
             if "normal" in {*support.fix, *support.spring}:
                 self.cells(key, support.group, self.dim - 1)
             cells = self.mesh.cell_sets.get(support.group, [])

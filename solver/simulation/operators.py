@@ -9,6 +9,7 @@ from ..case.model import Zone
 from ..mechanics.fem.faces import FACE_POINTS, FaceBlock, surface_points
 from ..mechanics.mortar.cut import SubFaces
 from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
+from ..mechanics.mortar.master_normals import sharpest, with_directions, with_master_normals
 from ..mechanics.mortar.multipliers import constants
 from ..mechanics.mortar.operator import GapOperator, Scheme, gap_operator
 from ..mechanics.mortar.points import gauss
@@ -18,9 +19,13 @@ from ..mechanics.mortar.recovery import Asked
 from ..mechanics.mortar.surface_points import face_samples
 from ..mechanics.mortar.treatments import scheme_of
 from ..mesh.catalogue import BY_NAME
+from ..system.errors import InputError
 from .attributes import Attributes, CutZone
 from .options import Options
 from .rigid import quadric_of
+
+# Half of the largest angle between neighbouring faces of a master whose normals contact follows.
+_SMOOTH = np.radians(30)
 
 
 def operator_of(
@@ -41,10 +46,15 @@ def operator_of(
     scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
     if surface := quadric_of(groups.case, zone.master, groups.origin):
         masters = [frame(points, groups.nodes(zone.master, "contact"))]
+        if zone.normal == "master":
+            slaves = with_directions(slaves, -surface.gradient(points))
         scheme = _without_segments(scheme, surface)
     else:
         materials = groups.materials_behind(master_faces)
         masters = _master_facets(points, master_faces, materials, around)
+        if zone.normal == "master":
+            _refuse_sharp(groups, zone, masters)
+            slaves = with_master_normals(slaves, masters, points)
         if not options.shortcuts.quadrature:
             slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
@@ -59,6 +69,18 @@ def _without_segments(scheme: Scheme, surface: Quadric) -> Scheme:
     return replace(scheme, sample=sample, meet=meet, closure=False, nearest=False)
 
 
+def _refuse_sharp(groups: Attributes, zone: Zone, masters: list[Facets]) -> None:
+    angle, place = sharpest(masters, groups.points)
+    if angle > _SMOOTH:
+        at = ", ".join(f"{x:.6g}" for x in place + groups.origin)
+        allowed = (
+            f"the master {zone.master} is not smooth: its faces turn by more than "
+            f"{np.degrees(2 * _SMOOTH):.0f}° at ({at}); allowed there: element, nodal"
+        )
+        key = f"contact[{groups.case.zones.index(zone)}].normal"
+        raise InputError(groups.case.path, key, zone.normal, allowed)
+
+
 def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> Asked:
     """How a zone's pressure is recovered, and which of its macro-elements may be neighbours."""
     count = sum(len(block.nodes) for block in slave_faces)
@@ -71,7 +93,10 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> A
     form = form_of(zone.recovery, order, corners)
     if form.sweeps and zone.sweeps:
         form = replace(form, sweeps=zone.sweeps)
-    return Asked(form, vertex_neighbours(vertices, count), material)
+    softness = None
+    if zone.stabilised:
+        softness = np.array([1 / m.young for m in groups.case.materials.values()] + [0.0])
+    return Asked(form, vertex_neighbours(vertices, count), material, softness)
 
 
 def _as_bent(block: Facets) -> Facets:

@@ -111,3 +111,14 @@ def estimated(solution: Solution) -> Iterator[Line]:
         if zone.recovered and (left := int((zone.closed & (zone.recovered.degree == 0)).sum())):
             what = f"{zone.name}: pressure constant on {left} macro-elements"
             yield Line(what, "too few closed neighbours to recover it from")
+
+
+def yielding(solution: Solution) -> Iterator[Line]:
+    """A note where contact gives way to pressures that scatter."""
+    for given, zone in zip(solution.case.zones, solution.zones, strict=True):
+        if given.stabilised:
+            largest = float(np.abs(zone.gap[zone.closed]).max(initial=0.0))
+            what = f"{zone.name}: stabilised, average gaps of up to {largest:.1e} in contact"
+            yield Line(
+                what, "so far contact gives way to pressures that differ from their neighbours"
+            )

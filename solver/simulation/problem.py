@@ -90,16 +90,19 @@ class ContactProblem:
         self.motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         refuse_unsolvable(scene, self.motions, self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
-        self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
-        self.at_rest = Displacement.zero(
-            unsupported(self.motions, scene.free.basis), surface, scene.options.safeguards.remainder
-        )
+        loose = unsupported(self.motions, scene.free.basis)
+        self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
+        self.unsupported = loose
+        if scene.springs.nnz:
+            self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
         self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
-        self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts)
+        stabilised = any(zone.zone.stabilised for zone in scene.zones)
+        soft = self._compliance if stabilised else None
+        self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts, soft)
 
     @cached_property
     def _rough(self) -> Roughness:
@@ -256,6 +259,17 @@ class ContactProblem:
             accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
             correction=correction,
         )
+
+    def _compliance(self, closed: np.ndarray) -> sparse.csr_matrix:
+        """The compliance (c, c) of the closed multipliers (k,); zero in zones without one."""
+        parts = []
+        for zone in self.scene.zones:
+            mine, recovery = closed[zone.numbers], zone.operator.recovery
+            if zone.zone.stabilised and recovery and recovery.stabilisation:
+                parts.append(recovery.stabilisation.compliance(mine))
+            else:
+                parts.append(sparse.csr_matrix((int(mine.sum()),) * 2))
+        return sparse.block_diag(parts, format="csr")
 
     def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
         return self._systems.closed(closed)

@@ -1,21 +1,27 @@
-"""Supports that fix no displacement: springs to the ground, and nodes that move as one."""
+"""Supports that fix no displacement: springs, nodes that move as one or as others do."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from ..case.model import Scalar
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.loads import Field
 from ..mechanics.fem.springs import at_nodes, foundation
+from ..mechanics.fem.supports import Copies
 from ..system.errors import InputError
 from .groups import ALL
 
 if TYPE_CHECKING:
     from .attributes import Attributes
+
+# Nodes are copies where they are nearer to the image than this share of the model's extent.
+_NEAR = 1e-6
 
 
 def ties_of(groups: Attributes) -> dict[str, np.ndarray]:
@@ -33,6 +39,43 @@ def ties_of(groups: Attributes) -> dict[str, np.ndarray]:
         for direction in support.together:
             found[f"supports[{i}].together.{direction}"] = dim * nodes + "xyz".index(direction)
     return found
+
+
+def copies_of(groups: Attributes) -> dict[str, Copies]:
+    """Nodes that move as those of another side do, by key of the case file."""
+    found: dict[str, Copies] = {}
+    points, dim = groups.points + groups.origin, groups.points.shape[1]
+    body = body_numbers(len(points), groups.cut.cells)
+    extent = float(np.ptp(points, axis=0).max())
+    for i, support in enumerate(groups.case.supports):
+        if (given := support.cyclic) is None:
+            continue
+        key = f"supports[{i}].cyclic"
+        of, copy = groups.nodes(given.of, f"{key}.of"), groups.nodes(support.group, key)
+        turn = np.eye(dim) if given.angle is None else _turn(dim, given.angle, given.axis)
+        image = points[of] @ turn.T + (given.shift or np.zeros(dim))
+        # Both surfaces of an interface are at the same place: bodies are apart by a further axis.
+        apart = [np.c_[x, extent * body[n]] for x, n in ((image, of), (points[copy], copy))]
+        distance, nearest = cKDTree(apart[1]).query(apart[0])
+        lost = np.flatnonzero(distance > _NEAR * extent)
+        if len(lost) or len(of) != len(copy):
+            at = ", ".join(f"{x:.6g}" for x in image[lost[0]]) if len(lost) else ""
+            allowed = f"{len(of)} nodes have {len(copy)} copies"
+            allowed += f"; no copy is at ({at}), of the same body" if at else ""
+            raise InputError(groups.case.path, key, support.group, allowed)
+        found[key] = Copies(of, copy[nearest], turn)
+    return found
+
+
+def _turn(dim: int, degrees: float, axis: Sequence[float]) -> np.ndarray:
+    """The rotation (dim, dim) by an angle, in 3D about an axis (Rodrigues' formula)."""
+    angle = np.radians(degrees)
+    if dim == 2:
+        axis = (0.0, 0.0, 1.0)
+    unit = np.asarray(axis) / np.linalg.norm(axis)
+    across = np.cross(np.eye(3), unit)
+    whole = np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
+    return whole[:dim, :dim]
 
 
 def springs_of(groups: Attributes) -> sparse.csr_matrix:

@@ -27,7 +27,7 @@ from .consistency import inconsistency
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
-from .plan import decided, estimated, noted
+from .plan import decided, estimated, noted, yielding
 from .probes import probed
 from .problem import ContactProblem, Equilibrium
 from .recovery import Recovered, RecoveredZone, recovered
@@ -88,7 +88,7 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     with stage(clock, "recovery"):
         solution = _recover(problem, states, fields, plan)
     _tell_forces(solution)
-    solution.plan += [*estimated(solution), *remarks(solution.validity)]
+    solution.plan += [*estimated(solution), *remarks(solution.validity), *yielding(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")

@@ -13,6 +13,7 @@ import numpy as np
 from ..case import job_name
 from ..simulation.accuracy import Accuracy
 from ..simulation.validity import limits_passed
+from .scatter import oscillating
 from .verdict import (
     EXACT,
     EXPECTED,
@@ -79,12 +80,12 @@ def judge(
 
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
-    relative error that rounding alone may cause, is the first reason) or where the solve is beyond
-    what linear theory takes for granted. `result` is the name of the result file beside the verdict
-    and `sha256` its hash.
+    relative error that rounding alone may cause, is the first reason), where the solve is beyond
+    what linear theory takes for granted, or where the pressure oscillates. `result` is the name of
+    the result file beside the verdict and `sha256` its hash.
     """
     accuracy = Accuracy(solution.accuracy)
-    unreliable = [reason for reason in (accuracy.reason,) if reason]
+    unreliable = [reason for reason in (accuracy.reason, oscillating(solution)) if reason]
     unreliable += limits_passed(solution.case, solution.validity)
     reasons = unreliable + [check.reason for check in checks if not check.passed]
     word = PASSED if any(check.verifies for check in checks) else SOLVED

@@ -50,15 +50,17 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
 )
 SPHERES = "lame/spheres-hexa20"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
-UNLOADING = "loads/unloading"
+UNLOADING, SECTOR = "loads/unloading", "lame/rings-sector"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
 
 ENDING, EDGE, CYLINDER = "partial-waves/tria6", "contact-edge/tria3", "half-planes/hertz-quad4"
+RECEDING = "receding/quad8"
 TUBES = "axisymmetric/compound-tube"
 MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
 RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 DIE, SHAFT, LINES = "rigid/tilted-die", "rigid/shaft-in-tube", "rigid/lines-of-the-mesh"
+STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
@@ -217,6 +219,12 @@ def _stays_closed(true: Wrapped) -> Wrapped:
     return status
 
 
+def _first_guess_kept(true: Wrapped) -> Wrapped:
+    return lambda solve, start, eligible, *more: replace(
+        true(solve, start, eligible, *more), closed=start & eligible
+    )
+
+
 def _last_opened(found: Any) -> Any:
     closed = found.closed.copy()
     closed[np.flatnonzero(closed)[-1:]] = False
@@ -341,6 +349,9 @@ MUTANTS = (
     Mutant("load-mean", "a load is shared equally among the nodes of a face", BENT,
            "solver.mechanics.fem.loads:surface_vectors",
            changed(lambda found: (np.full(found[0].shape, 1 / found[0].shape[1]), found[1]))),
+    Mutant("sector-turn", "the copied side is turned by the angle and back again", SECTOR,
+           "solver.simulation.attributes:copies_of", changed(
+               lambda found: {k: replace(c, turn=c.turn.T) for k, c in found.items()})),
     Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
            "solver.simulation.probes:locate", changed(
                lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
@@ -391,7 +402,9 @@ MUTANTS = (
     Mutant("never-closes", "the contact status never closes a macro-element", CLOSING,
            "solver.simulation.problem:find_status", _never_closes),
     Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
-           ENDING, "solver.simulation.problem:find_status", _stays_closed),
+           RECEDING, "solver.simulation.problem:find_status", _stays_closed),
+    Mutant("first-guess-kept", "the contact status is its first guess", ENDING,
+           "solver.simulation.problem:find_status", _first_guess_kept),
     Mutant("end-too-early", "the last macro-element of the contact stays open", EDGE,
            "solver.simulation.problem:find_status", changed(_last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
@@ -450,6 +463,12 @@ MUTANTS = (
     Mutant("layer-side", "rigid lines look away from the slave", LINES,
            "solver.simulation.rigid:turned",
            changed(lambda faces: {name: nodes[:, ::-1] for name, nodes in faces.items()})),
+    Mutant("stabilisation-lost", "stabilised contact does not give way", STIFF,
+           "solver.mechanics.mortar.stabilisation:Stabilisation.compliance",
+           changed(lambda compliance: 0 * compliance)),
+    Mutant("normal-of-slave", "contact follows the slave's normals, not the master's", OBSTACLE,
+           "solver.simulation.operators:with_master_normals",
+           lambda _: lambda slaves, masters, points: slaves),
 )  # fmt: skip
 
 

@@ -32,6 +32,7 @@ from .nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
 from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
+from .receding import RecedingLayer
 from .uniform import Hydrostatic, UniformCompression
 from .waves import Waves2d, Waves3d
 
@@ -67,6 +68,7 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     HertzHalfPlanes,
     RoundedPunch,
     Wedge,
+    RecedingLayer,
     PolynomialPressure2d,
     PolynomialPressure3d,
 )

@@ -91,6 +91,97 @@ def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed]) -> FreeMotion:
     return _basis(held, count, offset)
 
 
+class CopyError(Exception):
+    """A copy, by its `number`, of nodes that supports hold in another way, or that are copies."""
+
+    def __init__(self, number: int, problem: str):
+        super().__init__(problem)
+        self.number = number
+
+
+@dataclass(frozen=True)
+class Copies:
+    """Nodes `copy` (n,) whose displacement is that of nodes `of` (n,), turned by `turn`."""
+
+    of: np.ndarray
+    copy: np.ndarray
+    turn: np.ndarray
+
+
+def copied(free: FreeMotion, copies: Sequence[Copies]) -> FreeMotion:
+    """What is left free where nodes are turned copies of others; a node may be its own copy.
+
+    The displacement u of a node is left free in the directions v that supports leave free there,
+    with the turn of v at the copy. Raises CopyError.
+
+    >>> turned = Copies(np.array([0]), np.array([1]), np.array([[0.0, -1.0], [1.0, 0.0]]))
+    >>> copied(free_motion(2, 2, []), [turned]).basis.toarray().round(3).T.tolist()
+    [[0.707, 0.0, 0.0, 0.707], [0.0, 0.707, -0.707, 0.0]]
+    """
+    for number, each in enumerate(copies):
+        pairs = np.concatenate([each.of, each.copy[each.copy != each.of]])
+        if len(np.unique(pairs)) < len(pairs):
+            raise CopyError(number, "a node is the copy of two others, or itself copied")
+        free = _with_copies(free, each, number)
+    return free
+
+
+def _with_copies(free: FreeMotion, copies: Copies, number: int) -> FreeMotion:
+    dim, turn = len(copies.turn), copies.turn
+    dofs = [dim * nodes[:, None] + np.arange(dim) for nodes in (copies.of, copies.copy)]
+    projector = (free.basis @ free.basis.T).tocsr()
+    if _spread(projector, dofs):
+        raise CopyError(number, "its nodes are tied, or copies, by another support")
+    held = [np.eye(dim) - _blocks(projector, each) for each in dofs]
+    given = [np.einsum("nij,nj->ni", h, free.offset[d]) for h, d in zip(held, dofs, strict=True)]
+    own = (copies.of == copies.copy)[:, None, None] * (
+        (np.eye(dim) - turn).T @ (np.eye(dim) - turn)
+    )
+    resistance = held[0] + turn.T @ held[1] @ turn + own
+    start = np.einsum(
+        "nij,nj->ni",
+        np.linalg.pinv(resistance, DEPENDENT, hermitian=True),
+        given[0] + given[1] @ turn,
+    )
+    missing = np.abs(np.einsum("nij,nj->ni", held[0], start) - given[0])
+    missing += np.abs(np.einsum("nij,nj->ni", held[1], start @ turn.T) - given[1])
+    if (missing > SAME * np.abs(free.offset).max(initial=0.0)).any():
+        raise CopyError(number, "supports give its nodes another displacement than the copied ones")
+    offset = free.offset.copy()
+    offset[dofs[0]], offset[dofs[1]] = start, start @ turn.T
+    values, vectors = np.linalg.eigh(resistance)
+    pair, which = np.nonzero(values < DEPENDENT)
+    mine = vectors[pair, :, which]
+    alone = (copies.of == copies.copy)[pair]
+    mine /= np.where(alone, 1.0, np.sqrt(2))[:, None]
+    columns = np.repeat(np.arange(len(pair)), dim)
+    rows = np.concatenate([dofs[0][pair].ravel(), dofs[1][pair][~alone].ravel()])
+    columns = np.concatenate([columns, columns.reshape(-1, dim)[~alone].ravel()])
+    entries = np.concatenate([mine.ravel(), (mine @ turn.T)[~alone].ravel()])
+    shape = (len(free.offset), len(pair))
+    added = sparse.coo_matrix((entries, (rows, columns)), shape=shape)
+    taken = np.zeros(len(free.offset))
+    taken[np.concatenate([each.ravel() for each in dofs])] = 1.0
+    kept = free.basis[:, np.flatnonzero(abs(free.basis).T @ taken == 0)]
+    return FreeMotion(sparse.hstack([kept, added]).tocsr(), offset, None)
+
+
+def _blocks(matrix: sparse.csr_matrix, dofs: np.ndarray) -> np.ndarray:
+    """The blocks (n, dim, dim) of a matrix on the diagonal, of degrees of freedom (n, dim)."""
+    shape = (*dofs.shape, dofs.shape[1])
+    rows = np.broadcast_to(dofs[:, :, None], shape).ravel()
+    columns = np.broadcast_to(dofs[:, None], shape).ravel()
+    return np.asarray(matrix[rows, columns]).reshape(shape)
+
+
+def _spread(projector: sparse.csr_matrix, dofs: Sequence[np.ndarray]) -> bool:
+    """Whether unknowns of these nodes belong to other nodes too."""
+    mine = np.concatenate([each.ravel() for each in dofs])
+    dim = dofs[0].shape[1]
+    found = projector[mine].tocoo()
+    return bool((mine[found.row] // dim != found.col // dim).any())
+
+
 def tied(free: FreeMotion, ties: Sequence[np.ndarray]) -> FreeMotion:
     """What is left free where all degrees of freedom (n,) of each tie have one displacement.
 

@@ -194,7 +194,7 @@ def choose_pivots(constraints: sparse.csr_matrix, own: np.ndarray) -> tuple[np.n
     return pivot, found
 
 
-def _inverse(pivots: sparse.csr_matrix) -> sparse.csr_matrix:
+def inverse_of(pivots: sparse.csr_matrix) -> sparse.csr_matrix:
     """The inverse of the columns (m, m) of `choose_pivots`: D (1 + N) with Nᵏ = 0, k ≤ _LAYERS."""
     diagonal = pivots.diagonal()
     beside = (pivots - sparse.diags(diagonal)).tocsr()
@@ -228,7 +228,7 @@ def condense(
     kept = np.ones(n, dtype=bool)
     kept[pivot] = False
     kept_columns, coupling = np.flatnonzero(kept), matrix[pivot]
-    inverse = _inverse(constraints[:, pivot])
+    inverse = inverse_of(constraints[:, pivot])
     follow = -(inverse @ constraints[:, kept_columns])
     expansion = _expansion(n, kept_columns, pivot, follow)
     condensed: Symmetric = matrix

@@ -4,7 +4,7 @@ A group is factored again only when its own closed multipliers change. A body ou
 factored once, whatever the contact status of the others.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,7 @@ from .condensation import (
 from .direct import Factor
 from .krylov import EPSILON
 from .multigrid import Unknowns
+from .stabilised import stabilise
 
 _NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
 _DEPENDENT = "constraints that nearly depend on one another: a saddle point"
@@ -104,7 +105,8 @@ class Systems:
 
     `matrix` K (n, n), `constraints` (k, n) of all multipliers, `own` (n,) the unknowns that may be
     eliminated by condensation, None where some multiplier has none: then the constraints augment
-    the stiffness. `unknowns` describes each.
+    the stiffness. `unknowns` describes each. `compliance`: S (c, c) of the c multipliers that a
+    mask (k,) has closed, where contact is stabilised.
     """
 
     def __init__(
@@ -114,9 +116,10 @@ class Systems:
         own: np.ndarray | None,
         unknowns: Unknowns,
         parts: Sequence[Part],
+        compliance: Callable[[np.ndarray], sparse.csr_matrix] | None = None,
     ):
         self._matrix, self._constraints, self._own = matrix, constraints, own
-        self._unknowns, self._parts = unknowns, parts
+        self._unknowns, self._parts, self._compliance = unknowns, parts, compliance
         self._kept: dict[int, tuple[bytes, ConstrainedSystem]] = {}
         self._gave_up: dict[int, str] = {}
         self.latest: ConstrainedSystem | None = None
@@ -165,6 +168,8 @@ class Systems:
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
             return _augmented(matrix, constraints, unknowns.dim)
+        if self._compliance is not None and (soft := self._compliance(closed)).nnz:
+            return stabilise(matrix, constraints, own, soft)
         if why := against_condensation(matrix, constraints):
             try:
                 return saddle_point(matrix, constraints, why, weighted=False)

@@ -33,6 +33,8 @@ _SAME_SIDE = np.cos(np.radians(30))
 _ONE_SIDE = 0.4
 # The singular values of a fit may differ by this factor.
 _RANK = 1 / 30
+# Functions below this share of the largest one are round-off, as across neighbours in a line.
+_NOTHING = 1e-10
 # So many rings of neighbours are tried.
 _TRIED = 3
 _AT_ONCE = 4096
@@ -264,7 +266,8 @@ def _fit(
         own[..., -1] = 1.0
         system = np.concatenate([system, own], axis=1)
     size = np.linalg.norm(system, axis=1)
-    system /= np.where(size > 0, size, 1.0)[:, None]
+    some = size > _NOTHING * size.max(axis=1, keepdims=True)
+    system *= np.where(some, 1 / np.where(some, size, 1.0), 0.0)[:, None]
     squares, vectors = np.linalg.eigh(system.swapaxes(1, 2) @ system)
     solved = squares[:, 0] > _RANK**2 * squares[:, -1]
     v, scaled = vectors[solved], system[solved, : other.shape[1]]

@@ -17,6 +17,7 @@ from ..fem.faces import circumference
 from .facets import tangents_of
 from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
+from .stabilisation import Stabilisation, stabilisation
 from .surface_points import Surface
 
 
@@ -25,12 +26,14 @@ class Asked:
     """The form of a recovery on m macro-elements.
 
     `near` (m, m): which share a vertex; `material` (m,): a number of that of the slave's cells. The
-    master's faces have theirs as the number of their `Facets`.
+    master's faces have theirs as the number of their `Facets`. `softness`: 1 / E of the materials,
+    and 0 for rigid bodies, the last one; given where contact is to be stabilised.
     """
 
     form: Form
     near: sparse.csr_matrix
     material: np.ndarray
+    softness: np.ndarray | None = None
 
 
 def moments(found: Sequence[Segments], surface: Surface) -> Moments:
@@ -80,6 +83,7 @@ class Recovery:
     near: sparse.csr_matrix
     loads: sparse.csr_matrix
     products: np.ndarray
+    stabilisation: Stabilisation | None = None
 
     def reconstruction(self, closed: np.ndarray) -> Reconstruction:
         """The reconstruction among closed macro-elements (m,)."""
@@ -129,7 +133,18 @@ def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes:
     entries = [np.concatenate(part or [np.empty(0, int)]) for part in (values, rows, columns)]
     loads = sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=(m * k, dim * n_nodes))
     near = _same_materials(asked, found)
-    return Recovery(form=form, moments=at, near=near, loads=loads.tocsr(), products=products)
+    stabilised = None
+    if asked.softness is not None:
+        soft = asked.softness[asked.material], asked.softness
+        stabilised = stabilisation(found, at, near, surface.covered, soft)
+    return Recovery(
+        form=form,
+        moments=at,
+        near=near,
+        loads=loads.tocsr(),
+        products=products,
+        stabilisation=stabilised,
+    )
 
 
 def _same_materials(asked: Asked, found: Sequence[Segments]) -> sparse.csr_matrix:

@@ -150,7 +150,8 @@ def _certain(
         _log(len(changes) + 1, closed, wrong)
         if not wrong.any():
             return StatusResult(closed, len(changes) + 1, changes)
-        force = (area * trial.pressure)[eligible] - matrix @ trial.gap[eligible]
+        opened = np.where(closed, 0.0, trial.gap)
+        force = (area * trial.pressure)[eligible] - matrix @ opened[eligible]
         latest, closed = closed, eligible.copy()
         closed[eligible] = complementary(matrix, force) == 0
     raise failure or SolveError(

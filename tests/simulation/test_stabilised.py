@@ -1,0 +1,142 @@
+"""Stabilised contact: exact where the pressure is linear, and smooth where plain LAC scatters."""
+
+import numpy as np
+import pytest
+
+from solver import solve_case
+from solver.system.errors import InputError
+from tests.scenes import PRESSURE, block_case, block_mesh
+
+STIFF = {"bottom": ("QUAD4", 16), "top": ("QUAD4", 8), "young": (1e5, 1e3)}
+"""A fine, stiff slave on a coarse, soft master."""
+LYING = {"bottom": ("PENTA6", 4), "top": ("HEXA8", 2), "young": (2e3, 1e3)}
+"""Quadrangles of PENTA6, on a master that is twice as coarse."""
+
+
+def waves(bottom, top, young, **keys) -> dict:
+    """Two layers pressed together, one of them wavy; cells and faces along the interface."""
+    dim = 2 if bottom[0] in ("TRIA3", "QUAD4") else 3
+    axes = "xyz"[:dim]
+    sides = [(group + axis, axis) for axis in axes[:-1] for group in ("sym", "far")]
+    phi = "*".join(f"cos(pi*{axis}/50)" for axis in axes[:-1])
+    layers = {}
+    for name, (cells, n) in {"bottom": bottom, "top": top}.items():
+        layers[name] = {"cells": cells, "divisions": [n] * (dim - 1) + [max(n // 2, 2)]}
+        if cells == "PENTA6":
+            layers[name]["contact"] = "QUAD4"
+    return {
+        "name": "waves",
+        "mesh": {"recipe": "blocks", "size": 50, **layers},
+        **({"plane": "strain"} if dim == 2 else {}),
+        "materials": {
+            "bottom": {"young": young[0], "poisson": 0.3},
+            "top": {"young": young[1], "poisson": 0.2},
+        },
+        "supports": [
+            *({"group": group, "fix": [axis]} for group, axis in sides),
+            {"group": "base", "fix": [axes[-1]]},
+            {"group": "press", "fix": {axes[-1]: "solution"}},
+        ],
+        "contact": [
+            {
+                "name": "interface",
+                "slave": "bottom_contact",
+                "master": "top_contact",
+                "clearance": f"0.2*(1 - {phi})",
+                **keys,
+            }
+        ],
+        "reference": {
+            "kind": "analytical",
+            "solution": {
+                "name": f"waves_{dim}d", "size": 50, "amplitude": 0.2, "mean_pressure": 25,
+                "bottom": "bottom", "top": "top",
+            },
+            "contact_pressure": "solution",
+        },
+    }  # fmt: skip
+
+
+def deviation(found) -> np.ndarray:
+    """What single faces have beside the exact pressure, over its peak."""
+    [zone] = found.solution.zones
+    exact = found.solution.case.solution.contact_pressure(zone.centre)
+    return (zone.multiplier - exact) / exact.max()
+
+
+def jump(found) -> float:
+    """The largest difference of neighbours in a plane case, over the peak."""
+    order = np.argsort(found.solution.zones[0].centre[:, 0])
+    return float(np.abs(np.diff(deviation(found)[order])).max())
+
+
+def test_a_fine_stiff_slave():
+    """On a master half, then a quarter as fine; ten, then ten thousand times as soft."""
+    plain = solve_case(waves(**STIFF))
+    assert jump(plain) > 1
+    assert jump(solve_case(waves(**STIFF, stabilised=True))) < 0.01
+    for young in (1e4, 1e7):
+        given = STIFF | {"top": ("QUAD4", 4), "young": (young, 1e3)}
+        found = solve_case(waves(**given, stabilised=True))
+        assert found.solution.iterations == 1
+        assert jump(found) < 0.03
+        assert np.abs(deviation(found)).max() < 0.05
+
+
+def test_quadrangles_of_prisms():
+    plain, found = (solve_case(waves(**LYING, stabilised=s)) for s in (False, True))
+    assert np.abs(deviation(plain)).max() > 0.3
+    assert np.abs(deviation(found)).max() < 0.1
+
+
+def test_it_converges_faster_than_plain_contact():
+    """Second order of the means, of matching facets; the gaps that it leaves fall faster."""
+    errors, gaps = [], []
+    for n in (8, 16, 32):
+        given = {"bottom": ("QUAD4", n), "top": ("QUAD4", n // 2), "young": (2e3, 1e3)}
+        found = solve_case(waves(**given, stabilised=True))
+        errors.append(np.abs(deviation(found)).max())
+        gaps.append(np.abs(found.solution.zones[0].gap).max())
+    assert errors[0] / errors[1] > 3
+    assert errors[1] / errors[2] > 3
+    assert gaps[1] / gaps[2] > 7
+
+
+@pytest.mark.parametrize(("bottom", "top"), [("QUAD4", "TRIA6"), ("TETRA4", "PYRA13")])
+def test_the_patch_test_stays_exact(bottom, top):
+    dim = 2 if bottom == "QUAD4" else 3
+    case = block_case(dim, zone=", stabilised: true")
+    found = solve_case(case, block_mesh(bottom, top, (3, 2)))
+    assert found.pressure == pytest.approx(PRESSURE, rel=1e-12)
+
+
+def test_contact_that_opens():
+    """A half ellipse of pressure: the same contact, and forces in balance."""
+    case = waves(("QUAD4", 24), ("QUAD4", 12), (1e4, 1e3))
+    case["supports"][-1]["fix"] = ["x"]
+    case["loads"] = [{"group": "press", "pressure": 2.0}]
+    case.pop("reference")
+    plain, found = (
+        solve_case({**case, "contact": [{**case["contact"][0], "stabilised": s}]})
+        for s in (False, True)
+    )
+    [zone] = found.solution.zones
+    assert 0 < zone.closed.sum() < len(zone.closed)
+    assert zone.multiplier.min() == 0
+    assert zone.gap[~zone.closed].min() > 0
+    for one in (plain, found):
+        assert one.solution.zones[0].resultants.force[1] == pytest.approx(-100, rel=1e-9)
+
+
+def test_the_plan_tells_the_gaps_that_it_leaves():
+    found = solve_case(waves(**LYING, stabilised=True))
+    [zone] = found.solution.zones
+    line = next(line.what for line in found.solution.plan if "stabilised" in line.what)
+    assert f"{np.abs(zone.gap).max():.1e}" in line
+
+
+def test_refused_where_pressures_belong_to_nodes():
+    with pytest.raises(
+        InputError, match="no pressure that could be stabilised; allowed there: lac"
+    ):
+        solve_case(waves(**STIFF, stabilised=True, treatment="nodal"))
