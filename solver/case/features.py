@@ -13,7 +13,7 @@ from msgspec import NODEFAULT
 
 from .file import CaseFile
 from .solutions import SOLUTIONS
-from .typed import bare, fields, is_section, parts_of, read_as
+from .typed import Section, fields, is_section, parts_of, read_as
 from .yaml import read_mapping
 
 # Labels and texts for readers, which change no result.
@@ -65,7 +65,7 @@ def _inside(kind: Any, path: str) -> Iterator[str]:
             yield from _inside(get_args(part)[-1 if ending == ".*" else 0], path + ending)
 
 
-def _used(value: Any, path: str) -> Iterator[str]:
+def _used(value: Section, path: str) -> Iterator[str]:
     """The features of a section as read, and of the sections in it."""
     for name, field in fields(type(value)).items():
         given, here = getattr(value, field.name), f"{path}.{name}".lstrip(".")

@@ -167,7 +167,7 @@ def described(kind: Any) -> str:
     """The values that a type allows, in words."""
     if said := _description(kind):
         return said
-    kind = bare(kind)
+    kind = _bare(kind)
     if get_origin(kind) is Literal:
         *rest, last = map(str, get_args(kind))
         return f"{', '.join(rest)} or {last}" if rest else last
@@ -197,13 +197,13 @@ def _description(kind: Any) -> str:
     return ""
 
 
-def bare(kind: Any) -> Any:
-    return bare(kind.__origin__) if get_origin(kind) is Annotated else kind
+def _bare(kind: Any) -> Any:
+    return _bare(kind.__origin__) if get_origin(kind) is Annotated else kind
 
 
 def parts_of(kind: Any) -> list[Any]:
     """The members of a union, or the type itself."""
-    kind = bare(kind)
+    kind = _bare(kind)
     if get_origin(kind) in (Union, UnionType):
         return [part for member in get_args(kind) for part in parts_of(member)]
     return [kind]
@@ -245,7 +245,7 @@ def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
         for key, item, inner in _children(convert, value, part):
             if inner is None:
                 of_key = get_args(part)[0]
-                names = get_args(bare(of_key)) if get_origin(bare(of_key)) is Literal else ()
+                names = get_args(_bare(of_key)) if get_origin(_bare(of_key)) is Literal else ()
                 problem = f"unknown key; {hint(str(key), names)}" if names else ""
                 problem = problem or f"the key must be {described(of_key)}"
                 return FieldError((*keys, key), problem, item)

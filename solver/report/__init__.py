@@ -16,8 +16,9 @@ def write_report(
 
     Every verdict is in every file: the main page and the page of its family, summary.json,
     .csv, .md, junit.xml, and failures.txt (empty when all passed); `bench.html` where other codes
-    have results; `matrix.html` with families. `families` are files `family.yaml`, each in the folder of its family. Returned are
-    a line for each solve that did not pass, the outcome, and the processor time by family.
+    have results; `matrix.html` with families. `families` are files `family.yaml`, each in the
+    folder of its family. Returned are a line for each solve that did not pass, the outcome, and the
+    processor time by family.
     """
     from ..system.files import write_text
     from . import tables

@@ -72,11 +72,16 @@ def matrix(rows: Sequence[Row], folders: Sequence[Path]) -> list[Line]:
             dimension = "axisymmetric"
         for name in (said | cells) & lines.keys() if dimension else ():
             lines[name].by_dimension[dimension].add(row)
-    for pattern, reason in _reasons(folders).items():
+    for pattern, reason in reasons(folders).items():
         for line in lines.values():
-            if line.hole and fnmatchcase(line.feature, pattern.replace("[", "[[]")):
+            if line.hole and fits(line.feature, pattern):
                 line.reason = reason
     return list(lines.values())
+
+
+def fits(feature: str, pattern: str) -> bool:
+    """Whether a feature is one of a pattern's; `[]` stands for itself."""
+    return fnmatchcase(feature, pattern.replace("[", "[[]"))
 
 
 def _used(folders: Sequence[Path]) -> dict[tuple[str, str], set[str]]:
@@ -85,13 +90,14 @@ def _used(folders: Sequence[Path]) -> dict[tuple[str, str], set[str]]:
     for folder in folders:
         for path in folder.glob("*.yaml"):
             try:
-                found[folder.name, read_mapping(path).get("name")] = used(path)
+                found[folder.name, str(read_mapping(path).get("name"))] = used(path)
             except InputError:
                 continue
     return found
 
 
-def _reasons(folders: Sequence[Path]) -> Mapping[str, str]:
+def reasons(folders: Sequence[Path]) -> Mapping[str, str]:
+    """Why features are used by no case, by pattern, from the file beside the families' folders."""
     for file in {folder.parent / _UNVERIFIED for folder in folders}:
         if file.is_file():
             return read_mapping(file).get("features", {})
