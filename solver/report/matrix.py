@@ -33,7 +33,7 @@ class Use:
 
 
 @dataclass
-class Line:
+class Feature:
     """A feature with its use by dimension, and the reason where nothing uses it."""
 
     feature: str
@@ -46,7 +46,7 @@ class Line:
         return not any(use.solves for use in self.by_dimension.values())
 
 
-def matrix(rows: Sequence[Row], folders: Sequence[Path]) -> list[Line]:
+def matrix(rows: Sequence[Row], folders: Sequence[Path]) -> list[Feature]:
     """All features, and the cell types on both sides; `folders`: of families, with their cases.
 
     Raises InputError where the file of reasons cannot be read.
@@ -54,7 +54,7 @@ def matrix(rows: Sequence[Row], folders: Sequence[Path]) -> list[Line]:
     names = [f"cells: {name} as {s}" for name in BY_NAME for s in ("slave", "master")]
     names = [name for name in names if BY_NAME[name.split()[1]].dim > 1]
     lines = {
-        name: Line(name, {dimension: Use() for dimension in DIMENSIONS})
+        name: Feature(name, {dimension: Use() for dimension in DIMENSIONS})
         for name in [*features(RECIPES), *names]
     }
     uses = _used(folders)
