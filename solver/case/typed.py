@@ -177,7 +177,7 @@ def described(kind: Any) -> str:
         return f"a list of {described(get_args(kind)[0])}"
     if get_origin(kind) is dict:
         return "a mapping of keys to values"
-    parts = [part for part in _parts(kind) if part is not NoneType]
+    parts = [part for part in parts_of(kind) if part is not NoneType]
     return _WORDS.get(kind) or " or ".join(map(described, parts if parts != [kind] else []))
 
 
@@ -201,11 +201,11 @@ def _bare(kind: Any) -> Any:
     return _bare(kind.__origin__) if get_origin(kind) is Annotated else kind
 
 
-def _parts(kind: Any) -> list[Any]:
+def parts_of(kind: Any) -> list[Any]:
     """The members of a union, or the type itself."""
     kind = _bare(kind)
     if get_origin(kind) in (Union, UnionType):
-        return [part for member in get_args(kind) for part in _parts(member)]
+        return [part for member in get_args(kind) for part in parts_of(member)]
     return [kind]
 
 
@@ -237,7 +237,7 @@ def _fits(convert: Convert, value: object, kind: Any) -> bool:
 
 def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
     """The innermost value that does not fit its type, and why."""
-    for part in _parts(kind):
+    for part in parts_of(kind):
         if not _is_like(part, value):
             continue
         if is_section(part) and (fault := _wrong_key(value, fields(part), keys)):

@@ -149,7 +149,10 @@ def solve(deck):
     add_contact(model, bodies, deck["contact"][0], pressures, contact)
     force = sum(abs(value) for *_, value in deck["forces"])
     moved = max((abs(value) for *_, value in deck["held"]), default=0.0)
-    scale = force + slave.young * moved * np.ptp(points, axis=0).max() ** (dim - 2)
+    extent = np.ptp(points, axis=0).max()
+    scale = force + slave.young * moved * extent ** (dim - 2)
+    # Bodies that overlap have a load of their own: the force of a strain of 1e-6.
+    scale = scale or 1e-6 * slave.young * extent ** (dim - 1)
     iterations, converged = model.solve("noisy", *SEARCH, "max_res", 1e-9 * scale)
     if not converged:
         sys.exit(f"GetFEM: no convergence in {iterations} iterations")

@@ -16,14 +16,16 @@ def write_report(
 
     Every verdict is in every file: the main page and the page of its family, summary.json,
     .csv, .md, junit.xml, and failures.txt (empty when all passed); `bench.html` where other codes
-    have results. `families` are files `family.yaml`, each in the folder of its family. Returned are
-    a line for each solve that did not pass, the outcome, and the processor time by family.
+    have results; `matrix.html` with families. `families` are files `family.yaml`, each in the
+    folder of its family. Returned are a line for each solve that did not pass, the outcome, and the
+    processor time by family.
     """
     from ..system.files import write_text
     from . import tables
     from .bench import write_bench
     from .charts import write_script
     from .junit import to_junit
+    from .matrix import matrix_page
     from .page import family_page, main_page
     from .rows import read_rows
     from .sections import sections
@@ -32,7 +34,10 @@ def write_report(
     files = {file.resolve().parent.name: file for file in families}
     parts = sections(read_rows(verdicts), files, folder / "pictures")
     rows = [row for part in parts for row in part.rows]
-    write_bench(rows, folder, [file.resolve().parent for file in families])
+    folders = [file.resolve().parent for file in families]
+    write_bench(rows, folder, folders)
+    if folders:  # the main page links it
+        write_text(folder / "matrix.html", matrix_page(rows, folders))
     contents = {
         PAGE: main_page(parts, folder),
         "summary.json": tables.to_json(rows),

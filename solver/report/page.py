@@ -15,6 +15,7 @@ from .tables import outcome
 
 # Pages beside the report that other commands write.
 _PAGES = {
+    "matrix": "what is verified, by feature",
     "orders": "orders of convergence",
     "study": "error against run time, LAC and other treatments",
     "stability": "numerical stability",

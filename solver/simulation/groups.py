@@ -16,7 +16,10 @@ from ..system.errors import InputError, hint
 ALL = "all"
 # Nodes nearer to the axis than this share of the largest coordinate are on it.
 ON_AXIS = 1e-12
-_EMPTY = "is empty, or none of its members touches a volume cell"
+_EMPTY = (
+    "is empty, or none of its members touches a volume cell (a rigid line or surface is one of "
+    "`bodies`)"
+)
 
 
 def check_groups(case: Case, mesh: meshio.Mesh) -> None:

@@ -192,7 +192,10 @@ def _simplex(case: Case, name: str, slave: np.ndarray) -> np.ndarray:
     gap, _ = surface.distance(middle, -out)
     sides = np.linalg.svd(out[None])[2][1:]
     sides *= np.where(sides.sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-    corners = middle - gap * out + size * np.vstack([np.zeros(dim), sides, -out])
+    base = np.vstack([np.zeros(dim), sides])
+    if not case.axisymmetric:
+        base -= base.mean(axis=0)
+    corners = middle - gap * out + size * np.vstack([base, -out])
     if np.linalg.det(corners[1:] - corners[0]) < 0:
         corners[:2] = corners[1::-1]
     return corners

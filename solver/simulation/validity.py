@@ -32,12 +32,15 @@ def validity(scene: Scene, states: Sequence[Equilibrium]) -> Validity:
     for state in states:
         moved, closed = state.displacement, state.status.closed
         strain, rotation = largest_strain(scene.points, scene.blocks, moved)
-        slips = [found.slip, *(_slip(scene, zone, moved, closed) for zone in scene.zones)]
+        slips = [
+            found.slip,
+            *(_slip(scene, z, moved, closed) for z in scene.zones if _bent(z, scene)),
+        ]
         past = inside_others(scene.points + moved, solid, scene.body)
         partly = sum(_partly_covered(zone, closed) for zone in scene.zones)
         found = Validity(
             strain=max(found.strain, strain),
-            rotation=max(found.rotation, rotation),
+            rotation=max(found.rotation, rotation, _turn(scene, moved)),
             slip=max(slips),
             pushed_past=max(found.pushed_past, past),
             partly_covered=max(found.partly_covered, partly),
@@ -53,6 +56,21 @@ def meshed(scene: Scene) -> dict[str, np.ndarray]:
         parts = [scene.mesh.members(kind, group) for group in hidden]
         kept[kind] = cells[~np.any([np.zeros(len(cells), dtype=bool), *parts], axis=0)]
     return kept
+
+
+def _turn(scene: Scene, moved: np.ndarray) -> float:
+    """The largest rotation of a rigid body, in radians."""
+    found = [0.0]
+    for frame in scene.rigid.values():
+        amount = frame.amount(moved[frame.nodes])
+        found.append(float(np.linalg.norm([amount.get(key, 0.0) for key in ("rx", "ry", "rz")])))
+    return max(found)
+
+
+def _bent(zone: ZoneScene, scene: Scene) -> bool:
+    """Whether sliding changes what a zone takes for granted: a rigid plane is the same all over."""
+    body = scene.case.rigid.get(zone.zone.master)
+    return body is None or body.surface != "plane"
 
 
 def _slip(scene: Scene, zone: ZoneScene, moved: np.ndarray, closed: np.ndarray) -> float:

@@ -18,7 +18,7 @@ from ..case.model import Exact
 from ..case.rules import ERRORS
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution, ZoneResult
-from . import samples
+from . import numbers, samples
 from .verdict import CheckResult, Regression
 
 RELATIVE = 1e-3
@@ -145,21 +145,21 @@ CHECKS: tuple[Check, ...] = (
         like="stress_components",
     ),
     Check("balance", None, None, samples.balance, _unit, 1e-10, fixed=True, by_zone=False),
-    Check("force", None, "force", samples.contact_force, _total_force),
-    Check("contact_area", None, "contact_area", samples.contact_area, _unit),
-    Check("reaction", None, "reaction", samples.reaction, _total_force, by_zone=False),
-    Check("moment", None, "moment", samples.moment, _total_moment, by_zone=False),
+    Check("force", None, "force", numbers.contact_force, _total_force),
+    Check("contact_area", None, "contact_area", numbers.contact_area, _unit),
+    Check("reaction", None, "reaction", numbers.reaction, _total_force, by_zone=False),
+    Check("moment", None, "moment", numbers.moment, _total_moment, by_zone=False),
     Check(
         "displacement_at",
         None,
         "displacement_at",
-        samples.probed("displacement"),
+        numbers.probed("displacement"),
         _elongation,
         by_zone=False,
     ),
-    Check("stress_at", None, "stress_at", samples.probed("stress"), _load, by_zone=False),
-    Check("pressure_at", None, "pressure_at", samples.probed("pressure"), _load, by_zone=False),
-    Check("strain_energy", None, "strain_energy", samples.strain_energy, _unit, by_zone=False),
+    Check("stress_at", None, "stress_at", numbers.probed("stress"), _load, by_zone=False),
+    Check("pressure_at", None, "pressure_at", numbers.probed("pressure"), _load, by_zone=False),
+    Check("strain_energy", None, "strain_energy", numbers.strain_energy, _unit, by_zone=False),
     Check("counts", None, None, samples.counts, _unit, 0.0, fixed=True, by_zone=False),
     Check("observation", "OBSERVATION/PRES", _PRESSURE, samples.observed("pressure"), _load),
     Check(

@@ -26,6 +26,7 @@ from .verdict import (
     CheckError,
     CheckResult,
     Force,
+    Probed,
     Sides,
     Verdict,
 )
@@ -115,6 +116,7 @@ def judge(
         plan=[list(entry) for entry in solution.plan],
         checks=list(checks),
         forces=list(_forces(solution)),
+        probes=list(_probes(solution)),
         largest_displacement=solution.largest_displacement[0],
         attainable=accuracy.estimate,
         provenance=dict(provenance or {}),
@@ -194,6 +196,16 @@ def _forces(solution: Solution) -> Iterator[Force]:
             given = ((key, getattr(one, key, None)) for key in keys)
             lists = {key: value.tolist() for key, value in given if value is not None}
             yield Force(step=number, factor=step.factor, name=name, **lists)
+
+
+def _probes(solution: Solution, most: int = 10) -> Iterator[Probed]:
+    """The values at each probe, at `most` places of each."""
+    for name, probe in solution.probes.items():
+        for place, *values in zip(*(array[:most] for array in vars(probe).values()), strict=True):
+            keys = [key for key in vars(probe) if key != "place"]
+            given = zip(keys, values, strict=True)
+            known = {key: value.tolist() for key, value in given if np.isfinite(value).all()}
+            yield Probed(name=name, place=place.tolist(), **known)
 
 
 def _first_of(reasons: Sequence[str]) -> str:

@@ -120,6 +120,17 @@ class Force:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Probed:
+    """The values at one place of a probe: displacement and stress, or contact pressure."""
+
+    name: str
+    place: list[float]
+    displacement: list[float] | None = None
+    stress: list[float] | None = None
+    pressure: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class CheckError:
     """A check by name and zone, and its error."""
 
@@ -217,6 +228,7 @@ class Verdict:
     plan: list[list[str]] = field(default_factory=list)
     checks: list[CheckResult] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
+    probes: list[Probed] = field(default_factory=list)
     largest_displacement: float | None = None
     strain_energy: float | None = None
     accuracy: dict[str, float] = field(default_factory=dict)

@@ -154,6 +154,13 @@ def test_a_body_that_contact_alone_holds(code, tmp_path):
     assert not deck_of(*case_of("QUAD4", "QUAD4"), layer=True).start.any()
 
 
+@pytest.mark.parametrize("code", CODES[:2])
+def test_overlap_is_the_only_load(code, tmp_path):
+    """0.5 mm on 100 mm, both ends held: 2000 · 0.005 / 0.91."""
+    deck = deck_of(*pressed(0.0, interference=0.5), layer=code.layer)
+    assert slave_pressures(code, deck, tmp_path) == pytest.approx(10 / 0.91, rel=2e-3)
+
+
 @pytest.mark.skipif(not CalculiX().version(), reason="not installed")
 def test_an_open_gap_is_not_given(tmp_path):
     """CalculiX writes zeros for the gaps of points that do not touch."""

@@ -222,17 +222,22 @@ def test_pages_show_the_estimated_error(report):
     )
 
 
-def test_pages_list_the_forces_of_each_step(tmp_path):
+def test_pages_list_the_forces_of_each_step_and_the_probes(tmp_path):
     """Round-off beside the largest force of 1250 is shown as zero."""
     base = {"factor": 0.5, "moment": [0, 0, -1e-13], "step": 2}
     contact = base | {"name": "zone a", "force": [1e-12, -1250], "area": [50, 50, 50]}
     forces = [base | {"step": 1, "name": "zone a", "force": [0, -625]}, contact]
     forces += [base | {"name": "floor", "force": [0, 1250]}]
-    path = put(tmp_path / "a" / "verdict.json", verdict("a", "passed", forces=forces))
+    probes = [{"name": "tip", "place": [1, 2], "displacement": [0.5, 1e-12], "stress": [0] * 6}]
+    probes += [{"name": "middle", "place": [1, 0], "pressure": 25}]
+    more = {"forces": forces, "probes": probes, "largest_displacement": 0.5}
+    path = put(tmp_path / "a" / "verdict.json", verdict("a", "passed", **more))
     write_report([path], tmp_path / "report", [])
     page = (tmp_path / "report" / "fam.html").read_text()
     table = re.sub(r"<[^>]*>", " ", page[page.index("class=forces") :])
     for row in ("2 0.5 zone a 0, -1250 0, 0, 0 50 –", "2 0.5 floor 0, 1250 0, 0, 0 – –"):
+        assert row in " ".join(table.split())
+    for row in ("tip 1, 2 0.5, 0 0, 0, 0, 0, 0, 0 –", "middle 1, 0 – – 25"):
         assert row in " ".join(table.split())
 
 

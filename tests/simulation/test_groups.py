@@ -100,7 +100,7 @@ MISFITS = [
     (
         "slave: bottom_contact",
         "slave: empty",
-        "contact[0].slave = 'empty': is empty, or none of its members touches a volume cell; a gr",
+        "contact[0].slave = 'empty': is empty, or none of its members touches a volume cell (a ",
     ),
     ("slave: bottom_contact", "slave: lower", "contact[0].slave = 'lower': holds 1 QUAD4 but no f"),
     ("master: top_contact", "master: top", "contact[0].master = 'top': no such group in the mesh;"),

@@ -49,6 +49,16 @@ def test_a_plane_bears_no_force_along_itself_and_is_not_pierced():
     assert overlap(found) < overlap(plain) / 5
 
 
+def test_a_plane_without_a_mesh():
+    """The same contact as on faces of a rigid block, stabilised or not."""
+    case = cylinder("master", stabilised=True)
+    meshed = solve_case(case)
+    case["bodies"]["floor"] = {"plane": {"point": [0, 0], "normal": [0, 1]}}
+    case["contact"][0]["master"] = "floor"
+    found = solve_case(case)
+    assert found.pressure == pytest.approx(meshed.pressure, rel=1e-9, abs=1e-9)
+
+
 def test_normals_of_a_faceted_circle():
     """Facets of angle φ, a distance g of a tenth away: normals are known to g φ / 2 + φ² / 8."""
     angle = np.linspace(0, 1, 9)

@@ -73,9 +73,20 @@ def unsupported(
 
 
 def nodes_of_unknowns(basis: sparse.csr_matrix, dim: int) -> np.ndarray:
-    """The node (n_free,) of each free unknown; `basis` (dim · n_nodes, n_free)."""
+    """The node (n_free,) of each free unknown, `dim` at most per node.
+
+    `basis` (dim · n_nodes, n_free). The six motions of a rigid body belong to its first two nodes:
+
+    >>> nodes_of_unknowns(sparse.csr_matrix(np.ones((12, 5))), 3).tolist()
+    [0, 0, 0, 1, 1]
+    """
     columns = basis.tocsc()
-    return columns.indices[columns.indptr[:-1]] // dim
+    start = columns.indptr[:-1]
+    nodes = columns.indices[start] // dim
+    order = np.argsort(nodes, kind="stable")
+    rank = np.empty(len(nodes), dtype=int)
+    rank[order] = np.arange(len(nodes)) - np.searchsorted(nodes[order], nodes[order])
+    return columns.indices[start + dim * (rank // dim)] // dim
 
 
 def joined_bodies(gaps: sparse.csr_matrix, bodies: np.ndarray, n_bodies: int) -> np.ndarray:

@@ -132,7 +132,7 @@ def frame(points: np.ndarray, nodes: np.ndarray) -> Facets:
     return Facets(
         type=BY_NAME["TRIA3" if dim == 2 else "TETRA4"],
         nodes=nodes[None],
-        number=np.zeros(1, dtype=int),
+        number=np.full(1, -1),
         corner=corner,
         centre=corner.mean(axis=1),
         radius=np.full(1, np.inf),

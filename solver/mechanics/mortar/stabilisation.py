@@ -74,10 +74,12 @@ def stabilisation(
     sizes, soft, covered = np.zeros((3, len(area)))
     for segments in found:
         faces, face = segments.master.faces, segments.master.face
+        compliant = softness[1][faces.number[face]]
         size = faces.radius[face] * (2.0 if dim == 2 else np.sqrt(2.0)) / faces.type.order
+        size = np.where(compliant > 0, size, 0.0)  # facets of rigid masters are their shape
         np.add.at(covered, segments.macro, segments.area)
         np.add.at(sizes, segments.macro, segments.area * size)
-        np.add.at(soft, segments.macro, segments.area * size * softness[1][faces.number[face]])
+        np.add.at(soft, segments.macro, segments.area * size * compliant)
     covered = np.where(covered > 0, covered, 1.0)
     own = 1 / np.linalg.norm(moments.local.axes[:, 0], axis=1)
     ratio = np.clip(sizes / covered / own, 1.0, _COARSEST)

@@ -1,0 +1,82 @@
+"""The matrix of what is verified: no key of the case file without a case, or a reason."""
+
+from pathlib import Path
+
+import pytest
+
+from solver.case.features import features, used
+from solver.commands.jobs import case_files
+from solver.mesh.keys import RECIPES
+from solver.report.matrix import fits, matrix, matrix_page, reasons
+from solver.report.rows import read_rows
+from tests.report.test_report import CHECK, verdict
+from tests.report.verdicts import put
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
+FOLDERS = sorted(file.parent for file in CASES.glob("*/family.yaml"))
+CASE = """\
+name: {name}
+mesh: {{recipe: blocks, size: 1.0, bottom: {{cells: QUAD4}}, top: {{cells: QUAD4}}}}
+plane: {plane}
+materials: {{all: {{young: 1.0, poisson: 0.3}}}}
+supports: [{{group: base, fix: [y]}}]
+contact: [{{slave: bottom_contact, master: top_contact, treatment: nodal}}]
+reference: {{kind: analytical, contact_pressure: 1.0}}
+"""
+
+
+@pytest.fixture(scope="module")
+def unused():
+    found = {feature for folder in FOLDERS for file in case_files(folder) for feature in used(file)}
+    assert found <= {*features(RECIPES), "mesh", "reference.solution"}
+    return [feature for feature in features(RECIPES) if feature not in found]
+
+
+def test_every_key_and_choice_has_a_case_or_a_reason(unused):
+    patterns = reasons(FOLDERS)
+    assert [f for f in unused if not any(fits(f, pattern) for pattern in patterns)] == []
+
+
+def test_no_reason_outlives_its_hole(unused):
+    assert [p for p in reasons(FOLDERS) if not any(fits(f, p) for f in unused)] == []
+
+
+def test_features_of_a_file(tmp_path):
+    file = tmp_path / "c.yaml"
+    file.write_text(CASE.format(name="c", plane="strain"))
+    assert used(file) >= {
+        "plane: strain",
+        "mesh.recipe: blocks",
+        "contact[].treatment: nodal",
+        "contact[].recovery: none",
+        "materials.*.young",
+        "reference.contact_pressure",
+        "supports[].group",
+    }
+    assert not {"loads", "contact[].treatment: lac", "contact[].clearance"} & used(file)
+
+
+def test_a_line_counts_solves_by_dimension_and_names_the_strictest_check(tmp_path):
+    family, files = tmp_path / "cases" / "fam", []
+    family.mkdir(parents=True)
+    for name, plane, tolerance in (
+        ("a", "strain", 1e-3),
+        ("b", "strain", 1e-6),
+        ("c", "stress", 1),
+    ):
+        (family / f"{name}.yaml").write_text(CASE.format(name=name, plane=plane))
+        check = CHECK | {"error": tolerance / 2, "tolerance": tolerance, "passed": True}
+        files.append(tmp_path / "results" / "fam" / name / "verdict.json")
+        put(files[-1], verdict(name, "passed", family="fam", checks=[check], worst=check))
+    rows = read_rows(files)
+    lines = {line.feature: line for line in matrix(rows, [family])}
+    use = lines["plane: strain"].by_dimension["plane"]
+    assert len(use.solves) == 2
+    assert (use.strictest[0], use.strictest[2].name) == (1e-6, "b")
+    assert len(lines["contact[].treatment: nodal"].by_dimension["plane"].solves) == 3
+    assert lines["plane: axisymmetric"].hole
+    assert not lines["plane: stress"].hole
+    (tmp_path / "cases" / "unverified.yaml").write_text("features: {'plane: axi*': not yet}\n")
+    page = matrix_page(rows, [family])
+    assert "<td>not yet</td>" in page
+    assert "<li>contact[].treatment: lac</li>" in page
