@@ -1,6 +1,7 @@
 """Order, limit and band: exact sequences derived by hand, and small cases with known answers."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -132,3 +133,15 @@ def test_bad_input_is_refused_in_one_line(options, message, capsys):
     said = capsys.readouterr().err
     assert message in said
     assert said.count("\n") == 1
+
+
+def test_the_command_and_the_table_of_the_page(tmp_path, monkeypatch, capsys):
+    text = (CASES.parent / "docs" / "converge.md").read_text()
+    command = re.search(r"-m solver (converge .*)", text).group(1).split()
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cases").symlink_to(CASES)
+    assert main(command) == 0
+    printed = capsys.readouterr().out
+    (shown,) = re.findall(r"```\n(manufactured.*?)```", text, re.DOTALL)
+    assert set(shown.splitlines()) <= set(printed.splitlines())
+    assert (tmp_path / "results/converge/quad4.html").is_file()
