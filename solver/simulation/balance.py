@@ -129,12 +129,22 @@ def _holder(scene: Scene, key: str) -> str:
 
 
 def _resultant(scene: Scene, name: str, force: np.ndarray) -> Reaction:
-    flat = ((0, 0), (0, 3 - force.shape[1]))
-    places = np.pad(scene.points + scene.origin, flat)
-    moment = np.cross(places, np.pad(force, flat)).sum(axis=0)
+    acts = np.flatnonzero(force.any(axis=1))
+    return Reaction(name, force.sum(axis=0), moment(scene, acts, force[acts]))
+
+
+def moment(scene: Scene, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """The moment (3,) about the origin of forces (n, dim) at nodes (n,).
+
+    Those on axisymmetric bodies have none.
+    """
     if scene.case.axisymmetric:
-        moment = np.zeros(3)
-    return Reaction(name, force.sum(axis=0), moment)
+        return np.zeros(3)
+    place = scene.points[nodes] + scene.origin
+    if place.shape[1] == 3:
+        return np.cross(place, force).sum(axis=0)
+    turning = place[:, 0] @ force[:, 1] - place[:, 1] @ force[:, 0]
+    return np.array([0.0, 0.0, turning])
 
 
 def strain_energy(state: Equilibrium) -> float:

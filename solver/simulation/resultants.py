@@ -5,6 +5,7 @@ import numpy as np
 from ..mechanics.fem.faces import surface_points
 from ..mechanics.mortar.edge import Edges, contact_edges
 from ..mechanics.mortar.reconstruction import vertex_neighbours
+from .balance import moment
 from .problem import Equilibrium
 from .recovery import RecoveredZone
 from .scene import Scene, ZoneScene
@@ -26,14 +27,10 @@ def resultants(
         forces = forces + field.force
     nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
     force = forces.reshape(scene.points.shape)[nodes]
-    places = np.pad(scene.points[nodes] + scene.origin, ((0, 0), (0, 3 - force.shape[1])))
-    moment = np.cross(places, np.pad(force, ((0, 0), (0, 3 - force.shape[1])))).sum(axis=0)
-    if scene.case.axisymmetric:
-        moment = np.zeros(3)
     return Resultants(
         area=area,
         force=force.sum(axis=0),
-        moment=moment,
+        moment=moment(scene, nodes, force),
         edges=edges,
         pressure=np.array([mean.min(), mean.max()]),
     )
