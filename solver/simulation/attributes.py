@@ -10,7 +10,7 @@ import numpy as np
 from ..case.expressions import evaluate
 from ..case.material import Material
 from ..case.model import Case, Exact, Load, Scalar
-from ..case.solutions import ExactSolution
+from ..case.solutions.base import ExactSolution
 from ..mechanics.fem import has_straight_edges
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block, lame_parameters

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...case.solutions import ElasticSolution
+from ...case.solutions.base import ElasticSolution
 from ...mechanics.fem import shape_functions
 from ...mechanics.fem.elasticity import physical_gradients
 from ...mechanics.fem.faces import circumference, surface_points
