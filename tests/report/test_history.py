@@ -89,10 +89,12 @@ def test_a_time_that_grew_beyond_its_noise(time, machine, times, told):
     assert last_marks(*before, past("b", 9, time=time, machine=machine)) == told
 
 
-def test_old_times_are_forgotten_after_ten_records():
-    before = [past("a", day, time=9.0) for day in range(1, 7)]
-    before += [past("b", day, time=1.0) for day in range(7, 17)]
-    assert last_marks(*before, past("c", 20, time=1.3)) == [("time", False)]
+def test_the_median_is_that_of_the_last_ten_records():
+    # Of the last ten, five are 1.0 and five 9.0: median 5.0. Of nine or eleven the median is 1.0.
+    times = [1.0] * 6 + [9.0] * 5 + [1.0] * 5
+    before = [past("a", day, time=each) for day, each in enumerate(times, 1)]
+    assert last_marks(*before, past("b", 20, time=1.3)) == []
+    assert last_marks(*before, past("a", 17), past("b", 20, time=1.3)) == [("time", False)]
 
 
 def test_repeated_records_are_compared_with_the_revision_before():
