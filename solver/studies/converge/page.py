@@ -21,10 +21,15 @@ _LOOKS = {_COMPUTED: Look(BLUE), _LIMIT: Look(ORANGE, "diamond")}
 def outcome(found: Sequence[Convergence]) -> str:
     """How many bands have the exact value."""
     inside, bands, known = contained(found)
-    if not known:
-        return "No exact value is known."
-    text = f"{inside} of {bands} bands have the exact value"
-    return f"{text}; {known - bands} quantities with a known value have no band."
+    same, all_of_them, _ = contained(found, exact=True)
+    parts = []
+    if bands:
+        parts.append(f"{inside} of {bands} bands have the exact value")
+    if known > bands:
+        parts.append(f"{known - bands} quantities with a known value have no band")
+    if all_of_them:
+        parts.append(f"{same} of {all_of_them} that do not depend on the mesh are exact")
+    return "; ".join(parts or ["No exact value is known"]) + "."
 
 
 def as_text(found: Convergence) -> str:
@@ -75,13 +80,12 @@ def write_convergence(found: Sequence[Convergence], file: Path) -> Path:
         {"found": one, "table": table(one), "charts": _charts(f"case-{number}", one)}
         for number, one in enumerate(found)
     ]
-    inside, bands, _ = contained(found)
     content = render(
         Path(__file__).with_name("page.html.jinja"),
         charts=True,
         title="Results of refined meshes",
         outcome=outcome(found),
-        good=inside == bands,
+        good=all(one.contained is not False for each in found for one in each.quantities),
         sections=sections,
         head=HEAD,
         data=file.name,

@@ -59,7 +59,7 @@ def _contact(solution: Solution, zone: ZoneResult, degree: int) -> Iterator[Quan
     """Peak pressure, contact force and contact area of a zone."""
     suffix = f", {zone.name}" if len(solution.zones) > 1 else ""
     theory = 2.0 if zone.recovered is None else 3.0
-    yield Quantity(f"peak pressure{suffix}", peak(zone), _peak(solution, zone), theory)
+    yield Quantity(f"peak pressure{suffix}", peak(zone), known_peak(solution, zone), theory)
     if zone.resultants is not None:
         force, area = zone.resultants.force, float(zone.resultants.area[0])
         scale = float(zone.area @ zone.multiplier)
@@ -79,10 +79,16 @@ def peak(zone: ZoneResult) -> float:
 
 def _given(solution: Solution, key: str, known: float | None) -> float | None:
     """The number or the length of the vector in the reference, for one zone; else what is known."""
-    given: Any = solution.case.reference.get(key)
+    given: Any = _reference(solution, key)
     if given is None or len(solution.zones) > 1:
         return known
     return float(np.linalg.norm(given))
+
+
+def _reference(solution: Solution, key: str) -> Any:
+    """A value of the reference, if this is exact and has one."""
+    exact = solution.case.reference_kind in ("analytical", "manufactured")
+    return solution.case.reference.get(key) if exact else None
 
 
 def _pressures(solution: Solution, zone: ZoneResult) -> tuple[np.ndarray, np.ndarray] | None:
@@ -94,8 +100,11 @@ def _pressures(solution: Solution, zone: ZoneResult) -> tuple[np.ndarray, np.nda
     return exact.contact_pressure(at.place), at.weight
 
 
-def _peak(solution: Solution, zone: ZoneResult) -> float | None:
-    exact = solution.case.solution
+def known_peak(solution: Solution, zone: ZoneResult) -> float | None:
+    """The largest pressure of the reference or the exact solution; None where it is infinite."""
+    given, exact = _reference(solution, "contact_pressure"), solution.case.solution
+    if isinstance(given, int | float):
+        return float(given)
     if exact is None:
         return None
     if "peak" in exact.quantities:

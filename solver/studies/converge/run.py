@@ -88,14 +88,14 @@ def _converged(sizes: Sequence[float], row: Sequence[Quantity]) -> Converged:
     """One quantity on all meshes."""
     values = [one.value for one in row]
     found = extrapolate(sizes, values, row[-1].theory, max(one.scale for one in row))
-    known = _settled(row)
+    known = settled(row)
     inside = None
     if known is not None and found.band is not None:
         inside = abs(values[-1] - known) <= found.band
     return Converged(name=row[-1].name, values=values, found=found, known=known, contained=inside)
 
 
-def _settled(row: Sequence[Quantity]) -> float | None:
+def settled(row: Sequence[Quantity]) -> float | None:
     """The exact value on the finest mesh, where it depends little enough on the mesh."""
     *_, before, last = row
     if before.known is None or last.known is None:
@@ -105,16 +105,12 @@ def _settled(row: Sequence[Quantity]) -> float | None:
     return last.known if abs(last.known - before.known) <= allowed else None
 
 
-def contained(found: Sequence[Convergence]) -> tuple[int, int, int]:
+def contained(found: Sequence[Convergence], exact: bool = False) -> tuple[int, int, int]:
     """Bands with the exact value in them, bands, and quantities whose exact value is known.
 
-    Quantities that do not depend on the mesh are left out.
+    Of the quantities that do not depend on the mesh if `exact`, else of all others.
     """
-    known = [
-        one
-        for each in found
-        for one in each.quantities
-        if one.known is not None and one.found.kind != "exact"
-    ]
+    every = (one for each in found for one in each.quantities if one.known is not None)
+    known = [one for one in every if (one.found.kind == "exact") is exact]
     bands = [one.contained for one in known if one.contained is not None]
-    return sum(bands), len(bands), len(known)
+    return sum(map(bool, bands)), len(bands), len(known)

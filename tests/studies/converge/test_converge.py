@@ -3,12 +3,17 @@
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from solver.case.file import HALVINGS_TEXT
+from solver.case.reader import load_case
 from solver.commands.cli import main
+from solver.studies.converge.quantities import Quantity, known_peak
 from solver.studies.converge.richardson import extrapolate, observed_order
-from solver.studies.converge.run import contained, converge
+from solver.studies.converge.run import contained, converge, settled
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 HALVED = (4.0, 2.0, 1.0)
@@ -90,6 +95,29 @@ def test_values_that_do_not_depend_on_the_mesh():
     assert extrapolate(HALVED, [1e-13, 3e-13, 1e-13], 2.0).kind == "oscillatory"
 
 
+def test_an_exact_value_that_follows_the_mesh_is_unknown():
+    # The computed value changes by 1 between the last two meshes, so that 0.1 is allowed.
+    def known(*exact):
+        pairs = zip((10.0, 12.0, 13.0), exact, strict=True)
+        return settled([Quantity("area", value, one, 2.0) for value, one in pairs])
+
+    assert known(9.0, 11.0, 11.05) == 11.05
+    assert known(9.0, 11.0, 11.2) is None
+    assert known(11.0, None, 11.0) is None
+
+
+def test_the_peak_in_the_tip_of_a_wedge_is_infinite():
+    case = load_case(CASES / "half-planes" / "wedge-tria6.yaml")
+    exact = case.solution
+    # Four faces of the length 1/2 on both sides of the tip, each a macro-element.
+    points = np.stack([np.linspace(-1, 1, 5), np.zeros(5)], axis=1)
+    faces = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
+    zone = SimpleNamespace(faces=[("SEG2", faces, np.arange(4))])
+    solution = SimpleNamespace(case=case, mesh=SimpleNamespace(points=points))
+    assert exact.contact_pressure(points).max() > 5 * exact.contact_pressure(points[1:2])
+    assert known_peak(solution, zone) is None
+
+
 @pytest.fixture(scope="module")
 def manufactured():
     return converge(CASES / "manufactured" / "quad4.yaml")
@@ -106,18 +134,25 @@ def test_the_band_has_the_exact_value(manufactured):
     assert found["contact force"].known == pytest.approx(17 / 1200)
     assert found["contact area"].found.kind == "exact"
     assert contained([manufactured]) == (3, 3, 3)
+    assert contained([manufactured], exact=True) == (2, 2, 2)
     assert manufactured.estimate_order == pytest.approx(1.0, abs=0.1)
 
 
-def test_the_command_prints_a_table_and_writes_json_and_a_page(tmp_path, capsys):
-    case, file = str(CASES / "ssnp170" / "a.yaml"), tmp_path / "a.json"
-    assert main(["converge", case, "--levels", "1", "2", "3", "-o", str(file)]) == 0
+def test_an_exact_reference_is_known(capsys):
+    assert main(["converge", str(CASES / "ssnp170" / "a.yaml"), "--levels", "1", "2", "3"]) == 0
     text = capsys.readouterr().out
     assert text.count("does not depend on the mesh") == 5
-    (record,) = json.loads(file.read_text())
-    force = next(one for one in record["quantities"] if one["name"] == "contact force")
-    assert force["values"] == pytest.approx([1250.0] * 3)
-    assert "ssnp170-a" in file.with_suffix(".html").read_text()
+    # The reference is a pressure of 25.
+    assert text.endswith("\n1 of 1 that do not depend on the mesh are exact.\n")
+
+
+def test_a_mesh_file_is_halved_and_nothing_else(capsys):
+    case = str(CASES / "rigid" / "lines-of-the-mesh.yaml")
+    assert main(["converge", case]) == 0
+    assert capsys.readouterr().out.count("does not depend on the mesh") == 8
+    assert main(["converge", case, "--levels", "1", "2", "3"]) == 2
+    said = capsys.readouterr().err
+    assert said == f"{case}: --refine = 3: of a mesh file must be {HALVINGS_TEXT}\n"
 
 
 @pytest.mark.parametrize(
@@ -144,4 +179,9 @@ def test_the_command_and_the_table_of_the_page(tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr().out
     (shown,) = re.findall(r"```\n(manufactured.*?)```", text, re.DOTALL)
     assert set(shown.splitlines()) <= set(printed.splitlines())
-    assert (tmp_path / "results/converge/quad4.html").is_file()
+    (record,) = json.loads((tmp_path / "results/converge/quad4.json").read_text())
+    assert record["unknowns"] == [872, 2956, 10772]
+    assert record["quantities"][1]["found"]["value"] == pytest.approx(17 / 1200, rel=1e-7)
+    # A chart for each quantity that changes: peak pressure, contact force, strain energy.
+    page = (tmp_path / "results/converge/quad4.html").read_text()
+    assert page.count("<div class=chart ") == 3
