@@ -33,8 +33,8 @@ SILENCE = $(if $(QUIET),--quiet rules progress reason host)
 SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report summary compare gallery bench orders study stability infsup
-.PHONY: scaling benchmark converge test accept
+.PHONY: help all-cases family case report summary compare record gallery bench orders study
+.PHONY: stability infsup scaling benchmark converge test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment code-environment gallery-environment test-environment lint-environment docs-environment
 .PHONY: bill-environment
@@ -68,6 +68,9 @@ summary: ## print the last report's table, as Markdown
 compare: environment ## compare with another batch: make compare BASE=folder [THIS=folder]
 	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
 	@$(OURS) solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
+
+record: environment ## record the last batch, show all records: HISTORY=folder keeps them there
+	@$(OURS) solver record $(if $(HISTORY),--history "$(HISTORY)")
 
 gallery: override CONFIG += $(CHOICE)
 gallery: gallery-environment ## draw each result with PyVista, off-screen: all or FAMILY=…
