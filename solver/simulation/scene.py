@@ -9,7 +9,6 @@ import numpy as np
 from scipy import sparse
 
 from ..case.model import Case, Step, Zone
-from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, volume_cells
 from ..mechanics.fem.mixed import MeanStress
@@ -188,8 +187,8 @@ def build_scene(
         free = groups.supports()
         force, springs = groups.forces(), springs_of(groups)
         zones = _zones(case, cut_zones, surfaces, operators, free)
-    body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
-    n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
+    n_bodies = int(groups.body.max()) + 1
+    n_multipliers = sum(len(z.operator.initial) for z in zones)
     return Scene(
         case=case,
         options=options,
@@ -203,7 +202,7 @@ def build_scene(
         rounding=rounding,
         points=cut_mesh.points,
         mesh=cut_mesh,
-        body=body,
+        body=groups.body,
         blocks=blocks,
         mean=mean,
         fixed=groups.fixed,
