@@ -24,7 +24,7 @@ CREDIBLE, DOUBTFUL = 1.25, 3.0
 LEEWAY = 0.1
 # Values that grow without limit, but slowly, like a logarithm, look like an order below this one.
 _NONE = 0.1
-# Orders are sought up to this one; no value of a mesh tells a higher one from it.
+# The largest order that is sought: values of meshes cannot distinguish higher ones.
 _HIGHEST = 20.0
 
 Kind = Literal["monotone", "exact", "oscillatory", "divergent", "stalled"]
