@@ -54,6 +54,8 @@ def _extent(
         length = np.bincount(at.macro, at.weight)
         edges = contact_edges(points, ends, length, whole, mean, closed, around)
         return edges, surface.covered[closed].sum() + edges.lengths.sum(axis=0)
+    if closed.all() or not closed.any():
+        return None, np.full(3, surface.covered[closed].sum())
     near = vertex_neighbours(faces, len(closed)).astype(int)
     inside, around = closed & (near @ ~closed == 0), closed | (near @ closed > 0)
     return None, np.array([surface.covered[chosen].sum() for chosen in (closed, inside, around)])
