@@ -33,8 +33,8 @@ SILENCE = $(if $(QUIET),--quiet rules progress reason host)
 SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report summary compare gallery bench orders study stability infsup
-.PHONY: scaling benchmark test accept
+.PHONY: help all-cases family case report summary compare record gallery bench orders study
+.PHONY: stability infsup scaling benchmark converge test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment code-environment gallery-environment test-environment lint-environment docs-environment
 .PHONY: bill-environment
@@ -69,6 +69,9 @@ compare: environment ## compare with another batch: make compare BASE=folder [TH
 	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
 	@$(OURS) solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
 
+record: environment ## record the last batch, show all records: HISTORY=folder keeps them there
+	@$(OURS) solver record $(if $(HISTORY),--history "$(HISTORY)")
+
 gallery: override CONFIG += $(CHOICE)
 gallery: gallery-environment ## draw each result with PyVista, off-screen: all or FAMILY=…
 	@$(SNAKEMAKE) gallery
@@ -80,6 +83,16 @@ bench: environment ## run other codes on the cases: all installed, or CODES=calc
 orders: override CONFIG += $(CHOICE)
 orders: environment ## refine step by step and fit orders of convergence: all or FAMILY=…
 	@$(SNAKEMAKE) orders
+
+CONVERGE = $(addprefix cases/,waves/tria3.yaml waves/tria6.yaml waves/quad8.yaml \
+	waves/stiff-quad4.yaml manufactured/tria3.yaml manufactured/tria6.yaml manufactured/quad4.yaml \
+	manufactured/quad8.yaml polynomial/quad4.yaml polynomial/quad9.yaml lame/cylinders-tria6.yaml \
+	lame/cylinders-quad8.yaml lame/oval-tria6.yaml lame/oval-quad9.yaml \
+	axisymmetric/tubes-tria6.yaml axisymmetric/spheres-tria6.yaml contact-edge/tria3.yaml \
+	partial-waves/quad4.yaml receding/quad8.yaml half-planes/hertz-quad4.yaml)
+converge: environment ## uncertainty by refined meshes: of cases with known answers or CASE=my-case.yaml
+	@$(OURS) solver converge $(if $(CASE),"$(CASE)",$(CONVERGE)) \
+	  $(if $(LEVELS),--levels $(LEVELS)) -o results/converge/converge.json
 
 study: override CONFIG += $(if $(LEVEL),study=$(LEVEL))
 study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick

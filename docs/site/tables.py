@@ -12,7 +12,7 @@ from typing import Any, get_args, get_origin
 from msgspec import NODEFAULT
 
 from solver.case.file import CaseFile
-from solver.case.solutions import SOLUTIONS
+from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.typed import Section, described, is_section, titles_of
 from solver.case.typed import fields as keys_of
 from solver.report.html import MEANING

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 from msgspec import NODEFAULT
 
 from .file import CaseFile
-from .solutions import SOLUTIONS
+from .solutions.catalogue import SOLUTIONS
 from .typed import Section, fields, is_section, parts_of, read_as
 from .yaml import read_mapping
 

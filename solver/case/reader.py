@@ -38,7 +38,7 @@ from .typed import read_as
 from .yaml import parse_mapping, read_text
 
 if TYPE_CHECKING:
-    from .solutions import ExactSolution
+    from .solutions.base import ExactSolution
 
 # The quantity of an exact solution that `solution` means under a key; in supports, displacement.
 _QUANTITY = {
@@ -238,7 +238,7 @@ class _Reader:
         given = self.file.reference.solution if self.file.reference else None
         if given is None:
             return None
-        from .solutions import Known, build
+        from .solutions.catalogue import Known, build
 
         known = Known(
             where=self.path,

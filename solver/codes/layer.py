@@ -11,8 +11,7 @@ import meshio
 import numpy as np
 
 from ..case.model import Case, Load, Support
-from ..case.solutions import ExactSolution
-from ..case.solutions.base import Part
+from ..case.solutions.base import ExactSolution, Part
 from ..mesh.catalogue import BY_MESHIO, BY_NAME, CellType
 
 LAYER = "whole layer"

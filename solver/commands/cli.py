@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import codes, jobs, look, results, studies
+from . import codes, history, jobs, look, results, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
@@ -96,6 +96,7 @@ def _parser() -> argparse.ArgumentParser:
     results.add_commands(commands)
     codes.add_commands(commands)
     _add_batch(commands)
+    history.add_commands(commands)
     jobs.add_commands(commands)
     studies.add_commands(commands)
     return parser

@@ -21,6 +21,7 @@ def add_commands(commands: Any) -> None:
     """Add the commands of all studies to the program."""
     _add_orders(commands)
     _add_expect(commands)
+    _add_converge(commands)
     study = commands.add_parser("study", description="Error against run time.")
     _add_study(study.add_subparsers(title="commands", metavar="COMMAND", required=True))
     scaling = commands.add_parser("scaling", description="Cost against size.")
@@ -80,6 +81,40 @@ def _expect(options: argparse.Namespace) -> int:
     print("expected:")
     for name, error in expected_errors(options.case, options.levels or LEVELS).items():
         print(f"  {name}: {error:.1e}")
+    return 0
+
+
+def _add_converge(commands: Any) -> None:
+    purpose = "the order, the limit and its uncertainty of results, by refined meshes"
+    command = add_command(commands, "converge", _converge, purpose)
+    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
+    command.add_argument("--swap", action="store_true", help="exchange slave and master")
+    command.add_argument(
+        "--levels",
+        type=int,
+        nargs="+",
+        metavar="N",
+        help="factors of divisions, three or more (1 2 4)",
+    )
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FILE.json", help="and a page beside it, FILE.html"
+    )
+    add_threads(command)
+
+
+def _converge(options: argparse.Namespace) -> int:
+    from ..studies.converge.page import as_text, outcome, write_convergence
+    from ..studies.converge.run import LEVELS, converge
+
+    if options.output and options.output.suffix != ".json":
+        raise InputError(options.output, "--output", None, "must end in .json")
+    found = []
+    for path in options.cases:
+        found.append(converge(path, options.levels or LEVELS, options.swap))
+        print(as_text(found[-1]) + "\n", flush=True)
+    print(outcome(found))
+    if options.output:
+        print(f"Page: {write_convergence(found, options.output)}")
     return 0
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from operator import itemgetter
 from pathlib import Path
 
 from ..case.features import features, used
@@ -28,8 +29,10 @@ class Use:
         """Add a solve."""
         self.solves.append(row)
         for check in row.verdict.checks if row.verdict.passed else ():
-            if check.verifies and not (self.strictest and self.strictest[0] <= check.tolerance):
-                self.strictest = check.tolerance, check.name, row
+            # The status has no tolerance: it is compared with 0 or 1.
+            if check.verifies and check.tolerance > 0:
+                found = check.tolerance, check.name, row
+                self.strictest = min(self.strictest or found, found, key=itemgetter(0))
 
 
 @dataclass

@@ -24,6 +24,7 @@ _PAGES = {
     "gallery": "gallery of all solves",
     "bench": "other codes on the same cases",
     "compare": "comparison with another batch",
+    "history": "past batches",
 }
 _TABLES = {"JSON": "summary.json", "CSV": "summary.csv", "Markdown": "summary.md"}
 # Where `make docs` writes the documentation, from the folder of a report.

@@ -10,7 +10,7 @@ import numpy as np
 from ..case.expressions import evaluate
 from ..case.material import Material
 from ..case.model import Case, Exact, Load, Scalar
-from ..case.solutions import ExactSolution
+from ..case.solutions.base import ExactSolution
 from ..mechanics.fem import has_straight_edges
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block, lame_parameters
@@ -151,10 +151,14 @@ class Attributes:
         return value
 
     @cached_property
+    def body(self) -> np.ndarray:
+        """The body (n,) of each node."""
+        return body_numbers(len(self.points), self.cut.cells)
+
+    @cached_property
     def exact_part(self) -> np.ndarray:
         """The part (n,) of the case's exact solution that each node belongs to."""
-        points = self.points + self.origin
-        return node_parts(self._exact, points, body_numbers(len(points), self.cut.cells))
+        return node_parts(self._exact, self.points + self.origin, self.body)
 
     @property
     def _exact(self) -> ExactSolution:
@@ -174,8 +178,8 @@ class Attributes:
         """Cells with their materials, and the mean stress of those in mixed form.
 
         Cells of rigid bodies, which need no material, get a unit one; they are left out where the
-        body moves. Without `mixed_form` none is
-        in it, whatever the case says; `plain`: cells with straight edges have plain quadrature.
+        body moves. Without `mixed_form` none is in it, whatever the case says; `plain`: cells with
+        straight edges have plain quadrature.
         """
         young = self.by_material(lambda m: m.young, 1.0)
         poisson = self.by_material(lambda m: m.poisson, 0.0)
@@ -371,22 +375,12 @@ class Attributes:
 
     def _exact_force(self, kind: str, name: str, nodes: np.ndarray, part: int) -> np.ndarray:
         """Forces (n, dim) of the exact solution's body force or stress on cells or faces."""
-        exact, origin = self._exact, self.origin
+        exact, origin, at = self._exact, self.origin, (self.points, nodes, name)
         if kind == "body_force":
-            return body_forces(
-                self.points,
-                nodes,
-                name,
-                lambda local: exact.body_force(local + origin, part),
-                self.axisymmetric,
-            )
+            return body_forces(*at, lambda x: exact.body_force(x + origin, part), self.axisymmetric)
+        pressure = kind == "pressure"
         return stress_forces(
-            self.points,
-            nodes,
-            name,
-            lambda local: exact.stress(local + origin, part),
-            kind == "pressure",
-            self.axisymmetric,
+            *at, lambda x: exact.stress(x + origin, part), pressure, self.axisymmetric
         )
 
 

@@ -192,7 +192,7 @@ def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | N
     integrals = (rows @ integrals).tocsr()
     size = abs(integrals).max(axis=0).toarray().ravel()
     scale = 1 / np.where(size > 0, size, 1.0)
-    integrals = integrals @ sparse.diags_array(scale)
+    integrals.data *= scale[integrals.indices]
     integrals.data[np.abs(integrals.data) < _ROUND_OFF] = 0.0
     integrals.eliminate_zeros()
     alone = integrals[np.diff(integrals.indptr) == 1]
@@ -212,17 +212,20 @@ def _integrals(scene: Scene, zone: ZoneScene) -> sparse.csr_matrix:
     """-∫ N n dS (n_dofs, m) over each macro-element of a zone."""
     dim, surface = scene.points.shape[1], zone.operator.surface
     partly = surface.covered < (1 - _COVERED) * surface.area
-    matrix = zone.operator.matrix.T @ sparse.diags_array(partly.astype(float))
+    around, shape = scene.case.axisymmetric, (scene.n_dofs, zone.count)
+    parts = []
     for face in zone.sub_faces:
         whole = ~partly[face.macro]
         nodes, macro = face.nodes[whole], face.macro[whole]
-        around = scene.case.axisymmetric
         values, _ = face_integrals(scene.points, nodes, face.type.name, around)
         rows = dim * nodes[:, :, None] + np.arange(dim)
         columns = np.broadcast_to(macro[:, None, None], rows.shape)
-        entries = (-values.ravel(), (rows.ravel(), columns.ravel()))
-        matrix = matrix + sparse.csr_array(entries, shape=matrix.shape)
-    return sparse.csr_matrix(matrix)
+        parts.append((-values.ravel(), rows.ravel(), columns.ravel()))
+    entries, row, column = (np.concatenate(part) for part in zip(*parts, strict=True))
+    matrix = sparse.csr_matrix((entries, (row, column)), shape=shape)
+    if partly.any():
+        matrix += zone.operator.matrix.T @ sparse.diags(partly.astype(float))
+    return matrix
 
 
 def _free_slave_rows(scene: Scene) -> sparse.csr_matrix:

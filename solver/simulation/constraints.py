@@ -115,19 +115,21 @@ def free_motion(
 
     `motions` (n_dofs, r): the rigid motions of all bodies.
     """
-    per_area = sparse.diags(1 / constraints.covered[closed]) @ constraints.gaps[closed]
-    held = sparse.vstack([per_area, unit_springs(scene)]).tocsr()
+    held = (sparse.diags(1 / constraints.covered[closed]) @ constraints.gaps[closed]).tocsr()
+    if scene.springs.nnz:
+        held = sparse.vstack([held, unit_springs(scene)]).tocsr()
     found = unheld_motion(motions, scene.free.basis, held, scene.n_bodies)
     if found is None:
         return ""
     return f"nothing keeps {body_names(scene)[found[0]]} from a free motion ({found[1]})"
 
 
-def refuse_unsolvable(
-    scene: Scene, motions: sparse.csc_matrix, constraints: ContactConstraints
-) -> None:
-    """Raise InputError where a body moves freely, or a cut macro-element owns no free unknown."""
-    if moves := free_motion(scene, motions, constraints, constraints.eligible):
+def refuse_unsolvable(scene: Scene, moves: str, constraints: ContactConstraints) -> None:
+    """Raise InputError where a body moves freely, or a cut macro-element owns no free unknown.
+
+    `moves`: the free motion that is left with all of the contact closed; empty if none.
+    """
+    if moves:
         allowed = f"{moves}, even with all of the contact closed; add a support"
         raise InputError(scene.case.path, "supports", None, allowed)
     lost = constraints.dependent

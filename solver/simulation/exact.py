@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..case.solutions import ExactSolution
+from ..case.solutions.base import ExactSolution
 from ..mechanics.fem import shape_functions
 from ..mechanics.fem.faces import FACE_POINTS, SurfacePoints, nodal_normals, surface_points
 from ..mechanics.fem.gauss import gauss_rule

@@ -88,7 +88,8 @@ class ContactProblem:
         self.scene = scene
         self.constraints = contact_constraints(scene)
         self.motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
-        refuse_unsolvable(scene, self.motions, self.constraints)
+        self._moves: dict[bytes, str] = {}
+        refuse_unsolvable(scene, self._free_motion(self.constraints.eligible), self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
         loose = unsupported(self.motions, scene.free.basis)
         self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
@@ -197,7 +198,11 @@ class ContactProblem:
         return eligible if self._free_motion(guess) else guess
 
     def _free_motion(self, closed: np.ndarray) -> str:
-        return free_motion(self.scene, self.motions, self.constraints, closed)
+        """See `free_motion`; the last answer is kept, as a guess is asked about more than once."""
+        key = closed.tobytes()
+        if key not in self._moves:
+            self._moves = {key: free_motion(self.scene, self.motions, self.constraints, closed)}
+        return self._moves[key]
 
     def _solve_closed(
         self, closed: np.ndarray, step: Step, correction: np.ndarray | float

@@ -10,7 +10,6 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..case.model import Scalar
-from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.loads import Field
 from ..mechanics.fem.springs import at_nodes, foundation
 from ..mechanics.fem.supports import Copies
@@ -33,7 +32,7 @@ def ties_of(groups: Attributes) -> dict[str, np.ndarray]:
             continue
         key = f"supports[{i}].group"
         nodes = groups.nodes(support.group, key)
-        if np.ptp(body_numbers(len(groups.points), groups.cut.cells)[nodes]):
+        if np.ptp(groups.body[nodes]):
             allowed = "its nodes belong to several bodies; only one body is tied"
             raise InputError(groups.case.path, key, support.group, allowed)
         for direction in support.together:
@@ -45,7 +44,6 @@ def copies_of(groups: Attributes) -> dict[str, Copies]:
     """Nodes that move as those of another side do, by key of the case file."""
     found: dict[str, Copies] = {}
     points, dim = groups.points + groups.origin, groups.points.shape[1]
-    body = body_numbers(len(points), groups.cut.cells)
     extent = float(np.ptp(points, axis=0).max())
     for i, support in enumerate(groups.case.supports):
         if (given := support.cyclic) is None:
@@ -55,7 +53,7 @@ def copies_of(groups: Attributes) -> dict[str, Copies]:
         turn = np.eye(dim) if given.angle is None else _turn(dim, given.angle, given.axis)
         image = points[of] @ turn.T + (given.shift or np.zeros(dim))
         # Both surfaces of an interface are at the same place: bodies are apart by a further axis.
-        apart = [np.c_[x, extent * body[n]] for x, n in ((image, of), (points[copy], copy))]
+        apart = [np.c_[x, extent * groups.body[n]] for x, n in ((image, of), (points[copy], copy))]
         distance, nearest = cKDTree(apart[1]).query(apart[0])
         lost = np.flatnonzero(distance > _NEAR * extent)
         if len(lost) or len(of) != len(copy):

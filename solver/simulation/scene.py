@@ -9,7 +9,6 @@ import numpy as np
 from scipy import sparse
 
 from ..case.model import Case, Step, Zone
-from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, volume_cells
 from ..mechanics.fem.initial import StrainLoads
@@ -198,8 +197,8 @@ def build_scene(
         force, springs = groups.forces(), springs_of(groups)
         initial = strain_loads_of(groups, blocks, mean)
         zones = _zones(case, cut_zones, surfaces, operators, free)
-    body = body_numbers(len(cut_mesh.points), cut_mesh.cells)
-    n_bodies, n_multipliers = int(body.max()) + 1, sum(len(z.operator.initial) for z in zones)
+    n_bodies = int(groups.body.max()) + 1
+    n_multipliers = sum(len(z.operator.initial) for z in zones)
     return Scene(
         case=case,
         options=options,
@@ -213,7 +212,7 @@ def build_scene(
         rounding=rounding,
         points=cut_mesh.points,
         mesh=cut_mesh,
-        body=body,
+        body=groups.body,
         blocks=blocks,
         mean=mean,
         fixed=groups.fixed,

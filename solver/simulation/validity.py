@@ -80,10 +80,10 @@ def _slip(scene: Scene, zone: ZoneScene, moved: np.ndarray, closed: np.ndarray) 
     size = surface.area
     if scene.case.axisymmetric:
         size = size / circumference(surface.centre)
-    weights = operator.mean.T @ sparse.diags_array(surface.area)
-    normal = weights @ surface.normal
+    by_multiplier, area = operator.mean.T, surface.area
+    normal = by_multiplier @ (area[:, None] * surface.normal)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    size = (weights @ size ** (1 / (dim - 1))) / (weights @ np.ones(len(size)))
+    size = (by_multiplier @ (area * size ** (1 / (dim - 1)))) / (by_multiplier @ area)
     gaps = operator.matrix.tocoo()
     along = gaps.data * normal[gaps.row, gaps.col % dim]
     shape = (len(mine), len(moved))

@@ -9,6 +9,7 @@ import shlex
 import subprocess
 import sys
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -39,6 +40,7 @@ def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
     }
 
 
+@cache
 def _version(package: str) -> str:
     try:
         return version(package)

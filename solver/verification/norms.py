@@ -33,8 +33,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..case.solutions import ElasticSolution, ExactSolution
-from ..case.solutions.base import lame_of
+from ..case.solutions.base import ElasticSolution, ExactSolution, lame_of
 from ..mechanics.fem import shape_functions
 from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop
 from ..mechanics.fem.faces import surface_points

@@ -7,7 +7,7 @@ what is linear on a regular grid. Places at the rim of the surface have none.
 
 import numpy as np
 
-from ..case.solutions import ExactSolution
+from ..case.solutions.base import ExactSolution
 from ..mesh.catalogue import cell_type
 from ..simulation.solution import NodalContact, ZoneResult
 

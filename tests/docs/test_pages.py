@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from solver.case.file import Pick
-from solver.case.solutions import SOLUTIONS
+from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.typed import fields
 from solver.mesh.keys import RECIPES
 from solver.report.html import NORMS

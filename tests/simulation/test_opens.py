@@ -19,7 +19,7 @@ from tests.scenes import block_case, block_mesh
 KINDS = [name for name, cell in BY_NAME.items() if cell.dim > 1]
 UNITS = "units: {length: mm, stress: N/mm²}\n"
 FIELDS = {
-    "point": {"displacement": 3, "stress": 6, "normal_stress": 1, "body": 1},
+    "point": {"displacement": 3, "stress": 6, "normal_stress": 1, "body": 1, "reaction": 3},
     "cell": {
         "pressure": 1, "gap": 1, "status": 1, "coverage": 1, "macro_element": 1, "zone": 1,
         "pressure_error_estimate": 1,
@@ -64,6 +64,7 @@ def assert_opened(opened, solution):
         assert {k: v.size // len(v) for k, v in data.items()} == fields
     np.testing.assert_array_equal(point_data["displacement"][:, :dim], solution.displacement)
     np.testing.assert_array_equal(point_data["stress"], solution.stress)
+    np.testing.assert_array_equal(point_data["reaction"][:, :dim], solution.reaction)
     on_face = cell_data["zone"] >= 0
     assert np.isnan(cell_data["pressure"][~on_face]).all()
     owner = cell_data["macro_element"][on_face]

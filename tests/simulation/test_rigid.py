@@ -128,7 +128,7 @@ def test_a_turn_about_another_point_is_the_same_motion():
 
 
 def test_a_die_in_space_bears_the_moments_of_its_force():
-    """A force at (3, 2) on a die over the unit square, free to sink, held against all turns."""
+    """A force at (3, 2) on a die over the unit square, free to sink, fixed against rotation."""
     text = in_space().replace("move: {z: -0.02}", "move: {rx: 1.0e-4, rz: 0.1}, force: {z: -20}")
     solution = simulate(case(text=text), block_mesh("HEXA8", "TETRA4", (1, 2)))
     die = next(body for body in solution.rigid if body.body == "die")

@@ -8,7 +8,7 @@ import pytest
 
 from solver.case.material import Material
 from solver.case.model import Rigid
-from solver.case.solutions import SOLUTIONS
+from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.mesh import generate

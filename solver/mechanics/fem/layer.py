@@ -36,45 +36,48 @@ def turned(points: np.ndarray, faces: Faces, toward: np.ndarray) -> dict[str, np
     >>> turned(points, {"SEG2": np.array([[1, 0], [1, 2]])}, below)["SEG2"].tolist()
     [[0, 1], [1, 2]]
     """
-    dim, blocks = points.shape[1], list(faces.items())
-    number = np.cumsum([0, *(len(nodes) for _, nodes in blocks)])
-    count, size = number[-1], len(points)
-    rows = [_rims(cell_type(name), nodes, size) for name, nodes in blocks]
-    owner = np.concatenate(
-        [
-            np.repeat(first + np.arange(len(r)), r.shape[1])
-            for first, (r, _) in zip(number, rows, strict=False)
-        ]
-    )
-    rim, way = (
-        np.concatenate([part.ravel() for part in parts]) for parts in zip(*rows, strict=True)
-    )
-    # Two faces at a rim agree where they pass it in opposite ways. Each face is two nodes of a
-    # graph: as it is, and turned.
-    order = np.argsort(rim, kind="stable")
-    same = np.flatnonzero(np.diff(rim[order]) == 0)
-    i, j = owner[order[same]], owner[order[same + 1]]
-    odd = way[order[same]] == way[order[same + 1]]
-    ends = (np.r_[i, i + count], np.r_[j + count * odd, j + count * ~odd])
-    graph = sparse.coo_matrix((np.ones(len(ends[0])), ends), shape=(2 * count, 2 * count))
-    part = connected_components(graph, directed=False)[1]
-    if (part[:count] == part[count:]).any():
+    dim, count = points.shape[1], sum(map(len, faces.values()))
+    side = _sides(faces, len(points))
+    if (side[:count] == side[count:]).any():
         return None
-    centre = np.concatenate([points[nodes].mean(axis=1) for _, nodes in blocks])
-    normal = np.concatenate([_normals(points, name, nodes) for name, nodes in blocks])
+    centre = np.concatenate([points[nodes].mean(axis=1) for nodes in faces.values()])
+    normal = np.concatenate([_normals(points, name, nodes) for name, nodes in faces.items()])
     distance, nearest = cKDTree(toward[:, :dim]).query(centre)
     away = np.einsum("fd,fd->f", normal, toward[nearest, dim:]) > 0
     flipped = np.zeros(count, dtype=bool)
-    whole = np.minimum(part[:count], part[count:])
-    for label in np.unique(whole):
-        mine = np.flatnonzero(whole == label)
+    part = np.minimum(side[:count], side[count:])
+    for label in np.unique(part):
+        mine = np.flatnonzero(part == label)
         seed = mine[distance[mine].argmin()]
-        flipped[mine] = (part[mine] != part[seed]) ^ away[seed]
-    found = {}
-    for first, (name, nodes) in zip(number, blocks, strict=False):
+        flipped[mine] = (side[mine] != side[seed]) ^ away[seed]
+    found, first = {}, 0
+    for name, nodes in faces.items():
         mirrored = nodes[:, list(cell_type(name).mirror)]
-        found[name] = np.where(flipped[first : first + len(nodes)][:, None], mirrored, nodes)
+        found[name] = np.where(flipped[first : first + len(nodes), None], mirrored, nodes)
+        first += len(nodes)
     return found
+
+
+def _sides(faces: Faces, size: int) -> np.ndarray:
+    """A label (2 n,) for each of n faces as it is, then turned: the same on one side of a part.
+
+    Two faces at a rim agree where they pass it in opposite ways.
+    """
+    rims = [_rims(cell_type(name), nodes, size) for name, nodes in faces.items()]
+    number = np.split(
+        np.arange(sum(map(len, faces.values()))), np.cumsum([len(r) for r, _ in rims])
+    )
+    owner = np.concatenate(
+        [np.repeat(n, r.shape[1]) for n, (r, _) in zip(number, rims, strict=False)]
+    )
+    rim, way = (np.concatenate([a.ravel() for a in arrays]) for arrays in zip(*rims, strict=True))
+    order = np.argsort(rim, kind="stable")
+    same = np.flatnonzero(np.diff(rim[order]) == 0)
+    one, other, count = order[same], order[same + 1], len(np.unique(owner))
+    i, j, odd = owner[one], owner[other], way[one] == way[other]
+    ends = (np.r_[i, i + count], np.r_[j + count * odd, j + count * ~odd])
+    graph = sparse.coo_matrix((np.ones(len(ends[0])), ends), shape=(2 * count, 2 * count))
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _rims(kind: CellType, nodes: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:

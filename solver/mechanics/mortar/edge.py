@@ -84,6 +84,16 @@ def contact_edges(
     (array([[2.5, 0. ]]), array([ True]))
     """
     m = len(ends)
+    if closed.all() or not closed.any():
+        nowhere = np.empty((0, 2))
+        return Edges(
+            position=nowhere,
+            lower=nowhere,
+            upper=nowhere,
+            macro=np.empty(0, dtype=int),
+            better=np.empty(0, dtype=bool),
+            lengths=np.empty((0, 3)),
+        )
     around = (np.ones(2 * m), (np.repeat(np.arange(m), 2), ends.ravel()))
     touch = sparse.csr_matrix(around, shape=(m, len(points)))
     pairs = (touch @ touch.T).tocoo()

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ...case.material import Material
-from ...case.solutions import ElasticSolution, Part
+from ...case.solutions.base import ElasticSolution, Part
 from ...mechanics.fem import shape_functions
 from ...mechanics.fem.small_matrices import invert
 from ...mesh.catalogue import cell_type

@@ -8,7 +8,7 @@ import pytest
 from solver.case.material import Material
 from solver.case.model import EXACT
 from solver.case.reader import parse_case
-from solver.case.solutions import SOLUTIONS
+from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.nested import NestedCylinders
 from solver.system.errors import InputError

@@ -8,7 +8,7 @@ import pytest
 
 from solver.case.material import Material
 from solver.case.reader import load_case
-from solver.case.solutions import SOLUTIONS
+from solver.case.solutions.catalogue import SOLUTIONS
 from solver.mechanics.fem.faces import surface_points
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.simulation.exact import computed_pressure

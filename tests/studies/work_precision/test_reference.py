@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from solver.case.solutions import ElasticSolution
+from solver.case.solutions.base import ElasticSolution
 from solver.simulation.simulate import simulate
 from solver.studies.work_precision.description import read_study
 from solver.studies.work_precision.reference import RefinedSolution

@@ -1,0 +1,1 @@
+"""Uncertainty of a case's results from solves on refined meshes."""
