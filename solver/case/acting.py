@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from .kinds import Angle, Groups, Name, Scalar, Scalars, Vector
-from .model import LOAD_KINDS
 from .typed import FieldError, Number, Positive, Section, Text
 
 
@@ -200,7 +199,8 @@ class LoadKeys(Section, frozen=True):
     name: Name | None = None
 
     def __post_init__(self) -> None:
-        given = [getattr(self, kind) for kind in LOAD_KINDS]
+        of_faces = (self.pressure, self.traction, self.force)
+        given = (*of_faces, self.body_force, self.strain, self.temperature)
         if sum(value is not None for value in given) != 1:
             problem = (
                 "must be {group, and exactly one of pressure, traction, body_force, force, strain, "
