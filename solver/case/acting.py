@@ -101,6 +101,11 @@ _FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
 _Springs = Annotated[dict[_Axis, Scalar], Meta(min_length=1, description=_SPRING)]
 
 
+_STRAIN = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions"
+_Strain = Annotated[
+    dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar],
+    Meta(min_length=1, description=_STRAIN),
+]
 _Directions = Annotated[tuple[Literal["x", "y", "z"], ...], Meta(min_length=1)]
 _TOGETHER = "a list of x, y, z"
 
@@ -170,12 +175,15 @@ class SupportKeys(Section, frozen=True):
 class LoadKeys(Section, frozen=True):
     """A load.
 
-    group: the faces of this group or, for a body force, its cells
+    group: the faces of this group; for a body force, a strain or a temperature, its cells
     at: the node at this point, for a force
     pressure: force per area against the faces, positive inwards
     traction: force per area, as a vector
     body_force: force per volume, as a vector
     force: the whole force, as a vector: distributed evenly over the area of faces, or over nodes
+    strain: initial strain, which causes no stress where it is free; xy is half the angle of shear
+    temperature: change of temperature; the initial strain is its product with the expansion
+    expansion: coefficient of thermal expansion, with temperature
     name: the name that `steps` gives factors of the load
     """
 
@@ -185,12 +193,21 @@ class LoadKeys(Section, frozen=True):
     traction: Scalars | None = None
     body_force: Scalars | None = None
     force: Vector | None = None
+    strain: _Strain | None = None
+    temperature: Scalar | None = None
+    expansion: Scalar | None = None
     name: Name | None = None
 
     def __post_init__(self) -> None:
-        given = (self.pressure, self.traction, self.body_force, self.force)
+        of_faces = (self.pressure, self.traction, self.force)
+        given = (*of_faces, self.body_force, self.strain, self.temperature)
         if sum(value is not None for value in given) != 1:
-            problem = "must be {group, and exactly one of pressure, traction, body_force, force}"
+            problem = (
+                "must be {group, and exactly one of pressure, traction, body_force, force, strain, "
+                "temperature (with expansion)}"
+            )
             raise FieldError((), problem)
+        if (self.temperature is None) != (self.expansion is None):
+            raise FieldError((), "must be {group, expansion, temperature}: one needs the other")
         if (self.group is None) == (self.at is None) or (self.at and self.force is None):
             raise FieldError((), "must be {group} with its load, or {at, force}")

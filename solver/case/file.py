@@ -319,8 +319,8 @@ _OUT_OF_SCOPE = {
         "hyperelastic"),
     "out of scope: linear elasticity only": (
         "plasticity", "plastic", "yield", "yield_stress", "hardening", "creep", "viscosity"),
-    "thermal and initial strain are out of scope; interference may stand for them": (
-        "temperature", "expansion", "thermal_expansion", "thermal", "initial_strain", "alpha"),
+    "initial strain is a load: {group, expansion, temperature}, or {group, strain}": (
+        "thermal_expansion", "thermal", "initial_strain", "eigenstrain", "alpha"),
     "dynamics is out of scope: static equilibrium only": (
         "dynamics", "dynamic", "density", "mass", "inertia", "damping", "velocity", "time"),
     "beams, shells and trusses are out of scope: bodies are meshed with plane or solid cells": (

@@ -23,7 +23,7 @@ Scalar = float | Expression
 Vector = tuple[Scalar, ...]
 # A load factor, or the factors of named loads and supports.
 Step = float | dict[str, float]
-LOAD_KINDS = ("pressure", "traction", "body_force", "force")
+LOAD_KINDS = ("pressure", "traction", "body_force", "force", "strain", "temperature")
 SWAPPED = "-swapped"
 # A discretisation error may exceed the expected one by this factor.
 MARGIN = 1.5
@@ -73,12 +73,29 @@ class Support:
 
 @dataclass(frozen=True)
 class Load:
-    """A load on a group: `kind` is one of LOAD_KINDS; a pressure is a scalar, positive inwards."""
+    """A load on a group: `kind` is one of LOAD_KINDS; a pressure is a scalar, positive inwards.
+
+    An initial strain has values by component, a temperature those of temperature and expansion.
+    """
 
     group: str
     kind: str
-    value: Scalar | Vector | Exact
+    value: Scalar | Vector | Exact | dict[str, Scalar]
     name: str = ""
+
+    @property
+    def of_cells(self) -> bool:
+        """Whether it acts on volume cells."""
+        return self.kind == "body_force" or self.strains
+
+    @property
+    def strains(self) -> bool:
+        """Whether it is an initial strain, which a temperature is too."""
+        return self.kind in ("strain", "temperature")
+
+    def factor(self, step: Step) -> float:
+        """Its factor in a step."""
+        return step.get(self.name, 1.0) if isinstance(step, dict) else step
 
 
 @dataclass(frozen=True)

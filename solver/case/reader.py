@@ -221,7 +221,11 @@ class _Reader:
         item, keys = self.file.loads[index], ("loads", index)
         kind = next(kind for kind in LOAD_KINDS if getattr(item, kind) is not None)
         group = self.group((*keys, "group"), item.group, item.at)
-        return Load(group, kind, self.value_or_exact(*keys, kind), item.name or "")
+        if kind == "temperature":
+            value: Any = {key: self.value(*keys, key) for key in ("temperature", "expansion")}
+        else:
+            value = (self.value if kind == "strain" else self.value_or_exact)(*keys, kind)
+        return Load(group, kind, value, item.name or "")
 
     def probe(self, name: str) -> Probe:
         item = self.file.probes[name]

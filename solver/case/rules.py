@@ -215,6 +215,21 @@ def _check_motion(case: Case, dim: int) -> None:
             raise InputError(case.path, f"reference.moment.{name}", value, allowed)
 
 
+def _check_strains(case: Case, dim: int) -> None:
+    """Initial strains have the components of the mesh; exact solutions know none."""
+    for i, load in enumerate(case.loads):
+        if not load.strains:
+            continue
+        key = f"loads[{i}].{load.kind}"
+        if case.solution:
+            allowed = f"{case.solution.name} has no initial strain; allowed: a reference without it"
+            raise InputError(case.path, key, None, allowed)
+        across = {"yz", "xz"} & load.value.keys() if isinstance(load.value, dict) else set()
+        if across and dim == 2:
+            allowed = "across the plane of a plane case; allowed are xx, yy, zz and xy"
+            raise InputError(case.path, key, max(across), allowed)
+
+
 def check_dimension(case: Case, dim: int) -> None:
     """Raise `InputError` for a vector, direction or expression that does not fit the dimension."""
     allowed = f"must have {dim} components, as the mesh has"
@@ -223,6 +238,7 @@ def check_dimension(case: Case, dim: int) -> None:
             shown = [v.text if isinstance(v, Expression) else v for v in vector]
             raise InputError(case.path, key, shown, allowed)
     _check_motion(case, dim)
+    _check_strains(case, dim)
     if dim == 3:
         return
     for i, support in enumerate(case.supports):

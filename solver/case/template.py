@@ -41,7 +41,8 @@ supports:
   - {{group: symy, fix: [normal]}}
   - {{group: base, fix: {{z: 0.0}}}}
 
-# pressure (positive inwards) or traction: [x, y, z] on faces; body_force: [x, y, z] on cells.
+# pressure (positive inwards) or traction: [x, y, z] on faces; body_force: [x, y, z] on cells;
+# strain: {{xx: …}}, or expansion and temperature, on cells.
 # A value may be an expression in x, y, z, r, pi, sqrt, sin, cos, such as "25 * (1 - x / 50)".
 loads:
   - {{group: press, pressure: 25.0}}

@@ -109,7 +109,7 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
     """The deck of a case on its mesh; `layer`: a plane one as one layer of cells in space.
 
     Raises InputError where case and mesh do not fit, UnsupportedError for what no code is given:
-    springs, groups that move as one, factors of single loads.
+    springs, groups that move as one, initial strain, factors of single loads.
     """
     mesh = with_groups(case, mesh)
     check_groups(case, mesh)
@@ -167,6 +167,8 @@ def _is_constant(load: Load) -> bool:
 def _refuse(case: Case) -> None:
     if case.histories:
         raise UnsupportedError("factors of single loads in steps: not written for codes")
+    if any(load.strains for load in case.loads):
+        raise UnsupportedError("initial strain and change of temperature: not written for codes")
     if any(support.together or support.cyclic for support in case.supports):
         raise UnsupportedError("groups that move as one: not written for codes")
     if any(support.spring for support in case.supports):

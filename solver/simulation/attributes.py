@@ -192,6 +192,7 @@ class Attributes:
                 *lame_parameters(young[name], poisson[name]),
                 plain and bool(has_straight_edges(BY_NAME[name], self.points[cells]).all()),
                 self.axisymmetric,
+                np.arange(len(cells)),
             )
             for name, cells in self.cut.cells.items()
         ]
@@ -299,7 +300,7 @@ class Attributes:
         return nodal_normals(self.points, self.faces(group, key))[nodes]
 
     def forces(self) -> np.ndarray:
-        """Nodal forces (n, dim) of all loads at load factor 1."""
+        """Nodal forces (n, dim) of all loads but initial strains, at load factor 1."""
         total = rigid.forces(self)
         for i, load in enumerate(self.case.loads):
             total += self._force(load, f"loads[{i}].group")
@@ -333,6 +334,8 @@ class Attributes:
 
     def _force(self, load: Load, key: str) -> np.ndarray:
         total = np.zeros_like(self.points)
+        if isinstance(load.value, dict):
+            return total  # see `initial`
         if load.kind == "force":
             assert isinstance(load.value, tuple)
             return self._share(load, key)[:, None] * self.field(load.value)(self.points[:1])

@@ -147,10 +147,17 @@ def moment(scene: Scene, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
     return np.array([0.0, 0.0, turning])
 
 
-def strain_energy(state: Equilibrium) -> float:
-    """½ ∫ σ:ε of the bodies: half the work of internal forces, to which rigid motions add none."""
-    moved = state.iterate.deformation.sum(axis=0)
-    return float((moved * (state.iterate.internal - state.iterate.springs)).sum() / 2)
+def strain_energy(scene: Scene, state: Equilibrium) -> float:
+    """½ ∫ σ:(ε − ε₀) of the bodies in the last step, by the work of forces.
+
+    Rigid motions add none.
+    """
+    iterate, initial = state.iterate, scene.initial
+    moved, step = iterate.deformation.sum(axis=0), scene.case.steps[-1]
+    elastic = (iterate.internal - iterate.springs) / 2 - scene.straining(step, initial.force)
+    of_strains = scene.straining(step, scene.straining(step, initial.energy))
+    swelled = iterate.mean_stress @ iterate.swelling
+    return float((moved * elastic).sum() + (of_strains - swelled) / 2)
 
 
 def _both(

@@ -207,7 +207,7 @@ class _Groups:
 
     def check_loads(self) -> None:
         for i, load in enumerate(self.case.loads):
-            key, on_volume = f"loads[{i}].group", load.kind == "body_force"
+            key, on_volume = f"loads[{i}].group", load.of_cells
             if on_volume and load.group == ALL:
                 chosen = zip(self.mesh.cells, self.block_dims, strict=True)
                 parts = [np.arange(len(block.data) * (dim == self.dim)) for block, dim in chosen]
@@ -244,7 +244,7 @@ class _Groups:
                 for block, part in zip(self.mesh.cells, parts, strict=True)
             )
             if lost == count or (lost and not isinstance(load.value, Exact)):
-                kind = "cells" if load.kind == "body_force" else "faces"
+                kind = "cells" if load.of_cells else "faces"
                 allowed = (
                     f"{lost} of its {count} {kind} belong to the rigid body {rigid}, which is "
                     "fixed: a load there does nothing; load a deformable body"

@@ -16,8 +16,9 @@ from .scene import Scene
 class ContactIterate:
     """Displacement and mean stress (of cells in mixed form) under loads `force` (n, dim).
 
-    The gaps of the multipliers `closed` (k,) are to vanish; see `condensation.Iterate`. `extended`:
-    internal forces are summed in extended precision.
+    The gaps of the multipliers `closed` (k,) are to vanish; see `condensation.Iterate`. `swelling`
+    (size,) of initial strains; see `mechanics.fem.initial`. `extended`: internal forces are summed
+    in extended precision.
     """
 
     scene: Scene
@@ -26,6 +27,7 @@ class ContactIterate:
     force: np.ndarray
     displacement: Displacement
     mean_stress: np.ndarray
+    swelling: np.ndarray
     extended: bool = False
 
     @property
@@ -35,8 +37,8 @@ class ContactIterate:
 
     @cached_property
     def defect(self) -> np.ndarray:
-        """By how much the mean stress differs from λ div u; see `mechanics.fem.mixed`."""
-        return self.scene.mean.defect(self.deformation, self.mean_stress)
+        """By how much the mean stress differs from λ (div u − tr ε₀); see `mechanics.fem.mixed`."""
+        return self.scene.mean.defect(self.deformation, self.mean_stress) + self.swelling
 
     @cached_property
     def internal(self) -> np.ndarray:

@@ -221,6 +221,7 @@ class ContactProblem:
             force=force,
             displacement=self.at_rest.moved(offset),
             mean_stress=np.zeros(scene.mean.size),
+            swelling=scene.straining(step, scene.initial.swelling),
         )
         return self._refined(start, _force_scale(start), StatusResult(closed, 1, []), correction)
 
@@ -289,7 +290,9 @@ class ContactProblem:
 
         eligible = self.constraints.eligible
         push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
-        loads = self.unsupported.T @ self.scene.acting(step)[0].ravel()
+        # Initial strain has no resultant, but for round-off.
+        strained = self.scene.straining(step, self.scene.initial.force)
+        loads = self.unsupported.T @ (self.scene.acting(step)[0] - strained).ravel()
         largest = np.abs(loads).max(initial=0.0)
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")

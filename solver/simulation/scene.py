@@ -11,6 +11,7 @@ from scipy import sparse
 from ..case.model import Case, Step, Zone
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, volume_cells
+from ..mechanics.fem.initial import StrainLoads
 from ..mechanics.fem.mixed import MeanStress
 from ..mechanics.fem.supports import Fixed, FreeMotion
 from ..mechanics.mortar.cut import CutMesh, SubFaces, cut
@@ -21,6 +22,7 @@ from ..system.clock import Clock
 from ..system.progress import stage
 from .attributes import Attributes, CutZone
 from .groups import ON_AXIS, check_groups, named_parts
+from .initial import strain_factors, strain_loads_of
 from .operators import operator_of
 from .options import LEAN, Options
 from .relations import springs_of
@@ -105,7 +107,8 @@ class Scene:
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
     up for it. `fixed`: the displacements that are held, by key of the case file, `rigid`: the rigid
     bodies. `springs` (n_dofs, n_dofs) is the stiffness of springs to the ground. `probed`: nodes by
-    probe. `force` (n, dim) and `free.offset` are for load factor 1.
+    probe. `force` (n, dim), all but that of `initial` strains, and `free.offset` are for load
+    factor 1.
     """
 
     case: Case
@@ -123,6 +126,7 @@ class Scene:
     rigid: dict[str, Frame]
     free: FreeMotion
     force: np.ndarray
+    initial: StrainLoads
     springs: sparse.csr_matrix
     probed: dict[str, np.ndarray]
     histories: dict[str, tuple[np.ndarray, np.ndarray]]
@@ -131,11 +135,16 @@ class Scene:
 
     def acting(self, step: Step) -> tuple[np.ndarray, np.ndarray]:
         """Forces (n, dim) and imposed displacements (n_dofs,) of a step."""
+        strained = self.straining(step, self.initial.force)
         if not isinstance(step, dict):
-            return step * self.force, step * self.free.offset
+            return step * self.force + strained, step * self.free.offset
         parts = [(step.get(name, 1.0), *part) for name, part in self.histories.items()]
         force = np.sum([f * force for f, force, _ in parts], axis=0)
-        return force, np.sum([f * offset for f, _, offset in parts], axis=0)
+        return force + strained, np.sum([f * offset for f, _, offset in parts], axis=0)
+
+    def straining(self, step: Step, values: np.ndarray) -> np.ndarray:
+        """The sum of `values` (k, …) of the initial strains, with their factors in a step."""
+        return np.tensordot(strain_factors(self.case, step), values, axes=1)
 
     @property
     def n_dofs(self) -> int:
@@ -186,6 +195,7 @@ def build_scene(
         blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
         free = groups.supports()
         force, springs = groups.forces(), springs_of(groups)
+        initial = strain_loads_of(groups, blocks, mean)
         zones = _zones(case, cut_zones, surfaces, operators, free)
     n_bodies = int(groups.body.max()) + 1
     n_multipliers = sum(len(z.operator.initial) for z in zones)
@@ -209,6 +219,7 @@ def build_scene(
         rigid=groups.frames,
         free=free,
         force=force,
+        initial=initial,
         springs=springs,
         probed={p.name: groups.nodes(p.group, "probes") for p in case.probes if p.group},
         histories=groups.histories(),

@@ -153,6 +153,7 @@ def _recover(
         scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
     )
     stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
+    stress -= scene.straining(scene.case.steps[-1], scene.initial.stress)
     if scene.case.thin:
         stress[:, 2] = 0.0
     scale = _stress_scale(scene, states, stress)
@@ -182,7 +183,7 @@ def _recover(
         matrix_entries=problem.matrix.nnz,
         plan=plan,
         validity=validity(scene, states),
-        strain_energy=strain_energy(last),
+        strain_energy=strain_energy(scene, last),
         reaction=at_nodes,
         probes=probed(scene, zones, last.displacement, stress),
         accuracy=last.accuracy.causes,
@@ -352,7 +353,7 @@ def _stress_scale(scene: Scene, states: list[Equilibrium], stress: np.ndarray) -
     Else the largest contact pressure of any step or `stress` (n, 6), else 1.
     """
     values = [
-        abs(load.value * (step.get(load.name, 1.0) if isinstance(step, dict) else step))
+        abs(load.value * load.factor(step))
         for load in scene.case.loads
         for step in scene.case.steps
         if load.kind == "pressure" and isinstance(load.value, float)

@@ -68,6 +68,8 @@ def _unloaded(
     awake, imposed = np.zeros((2, n_bodies), dtype=bool)
     imposed[scene.body[(offset.reshape(scene.force.shape) != 0).any(axis=1)]] = True
     awake[scene.body[(scene.force != 0).any(axis=1)]] = True
+    # Where all of a body is held, its initial strain is stress.
+    imposed[scene.body[scene.initial.stress.any(axis=(0, 2))]] = True
     awake |= imposed
     initial = np.concatenate([np.empty(0), *(zone.operator.initial for zone in scene.zones)])
     pushed = np.flatnonzero((initial < 0) | (gaps @ offset != 0))

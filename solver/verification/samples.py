@@ -25,6 +25,7 @@ from ..mechanics.fem.stress import COMPONENTS
 from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues, deformable
 from ..simulation.groups import ALL
+from ..simulation.initial import strain_at
 from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
 
@@ -177,7 +178,8 @@ def stress_components(solution: Solution, _: None, reference: Reference) -> Samp
 def integration_stress(solution: Solution, _: None, reference: Reference) -> Sample:
     """The given components at the integration points of all cells, by Hooke's law.
 
-    They follow from the displacement without extrapolation to nodes and averages.
+    They follow from the displacement, less initial strains, without extrapolation to nodes and
+    averages.
     """
     place, stress, node, cell = (np.concatenate(c) for c in zip(*_by_hooke(solution), strict=True))
     if isinstance(reference, ExactValues):
@@ -199,7 +201,9 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
     Place (k, dim), stress (k, 6), and of the cell: its first node (k,) and its number (k,).
     """
     points, moving, first = solution.mesh.points, deformable(solution), 0
-    for block, elastic in zip(solution.mesh.cells, _materials(solution), strict=True):
+    for i, (block, elastic) in enumerate(
+        zip(solution.mesh.cells, _materials(solution), strict=True)
+    ):
         kind = cell_type(block.type)
         reference, _ = volume_rule(kind.name)
         values = shape_functions(kind.name).values(reference)
@@ -214,9 +218,10 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
             if solution.case.axisymmetric:
                 hoop, _ = hoop_values(points, cells, kind, reference)
                 slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
-            dim = slope.shape[-1]
+            dim, place = slope.shape[-1], (values @ points[cells]).reshape(-1, kind.dim)
             lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
-            mean = lame * np.einsum("cqii->cq", slope)
+            initial = _initial_strain(solution, i, part, place).reshape(*slope.shape[:2], 6)
+            mean = lame * (np.einsum("cqii->cq", slope) - initial[..., :3].sum(axis=-1))
             if mixed is not None:
                 own = mixed[part] @ values.T
                 mean = np.where(np.isnan(own), mean, own)
@@ -225,10 +230,25 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
             tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
             if solution.case.thin:
                 tensor[..., 2, 2] = 0.0
-            stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]].reshape(-1, 6)
+            stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+            stress = (stress - 2 * shear[..., None] * initial).reshape(-1, 6)
             owners = (np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
-            yield (values @ points[cells]).reshape(-1, kind.dim), stress, *owners
+            yield place, stress, *owners
         first += len(block.data)
+
+
+def _initial_strain(
+    solution: Solution, block: int, part: np.ndarray, place: np.ndarray
+) -> np.ndarray:
+    """The initial strain (k, 6) in the last step at points (k, dim) in cells (n,) of a block."""
+    case, found = solution.case, np.zeros((len(place), 6))
+    for load in (load for load in case.loads if load.strains):
+        here = np.ones(len(place), dtype=bool)
+        if load.group != ALL:
+            mine = np.isin(part, solution.mesh.cell_sets[load.group][block])
+            here = np.repeat(mine, len(place) // len(part))
+        found[here] += load.factor(case.steps[-1]) * strain_at(case, load, place[here])
+    return found
 
 
 def _materials(solution: Solution) -> list[np.ndarray]:

@@ -305,7 +305,7 @@ REFUSED = [
     ),
     (
         "loads: [{group: Top, pressure: 1, traction: [0, 0, 1]}]",
-        "must be {group, and exactly one of pressure, traction, body_force, force}",
+        "must be {group, and exactly one of pressure, traction, body_force, force, strain, ",
     ),
     ("loads: [{pressure: 1}]", "must be {group} with its load, or {at, force}"),
     ("loads: [{group: Top, pressure: true}]", "loads[0].pressure = True: must be a number or"),

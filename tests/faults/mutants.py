@@ -49,6 +49,7 @@ PARTLY, VARYING, LAYERS, TILTED_SOLID = (
     "hydrostatic/tilted-hexa20-tetra10",
 )
 SPHERES = "lame/spheres-hexa20"
+HEATED = "loads/heated"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 UNLOADING, SECTOR = "loads/unloading", "lame/rings-sector"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
@@ -365,6 +366,12 @@ MUTANTS = (
            "solver.simulation.relations:foundation", changed(lambda k: 1.01 * k)),
     Mutant("spring-reaction", "the balance of forces leaves out springs", FOUNDATION,
            "solver.simulation.balance:_of_springs", changed(np.zeros_like)),
+    Mutant("initial-stress", "stress is not reduced by initial strain", HEATED,
+           "solver.simulation.scene:strain_loads_of",
+           changed(lambda found: replace(found, stress=np.zeros_like(found.stress)))),
+    Mutant("initial-zz", "initial strain across the plane has no effect", HEATED,
+           "solver.simulation.initial:strain_at",
+           changed(lambda strain: strain * [1, 1, 0, 1, 1, 1])),
     Mutant("tie-lost", "nodes that should move as one move apart", PLATEN,
            "solver.simulation.attributes:tied", lambda _: lambda free, ties: free),
     Mutant("history-lost", "every load acts in full in every step", UNLOADING,

@@ -30,7 +30,8 @@ class Block:
     """Cells of one type with their material.
 
     `cells` (n, n_nodes) node numbers; `lame` and `shear` (n,) Lamé's λ and μ, in units of stress
-    (plane strain in 2D); `straight`: all their edges are; `axisymmetric`: sections of rings.
+    (plane strain in 2D); `straight`: all their edges are; `axisymmetric`: sections of rings; `rows`
+    (n,): their places among all cells of the type, where it matters.
     """
 
     type: CellType
@@ -39,16 +40,18 @@ class Block:
     shear: np.ndarray
     straight: bool = True
     axisymmetric: bool = False
+    rows: np.ndarray | None = None
 
     @property
     def rule(self) -> tuple[np.ndarray, np.ndarray]:
         """The quadrature points (q, dim) and weights (q,) of the block."""
         return volume_rule(self.type.name, self.straight)
 
-    def of(self, chosen: np.ndarray) -> "Block":
+    def of(self, chosen: np.ndarray | slice) -> "Block":
         """The chosen (n,) of its cells."""
         cells, lame, shear = self.cells[chosen], self.lame[chosen], self.shear[chosen]
-        return replace(self, cells=cells, lame=lame, shear=shear)
+        rows = None if self.rows is None else self.rows[chosen]
+        return replace(self, cells=cells, lame=lame, shear=shear, rows=rows)
 
 
 def lame_parameters(young: np.ndarray, poisson: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -153,7 +156,8 @@ def shapes_in(
     return _Shapes(gradients, inverse, measure * around, hoop)
 
 
-def _chunks(block: Block, dim: int) -> Iterator[slice]:
+def chunks(block: Block, dim: int) -> Iterator[slice]:
+    """Parts of a block whose gradients fit into the processor's cache."""
     points, _ = block.rule
     size = len(points) * block.type.n_nodes * dim * 8
     step = max(1, _CHUNK_BYTES // size)
@@ -165,7 +169,7 @@ def _in_the_middle(points: np.ndarray, block: Block) -> Iterator[tuple[slice, _S
     """Parts of a block with what is in the middle (q = 1) of their cells, and sizes (n,)."""
     reference, weights = block.rule
     middle = (weights @ reference / weights.sum())[None]
-    for part in _chunks(block, points.shape[1]):
+    for part in chunks(block, points.shape[1]):
         found = shapes_in(points, block, block.cells[part], middle)
         yield part, found, found.measure[:, 0] * weights.sum()
 
@@ -208,7 +212,7 @@ def stiffness(
     n, dim = points.shape
     total = CellSum([block.cells for block in blocks], n, dim, kept)
     for block in blocks:
-        for part in _chunks(block, dim):
+        for part in chunks(block, dim):
             total.add(block.cells[part], element_matrices(points, block, part))
     return total.matrix, total.diagonal
 
@@ -231,7 +235,7 @@ def internal_force(
         return force.T.copy()
     for block in blocks:
         reference, weights = block.rule
-        for part in _chunks(block, dim):
+        for part in chunks(block, dim):
             cells = block.cells[part]
             found = shapes_in(points, block, cells, reference)
             stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
@@ -374,8 +378,8 @@ def nodal_stress(
     total, count = np.zeros(6 * n), np.zeros(n)
     for block in blocks:
         reference, _ = block.rule
-        fit = _extrapolation(block.type, reference)
-        for part in _chunks(block, points.shape[1]):
+        fit = extrapolation(block.type, reference)
+        for part in chunks(block, points.shape[1]):
             cells = block.cells[part]
             found = shapes_in(points, block, cells, reference)
             stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
@@ -387,8 +391,8 @@ def nodal_stress(
     return total.reshape(n, 6) / np.maximum(count, 1)[:, None]
 
 
-def _extrapolation(kind: CellType, reference: np.ndarray) -> np.ndarray:
-    """Matrix (n_nodes, q): values at quadrature points to values at nodes, by a linear fit."""
+def extrapolation(kind: CellType, reference: np.ndarray) -> np.ndarray:
+    """The matrix (n_nodes, q): values at quadrature points to values at nodes, by a linear fit."""
     if len(reference) == 1:
         return np.ones((kind.n_nodes, 1))
     linear = shape_functions(kind.skeleton)

@@ -20,7 +20,7 @@ Finite Element Procedures, §4.4–4.5; for s at vertices Bonet, Burton, Commun.
 (1998) 437–449.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from scipy import sparse
 
 from . import shape_functions
 from .assembly import degrees_of_freedom
-from .elasticity import Block, shapes_in
+from .elasticity import Block, chunks, shapes_in
 
 AUTOMATIC_ABOVE = 0.499
 """Poisson's ratio above which the mixed form is taken where a case does not choose."""
@@ -40,19 +40,26 @@ _CELLS_AT_ONCE = 2048
 class _Cells:
     """Cells of one type in mixed form.
 
-    `cells` (n, n_nodes); `rows` (n,) their places among all cells of that type; `unknowns` (n, k)
+    `block`, with their λ; `rows` (n,) their places among all cells of that type; `unknowns` (n, k)
     the numbers of what s is made of in each; `flux` (n, k, n_nodes, dim) the integrals of q ∂N/∂x;
     `at_nodes` (n, n_nodes, k) the values of the q at the nodes. `common` (dim,): the directions in
     which a displacement common to all nodes has no divergence.
     """
 
-    name: str
-    cells: np.ndarray
+    block: Block
     rows: np.ndarray
     unknowns: np.ndarray
     flux: np.ndarray
     at_nodes: np.ndarray
     common: np.ndarray
+
+    @property
+    def name(self) -> str:
+        return self.block.type.name
+
+    @property
+    def cells(self) -> np.ndarray:
+        return self.block.cells
 
 
 class MeanStress:
@@ -105,6 +112,22 @@ class MeanStress:
             opened = np.einsum("ckai,cai->ck", part.flux, difference, optimize=True)
             defect -= np.bincount(part.unknowns.ravel(), opened.ravel(), minlength=self.size)
         return defect
+
+    def integrals(
+        self, points: np.ndarray, values: Callable[[Block], np.ndarray], count: int
+    ) -> np.ndarray:
+        """∫ q v (count, size) of `values` (count, n, q) at the quadrature points of a block."""
+        found = np.zeros((count, self.size))
+        for part in self._parts if count else ():
+            for some in chunks(part.block, self._shape[1]):
+                block = part.block.of(some)
+                reference, weights = block.rule
+                measure = shapes_in(points, block, block.cells, reference).measure * weights
+                inside = _functions(points, block, block.cells, reference, measure)
+                opened = np.einsum("cq,cqk,lcq->lck", measure, inside, values(block), optimize=True)
+                for total, added in zip(found, opened, strict=True):
+                    np.add.at(total, part.unknowns[some], added)
+        return found
 
     def condensed_force(self, defect: np.ndarray) -> np.ndarray:
         """The part (n_dofs,) of a defect (size,) in the equations that are left: Bᵀ C⁻¹ defect."""
@@ -202,8 +225,7 @@ def _mean_stress(
         flux, at_nodes, weight = _integrals(points, block)
         common = np.ones(dim)
         common[: int(block.axisymmetric)] = 0.0
-        name = block.type.name
-        cells.append(_Cells(name, block.cells, rows, unknowns, flux, at_nodes, common))
+        cells.append(_Cells(block, rows, unknowns, flux, at_nodes, common))
         soft = weight / block.lame[:, None]
         compliance += np.bincount(unknowns.ravel(), soft.ravel(), minlength=size)
     return MeanStress(cells, compliance, n_nodes, dim)
