@@ -14,7 +14,6 @@ from msgspec import NODEFAULT
 from .file import CaseFile
 from .solutions.catalogue import SOLUTIONS
 from .typed import Section, fields, is_section, parts_of, read_as
-from .yaml import read_mapping
 
 # Labels and texts for readers, which change no result.
 _TEXTS = ("name", "title", "description", "units", "remark")
@@ -31,9 +30,9 @@ def features(recipes: Iterable[str]) -> list[str]:
     return found
 
 
-def used(path: Path) -> set[str]:
-    """The features of a case file; raises InputError where it is not valid."""
-    file = read_as(CaseFile, read_mapping(path), path)
+def used(content: dict[str, Any], path: Path) -> set[str]:
+    """The features of the content of a case file; raises InputError where it is not valid."""
+    file = read_as(CaseFile, content, path)
     found = set(_used(file, ""))
     mesh, solution = file.mesh, file.reference and file.reference.solution
     found.add(f"mesh.recipe: {mesh['recipe']}" if "recipe" in mesh else "mesh.file")

@@ -40,7 +40,7 @@ class Oblique:
 
 
 def split(free: FreeMotion, dim: int) -> tuple[np.ndarray, list[Oblique]]:
-    """Displacements (n, dim) given along axes, NaN where there is none, and all other supports."""
+    """Imposed displacements (n, dim) along axes, NaN in free directions, and all other supports."""
     held, oblique = free.offset.reshape(-1, dim).copy(), []
     basis = free.basis.tocsr()
     entries = np.diff(basis.indptr)

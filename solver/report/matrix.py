@@ -93,7 +93,8 @@ def _used(folders: Sequence[Path]) -> dict[tuple[str, str], set[str]]:
     for folder in folders:
         for path in folder.glob("*.yaml"):
             try:
-                found[folder.name, str(read_mapping(path).get("name"))] = used(path)
+                content = read_mapping(path)
+                found[folder.name, str(content.get("name"))] = used(content, path)
             except InputError:
                 continue
     return found

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from solver.case.features import features, used
+from solver.case.yaml import read_mapping
 from solver.commands.jobs import case_files
 from solver.mesh.keys import RECIPES
 from solver.report.matrix import fits, matrix, matrix_page, reasons
@@ -25,9 +26,18 @@ reference: {{kind: analytical, contact_pressure: 1.0}}
 """
 
 
+def features_of(file):
+    return used(read_mapping(file), file)
+
+
 @pytest.fixture(scope="module")
 def unused():
-    found = {feature for folder in FOLDERS for file in case_files(folder) for feature in used(file)}
+    found = {
+        feature
+        for folder in FOLDERS
+        for file in case_files(folder)
+        for feature in features_of(file)
+    }
     assert found <= {*features(RECIPES), "mesh", "reference.solution"}
     return [feature for feature in features(RECIPES) if feature not in found]
 
@@ -44,7 +54,7 @@ def test_no_reason_outlives_its_hole(unused):
 def test_features_of_a_file(tmp_path):
     file = tmp_path / "c.yaml"
     file.write_text(CASE.format(name="c", plane="strain"))
-    assert used(file) >= {
+    assert features_of(file) >= {
         "plane: strain",
         "mesh.recipe: blocks",
         "contact[].treatment: nodal",
@@ -53,7 +63,7 @@ def test_features_of_a_file(tmp_path):
         "reference.contact_pressure",
         "supports[].group",
     }
-    assert not {"loads", "contact[].treatment: lac", "contact[].clearance"} & used(file)
+    assert not {"loads", "contact[].treatment: lac", "contact[].clearance"} & features_of(file)
 
 
 def test_a_line_counts_solves_by_dimension_and_names_the_strictest_check(tmp_path):

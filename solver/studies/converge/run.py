@@ -39,7 +39,7 @@ class Convergence:
     """A case on all meshes: what its divisions are multiplied by, unknowns, and its quantities.
 
     `estimate`: the estimated relative error of constant pressures in L2, mesh by mesh, and its
-    order; empty and None where there is none. Its limit is zero, so that it has no band.
+    order; empty and None without an estimate. Its limit is zero, so that it has no band.
     """
 
     job: str
