@@ -39,13 +39,9 @@ class HalfPlanes(ElasticSolution):
     top: Material = parameter("of the upper body", source="material")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         finite = {name: isfinite(getattr(self, name).young) for name in self.parts}
         self.require("must not be rigid", **finite)
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """Of the lower and the upper body."""
-        return self.bottom, self.top
 
     @property
     def modulus(self) -> float:
@@ -63,10 +59,6 @@ class HalfPlanes(ElasticSolution):
     def initial_gap(self, x: np.ndarray) -> np.ndarray:
         """g₀ (n,) at places (n,) along the interface."""
         raise NotImplementedError
-
-    def level(self, x: np.ndarray) -> np.ndarray:
-        """The height above the interface."""
-        return x[:, -1]
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """−Re Z where the bodies touch."""
@@ -117,11 +109,7 @@ class ContactEdge(HalfPlanes):
     name: ClassVar[str] = "contact_edge"
 
     edge: float = parameter("e, where the contact ends: it is closed below", default=0.0)
-    factor: float = parameter("C, the factor of the pressure C √(e − x)")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("must be positive", factor=self.factor > 0)
+    factor: float = parameter("C, the factor of the pressure C √(e − x)", positive=True)
 
     def functions(self, z: np.ndarray) -> Functions:
         """Z = i C √z from the edge."""
