@@ -292,7 +292,7 @@ class ContactProblem:
 
         eligible = self.constraints.eligible
         push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
-        # Initial strain has no resultant, but for round-off.
+        # Up to round-off initial strain has no resultant.
         strained = self.scene.straining(step, self.scene.initial.force)
         loads = self.unsupported.T @ (self.scene.acting(step)[0] - strained).ravel()
         largest = np.abs(loads).max(initial=0.0)

@@ -1,7 +1,7 @@
 """Sums of cell matrices, each block of entries added straight to its place in the sparse sum.
 
 Which nodes share a cell is known before any matrix is. So the sum's pattern is made first, and no
-list of all the entries of all cells is ever held: memory is that of the sum and of a few cells.
+list of all the entries of all cells is ever held: memory is for the sum and a few cells only.
 Every degree of freedom belongs to a node (`dof = dim · node + component`), and every pair of nodes
 that share a cell has a block: an index for dim² entries.
 """

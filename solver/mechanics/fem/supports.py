@@ -103,7 +103,7 @@ class CopyError(Exception):
 
 @dataclass(frozen=True)
 class Copies:
-    """Nodes `copy` (n,) whose displacement is that of nodes `of` (n,), turned by `turn`."""
+    """Nodes `copy` (n,) that have the displacement of nodes `of` (n,), turned by `turn`."""
 
     of: np.ndarray
     copy: np.ndarray
