@@ -10,7 +10,7 @@ from .problem import Equilibrium
 from .scene import Scene, ZoneScene
 from .solution import Reaction, RigidMotion
 
-# A macro-element of which the segments miss less than this share is covered in full.
+# A macro-element is covered in full where its segments miss less than this share.
 _COVERED = 1e-6
 # Of a macro-element's largest coefficient: smaller ones are round-off, or too small to divide by.
 _ROUND_OFF, _OWN = 1e-10, 1e-2

@@ -1,7 +1,7 @@
 """Shape functions by cell type, in the node order of the catalogue.
 
 Those of edges and faces are products of a matrix and monomials, since contact evaluates them at
-many points; those of solid cells are scikit-fem's.
+many points; solid cells have scikit-fem's.
 """
 
 from functools import cache

@@ -1,9 +1,9 @@
 """A refined result in place of an exact solution: the fields of a fine mesh, anywhere in it.
 
 For two rectangular blocks on a plane interface, of regular QUAD cells. Displacement and gradient
-are those of the cell around a point. The pressure of the LAC method is right in the mean over each
-macro-element: a cubic spline through its integral is differentiated. The errors of this reference
-are those of the fine mesh; they are named as such wherever it is used.
+come from the cell around a point. The pressure of the LAC method is right in the mean over each
+macro-element: a cubic spline through its integral is differentiated. This reference has the errors
+of the fine mesh; wherever it is used, they are stated.
 """
 
 from collections.abc import Callable
@@ -122,7 +122,7 @@ class RefinedSolution(ElasticSolution):
 
 
 def read_reference(path: Path) -> RefinedSolution:
-    """The reference that a result file is; InputError for a file that is none."""
+    """The reference in a result file; InputError for another kind of file."""
     from ...verification.results import read_result
 
     return RefinedSolution(read_result(path).solution)
