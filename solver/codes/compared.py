@@ -214,7 +214,7 @@ class Compared:
         return _by_component(placed, COMPONENTS, expected)
 
     def _along(self, placed: Placed, directions: np.ndarray, reference: Reference) -> Sample:
-        """Stress along directions (dim,) or (k, dim) beside that of the reference."""
+        """Stress along directions (dim,) or (k, dim) beside the reference's."""
         if isinstance(reference, ExactValues):
             field = reference.exact.stress(placed.places, self._part(placed))
             expected = normal_stress(field, directions)

@@ -9,9 +9,6 @@ from typing import TypeVar
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 
-# Results that wait for their turn, for each thread.
-_WAITING = 2
-
 
 def workers() -> int:
     """The threads that this process may use: its cores, or fewer as OMP_NUM_THREADS says."""
@@ -41,7 +38,7 @@ def ahead(function: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator
         try:
             for part in parts:
                 waiting.append(pool.submit(function, part))
-                if len(waiting) > _WAITING * count:
+                if len(waiting) > count:
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.errors import SolveError
@@ -275,6 +274,8 @@ def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> No
 
 def _largest_eigenvalue(matrix: bsr_matrix, steps: int = 10) -> float:
     """Largest eigenvalue by Lanczos' iteration, from below."""
+    from scipy.linalg import eigh_tridiagonal
+
     vector = np.random.default_rng(0).uniform(-1, 1, matrix.shape[0]).astype(np.float32)
     vector /= np.linalg.norm(vector)
     previous = np.zeros_like(vector)

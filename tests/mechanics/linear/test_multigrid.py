@@ -25,7 +25,7 @@ def block(count: int, stretch: float = 1.0, poisson: float = 0.3) -> tuple[np.nd
     points, cells = grid(count)
     lame, shear = lame_parameters(np.full(len(cells), 2000.0), np.full(len(cells), poisson))
     points = points * [1.0, 1.0, stretch]
-    return points, stiffness(points, [Block(BY_NAME["HEXA8"], cells, lame, shear)])[0]
+    return points, stiffness(points, [Block(BY_NAME["HEXA8"], cells, lame, shear)]).tocsr()
 
 
 def motions(points: np.ndarray) -> np.ndarray:
