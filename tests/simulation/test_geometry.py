@@ -185,7 +185,7 @@ def test_handled(change, mesh):
 
 
 def test_a_support_on_the_master_surface_takes_the_load(mesh):
-    """The upper block hangs on it, so that nothing reaches the interface; and the plan tells."""
+    """The upper block hangs on it, so that nothing reaches the interface; and the plan says so."""
     held = [("loads:", "  - {group: top_contact, fix: [y]}\nloads:")]
     zone = solved(mesh, *held).zones[0]
     np.testing.assert_allclose(zone.multiplier, 0, atol=1e-9 * PRESSURE)

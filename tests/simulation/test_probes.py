@@ -65,7 +65,7 @@ def test_another_value_does_not_pass(name, wrong):
 
 
 def test_a_recovered_pressure_is_read_within_its_macro_element():
-    """Under a load of 25 (1 + x) it is not that of the constant, which is read without recovery."""
+    """Under a load of 25 (1 + x) it is not the constant, which is read without recovery."""
     load = ("pressure: 25.0}", "pressure: 25*(1 + x)}")
     exact = solved(load, ("{name: interface", "{name: interface, recovery: linear"))
     zone, plain = exact.zones[0], solved(load)

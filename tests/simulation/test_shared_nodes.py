@@ -93,7 +93,7 @@ def at_the_corner(n, treatment):
 
 
 def test_the_inf_sup_constant_at_a_corner():
-    """It is that of one zone, and levels off; without the cut it halves with the mesh."""
+    """It equals one zone's, and levels off; without the cut it halves with the mesh."""
     assert [at_the_corner(n, "lac") for n in (4, 8)] == pytest.approx([0.594, 0.579], abs=1e-3)
     coarse, fine = (at_the_corner(n, "uncut") for n in (4, 8))
     assert fine / coarse == pytest.approx(0.5, abs=0.02)

@@ -147,7 +147,7 @@ def test_what_is_left_after_unloading_is_compared_with_the_largest_step(unloaded
 
 
 def test_places_are_observed_against_the_last_factor():
-    """The reference of 8.25 is that of the factor 1/4; at 1/2 it is 16.5."""
+    """The reference of 8.25 belongs to the factor 1/4; at 1/2 it is 16.5."""
     text = CASE.replace(", name: press", "").replace(", name: weight", "")
     text += "steps: [0.5, 0.25]\nreference: {kind: analytical, contact_pressure: 8.25}\n"
     found = {check.name: check for check in run_checks(solved(text)[0])}
