@@ -53,7 +53,7 @@ class Compared:
         """The comparison; raises InputError where result and case do not belong together."""
         where = f"{case.name}@{foreign.code}"
         if foreign.step is not None and abs(foreign.step - case.factors[-1]) > _STEP:
-            allowed = f"the result must be that of load factor {case.factors[-1]:g}"
+            allowed = f"the result must belong to load factor {case.factors[-1]:g}"
             raise InputError(where, "step", foreign.step, allowed)
         foreign = flattened(foreign, mesh.points.shape[1], where, case.thin)
         model = Model.of(case, mesh)

@@ -223,7 +223,7 @@ class Placer:
         axes = "xyz"[: self.model.dim]
         moved = self.foreign.displacement
         if moved is not None and len(moved.places) == len(places):
-            told = "coordinates are those of the deformed mesh; the undeformed ones are needed"
+            told = "coordinates belong to the deformed mesh; the undeformed ones are needed"
             yield told, places - moved.values[:, : self.model.dim]
         for factor, text in UNITS.items():
             yield f"lengths are {text} times the case's: another unit?", places / factor

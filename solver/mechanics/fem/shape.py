@@ -118,7 +118,7 @@ def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
 
 
 def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
-    from skfem import element
+    import skfem.element as element
 
     if name in ("PENTA15", "PYRA5", "PYRA13"):
         from .extra_elements import ElementPyramid, ElementWedgeS2

@@ -6,12 +6,12 @@ macro-element: a cubic spline through its integral is differentiated. This refer
 of the fine mesh; wherever it is used, they are stated.
 """
 
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ...case.material import Material
 from ...case.solutions.base import ElasticSolution, Part
@@ -103,7 +103,9 @@ class RefinedSolution(ElasticSolution):
         return self._pressure(x[:, 0])
 
     @cached_property
-    def _pressure(self) -> CubicSpline:
+    def _pressure(self) -> Callable[[np.ndarray], np.ndarray]:
+        from scipy.interpolate import CubicSpline
+
         order = np.argsort(self.zone.centre[:, 0])
         length, force = self.zone.area[order], (self.zone.area * self.zone.multiplier)[order]
         start = self.zone.centre[order[0], 0] - length[0] / 2
