@@ -43,7 +43,7 @@ _ERRORS = {
 
 
 @dataclass
-class Surface:
+class DrawnSurface:
     """One surface: its `points` (n, 3), `displacement` (n, 3), `triangles` (t, 3), `edges` (e, 2).
 
     `fields` by the title of the map, (n,); `apart` (3,): where it goes when bodies are moved apart.
@@ -100,7 +100,7 @@ def _contact(solution: Solution) -> list[list[float]] | None:
     return None if not len(found) else [_three(f).tolist() for f in (found.min(0), found.max(0))]
 
 
-def _map(title: str, parts: list[Surface]) -> dict[str, Any]:
+def _map(title: str, parts: list[DrawnSurface]) -> dict[str, Any]:
     """The colours of a map: the same on both sides of zero where values have two signs."""
     values = np.concatenate([part.fields[title] for part in parts if title in part.fields])
     low, high = float(values.min()), float(values.max())
@@ -113,7 +113,7 @@ def _map(title: str, parts: list[Surface]) -> dict[str, Any]:
     return {"title": title, "limits": limits, "colors": colors}
 
 
-def _plain(part: Surface) -> dict[str, Any]:
+def _plain(part: DrawnSurface) -> dict[str, Any]:
     arrays = {
         "points": part.points.astype("<f4"),
         "displacement": part.displacement.astype("<f4"),
@@ -130,7 +130,7 @@ def _base64(array: np.ndarray) -> str:
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
 
 
-def _parts(solution: Solution) -> Iterator[Surface]:
+def _parts(solution: Solution) -> Iterator[DrawnSurface]:
     fields, outside, ways = _nodal_fields(solution), _outside(solution), ways_apart(solution)
     for number, body in enumerate(solution.bodies):
         look: dict[str, Any] = {
@@ -142,7 +142,7 @@ def _parts(solution: Solution) -> Iterator[Surface]:
         look |= {"color": edge_color(body), "fill": tint(body)}
         if shape := obstacle(solution, body.name):
             motion = _motion(solution, number)
-            yield Surface(
+            yield DrawnSurface(
                 **look,
                 points=_three(shape.points),
                 displacement=_three(motion(shape.points)),
@@ -151,7 +151,7 @@ def _parts(solution: Solution) -> Iterator[Surface]:
             continue
         own = [(kind, nodes[solution.body[nodes[:, 0]] == number]) for kind, nodes in outside]
         used = np.unique(np.concatenate([nodes.ravel() for _, nodes in own]))
-        yield Surface(
+        yield DrawnSurface(
             **look,
             points=_three(solution.mesh.points[used]),
             displacement=_three(solution.displacement[used]),
@@ -170,7 +170,7 @@ def _motion(solution: Solution, number: int) -> Callable[[np.ndarray], np.ndarra
     return lambda places: np.c_[places, np.ones(len(places))] @ linear
 
 
-def _zone_part(solution: Solution, zone: ZoneResult, way: np.ndarray) -> Surface:
+def _zone_part(solution: Solution, zone: ZoneResult, way: np.ndarray) -> DrawnSurface:
     """The slave faces of a zone; each has points of its own, since values jump between them."""
     units = solution.case.units
     titles = {
@@ -186,7 +186,7 @@ def _zone_part(solution: Solution, zone: ZoneResult, way: np.ndarray) -> Surface
         found.append((nodes.ravel(), np.repeat(owner, nodes.shape[1]), kind, local))
         first += nodes.size
     nodes, owner = (np.concatenate([part[i] for part in found]) for i in (0, 1))
-    return Surface(
+    return DrawnSurface(
         name=f"{zone.name}: slave faces",
         body=False,
         role="slave",
