@@ -27,7 +27,7 @@ def compiled(function: Callable[..., None]) -> Callable[..., None]:
     def machine_code() -> Any:
         from numba import njit
 
-        options = {"nogil": True, "fastmath": {"contract"}}
+        options: Any = {"nogil": True, "fastmath": {"contract"}}
         try:
             return njit(cache=True, **options)(function)
         except RuntimeError:  # no folder for the cache
