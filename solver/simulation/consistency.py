@@ -58,7 +58,7 @@ def _all(solution: Solution) -> Iterator[str]:
 def _by_key(solution: Solution, n: int) -> Iterator[str]:
     """What belongs to supports, loads and probes of the case."""
     if solution.acted.keys() - solution.case.acting.keys():
-        yield "the supports and loads are not those of the case"
+        yield "the supports and loads differ from the case's"
     for key, nodes in solution.acted.items():
         yield from _numbers(key, nodes, (None,), n)
     if solution.probes.keys() - {probe.name for probe in solution.case.probes}:
