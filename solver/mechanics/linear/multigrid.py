@@ -1,104 +1,211 @@
 """Algebraic multigrid for large 3D elasticity: smoothed aggregation within conjugate gradients.
 
 Nodes are gathered into aggregates, whose rigid motions are the unknowns of the next level (Vanek,
-Mandel, Brezina, Computing 56 (1996) 179). Every level is scaled to a diagonal of at most one and
+Mandel, Brezina, Computing 56 (1996) 179). Quadratic cells have a level of linear cells on their
+vertices first. Every level is scaled to a diagonal of at most one and
 kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer.
 Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in double
 precision take the solution to round-off.
+
+The hierarchy is that of the bodies alone. Contact corrects its levels (`contact_levels`), and a
+factor of the unknowns beside it solves there exactly, before and after each cycle.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import bsr_matrix, csr_matrix
+from scipy.sparse.linalg import LinearOperator
 
 from ...system.errors import SolveError
-from .condensed_matrix import Symmetric
+from .aggregation import aggregate
+from .condensed_matrix import CondensedMatrix, Symmetric
+from .contact_levels import Correction, Interface, correction_of
 from .krylov import EPSILON, conjugate_gradients, in_single
+from .unknowns import Nodes, Unknowns, laid_out
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
 LARGEST_DENSE = 4_000
 """Largest level that is inverted where nothing coarsens further; beyond it multigrid is refused."""
-MOST_NEIGHBOURS = 50
-"""Largest mean number of neighbouring aggregates (20–35 is typical). Contact couples everything on
-one face: with hundreds of faces on it, coarse levels fill in."""
+MOST_NEIGHBOURS = 100
+"""Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
 _ROWS_AT_ONCE = 30_000  # whole nodes
 _BLOCKS_AT_ONCE = 100_000
 _PARTS = 8  # of a product of matrices that is formed in parts
+_ONE = np.float32(1)
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
 # The iteration approaches the largest eigenvalue from below.
 _SAFETY = 1.05
 _SMOOTHED = 4 / 3
-
-
-@dataclass(frozen=True)
-class Unknowns:
-    """The meaning of the unknowns of a system, in `dim` dimensions.
-
-    `node` (n,): the node of each unknown, at most `dim` per node; `motions` (n, 3 or 6): the rigid
-    motions in these unknowns; `body` (n,): the number of the body. Bodies that slide on each other
-    share no aggregate. `quadratic`: some cells are quadratic.
-    """
-
-    dim: int
-    node: np.ndarray
-    motions: np.ndarray
-    body: np.ndarray
-    quadratic: bool = False
-
-    def of(self, chosen: np.ndarray) -> "Unknowns":
-        """The same for some of them."""
-        arrays = self.node[chosen], self.motions[chosen], self.body[chosen]
-        return Unknowns(self.dim, *arrays, self.quadratic)
+# A share of the unknowns: where more are beside contact, a factor of these is one of everything.
+_MOST_BESIDE = 1 / 4
 
 
 @dataclass(frozen=True)
 class Level:
-    """One level: scaled matrix, bound of its eigenvalues, and the ways to and from the next."""
+    """One level: scaled matrix, bound of its eigenvalues, and the ways to and from the next.
+
+    `correction` and `weight` (n, 1): what contact changes in the matrix and in the smoother.
+    """
 
     matrix: bsr_matrix
     bound: np.float32
     prolongation: bsr_matrix
     restriction: bsr_matrix
+    correction: Correction | None = None
+    weight: np.ndarray | np.float32 = _ONE
+
+    def multiply(self, x: np.ndarray) -> np.ndarray:
+        """The product of its matrix with x (n, k)."""
+        image = self.matrix @ x
+        if self.correction is not None:
+            self.correction.add_product(image, x)
+        return image
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
         """The correction for a residual (n, k): the Chebyshev polynomial applied to it."""
-        step = residual * (np.float32(4 / 3) / self.bound)
-        residual = residual - self.matrix @ step
+        step = residual * (self.weight * (np.float32(4 / 3) / self.bound))
+        residual = residual - self.multiply(step)
         change = _FIRST * step
         step *= np.float32(1 / 5)
-        step += residual * (np.float32(12 / 5) / self.bound)
+        step += residual * (self.weight * (np.float32(12 / 5) / self.bound))
         return change + _SECOND * step
 
+    def corrected(self, correction: Correction) -> "Level":
+        """The level under contact."""
+        changed = replace(self, correction=correction, weight=correction.weights(self.matrix))
+        half = np.sqrt(changed.weight)
 
-class Multigrid:
-    """A hierarchy for one matrix. `iterations`: the most that a solve has taken so far."""
+        def multiply(x: np.ndarray) -> np.ndarray:
+            return half * changed.multiply(half * x.reshape(-1, 1))
+
+        symmetric = LinearOperator(self.matrix.shape, multiply, dtype=np.float32)
+        return replace(changed, bound=np.float32(_SAFETY * _largest_eigenvalue(symmetric)))
+
+
+class Hierarchy:
+    """The levels of the bodies alone, each free to move.
+
+    `scale` (n,) of the unknowns and their rows `place` (n,) of `size` in the first level; the
+    matrix `last` of the last level.
+    """
 
     def __init__(self, matrix: Symmetric, unknowns: Unknowns):
-        """Set up for a symmetric positive definite `matrix` (n, n).
-
-        Raises SolveError where the diagonal is not positive, nothing coarsens, or coarse levels
-        would fill in.
-        """
+        """Set up for a symmetric `matrix` (n, n); raises SolveError as `Multigrid`."""
         diagonal = matrix.diagonal()
         if not (diagonal > 0).all():
             raise SolveError("the matrix is not positive definite: its diagonal is not positive")
+        self.scale = 1 / np.sqrt(diagonal)
+        self.place, nodes = laid_out(unknowns)
+        self.size = len(nodes.motions)
+        nodes.motions[self.place] /= self.scale[:, None]
+        blocks, motions, scale = _scaled(
+            _in_blocks(matrix, self.scale, self.place, self.size), nodes.motions
+        )
+        self.scale *= scale[self.place]
+        self.levels: list[Level] = []
+        nodes = replace(nodes, motions=motions)
+        if unknowns.quadratic and self.size > COARSEST:
+            blocks, nodes = self._add_linear(blocks, unknowns)
+        while blocks.shape[0] > COARSEST:
+            bound = _bound(blocks)
+            tentative, coarse_nodes = aggregate(blocks, nodes)
+            if tentative.nnz == 0 or 2 * tentative.shape[1] > blocks.shape[0]:
+                break
+            smoothed = _smoothed(blocks, tentative, bound)
+            _refuse_fill(smoothed)
+            blocks, nodes = self._add(blocks, bound, smoothed, coarse_nodes)
+        if blocks.shape[0] > LARGEST_DENSE:
+            size = blocks.shape[0]
+            raise SolveError(f"its levels end at {size} unknowns: nothing coarsens further")
+        self.last = blocks
+
+    def _add_linear(self, matrix: bsr_matrix, unknowns: Unknowns) -> tuple[bsr_matrix, Nodes]:
+        """Add the level of quadratic cells; return matrix and nodes of the linear ones."""
+        assert unknowns.linear is not None
+        place, nodes = laid_out(unknowns.of_vertices())
+        way = unknowns.linear.tocoo()
+        entries = (way.data / self.scale[way.row]).astype(np.float32)
+        where = self.place[way.row], place[way.col]
+        shape = self.size, len(nodes.motions)
+        prolongation = csr_matrix((entries, where), shape=shape).tobsr((3, 3))
+        return self._add(matrix, _bound(matrix), prolongation, nodes)
+
+    def _add(
+        self, matrix: bsr_matrix, bound: np.float32, prolongation: bsr_matrix, nodes: Nodes
+    ) -> tuple[bsr_matrix, Nodes]:
+        """Add a level; return matrix and nodes of the next."""
+        height, width = prolongation.blocksize
+        restriction = prolongation.T.tobsr((width, height))
+        coarse, motions, scale = _scaled(_coarse(matrix, prolongation), nodes.motions)
+        _scale_blocks(prolongation, np.ones(prolongation.shape[0]), scale)
+        _scale_blocks(restriction, scale, np.ones(prolongation.shape[0]))
+        self.levels.append(Level(matrix, bound, prolongation, restriction))
+        return coarse, replace(nodes, motions=motions)
+
+
+class Shared:
+    """The hierarchy of one stiffness matrix, set up once for all contact statuses."""
+
+    def __init__(self) -> None:
+        """Nothing is set up yet."""
+        self._hierarchy: Hierarchy | None = None
+
+    def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
+        """The hierarchy of `matrix`, the same at each call until it is closed."""
+        if self._hierarchy is None:
+            self._hierarchy = Hierarchy(matrix, unknowns)
+        return self._hierarchy
+
+    def close(self) -> None:
+        """Release its memory."""
+        self._hierarchy = None
+
+
+class Multigrid:
+    """Multigrid for one matrix. `iterations`: the most that a solve has taken so far."""
+
+    def __init__(self, matrix: Symmetric, unknowns: Unknowns, shared: Shared | None = None):
+        """Set up for a symmetric positive definite `matrix` (n, n).
+
+        `unknowns` are its own, or those of the stiffness that it is condensed from, whose hierarchy
+        is `shared`. Raises SolveError where the diagonal is not positive, nothing coarsens, or
+        coarse levels would fill in.
+        """
         self.iterations = 0
-        self._matrix = matrix
-        self._scale = 1 / np.sqrt(diagonal)[:, None]
-        self._place, body = _places(unknowns)
-        motions = np.zeros((3 * len(body), unknowns.motions.shape[1]))
-        motions[self._place] = unknowns.motions / self._scale
-        blocks = _in_blocks(matrix, self._scale[:, 0], self._place, 3 * len(body))
-        blocks, motions, scale = _scaled(blocks, motions)
-        self._scale *= scale[self._place, None]
-        self._levels, self._coarsest = _hierarchy(blocks, motions, body)
-        self._padded = 3 * len(body)
+        self._matrix, self._shared = matrix, shared or Shared()
+        condensed = matrix if isinstance(matrix, CondensedMatrix) else None
+        kept = slice(None) if condensed is None else condensed.kept
+        hierarchy = self._shared.hierarchy(condensed.stiffness if condensed else matrix, unknowns)
+        self._size, self._place = hierarchy.size, hierarchy.place[kept]
+        self._scale = hierarchy.scale[kept, None]
+        self._levels, last = hierarchy.levels, hierarchy.last.toarray().astype(float)
+        self._interface: Interface | None = None
+        if condensed is not None:
+            correction = correction_of(condensed, hierarchy.scale, hierarchy.place)
+            self._interface = self._beside(correction)
+            self._levels = []
+            for level in hierarchy.levels:
+                self._levels.append(level.corrected(correction))
+                correction = correction.coarser(level.prolongation)
+            last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
+        inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
+        self._coarsest = inverse.astype(np.float32)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
+
+    def _beside(self, correction: Correction) -> Interface | None:
+        """The solve of the unknowns beside contact; None where these are too many."""
+        number = np.full(self._size, -1)
+        number[self._place] = np.arange(len(self._place))
+        chosen = np.sort(number[correction.rows])
+        chosen = chosen[chosen >= 0]
+        if not 0 < len(chosen) <= _MOST_BESIDE * len(self._place):
+            return None
+        return Interface(self._matrix[chosen], chosen, self._scale[:, 0])
 
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
@@ -108,9 +215,10 @@ class Multigrid:
         """
         columns = np.asarray(right, dtype=float)
         columns = columns if columns.ndim == 2 else columns[:, None]
+        cycle = self._cycle if self._interface is None else self._cycle_and_interface
         solution, iterations = conjugate_gradients(
             lambda x: self._scale * (self._matrix @ (self._scale * x)),
-            in_single(self._cycle),
+            in_single(cycle),
             self._scale * columns,
             accuracy,
             MAX_ITERATIONS,
@@ -122,10 +230,21 @@ class Multigrid:
 
     def close(self) -> None:
         """Release the hierarchy; it solves no more."""
-        self._levels = []
+        self._levels, self._interface = [], None
+        self._shared.close()
+
+    def _cycle_and_interface(self, residual: np.ndarray) -> np.ndarray:
+        """A cycle with an exact solve beside contact before and after."""
+        assert self._interface is not None
+        first = self._interface.solve(residual[self._interface.chosen])
+        change = self._cycle(residual - self._interface.rows.T @ first)
+        change[self._interface.chosen] += first
+        left = residual[self._interface.chosen] - self._interface.rows @ change
+        change[self._interface.chosen] += self._interface.solve(left)
+        return change
 
     def _cycle(self, residual: np.ndarray) -> np.ndarray:
-        padded = np.zeros((self._padded, residual.shape[1]), dtype=np.float32)
+        padded = np.zeros((self._size, residual.shape[1]), dtype=np.float32)
         padded[self._place] = residual
         return self._descend(0, padded)[self._place]
 
@@ -135,21 +254,10 @@ class Multigrid:
             return self._coarsest @ residual
         level = self._levels[depth]
         change = level.smooth(residual)
-        coarse = level.restriction @ (residual - level.matrix @ change)
+        coarse = level.restriction @ (residual - level.multiply(change))
         change += level.prolongation @ self._descend(depth + 1, coarse)
-        change += level.smooth(residual - level.matrix @ change)
+        change += level.smooth(residual - level.multiply(change))
         return change
-
-
-def _places(unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
-    """Row (n,) of each unknown when every node has three, and the body of each such node."""
-    _, first, number, count = np.unique(
-        unknowns.node, return_index=True, return_inverse=True, return_counts=True
-    )
-    order = np.argsort(number, kind="stable")
-    rank = np.empty(len(number), dtype=int)
-    rank[order] = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
-    return 3 * number + rank, unknowns.body[first]
 
 
 def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
@@ -180,33 +288,15 @@ def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: in
     return bsr_matrix((blocks, columns, np.cumsum(np.concatenate(lengths))), shape=(size, size))
 
 
-def _hierarchy(
-    matrix: bsr_matrix, motions: np.ndarray, body: np.ndarray
-) -> tuple[list[Level], np.ndarray]:
-    """The levels below a scaled matrix, and the inverse of the last."""
-    levels: list[Level] = []
-    while matrix.shape[0] > COARSEST:
-        bound = np.float32(_SAFETY * _largest_eigenvalue(matrix))
-        tentative, coarse_motions, coarse_body = _aggregate(matrix, motions, body)
-        if tentative.nnz == 0 or 2 * tentative.shape[1] > matrix.shape[0]:
-            break
-        smoothed = matrix @ tentative
-        smoothed.data *= -np.float32(_SMOOTHED / bound)
-        height, width = tentative.blocksize
-        smoothed = (tentative + smoothed).tobsr((height, width))
-        _refuse_fill(smoothed)
-        restriction = smoothed.T.tobsr((width, height))
-        coarse = _coarse(matrix, smoothed)
-        coarse, motions, scale = _scaled(coarse, coarse_motions)
-        _scale_blocks(smoothed, np.ones(smoothed.shape[0]), scale)
-        _scale_blocks(restriction, scale, np.ones(smoothed.shape[0]))
-        levels.append(Level(matrix, bound, smoothed, restriction))
-        matrix, body = coarse, coarse_body
-    if matrix.shape[0] > LARGEST_DENSE:
-        raise SolveError(f"its levels end at {matrix.shape[0]} unknowns: nothing coarsens further")
-    dense = matrix.toarray().astype(float)
-    inverse = np.linalg.pinv((dense + dense.T) / 2, rcond=1e-7, hermitian=True)
-    return levels, inverse.astype(np.float32)
+def _bound(matrix: bsr_matrix) -> np.float32:
+    return np.float32(_SAFETY * _largest_eigenvalue(matrix))
+
+
+def _smoothed(matrix: bsr_matrix, tentative: bsr_matrix, bound: np.float32) -> bsr_matrix:
+    """The prolongation after a step of Jacobi's iteration."""
+    smoothed = matrix @ tentative
+    smoothed.data *= -np.float32(_SMOOTHED / bound)
+    return (tentative + smoothed).tobsr(tentative.blocksize)
 
 
 def _refuse_fill(prolongation: bsr_matrix) -> None:
@@ -238,33 +328,6 @@ def _rows(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
     chosen = slice(starts[0], starts[-1])
     arrays = matrix.data[chosen], matrix.indices[chosen], starts - starts[0]
     return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
-
-
-def _aggregate(
-    matrix: bsr_matrix, motions: np.ndarray, body: np.ndarray
-) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
-    """Tentative prolongation, and the motions and body of the aggregates.
-
-    Its columns are the motions of each aggregate, orthonormalised.
-    """
-    from pyamg.aggregation import (
-        fit_candidates,
-        standard_aggregation,
-    )
-
-    count = len(body)
-    rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
-    within = body[rows] == body[matrix.indices]
-    starts = np.zeros(count + 1, dtype=np.int32)
-    np.cumsum(np.bincount(rows[within], minlength=count), out=starts[1:])
-    columns = matrix.indices[within].astype(np.int32)
-    graph = csr_matrix((np.ones(len(columns)), columns, starts), shape=(count, count))
-    aggregates, _ = standard_aggregation(graph)
-    tentative, coarse = fit_candidates(aggregates, motions)
-    members = aggregates.tocoo()
-    coarse_body = np.zeros(aggregates.shape[1], dtype=body.dtype)
-    coarse_body[members.col] = body[members.row]
-    return bsr_matrix(tentative, dtype=np.float32), coarse, coarse_body
 
 
 def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
