@@ -72,7 +72,7 @@ class HalfPlanes(ElasticSolution):
         return np.where(self.closed(x[:, 0]), 0.0, np.maximum(found, 0.0))
 
     def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
-        """U and v of each body, v with the sign of its side."""
+        """Displacement u, v of each body, v with the sign of its side."""
         side, height, (whole, stress, _), (shear, poisson) = self._at(x, part)
         u = (1 - 2 * poisson) * whole.real - height * stress.imag
         v = 2 * (1 - poisson) * whole.imag - height * stress.real

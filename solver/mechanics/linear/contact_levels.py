@@ -10,13 +10,15 @@ levels do not fill in.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix
+from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
 
 from .condensed_matrix import CondensedMatrix
 from .direct import factorise_roughly
 
 # A share of the diagonal: rows with less, those of pivots, are not smoothed.
 _NOTHING = 1e-4
+# Added to the diagonal of a factored part: its round-off in single precision.
+_SHIFT = np.float32(1e-6)
 
 
 @dataclass(frozen=True)
@@ -26,9 +28,9 @@ class Correction:
     rows: np.ndarray
     matrix: csr_matrix
 
-    def add_product(self, image: np.ndarray, x: np.ndarray) -> None:
-        """Add C x to the `image` (n, k) of `x`."""
-        image[self.rows] += self.matrix @ x[self.rows]
+    def subtract_product(self, left: np.ndarray, x: np.ndarray) -> None:
+        """Subtract C x from what is `left` (n,)."""
+        left[self.rows] -= self.matrix @ x[self.rows]
 
     def coarser(self, prolongation: bsr_matrix) -> "Correction":
         """PᵀCP."""
@@ -37,48 +39,54 @@ class Correction:
         way = csr_matrix((way.data, local, way.indptr), shape=(len(self.rows), len(columns)))
         return Correction(columns, (way.T @ (self.matrix @ way)).tocsr())
 
-    def weights(self, matrix: bsr_matrix) -> np.ndarray:
-        """The weight (n, 1) of each row in the smoother: one where nothing changed, 0 at pivots.
+    def corrected_rows(self, matrix: bsr_matrix) -> csr_matrix:
+        """The rows (r, n) of K + C, given K (n, n)."""
+        columns = self.rows[self.matrix.indices]
+        shape = len(self.rows), matrix.shape[1]
+        own = csr_matrix((self.matrix.data, columns, self.matrix.indptr), shape=shape)
+        return (_chosen_rows(matrix, self.rows) + own).tocsr()
 
-        Elsewhere the inverse of the diagonal of K + C; less where the entries of a row add up to
-        more than typical of K.
+    def weights(self, matrix: bsr_matrix, corrected: csr_matrix) -> np.ndarray:
+        """The weight (n,) of each row in the smoother: one where nothing changed, 0 at pivots.
+
+        Elsewhere the inverse of the diagonal of the `corrected` rows (r, n) of K + C; less where
+        the entries of a row add up to more than typical of K.
         """
-        rows = _chosen_rows(matrix, self.rows)
-        whole = csr_matrix(
-            (self.matrix.data, self.rows[self.matrix.indices], self.matrix.indptr), shape=rows.shape
-        )
-        before = np.asarray(abs(rows).sum(axis=1)).ravel()
-        changed = rows + whole
-        diagonal = self.matrix.diagonal() + matrix.diagonal()[self.rows]
+        before = np.asarray(abs(_chosen_rows(matrix, self.rows)).sum(axis=1)).ravel()
+        diagonal = _own_diagonal(corrected, self.rows)
         there = diagonal > _NOTHING
         weight = np.ones(matrix.shape[0], dtype=np.float32)
         weight[self.rows] = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
-        sums = weight[self.rows] * (abs(changed) @ weight)
+        sums = weight[self.rows] * (abs(corrected) @ weight)
         weight[self.rows] /= np.sqrt(np.maximum(1.0, sums / np.median(before)))
-        return (weight * weight)[:, None]
+        return weight * weight
 
 
 class Interface:
-    """The unknowns `chosen` (r,) beside contact, solved exactly while others are held.
+    """The unknowns `chosen` (r,) of a level beside contact, solved exactly with the others held."""
 
-    `rows` (r, n) of the scaled matrix.
-    """
-
-    def __init__(self, rows: csr_matrix, chosen: np.ndarray, scale: np.ndarray):
-        """Factor the chosen columns of `rows` (r, n), scaled on both sides by `scale` (n,).
+    def __init__(self, correction: Correction, corrected: csr_matrix):
+        """Factor, given the `corrected` rows (r, n) of the level's matrix.
 
         Raises SolveError where that is not positive definite.
         """
-        self.chosen = chosen
-        values = rows.data * np.repeat(scale[chosen], np.diff(rows.indptr))
-        values *= scale[rows.indices]
-        arrays = values.astype(np.float32), rows.indices, rows.indptr
-        self.rows = csr_matrix(arrays, shape=rows.shape)
-        self._solve = factorise_roughly(self.rows[:, chosen])
+        there = np.flatnonzero(_own_diagonal(corrected, correction.rows) > _NOTHING)
+        self.chosen, self._rows = correction.rows[there], corrected[there]
+        own = self._rows[:, self.chosen] + _SHIFT * identity(len(there), np.float32)
+        self._solve = factorise_roughly(own)
 
-    def solve(self, residual: np.ndarray) -> np.ndarray:
-        """The change (r, k) that removes a `residual`."""
-        return self._solve(residual).astype(np.float32)
+    def before(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The change (r,) by a solve, and the residual (n,) left by it."""
+        first = self._solved(residual[self.chosen])
+        return first, residual - self._rows.T @ first
+
+    def after(self, residual: np.ndarray, change: np.ndarray, first: np.ndarray) -> None:
+        """Add the `first` solve and another one to the `change` (n,) of a `residual` (n,)."""
+        change[self.chosen] += first
+        change[self.chosen] += self._solved(residual[self.chosen] - self._rows @ change)
+
+    def _solved(self, right: np.ndarray) -> np.ndarray:
+        return self._solve(right[:, None])[:, 0].astype(np.float32)
 
 
 def correction_of(condensed: CondensedMatrix, scale: np.ndarray, place: np.ndarray) -> Correction:
@@ -110,3 +118,8 @@ def _chosen_rows(matrix: bsr_matrix, rows: np.ndarray) -> csr_matrix:
     arrays = matrix.data[some.data], some.indices, some.indptr
     found = bsr_matrix(arrays, shape=(height * len(blocks), matrix.shape[1])).tocsr()
     return found[height * np.searchsorted(blocks, rows // height) + rows % height]
+
+
+def _own_diagonal(rows: csr_matrix, numbers: np.ndarray) -> np.ndarray:
+    """The entries (r,) on the diagonal of a matrix, of which `rows` (r, n) have these `numbers`."""
+    return np.asarray(rows[np.arange(len(numbers)), numbers]).ravel()

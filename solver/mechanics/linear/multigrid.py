@@ -11,18 +11,20 @@ The hierarchy is that of the bodies alone. Contact corrects its levels (`contact
 factor of the unknowns beside it solves there exactly, before and after each cycle.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
-from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import bsr_matrix, csr_matrix
-from scipy.sparse.linalg import LinearOperator
 
 from ...system.errors import SolveError
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .contact_levels import Correction, Interface, correction_of
+from .galerkin import coarse, pattern, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
+from .products import Prolongation, multiply
 from .unknowns import Nodes, Unknowns, laid_out
 
 COARSEST = 600
@@ -34,7 +36,6 @@ MOST_NEIGHBOURS = 100
 MAX_ITERATIONS = 150
 _ROWS_AT_ONCE = 30_000  # whole nodes
 _BLOCKS_AT_ONCE = 100_000
-_PARTS = 8  # of a product of matrices that is formed in parts
 _ONE = np.float32(1)
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
@@ -47,44 +48,48 @@ _MOST_BESIDE = 1 / 4
 
 @dataclass(frozen=True)
 class Level:
-    """One level: scaled matrix, bound of its eigenvalues, and the ways to and from the next.
+    """One level: scaled matrix, bound of its eigenvalues, and the way to and from the next.
 
-    `correction` and `weight` (n, 1): what contact changes in the matrix and in the smoother.
+    `correction` and `weight` (n,): what contact changes in the matrix and in the smoother;
+    `interface`: the exact solve beside it, if these unknowns are not too many.
     """
 
     matrix: bsr_matrix
     bound: np.float32
-    prolongation: bsr_matrix
-    restriction: bsr_matrix
+    way: Prolongation
     correction: Correction | None = None
     weight: np.ndarray | np.float32 = _ONE
-
-    def multiply(self, x: np.ndarray) -> np.ndarray:
-        """The product of its matrix with x (n, k)."""
-        image = self.matrix @ x
-        if self.correction is not None:
-            self.correction.add_product(image, x)
-        return image
+    interface: Interface | None = None
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n, k): the Chebyshev polynomial applied to it."""
-        step = residual * (self.weight * (np.float32(4 / 3) / self.bound))
-        residual = residual - self.multiply(step)
-        change = _FIRST * step
-        step *= np.float32(1 / 5)
-        step += residual * (self.weight * (np.float32(12 / 5) / self.bound))
-        return change + _SECOND * step
+        """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
+        step = (np.float32(4 / 3) / self.bound) * self.weight * residual
+        change = self.remaining(residual, step)
+        change *= (_SECOND * np.float32(12 / 5) / self.bound) * self.weight
+        step *= _FIRST + _SECOND / np.float32(5)
+        change += step
+        return change
 
-    def corrected(self, correction: Correction) -> "Level":
-        """The level under contact."""
-        changed = replace(self, correction=correction, weight=correction.weights(self.matrix))
+    def remaining(self, residual: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """The residual (n,) after a change."""
+        left = multiply(self.matrix, change, residual, -1.0)
+        if self.correction is not None:
+            self.correction.subtract_product(left, change)
+        return left
+
+    def corrected(self, correction: Correction, most: float) -> "Level":
+        """The level under contact, with an exact solve of up to `most` unknowns beside it."""
+        rows = correction.corrected_rows(self.matrix)
+        weight, interface = correction.weights(self.matrix, rows), None
+        if len(correction.rows) <= most:
+            interface = Interface(correction, rows)
+        changed = replace(self, correction=correction, weight=weight, interface=interface)
         half = np.sqrt(changed.weight)
 
-        def multiply(x: np.ndarray) -> np.ndarray:
-            return half * changed.multiply(half * x.reshape(-1, 1))
+        def symmetric(x: np.ndarray, base: np.ndarray) -> np.ndarray:
+            return base - half * changed.remaining(np.zeros_like(x), half * x)
 
-        symmetric = LinearOperator(self.matrix.shape, multiply, dtype=np.float32)
-        return replace(changed, bound=np.float32(_SAFETY * _largest_eigenvalue(symmetric)))
+        return replace(changed, bound=_bound(symmetric, self.matrix.shape[0]))
 
 
 class Hierarchy:
@@ -112,13 +117,13 @@ class Hierarchy:
         if unknowns.quadratic and self.size > COARSEST:
             blocks, nodes = self._add_linear(blocks, unknowns)
         while blocks.shape[0] > COARSEST:
-            bound = _bound(blocks)
+            bound = _bound_of(blocks)
             tentative, coarse_nodes = aggregate(blocks, nodes)
             if tentative.nnz == 0 or 2 * tentative.shape[1] > blocks.shape[0]:
                 break
-            smoothed = _smoothed(blocks, tentative, bound)
-            _refuse_fill(smoothed)
-            blocks, nodes = self._add(blocks, bound, smoothed, coarse_nodes)
+            way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            _refuse_fill(way)
+            blocks, nodes = self._add(blocks, bound, way, coarse_nodes)
         if blocks.shape[0] > LARGEST_DENSE:
             size = blocks.shape[0]
             raise SolveError(f"its levels end at {size} unknowns: nothing coarsens further")
@@ -133,19 +138,16 @@ class Hierarchy:
         where = self.place[way.row], place[way.col]
         shape = self.size, len(nodes.motions)
         prolongation = csr_matrix((entries, where), shape=shape).tobsr((3, 3))
-        return self._add(matrix, _bound(matrix), prolongation, nodes)
+        return self._add(matrix, _bound_of(matrix), prolongation, nodes)
 
     def _add(
         self, matrix: bsr_matrix, bound: np.float32, prolongation: bsr_matrix, nodes: Nodes
     ) -> tuple[bsr_matrix, Nodes]:
         """Add a level; return matrix and nodes of the next."""
-        height, width = prolongation.blocksize
-        restriction = prolongation.T.tobsr((width, height))
-        coarse, motions, scale = _scaled(_coarse(matrix, prolongation), nodes.motions)
+        below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
         _scale_blocks(prolongation, np.ones(prolongation.shape[0]), scale)
-        _scale_blocks(restriction, scale, np.ones(prolongation.shape[0]))
-        self.levels.append(Level(matrix, bound, prolongation, restriction))
-        return coarse, replace(nodes, motions=motions)
+        self.levels.append(Level(matrix, bound, Prolongation(prolongation)))
+        return below, replace(nodes, motions=motions)
 
 
 class Shared:
@@ -184,28 +186,16 @@ class Multigrid:
         self._size, self._place = hierarchy.size, hierarchy.place[kept]
         self._scale = hierarchy.scale[kept, None]
         self._levels, last = hierarchy.levels, hierarchy.last.toarray().astype(float)
-        self._interface: Interface | None = None
         if condensed is not None:
             correction = correction_of(condensed, hierarchy.scale, hierarchy.place)
-            self._interface = self._beside(correction)
-            self._levels = []
+            self._levels, most = [], _MOST_BESIDE * self._size
             for level in hierarchy.levels:
-                self._levels.append(level.corrected(correction))
-                correction = correction.coarser(level.prolongation)
+                self._levels.append(level.corrected(correction, most))
+                correction = correction.coarser(level.way.matrix)
             last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
         inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
         self._coarsest = inverse.astype(np.float32)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
-
-    def _beside(self, correction: Correction) -> Interface | None:
-        """The solve of the unknowns beside contact; None where these are too many."""
-        number = np.full(self._size, -1)
-        number[self._place] = np.arange(len(self._place))
-        chosen = np.sort(number[correction.rows])
-        chosen = chosen[chosen >= 0]
-        if not 0 < len(chosen) <= _MOST_BESIDE * len(self._place):
-            return None
-        return Interface(self._matrix[chosen], chosen, self._scale[:, 0])
 
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
@@ -215,10 +205,9 @@ class Multigrid:
         """
         columns = np.asarray(right, dtype=float)
         columns = columns if columns.ndim == 2 else columns[:, None]
-        cycle = self._cycle if self._interface is None else self._cycle_and_interface
         solution, iterations = conjugate_gradients(
             lambda x: self._scale * (self._matrix @ (self._scale * x)),
-            in_single(cycle),
+            in_single(partial(np.apply_along_axis, self._cycle, 0)),
             self._scale * columns,
             accuracy,
             MAX_ITERATIONS,
@@ -230,21 +219,11 @@ class Multigrid:
 
     def close(self) -> None:
         """Release the hierarchy; it solves no more."""
-        self._levels, self._interface = [], None
+        self._levels = []
         self._shared.close()
 
-    def _cycle_and_interface(self, residual: np.ndarray) -> np.ndarray:
-        """A cycle with an exact solve beside contact before and after."""
-        assert self._interface is not None
-        first = self._interface.solve(residual[self._interface.chosen])
-        change = self._cycle(residual - self._interface.rows.T @ first)
-        change[self._interface.chosen] += first
-        left = residual[self._interface.chosen] - self._interface.rows @ change
-        change[self._interface.chosen] += self._interface.solve(left)
-        return change
-
     def _cycle(self, residual: np.ndarray) -> np.ndarray:
-        padded = np.zeros((self._size, residual.shape[1]), dtype=np.float32)
+        padded = np.zeros(self._size, dtype=np.float32)
         padded[self._place] = residual
         return self._descend(0, padded)[self._place]
 
@@ -253,10 +232,20 @@ class Multigrid:
         if depth == len(self._levels):
             return self._coarsest @ residual
         level = self._levels[depth]
+        if level.interface is None:
+            return self._through(depth, residual)
+        first, left = level.interface.before(residual)
+        change = self._through(depth, left)
+        level.interface.after(residual, change, first)
+        return change
+
+    def _through(self, depth: int, residual: np.ndarray) -> np.ndarray:
+        """Smoothing before and after the levels below."""
+        level = self._levels[depth]
         change = level.smooth(residual)
-        coarse = level.restriction @ (residual - level.multiply(change))
-        change += level.prolongation @ self._descend(depth + 1, coarse)
-        change += level.smooth(residual - level.multiply(change))
+        below = level.way.restrict(level.remaining(residual, change))
+        change = level.way.prolong(self._descend(depth + 1, below), change)
+        change += level.smooth(level.remaining(residual, change))
         return change
 
 
@@ -288,46 +277,21 @@ def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: in
     return bsr_matrix((blocks, columns, np.cumsum(np.concatenate(lengths))), shape=(size, size))
 
 
-def _bound(matrix: bsr_matrix) -> np.float32:
-    return np.float32(_SAFETY * _largest_eigenvalue(matrix))
+def _bound_of(matrix: bsr_matrix) -> np.float32:
+    return _bound(partial(multiply, matrix), matrix.shape[0])
 
 
-def _smoothed(matrix: bsr_matrix, tentative: bsr_matrix, bound: np.float32) -> bsr_matrix:
-    """The prolongation after a step of Jacobi's iteration."""
-    smoothed = matrix @ tentative
-    smoothed.data *= -np.float32(_SMOOTHED / bound)
-    return (tentative + smoothed).tobsr(tentative.blocksize)
+def _bound(multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int) -> np.float32:
+    """A bound of the eigenvalues of A, given A x + y for x and y (n,)."""
+    return np.float32(_SAFETY * _largest_eigenvalue(multiplied, size))
 
 
 def _refuse_fill(prolongation: bsr_matrix) -> None:
     """Raise SolveError where the next level will have too many neighbours, before it is formed."""
-    height, width = prolongation.blocksize
-    shape = prolongation.shape[0] // height, prolongation.shape[1] // width
-    ones = np.ones(len(prolongation.indices), dtype=np.float32)
-    felt = csr_matrix((ones, prolongation.indices, prolongation.indptr), shape=shape)
-    near = (felt.T @ felt).nnz / shape[1]
+    felt = pattern(prolongation)
+    near = (felt.T @ felt).nnz / felt.shape[1]
     if near > MOST_NEIGHBOURS:
         raise SolveError(f"its coarse levels would fill in, to {near:.0f} neighbours or more")
-
-
-def _coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
-    """Pᵀ A P, formed from some rows of A at a time because A P is large."""
-    height, width = prolongation.blocksize
-    count, size = matrix.shape[0] // height, prolongation.shape[1]
-    total = bsr_matrix((size, size), dtype=np.float32, blocksize=(width, width))
-    step = -(-count // _PARTS)
-    for first in range(0, count, step):
-        some, fine = (_rows(each, first, first + step) for each in (matrix, prolongation))
-        total = total + (fine.T @ (some @ prolongation)).tobsr((width, width))
-    return total
-
-
-def _rows(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
-    """Some rows of blocks."""
-    starts = matrix.indptr[first : last + 1]
-    chosen = slice(starts[0], starts[-1])
-    arrays = matrix.data[chosen], matrix.indices[chosen], starts - starts[0]
-    return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
 
 
 def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
@@ -361,14 +325,18 @@ def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> No
     matrix.data *= right.astype(np.float32).reshape(-1, width)[matrix.indices][:, None, :]
 
 
-def _largest_eigenvalue(matrix: bsr_matrix, steps: int = 10) -> float:
+def _largest_eigenvalue(
+    multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int, steps: int = 10
+) -> float:
     """Largest eigenvalue by Lanczos' iteration, from below."""
-    vector = np.random.default_rng(0).uniform(-1, 1, matrix.shape[0]).astype(np.float32)
+    from scipy.linalg import eigh_tridiagonal
+
+    vector: np.ndarray = np.random.default_rng(0).uniform(-1, 1, size).astype(np.float32)
     vector /= np.linalg.norm(vector)
     previous = np.zeros_like(vector)
     diagonal, beside = [], [np.float32(0)]
     for _ in range(steps):
-        image = matrix @ vector - beside[-1] * previous
+        image = multiplied(vector, -beside[-1] * previous)
         diagonal.append(np.float32(vector @ image))
         image -= diagonal[-1] * vector
         beside.append(np.float32(np.linalg.norm(image)))

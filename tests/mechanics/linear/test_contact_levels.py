@@ -88,6 +88,7 @@ def test_condensed_system_in_few_iterations(slave, master):
     solution = solver.solve((found @ exact[:, None])[:, 0])
     np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-10)
     assert solver.iterations <= 35
+    assert all(level.interface is not None for level in solver._levels)
 
 
 def test_exact_solve_beside_contact_saves_iterations(monkeypatch):
