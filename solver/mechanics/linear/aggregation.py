@@ -24,7 +24,7 @@ def aggregate(matrix: bsr_matrix, nodes: Nodes) -> tuple[bsr_matrix, Nodes]:
 
     body, count = nodes.body, len(nodes.body)
     rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
-    joined = body[rows] == body[matrix.indices]
+    joined = (body[rows] == body[matrix.indices]) & (body[rows] >= 0)
     if nodes.points is not None:
         joined[joined] = _near(rows[joined], matrix.indices[joined], nodes.points)
     starts = np.zeros(count + 1, dtype=np.int32)

@@ -39,7 +39,7 @@ class CondensedMatrix:
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """See `Symmetric`."""
-        whole = np.zeros((self.stiffness.shape[0], x.shape[1]))
+        whole = np.zeros((self.stiffness.shape[0], *x.shape[1:]))
         whole[self.kept] = x
         return (self.stiffness @ whole)[self.kept] + self.added @ x
 

@@ -24,8 +24,9 @@ from .condensed_matrix import CondensedMatrix, Symmetric
 from .contact_levels import Correction, Interface, correction_of
 from .galerkin import coarse, pattern, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
-from .products import Prolongation, multiply
-from .unknowns import Nodes, Unknowns, laid_out
+from .nodal_matrix import NodalMatrix
+from .products import in_pieces, multiply, multiply_transposed
+from .unknowns import Nodes, Unknowns, nodes_at, places
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
@@ -35,7 +36,6 @@ MOST_NEIGHBOURS = 100
 """Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
 _ROWS_AT_ONCE = 30_000  # whole nodes
-_BLOCKS_AT_ONCE = 100_000
 _ONE = np.float32(1)
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
@@ -48,7 +48,7 @@ _MOST_BESIDE = 1 / 4
 
 @dataclass(frozen=True)
 class Level:
-    """One level: scaled matrix, bound of its eigenvalues, and the way to and from the next.
+    """One level: scaled matrix, bound of its eigenvalues, and the way up from the next.
 
     `correction` and `weight` (n,): what contact changes in the matrix and in the smoother;
     `interface`: the exact solve beside it, if these unknowns are not too many.
@@ -56,7 +56,7 @@ class Level:
 
     matrix: bsr_matrix
     bound: np.float32
-    way: Prolongation
+    prolongation: bsr_matrix
     correction: Correction | None = None
     weight: np.ndarray | np.float32 = _ONE
     interface: Interface | None = None
@@ -105,12 +105,11 @@ class Hierarchy:
         if not (diagonal > 0).all():
             raise SolveError("the matrix is not positive definite: its diagonal is not positive")
         self.scale = 1 / np.sqrt(diagonal)
-        self.place, nodes = laid_out(unknowns)
-        self.size = len(nodes.motions)
+        blocks, self.place = _in_blocks(matrix, self.scale, unknowns)
+        self.size = blocks.shape[0]
+        nodes = nodes_at(unknowns, self.place, self.size)
         nodes.motions[self.place] /= self.scale[:, None]
-        blocks, motions, scale = _scaled(
-            _in_blocks(matrix, self.scale, self.place, self.size), nodes.motions
-        )
+        blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale *= scale[self.place]
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
@@ -132,12 +131,12 @@ class Hierarchy:
     def _add_linear(self, matrix: bsr_matrix, unknowns: Unknowns) -> tuple[bsr_matrix, Nodes]:
         """Add the level of quadratic cells; return matrix and nodes of the linear ones."""
         assert unknowns.linear is not None
-        place, nodes = laid_out(unknowns.of_vertices())
-        way = unknowns.linear.tocoo()
+        vertices = unknowns.of_vertices()
+        place, size = places(vertices)
+        way, nodes = unknowns.linear.tocoo(), nodes_at(vertices, place, size)
         entries = (way.data / self.scale[way.row]).astype(np.float32)
         where = self.place[way.row], place[way.col]
-        shape = self.size, len(nodes.motions)
-        prolongation = csr_matrix((entries, where), shape=shape).tobsr((3, 3))
+        prolongation = csr_matrix((entries, where), shape=(self.size, size)).tobsr((3, 3))
         return self._add(matrix, _bound_of(matrix), prolongation, nodes)
 
     def _add(
@@ -146,7 +145,7 @@ class Hierarchy:
         """Add a level; return matrix and nodes of the next."""
         below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
         _scale_blocks(prolongation, np.ones(prolongation.shape[0]), scale)
-        self.levels.append(Level(matrix, bound, Prolongation(prolongation)))
+        self.levels.append(Level(matrix, bound, prolongation))
         return below, replace(nodes, motions=motions)
 
 
@@ -191,7 +190,7 @@ class Multigrid:
             self._levels, most = [], _MOST_BESIDE * self._size
             for level in hierarchy.levels:
                 self._levels.append(level.corrected(correction, most))
-                correction = correction.coarser(level.way.matrix)
+                correction = correction.coarser(level.prolongation)
             last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
         inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
         self._coarsest = inverse.astype(np.float32)
@@ -243,17 +242,29 @@ class Multigrid:
         """Smoothing before and after the levels below."""
         level = self._levels[depth]
         change = level.smooth(residual)
-        below = level.way.restrict(level.remaining(residual, change))
-        change = level.way.prolong(self._descend(depth + 1, below), change)
+        below = multiply_transposed(level.prolongation, level.remaining(residual, change))
+        change = multiply(level.prolongation, self._descend(depth + 1, below), change)
         change += level.smooth(level.remaining(residual, change))
         return change
 
 
-def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
-    """The scaled matrix in single precision and blocks of three; rows without unknown are zero.
+def _in_blocks(
+    matrix: Symmetric, scale: np.ndarray, unknowns: Unknowns
+) -> tuple[bsr_matrix, np.ndarray]:
+    """The scaled matrix in single precision and blocks of three, and the row (n,) of each unknown.
 
-    Row and column i go to `place[i]` (n,) of `size`. Rows are copied in parts, so that there is no
-    second matrix in double precision.
+    Rows without unknown are zero.
+    """
+    if isinstance(matrix, NodalMatrix):
+        return matrix.scaled(scale), matrix.free
+    place, size = places(unknowns)
+    return _of_rows(matrix, scale, place, size), place
+
+
+def _of_rows(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
+    """The same, row and column i at `place[i]` (n,) of `size`.
+
+    Rows are copied in parts, so that there is no second matrix in double precision.
     """
     order, place = np.argsort(place), place.astype(np.int32)
     rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
@@ -306,12 +317,19 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     there = diagonal > 0
     scale = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
     weights = scale.astype(np.float32).reshape(-1, size)
-    inner = np.empty(matrix.data.shape[:2], dtype=np.float32)
-    for first in range(0, len(inner), _BLOCKS_AT_ONCE):
-        some = slice(first, first + _BLOCKS_AT_ONCE)
-        columns = weights[matrix.indices[some], :, None]
-        inner[some] = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
-    sums = scale * np.add.reduceat(inner, matrix.indptr[:-1], axis=0).ravel()
+    sums = np.zeros(weights.shape)
+
+    def add_up(first: int, last: int) -> None:
+        starts = matrix.indptr[first : last + 1]
+        some, filled = slice(starts[0], starts[-1]), np.diff(starts) > 0
+        if filled.any():
+            columns = weights[matrix.indices[some], :, None]
+            inner = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
+            starts = starts[:-1][filled] - starts[0]
+            sums[first:last][filled] = np.add.reduceat(inner, starts, axis=0)
+
+    in_pieces(add_up, matrix)
+    sums = scale * sums.ravel()
     scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
     _scale_blocks(matrix, scale, scale)
     return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
@@ -320,9 +338,16 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
 def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> None:
     """Multiply rows and columns, in place."""
     height, width = matrix.blocksize
-    rows = np.repeat(left.astype(np.float32).reshape(-1, height), np.diff(matrix.indptr), axis=0)
-    matrix.data *= rows[:, :, None]
-    matrix.data *= right.astype(np.float32).reshape(-1, width)[matrix.indices][:, None, :]
+    rows = left.astype(np.float32).reshape(-1, height)
+    columns = right.astype(np.float32).reshape(-1, width)
+
+    def multiply_rows(first: int, last: int) -> None:
+        starts = matrix.indptr[first : last + 1]
+        some = slice(starts[0], starts[-1])
+        matrix.data[some] *= np.repeat(rows[first:last], np.diff(starts), axis=0)[:, :, None]
+        matrix.data[some] *= columns[matrix.indices[some]][:, None, :]
+
+    in_pieces(multiply_rows, matrix)
 
 
 def _largest_eigenvalue(

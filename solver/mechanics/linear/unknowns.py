@@ -53,16 +53,21 @@ class Nodes:
     points: np.ndarray | None
 
 
-def laid_out(unknowns: Unknowns) -> tuple[np.ndarray, Nodes]:
-    """Row (n,) of each unknown when every node has three, and these nodes."""
-    nodes, first, number, count = np.unique(
-        unknowns.node, return_index=True, return_inverse=True, return_counts=True
-    )
+def places(unknowns: Unknowns) -> tuple[np.ndarray, int]:
+    """The row (n,) of each unknown where every node that has some has three, and how many rows."""
+    number, count = np.unique(unknowns.node, return_inverse=True, return_counts=True)[1:]
     order = np.argsort(number, kind="stable")
     rank = np.empty(len(number), dtype=int)
     rank[order] = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
-    place = 3 * number + rank
-    motions = np.zeros((3 * len(nodes), unknowns.motions.shape[1]))
-    motions[place] = unknowns.motions
-    points = None if unknowns.points is None else unknowns.points[nodes]
-    return place, Nodes(motions, unknowns.body[first], points)
+    return 3 * number + rank, 3 * len(count)
+
+
+def nodes_at(unknowns: Unknowns, place: np.ndarray, size: int) -> Nodes:
+    """The nodes of `size` rows; those without unknowns belong to no body, −1."""
+    motions, body = np.zeros((size, unknowns.motions.shape[1])), np.full(size // 3, -1)
+    motions[place], body[place // 3] = unknowns.motions, unknowns.body
+    if unknowns.points is None:
+        return Nodes(motions, body, None)
+    points = np.zeros((size // 3, unknowns.points.shape[1]))
+    points[place // 3] = unknowns.points[unknowns.node]
+    return Nodes(motions, body, points)
