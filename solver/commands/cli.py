@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import codes, history, jobs, look, results, studies
+from . import codes, completion, history, jobs, look, results, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def run() -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit status."""
-    options = _parser().parse_args(arguments)
+    options = make_parser().parse_args(arguments)
     if options.threads:
         limit_threads(options.threads)
     try:
@@ -80,7 +80,8 @@ def _unexpected(error: Exception) -> int:
     return BUG
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of all commands."""
     parser = argparse.ArgumentParser(
         prog=PROGRAM,
         description="Verified contact solves.",
@@ -99,6 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     history.add_commands(commands)
     jobs.add_commands(commands)
     studies.add_commands(commands)
+    completion.add_commands(commands)
     return parser
 
 
