@@ -201,7 +201,7 @@ class Solved:
             return pyvista.read(file)
 
     def plot(self, scalars: str = "pressure", **options: Any) -> Any:
-        """Show a field in PyVista's window; `options` are those of its `plot`."""
+        """Show a field in PyVista's window; `options` go to its `plot`."""
         return self.to_pyvista().plot(scalars=scalars, **options)
 
     def save(self, path: str | os.PathLike[str]) -> None:

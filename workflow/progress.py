@@ -99,7 +99,7 @@ class State:
 
     @property
     def not_passed(self) -> int:
-        """The number of solves that did not pass, plus that of failed jobs."""
+        """The number of solves that did not pass, plus the number of failed jobs."""
         return self.bad + len(self.broken)
 
     @property

@@ -62,7 +62,7 @@ def contact_pressure(mesh: meshio.Mesh, load: Field) -> np.ndarray:
     for name, nodes in cut_mesh.cells.items():
         lame, shear = lame_parameters(np.full(len(nodes), YOUNG), np.full(len(nodes), POISSON))
         blocks.append(Block(BY_NAME[name], nodes, lame, shear))
-    matrix, _ = stiffness(points, blocks, free.selection)
+    matrix = free.reduced(stiffness(points, blocks))
     (press,) = boundary_faces(mesh, "top upper")
     force = face_forces(points, press.nodes, press.type.name, load, pressure=True)
     force = free.basis.T @ force.ravel()

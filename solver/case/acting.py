@@ -141,7 +141,7 @@ class SupportKeys(Section, frozen=True):
     spring: stiffness of springs by component: force per area and displacement on faces (an elastic
       foundation), force per displacement at nodes
     together: the components in which all nodes of the group have one displacement, an unknown
-    cyclic: the displacement is that of another side, turned or shifted with it
+    cyclic: the displacement equals another side's, turned or shifted with it
     name: the name that `steps` gives factors of the imposed values
     """
 

@@ -1,6 +1,6 @@
 """Expressions of position in a case file: `25*(1 - r**2/100)`, parsed from a whitelist.
 
-The text is parsed into Python's syntax tree, every node of which must be on the list below; it is
+The text is parsed into Python's syntax tree, and each of its nodes must be on the list below; it is
 never compiled or run. All numbers are floats, so that no power can grow without bound.
 """
 

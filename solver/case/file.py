@@ -167,7 +167,7 @@ class ZoneKeys(Section, frozen=True):
     """A contact zone.
 
     name: the zone's name in the results
-    slave: the faces that carry the multipliers: the finer ones, or those of the softer body
+    slave: the faces that carry the multipliers: the finer ones, or the softer body's
     master: the faces opposite to them
     hexahedra: the cells into which slave hexahedra are cut
     treatment: the treatment of the interface

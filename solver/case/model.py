@@ -75,7 +75,7 @@ class Support:
 class Load:
     """A load on a group: `kind` is one of LOAD_KINDS; a pressure is a scalar, positive inwards.
 
-    An initial strain has values by component, a temperature those of temperature and expansion.
+    An initial strain has values by component, a temperature its own value and the expansion.
     """
 
     group: str

@@ -1,4 +1,4 @@
-"""The rules of a case file that go beyond single keys; none of them needs the mesh itself."""
+"""The rules of a case file that concern several keys; they need no mesh."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -105,7 +105,7 @@ def _check_names(case: Case) -> None:
 
 
 def _check_probes(case: Case) -> None:
-    """Probes are on zones of the case; references are those of probes that have such a value."""
+    """A probe's zone is one of the case; a reference names a probe that has such a value."""
     zones = {zone.name for zone in case.zones}
     for probe in case.probes:
         if probe.zone and probe.zone not in zones:

@@ -52,7 +52,7 @@ class FieldError(ValueError):
 
 
 class _UnknownKeyError(FieldError):
-    """A key that a section has not."""
+    """A key that a section does not have."""
 
 
 class Section(Struct, frozen=True, forbid_unknown_fields=True):
@@ -112,7 +112,7 @@ def refuse_twins(key: str, items: Iterable[Any]) -> None:
 
 
 def refuse_unknown(keys: Keys, name: str, kind: str, known: Collection[str]) -> None:
-    """Raise `FieldError` where a name is none of the known ones of its kind."""
+    """Raise `FieldError` for an unknown name of its kind."""
     if name not in known:
         raise FieldError(keys, f"no such {kind}; {hint(name, known)}")
 

@@ -101,7 +101,7 @@ class CalculiX:
 
     @staticmethod
     def _on_bodies(found: ForeignResult, deck: Deck) -> ForeignResult:
-        """The fields at the nodes of the deck: pressures on a layer are those of the node below."""
+        """The fields at the nodes of the deck: the node below a layer gets its pressure."""
         if not any(map(needed, deck.pairs)):
             return found
         count, below = len(deck.points), with_layers(deck)[1]
@@ -185,7 +185,7 @@ def _closing(deck: Deck) -> Iterator[str]:
 
 
 def _boundary(deck: Deck, factor: float) -> Iterator[str]:
-    """Displacements that are given, and those of the auxiliary nodes of oblique supports."""
+    """Imposed displacements, also of the auxiliary nodes of oblique supports."""
     for node, axis, value in deck.fixed():
         yield f"{node + 1}, {axis + 1}, {axis + 1}, {factor * value:.13e}"
     for node, of in enumerate(deck.oblique, start=len(deck.points) + 1):

@@ -53,7 +53,7 @@ class Compared:
         """The comparison; raises InputError where result and case do not belong together."""
         where = f"{case.name}@{foreign.code}"
         if foreign.step is not None and abs(foreign.step - case.factors[-1]) > _STEP:
-            allowed = f"the result must be that of load factor {case.factors[-1]:g}"
+            allowed = f"the result must belong to load factor {case.factors[-1]:g}"
             raise InputError(where, "step", foreign.step, allowed)
         foreign = flattened(foreign, mesh.points.shape[1], where, case.thin)
         model = Model.of(case, mesh)
@@ -214,7 +214,7 @@ class Compared:
         return _by_component(placed, COMPONENTS, expected)
 
     def _along(self, placed: Placed, directions: np.ndarray, reference: Reference) -> Sample:
-        """Stress along directions (dim,) or (k, dim) beside that of the reference."""
+        """Stress along directions (dim,) or (k, dim) beside the reference's."""
         if isinstance(reference, ExactValues):
             field = reference.exact.stress(placed.places, self._part(placed))
             expected = normal_stress(field, directions)

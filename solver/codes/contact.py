@@ -18,7 +18,7 @@ from ..verification.samples import Reference, Sample, expected_pressure
 from .model import Model
 from .placing import NEAR, Placed
 
-# A value below this share of the largest is none: files print zeros in this way.
+# A value below this share of the largest is zero: files print zeros in this way.
 _NOTHING = 1e-9
 # How far from the faces of the case, over their size, a curved surface of another mesh may be.
 _SAGITTA = 0.02

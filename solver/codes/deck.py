@@ -80,7 +80,7 @@ class Deck:
     def of_plane_strain(self, stress: np.ndarray) -> np.ndarray:
         """Stress (n, 6) at all nodes from xx, yy, xy (n, 3): zz = ν (xx + yy), the others zero.
 
-        At a node between materials ν is that of one of them.
+        At a node between materials ν is taken from one of them.
         """
         poisson = np.zeros(len(self.points))
         of = np.array([material.poisson for material in self.materials])

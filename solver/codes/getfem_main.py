@@ -99,7 +99,7 @@ class BodyMesh:
 
 
 def connected(cells, start, count):
-    """The nodes that cells join to those of `start`."""
+    """The nodes that cells connect to the nodes `start`."""
     mine = np.zeros(count, dtype=bool)
     mine[list(start)] = True
     while True:

@@ -12,7 +12,7 @@ from KratosMultiphysics.StructuralMechanicsApplication import structural_mechani
 
 
 def main() -> None:
-    """Solve, and write displacement and stress at all nodes, pressure at those of the slave."""
+    """Solve, and write displacement and stress at all nodes, pressure at slave nodes."""
     parameters = Kratos.Parameters(Path("ProjectParameters.json").read_text(encoding="utf-8"))
     model = Kratos.Model()
     analysis = structural_mechanics_analysis.StructuralMechanicsAnalysis(model, parameters)

@@ -249,7 +249,7 @@ def nodal(deck, mesh, stress):
 
 
 def main():
-    """Solve, and write displacement and stress at all nodes, pressure at those of the slaves."""
+    """Solve, and write displacement and stress at all nodes, pressure at slave nodes."""
     deck = json.loads(Path("deck.json").read_text(encoding="ascii"))
     mesh = build(deck)
     nodes = Nodes(deck, mesh)

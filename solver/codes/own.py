@@ -1,6 +1,6 @@
 """A user's own code: a folder with `code.yaml`, its commands, or `code.py`, one class.
 
-The folder's name is that of the code. `code.yaml`:
+The folder's name is the code's name. `code.yaml`:
 
     command: ["{python}", "{code}/toy.py"]   # run in a folder that holds the input
     version: "1.0"
@@ -38,7 +38,7 @@ class OwnCodeFile(Section, frozen=True):
     command: program and arguments; {code} is the folder of this file, {python} our Python
     version: of the code, shown beside its results
     input: what is written for it
-    results: its files of results, as check-result reads them; by default those of `input`
+    results: its files of results, as check-result reads them; by default as `input` writes them
     map: a map of their names and units
     settings: shown beside the results
     layer: a plane case is one layer of cells in 3D
@@ -83,7 +83,7 @@ class OwnCode:
         return found
 
     def read(self, deck: Deck, folder: Path) -> ForeignResult:
-        """The files of results, or those of the code whose input it takes."""
+        """Its files of results, or the files of the code whose input it takes."""
         if self.file.results is None:
             return self.base.read(deck, folder)
         mapping = ResultMap()

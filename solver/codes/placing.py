@@ -118,7 +118,7 @@ class Placer:
             self._refuse_elsewhere(places, name, whole=name not in CONTACT)
             body = np.full(len(places), -1)
         node = self._nodes(places, body)
-        # A table of all nodes in their order tells the sides of the interface apart.
+        # A table of all nodes in their order distinguishes the sides of the interface.
         numbered = numbered or np.array_equal(node, np.arange(len(self.model.points)))
         body = np.where(node >= 0, self.model.body[node], body)
         return Placed(
@@ -139,7 +139,7 @@ class Placer:
         return bool((~self.model.rigid[body[body >= 0]]).any())
 
     def _flat(self, points: np.ndarray, name: str) -> np.ndarray:
-        """Places in the case's dimension; those of a plane case may have any z."""
+        """Places in the case's dimension; in a plane case z may have any value."""
         points = np.asarray(points, dtype=float)
         if not np.isfinite(points).all():
             raise self._refused(name, "coordinates that are not finite numbers")
@@ -223,7 +223,7 @@ class Placer:
         axes = "xyz"[: self.model.dim]
         moved = self.foreign.displacement
         if moved is not None and len(moved.places) == len(places):
-            told = "coordinates are those of the deformed mesh; the undeformed ones are needed"
+            told = "coordinates belong to the deformed mesh; the undeformed ones are needed"
             yield told, places - moved.values[:, : self.model.dim]
         for factor, text in UNITS.items():
             yield f"lengths are {text} times the case's: another unit?", places / factor

@@ -1,4 +1,4 @@
-"""The codes by name: those of this folder, and those of users, each in a folder of its own."""
+"""The codes by name: this folder's, and users' own, each in a folder."""
 
 from collections.abc import Mapping, Sequence
 from importlib import import_module

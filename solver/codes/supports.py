@@ -86,7 +86,7 @@ def closing(
     oblique: Sequence[Oblique],
     pairs: Sequence[tuple[Zone, list[FaceBlock], list[FaceBlock]]],
 ) -> np.ndarray:
-    """Displacement (n, dim), zero but for bodies that contact alone can hold.
+    """Displacement (n, dim), zero except on bodies that contact alone can hold.
 
     Such a body, of an open zone, is moved to the other side until they overlap a little. Without
     contact at the start the first matrix of a code is singular.

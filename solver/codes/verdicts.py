@@ -87,7 +87,7 @@ def without_foreign(
 
 
 def _named(verdict: Verdict, code: str, version: str, settings: Mapping[str, str]) -> Verdict:
-    """The verdict as that of a code."""
+    """The verdict in the name of a code."""
     return replace(
         verdict,
         job=f"{verdict.job}@{code}",

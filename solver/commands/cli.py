@@ -13,11 +13,12 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError, SolveError, of_machine
+from ..system.imports import defer
 from ..system.package import PROGRAM, PROJECT, project_version
 from . import codes, completion, history, jobs, look, results, studies
 from .options import add_command, add_threads, limit_threads
@@ -39,6 +40,7 @@ PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
 def run() -> int:
     """Run the command of this process; its exit status."""
+    defer()
     # Lines leave as they are written, so that the last line of a log is what was said last.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
@@ -50,7 +52,7 @@ def run() -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit status."""
-    options = make_parser().parse_args(arguments)
+    options = parser().parse_args(arguments)
     if options.threads:
         limit_threads(options.threads)
     try:
@@ -80,8 +82,9 @@ def _unexpected(error: Exception) -> int:
     return BUG
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """The parser of all commands."""
+@cache
+def parser() -> argparse.ArgumentParser:
+    """The command line: all commands with their arguments."""
     parser = argparse.ArgumentParser(
         prog=PROGRAM,
         description="Verified contact solves.",

@@ -1,6 +1,7 @@
 """Shell completion: a script that knows all commands and options, made by shtab from the parser."""
 
 import argparse
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,9 @@ def add_commands(commands: Any) -> None:
 
 
 def _completion(options: argparse.Namespace) -> int:
-    from .cli import make_parser
+    from .cli import parser
 
-    print(script(make_parser(), options.shell))
+    print(script(parser(), options.shell))
     return 0
 
 
@@ -28,6 +29,7 @@ def script(parser: argparse.ArgumentParser, shell: str) -> str:
     """The script for a shell that completes the installed command; paths complete to files."""
     import shtab
 
+    parser = copy(parser)
     parser.prog = PROJECT
     [commands] = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
     for command in commands.choices.values():

@@ -55,13 +55,13 @@ class Listed:
 
 
 def case_files(folder: Path) -> list[Path]:
-    """The case files of a folder, sorted; hidden files, such as an editor's locks, are none."""
+    """The case files of a folder, sorted, without hidden files such as an editor's locks."""
     found = (f for f in folder.glob("*.yaml") if not f.name.startswith("."))
     return sorted(f for f in found if f.name not in DESCRIPTIONS)
 
 
 def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Listed]:
-    """The jobs of all case files in the folders, those of one file together.
+    """The jobs of all case files in the folders, file by file.
 
     `variants`: where there may be hexahedra, once more with the other cut. A file that
     names its case as another file of the family does is refused, under a free name.

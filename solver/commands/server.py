@@ -18,13 +18,23 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import NoReturn
 
 from ..system.package import PACKAGE
+from ..system.provenance import gather
+from .cli import parser
 from .warm import GREETING, LIMIT, THREADS, outcome
 
 # Modules that the solver imports late. The command itself reports a missing one.
-_LATE = ("gmsh", "jsonschema.validators", "skfem.element", "cvxopt")
+_LATE = (
+    "gmsh",
+    "skfem.element",
+    "cvxopt.cholmod",
+    "scipy.optimize",
+    "scipy.sparse.linalg",
+    "tomllib",
+)
 _INPUT = 0
 _BUG = 70
 
@@ -55,7 +65,10 @@ def _reap(options: int = 0) -> None:
 
 
 def load() -> None:
-    """Import the whole solver and exclude it from garbage collection: forks share it."""
+    """Do once what every fork would: import the solver, find versions, declare the command line.
+
+    All of it is excluded from garbage collection, so that forks share it.
+    """
     ours = [
         module.name
         for module in pkgutil.walk_packages(sys.modules[PACKAGE].__path__, f"{PACKAGE}.")
@@ -64,6 +77,8 @@ def load() -> None:
         if not name.endswith("__main__"):
             with suppress(ImportError, OSError):
                 importlib.import_module(name)
+    gather(Path(), None)
+    parser()
     gc.collect()
     gc.freeze()
 

@@ -1,6 +1,6 @@
 """The catalogue of cell types: names, reference nodes, edges, faces, orders.
 
-Node order is that of VTK (and of meshio) throughout. Faces are listed with their nodes turned
+Nodes are in VTK's order (and meshio's) throughout. Faces are listed with their nodes turned
 outward for a cell of positive Jacobian. Reference cells: the unit simplex, the unit square and
 cube, triangle × [0, 1]; pyramids stand on [-1, 1]² with their apex at (0, 0, 1).
 """
@@ -101,7 +101,7 @@ _SHAPES = {
         ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
         (0, 2, 1, 3),
     ),
-    # The faces of a hexahedron stand in the order of HEXA27's face-centre nodes.
+    # The faces of a hexahedron are in the order of HEXA27's face-centre nodes.
     "HEXA": _Shape(
         tuple((*v, z) for z in (0, 1) for v in _SQUARE),
         (*_RING, *((a + 4, b + 4) for a, b in _RING), (0, 4), (1, 5), (2, 6), (3, 7)),

@@ -244,7 +244,7 @@ class BrickKeys(Section, frozen=True, kw_only=True):
 class BricksKeys(Section, frozen=True, kw_only=True):
     """Bodies put together from rectangular blocks, anywhere.
 
-    bricks: the blocks; those of one name that touch share their nodes
+    bricks: the blocks; blocks of one name share their nodes where they touch
     refine: multiplies all divisions
     """
 

@@ -147,7 +147,7 @@ def digits(error: float | None) -> float | None:
 
 @dataclass(frozen=True)
 class Bench:
-    """All codes side by side; `rows` are those of a report, and what is recorded."""
+    """All codes side by side; `rows` are the rows of a report, and recorded results."""
 
     rows: Sequence[Row]
 

@@ -24,7 +24,7 @@ _SCHEMA = "https://vega.github.io/schema/vega-lite/v6.json"
 _TEMPLATES = Path(__file__).with_name("templates")
 EPSILON = float(np.finfo(float).eps)
 INK, MUTED, PAPER, FLOOR = "#1f2933", "#66727f", "#ffffff", "#e6eaee"
-# Colours that the colour-blind tell apart (Okabe and Ito).
+# Colours that colour-blind readers can distinguish (Okabe and Ito).
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "#aa5588"
 CROSS = "M-1,-1L1,1M1,-1L-1,1"
 SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
@@ -48,7 +48,7 @@ class Look:
     dashes: tuple[float, ...] = ()
 
 
-# Colour and mark by the shape of cells, so that either tells them apart.
+# Colour and mark by the shape of cells: either identifies them.
 LOOKS = {
     "TRIA": Look(BLUE),
     "TETRA": Look(BLUE),
@@ -173,7 +173,7 @@ def _libraries() -> str:
 
 @cache
 def theme() -> Spec:
-    """Fonts and colours of all charts, and what stands for each colour on a dark page."""
+    """Fonts and colours of all charts, and the colours that replace them on a dark page."""
     return dict(json.loads((_TEMPLATES / "charts.json").read_text(encoding="utf-8")))
 
 

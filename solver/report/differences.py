@@ -21,7 +21,7 @@ from .rows import Row, natural
 from .tables import outcome
 
 SUMMARY = "summary.json"
-# The name of our own solver beside those of codes.
+# The name of our own solver beside the names of codes.
 OURS = "ours"
 # A solve whose time changed is worth a line from this ratio on, and from these seconds.
 _RATIO, _SECONDS, _MOST = 1.5, 0.2, 10
@@ -56,7 +56,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Change:
-    """A quantity of a solve that is not what it was; `size` is relative, None for what is none."""
+    """A quantity of a solve that has changed; `size` is relative, None where there is no number."""
 
     solve: str
     quantity: str

@@ -13,7 +13,7 @@ tolerance: What the tolerances of the cases are made of.
 figures:                       # the solves whose pressure is drawn along the interface;
   - {job: block-quad8}         # left out: the first of each kind of reference and dimension
   - {job: block-hexa8, along: sqrt(x**2 + y**2), caption: what to look at}
-reference_code:                # another code's own errors, drawn beside those of the solves
+reference_code:                # another code's own errors, drawn beside the solves' errors
   - {name: code_aster, version: "14.6", error: 4.0e-13, remark: most cases}
 """
 

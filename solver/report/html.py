@@ -65,7 +65,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render(template: Path, **values: Any) -> str:
-    """A page from a template that lies with its study; it may extend those of the report."""
+    """A page from a study's own template, which may extend the report's templates."""
     return environment(template.parent).get_template(template.name).render(values)
 
 

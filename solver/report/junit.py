@@ -1,7 +1,7 @@
 """The report as JUnit XML, which CI servers read.
 
-There is no standard of it, but two schemas that most readers and checkers go by: that of Ant's
-task (strict: every attribute is asked for, and no other is allowed) and that of Jenkins. What is
+It has no standard, but two schemas that most readers and checkers follow: the one of Ant's
+task (strict: every attribute is required, and no other is allowed) and the one of Jenkins. What is
 written here holds under both.
 """
 

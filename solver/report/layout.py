@@ -25,7 +25,7 @@ def tint(body: BodyInfo) -> str:
 
 
 def mean_normal(solution: Solution) -> np.ndarray:
-    """The mean outward normal of the first zone's slave, (dim,); upward where there is none."""
+    """The mean outward normal of the first zone's slave, (dim,); upward without a zone."""
     dim = solution.mesh.points.shape[1]
     upward = np.eye(dim)[-1]
     if not solution.zones or not len(solution.zones[0].normal):
@@ -78,7 +78,7 @@ def tangent(zone: ZoneResult) -> np.ndarray:
     """The direction along the interface, (2,): to the right, or upward."""
     normal = zone.normal.mean(axis=0)
     along = np.array([normal[1], -normal[0]])
-    if not along.any():  # a closed surface: its mean normal is none
+    if not along.any():  # a closed surface: its mean normal is zero
         return np.array([1.0, 0.0])
     along /= np.linalg.norm(along)
     return along if tuple(np.round(along, 9)) > (0.0, 0.0) else -along

@@ -83,7 +83,7 @@ def matrix(rows: Sequence[Row], folders: Sequence[Path]) -> list[Feature]:
 
 
 def fits(feature: str, pattern: str) -> bool:
-    """Whether a feature is one of a pattern's; `[]` stands for itself."""
+    """Whether a feature fits a pattern; `[]` is literal."""
     return fnmatchcase(feature, pattern.replace("[", "[[]"))
 
 

@@ -60,7 +60,7 @@ def draw_pressure(
 ) -> Chart:
     """The pressure of a zone, the first or the one named, along the interface.
 
-    Raises ValueError where there is no such zone.
+    Raises ValueError for an unknown zone.
     """
     shown = next((z for z in solution.zones if zone in (None, z.name)), None)
     if shown is None:

@@ -164,9 +164,9 @@ class Row:
 
 
 def read_rows(verdicts: Iterable[Path]) -> list[Row]:
-    """All verdicts as rows, ours before those of other codes, failures first.
+    """All verdicts as rows, ours before other codes', failures first.
 
-    A file that is not a verdict as it was written, or not that of its folder and result, is a row
+    A file that is not a verdict as it was written, or belongs to another folder or result, is a row
     of a crashed solve.
     """
     rows = [Row(_read(path), path.parent) for path in verdicts]
@@ -174,7 +174,7 @@ def read_rows(verdicts: Iterable[Path]) -> list[Row]:
 
 
 def _place(row: Row) -> tuple[str, bool, int, list[tuple[int, int | str]]]:
-    """Where a row is in the tables: ours before those of other codes."""
+    """Where a row is in the tables: ours before other codes'."""
     return row.group, bool(row.verdict.code), WORDS.index(row.word), natural(row.name)
 
 
@@ -198,7 +198,7 @@ def _read(path: Path) -> Verdict:
 
 
 def ours(rows: Sequence[Row]) -> list[Row]:
-    """The solves of our own; where there are none, all."""
+    """Our own solves; all solves without any of our own."""
     return [row for row in rows if not row.verdict.code] or list(rows)
 
 

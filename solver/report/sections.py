@@ -150,7 +150,7 @@ class FamilySection:
 
 
 def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[FamilySection]:
-    """The sections of all rows, in the order that families ask for, else in that of the rows.
+    """The sections of all rows, in the order that families ask for, else in the order of the rows.
 
     `files` holds the `family.yaml` of a family by its name.
     """

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-# In the order of the work, in colours that the colour-blind tell apart.
+# In the order of the work, in colours that colour-blind readers can distinguish.
 COLORS = {
     "read": "#999999",
     "mesh": "#bbbbbb",

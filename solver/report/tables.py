@@ -45,7 +45,7 @@ def to_csv(rows: Sequence[Row]) -> str:
 
 
 def as_csv(records: Sequence[Mapping[str, Any]]) -> str:
-    """Records that have the same keys, with a line of headings; empty where there are none."""
+    """Records that have the same keys, with a line of headings; empty without records."""
     text = io.StringIO()
     if records:
         writer = csv.DictWriter(text, fieldnames=list(records[0]))

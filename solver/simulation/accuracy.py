@@ -80,7 +80,7 @@ class Accuracy:
 
 
 def pressure_of_forces(gaps: sparse.csr_matrix, noise: np.ndarray) -> float:
-    """The largest pressure that nodal forces of the sizes `noise` (n_dofs,) stand for.
+    """The largest pressure that nodal forces of the sizes `noise` (n_dofs,) correspond to.
 
     Read, as the multiplier itself, at the largest coefficient of each row of `gaps` (m, n_dofs).
     """

@@ -218,7 +218,7 @@ class Attributes:
     ) -> dict[str, np.ndarray]:
         """A value of the material of each cell (n,) by type; a group's own goes before `all`.
 
-        `otherwise`: that of cells without a material, which belong to rigid bodies.
+        `otherwise`: of cells without a material, which belong to rigid bodies.
         """
         materials = self.case.materials
         start = value(materials[ALL]) if ALL in materials else otherwise

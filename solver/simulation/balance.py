@@ -2,15 +2,15 @@
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import spsolve
 
 from ..mechanics.fem.faces import face_integrals
 from ..mechanics.fem.supports import DEPENDENT
+from ..mechanics.linear.direct import factorise
 from .problem import Equilibrium
 from .scene import Scene, ZoneScene
 from .solution import Reaction, RigidMotion
 
-# A macro-element of which the segments miss less than this share is covered in full.
+# A macro-element is covered in full where its segments miss less than this share.
 _COVERED = 1e-6
 # Of a macro-element's largest coefficient: smaller ones are round-off, or too small to divide by.
 _ROUND_OFF, _OWN = 1e-10, 1e-2
@@ -204,7 +204,7 @@ def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | N
     known = state.force + state.correction
     forces = rows @ (state.iterate.internal - known).astype(float).ravel()
     matrix = integrals.T @ integrals + sparse.diags_array((size == 0).astype(float))
-    pressure = np.atleast_1d(spsolve(matrix.tocsc(), integrals.T @ forces)) * scale
+    pressure = factorise(matrix, dim=scene.points.shape[1]).solve(integrals.T @ forces) * scale
     return list(np.split(pressure, np.cumsum([zone.count for zone in scene.zones])[:-1]))
 
 

@@ -17,7 +17,7 @@ class Displacement:
     component, its strain would be lost in the rounding of the motion; the remainder keeps it. The
     rigid motion is the motion of the contact surface, so that the remainder is smallest there.
     `motions` (n_dofs, k) are the rigid motions that supports leave free, `fit` (k, n_dofs) yields
-    the amounts of the motions in a displacement, `amount` (k,) are those of this one. The remainder
+    the amounts of the motions in a displacement, `amount` (k,) are this one's. The remainder
     is the sum, never evaluated, of two parts `deformation` (2, n_dofs): the second holds what the
     first loses to rounding, so that each refinement gains its digits in full.
 

@@ -71,7 +71,7 @@ def pressure_on(
 
 
 class ExactValues:
-    """The values that stand for `solution` under a key of the reference, on one solve's mesh."""
+    """The values of `solution` under a key of the reference, on one solve's mesh."""
 
     def __init__(self, solution: Solution, exact: ExactSolution):
         self.solution, self.exact = solution, exact

@@ -76,7 +76,7 @@ def named_parts(case: Case, mesh: meshio.Mesh) -> tuple[meshio.Mesh, tuple[int, 
 
 
 def with_cells(mesh: meshio.Mesh, wanted: Sequence[np.ndarray]) -> meshio.Mesh:
-    """The mesh with its `wanted` cells (n,), by block, and those of its groups."""
+    """The mesh with only its `wanted` cells (n,), by block, also in its groups."""
     sets: dict[str, list[np.ndarray]] = {name: [] for name in mesh.cell_sets}
     cells = []
     for i, (block, chosen) in enumerate(zip(mesh.cells, wanted, strict=True)):

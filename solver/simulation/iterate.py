@@ -47,7 +47,7 @@ class ContactIterate:
         if self.scene.options.safeguards.differences:
             internal = internal_force(points, blocks, self.deformation, self.extended)
         else:
-            product = stiffness(points, blocks)[0] @ self.displacement.total
+            product = stiffness(points, blocks) @ self.displacement.total
             internal = product.reshape(self.force.shape)
         return internal + self.scene.mean.force(self.mean_stress) + self.springs
 

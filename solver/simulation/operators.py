@@ -36,7 +36,7 @@ def operator_of(
     noise: float,
     options: Options,
 ) -> GapOperator:
-    """The gap operator of a zone; initial gaps below `noise` (a length) are none."""
+    """The gap operator of a zone; initial gaps below `noise` (a length) are zero."""
     points, count = groups.points, faces.count
     around = groups.axisymmetric
     slaves = [facets(points, f.type, f.nodes, f.macro, around) for f in faces.sub_faces]
@@ -127,7 +127,7 @@ def _initial_gaps(
 def _master_facets(
     points: np.ndarray, faces: list[FaceBlock], materials: list[np.ndarray], around: bool
 ) -> list[Facets]:
-    """Master faces, those of one type together whatever cell is behind them, by material (n,)."""
+    """Master faces by type, whatever cells are behind them, with their materials (n,)."""
     merged = []
     for name in dict.fromkeys(block.type.name for block in faces):
         alike = [i for i, block in enumerate(faces) if block.type.name == name]

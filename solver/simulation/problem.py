@@ -14,8 +14,10 @@ from ..mechanics.fem.bodies import (
     whole_motions,
 )
 from ..mechanics.fem.elasticity import stiffness
+from ..mechanics.linear.choice import against_multigrid
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ..mechanics.linear.multigrid import Unknowns
+from ..mechanics.linear.nodal_matrix import NodalMatrix
 from ..mechanics.linear.systems import Systems, parts_of
 from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
 from ..system.errors import SolveError
@@ -96,10 +98,10 @@ class ContactProblem:
         self.unsupported = loose
         if scene.springs.nnz:
             self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
-        self.matrix, self.diagonal = _stiffness(scene)
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
+        self.matrix, self.diagonal = _stiffness(scene, unknowns)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
         soft = self._compliance if stabilised else None
@@ -290,7 +292,7 @@ class ContactProblem:
 
         eligible = self.constraints.eligible
         push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
-        # Initial strain has no resultant, but for round-off.
+        # Up to round-off initial strain has no resultant.
         strained = self.scene.straining(step, self.scene.initial.force)
         loads = self.unsupported.T @ (self.scene.acting(step)[0] - strained).ravel()
         largest = np.abs(loads).max(initial=0.0)
@@ -312,12 +314,18 @@ def _force_scale(start: ContactIterate) -> float:
     return float(max(np.abs(start.force).max(), np.abs(internal).max())) or 1.0
 
 
-def _stiffness(scene: Scene) -> tuple[sparse.csr_matrix, np.ndarray]:
+def _stiffness(
+    scene: Scene, unknowns: Unknowns
+) -> tuple[sparse.csr_matrix | NodalMatrix, np.ndarray]:
     """The stiffness of the free unknowns, and the diagonal (n_dofs,) for all degrees of freedom."""
     free, mean = scene.free, scene.mean
-    matrix, diagonal = stiffness(scene.points, scene.blocks, free.selection)
-    if free.selection is None:
-        matrix = free.reduced(matrix)
+    blocks = stiffness(scene.points, scene.blocks)
+    diagonal = blocks.diagonal()
+    if free.selection is not None and not mean.size and not scene.springs.nnz:
+        matrix = NodalMatrix(blocks, free.selection)
+        large = not against_multigrid(len(free.selection), unknowns)
+        return (matrix if large else matrix.tocsr()), diagonal
+    matrix = free.reduced(blocks)
     if mean.size:
         matrix = matrix + free.reduced(mean.stiffness())
     if scene.springs.nnz:

@@ -41,7 +41,7 @@ def ties_of(groups: Attributes) -> dict[str, np.ndarray]:
 
 
 def copies_of(groups: Attributes) -> dict[str, Copies]:
-    """Nodes that move as those of another side do, by key of the case file."""
+    """Nodes that move as another side's nodes do, by key of the case file."""
     found: dict[str, Copies] = {}
     points, dim = groups.points + groups.origin, groups.points.shape[1]
     extent = float(np.ptp(points, axis=0).max())

@@ -163,7 +163,7 @@ def _with_cells(
 
 
 def _opposite(case: Case, mesh: meshio.Mesh, name: str) -> np.ndarray:
-    """The nodes of the faces that meet the body; all if there are none."""
+    """The nodes of the faces that meet the body; all nodes if no face does."""
     slaves = {s for z in case.zones if name in (z.slave, z.master) for s in (z.slave, z.master)}
     nodes = np.concatenate([_face_nodes(mesh, group) for group in sorted(slaves)])
     return nodes if len(nodes) else np.arange(len(mesh.points))
@@ -313,7 +313,7 @@ def free_motions(groups: Attributes) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def forces(groups: Attributes, name: str | None = None) -> np.ndarray:
-    """Nodal forces (n, dim) of the forces and moments on rigid bodies, or of those of a `name`."""
+    """Nodal forces (n, dim) of the forces and moments on rigid bodies, or of the named ones."""
     total = np.zeros_like(groups.points)
     for group, frame in groups.frames.items():
         body = groups.case.rigid[group]

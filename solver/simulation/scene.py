@@ -30,7 +30,7 @@ from .rigid import Frame
 from .selections import with_groups
 from .surfaces import Surfaces, surfaces_of
 
-# An average initial gap below this many roundings of the coordinates is none.
+# An average initial gap below this many roundings of the coordinates is zero.
 _GAP_ROUND_OFF = 8
 
 
@@ -267,13 +267,13 @@ def _zones(
 
 
 def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndarray:
-    """Values (n, dim) at the nodes of the mesh, interpolated at those of the scene's cut mesh."""
+    """Values (n, dim) at the mesh's nodes, interpolated at the nodes of the scene's cut mesh."""
     surfaces = [(zone.slave_faces, zone.master_faces) for zone in scene.zones]
     return _cut(replace_points(mesh, values), scene.case.zones, surfaces)[0].points
 
 
 def radial(points: np.ndarray) -> np.ndarray:
-    """Points (n, 2) of a meridian plane, those at the axis but for rounding put on it."""
+    """Points (n, 2) of a meridian plane; points on the axis up to rounding are put on it."""
     found = points.copy()
     found[np.abs(points[:, 0]) <= ON_AXIS * np.abs(points).max(), 0] = 0.0
     return found

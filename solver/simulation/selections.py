@@ -132,7 +132,7 @@ def _touched(mesh: meshio.Mesh, group: str | None = None) -> np.ndarray:
 
 
 def _within(mesh: meshio.Mesh, groups: tuple[str, ...]) -> np.ndarray:
-    """The nodes (n,) of the volume cells of any of the groups; all where there are none."""
+    """The nodes (n,) of the volume cells of any of the groups; all nodes without groups."""
     if not groups:
         return np.ones(len(mesh.points), dtype=bool)
     return np.logical_or.reduce([_touched(mesh, group) for group in groups])

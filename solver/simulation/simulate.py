@@ -45,7 +45,7 @@ from .unloaded import without_unloaded
 from .validity import remarks, validity
 
 _LOG = logging.getLogger(__name__)
-# Half, but for round-off.
+# Half, up to round-off.
 _HALF = 0.5 - 1e-9
 
 
@@ -289,7 +289,7 @@ def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
 
 
 def _closed(zone: ZoneScene, state: Equilibrium) -> np.ndarray:
-    """The macro-elements (m,) of which the closed multipliers have at least half."""
+    """The macro-elements (m,) with at least half of their multipliers closed."""
     return zone.by_macro_element(state.status.closed.astype(float)) >= _HALF
 
 

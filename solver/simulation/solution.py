@@ -355,7 +355,7 @@ class Solution:
 
     @property
     def hexahedra(self) -> str | None:
-        """The cut of slave hexahedra, if it overrides that of the case."""
+        """The cut of slave hexahedra, if it overrides the case's."""
         return self.case.hexahedra
 
     @property

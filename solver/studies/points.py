@@ -1,4 +1,4 @@
-"""Points of a study: each measured in processes of its own, and recorded whatever happens there.
+"""Points of a study: each measured in processes of its own, and recorded in any event.
 
 A record is a JSON object. Every one has these keys:
 

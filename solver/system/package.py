@@ -5,6 +5,7 @@ package depends on the name.
 """
 
 import sys
+from functools import cache
 from pathlib import Path
 
 PROJECT = "mortarcheck"
@@ -21,6 +22,7 @@ def in_project() -> bool:
     return (_SOURCES / "pyproject.toml").is_file()
 
 
+@cache
 def project_version() -> str:
     """The version in pyproject.toml: of the file itself, or as installed; else `unknown`."""
     if in_project():

@@ -55,6 +55,7 @@ def _command() -> list[str]:
     return ["python", *(a for a in sys.orig_argv[1:] if a != "-Es")]
 
 
+@cache
 def _revision() -> str:
     """The git revision of the project, marked where files differ from it; empty if installed."""
     if not in_project():
@@ -76,6 +77,7 @@ def _sha256(path: Path | None) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
+@cache
 def _cpu() -> str:
     """The processor's name; Linux has it in a file only."""
     try:

@@ -222,7 +222,7 @@ def _judge(
     scale = check.scale(solution) if check.fixed or magnitude == 0 else magnitude
     deviation = np.abs(sample.values - sample.reference)
     if deviation.size:
-        worst = int(np.argmax(deviation))  # the first that is not a number, if there is one
+        worst = int(np.argmax(deviation))  # the first that is not a number, if any
         error = _over(deviation[worst], scale)
         extremes = float(sample.values.min()), float(sample.values.max())
         value, reference = float(sample.values[worst]), float(sample.reference[worst])

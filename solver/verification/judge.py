@@ -223,7 +223,7 @@ def _extremes(arrays: Iterable[np.ndarray]) -> list[Any] | None:
 
 
 def _worst(checks: Sequence[CheckResult]) -> CheckError | None:
-    """The check of `ACCURACY` with the largest error; where none ran, of the norms checked."""
+    """The check of `ACCURACY` with the largest error; if none ran, the norm with the largest."""
     relative = [check for check in checks if check.name in ACCURACY]
     relative = relative or [check for check in checks if check.norm == "error"]
     found = [CheckError(name=c.name, zone=c.zone, error=c.error) for c in relative]

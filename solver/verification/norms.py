@@ -45,13 +45,13 @@ from .oscillation import grown, macro_neighbours, oscillation
 
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.
 _CHUNK = 1 << 17
-_TWICE = np.array([1, 1, 1, 2, 2, 2])  # off-diagonal components stand for two
+_TWICE = np.array([1, 1, 1, 2, 2, 2])  # off-diagonal components count twice
 
 
 def errors(solution: Solution, exact: ExactSolution | None = None) -> dict[str, float]:
     """The errors of a solve by name, against `exact` or the exact solution that its case names.
 
-    Empty where there is neither.
+    Empty without either.
     """
     exact = exact or solution.case.solution
     if exact is None:

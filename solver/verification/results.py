@@ -141,9 +141,9 @@ def _objects(file: h5py.File) -> int:
 
 
 def read_result(path: str | Path) -> Result:
-    """Read a result file back; `InputError` for a file that is none, or not as it was written."""
+    """Read a result file back; `InputError` for another kind of file, or a changed one."""
     if not (sha256 := seal_of(path)):
-        raise _no_result(path, "damaged, of another version, or none at all")
+        raise _no_result(path, "damaged, of another version, or another kind of file")
     try:
         with read_file(path, real=True) as file:
             lost = int(file.attrs["objects"]) - _objects(file)

@@ -30,7 +30,7 @@ from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
 
 Reference = Any
-# Pressures and gaps below this share of load and length are none.
+# Pressures and gaps below this share of load and length are zero.
 _TOUCHING = 1e-12
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.
 _CHUNK = 1 << 17
@@ -70,7 +70,7 @@ def expected_coverage(solution: Solution, zone: ZoneResult, reference: Reference
 
 
 def _covered(solution: Solution, zone: ZoneResult, reference: Reference) -> np.ndarray:
-    """The reference's pressure (m,), none where nothing is covered."""
+    """The reference's pressure (m,), zero where nothing is covered."""
     expected = expected_pressure(zone, reference)
     return np.where(expected_coverage(solution, zone, reference) > 0, expected, 0.0)
 

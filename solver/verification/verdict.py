@@ -298,13 +298,13 @@ def unbound(verdict: Verdict, path: Path) -> str:
     """
     *_, root, family, job = ("", "", *path.absolute().parts[:-1])
     if root == "results" and (family, job) != (verdict.family, verdict.job):
-        return f"the verdict is that of {verdict.family}/{verdict.job}"
+        return f"the verdict belongs to {verdict.family}/{verdict.job}"
     if verdict.result is not None:
         seal = seal_of(path.parent / verdict.result)
         if not seal:
             return f"the result {verdict.result} is missing or damaged"
         if seal != verdict.result_sha256:
-            return f"the result {verdict.result} is that of another solve"
+            return f"the result {verdict.result} belongs to another solve"
     return ""
 
 

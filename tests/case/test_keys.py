@@ -15,7 +15,7 @@ from solver.case.yaml import parse_mapping
 from solver.commands.schemas import FOLDER
 from solver.system.errors import InputError
 from solver.verification.checks import CHECKS
-from tests.case.test_case import FULL, PATH
+from tests.case.files import FULL, PATH
 
 
 def test_every_check_may_have_its_tolerance():

@@ -328,3 +328,21 @@ def test_help_imports_nothing_heavy():
         [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True
     )
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_a_plane_solve_imports_little(small):
+    unused = {"gmsh", "meshio.xdmf", "numpy.f2py.crackfortran", "pyamg", "scipy.constants"}
+    unused |= {"scipy.linalg", "scipy.optimize", "scipy.sparse.linalg", "scipy.spatial.transform"}
+    unused |= {"scipy.special", "skfem.assembly", "skfem.mesh", "skfem.utils"}
+    assert main(["mesh", str(small / "c.yaml"), "-o", str(small / "m.vtkhdf")]) == 0
+    command = f"solve {small}/c.yaml --mesh {small}/m.vtkhdf -o {small}/r.vtkhdf --quiet".split()
+    code = (
+        "import sys; from solver.commands.cli import run\n"
+        f"sys.argv[1:] = {command}\n"
+        f"print(run(), sorted({unused} & sys.modules.keys()), 'scipy.sparse' in sys.modules)"
+    )
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "0 [] True\n"

@@ -64,6 +64,6 @@ def test_every_listed_command_is_in_every_script(script, capsys, shell):
 
 
 def test_the_command_line_does_not_load_what_makes_the_script():
-    code = "import sys, solver.commands.cli as c; c.make_parser(); print('shtab' in sys.modules)"
+    code = "import sys, solver.commands.cli as c; c.parser(); print('shtab' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout == "False\n"

@@ -17,9 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from scipy.sparse import diags_array
 
-from solver.case.model import Material
 from solver.case.reader import load_case
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError, SolveError
@@ -29,31 +27,42 @@ from solver.verification.norms import errors
 from solver.verification.regression import accepted_values
 from solver.verification.run import mesh_of
 from solver.verification.verdict import CheckResult
+from tests.faults.patches import (
+    Wrapped,
+    changed,
+    every_third_off,
+    factor_of_half,
+    first_guess_kept,
+    first_nodes_exchanged,
+    first_scaled,
+    first_status_kept,
+    first_system_kept,
+    given,
+    last_opened,
+    lower_half_softer,
+    master_overlooked,
+    more_covered,
+    never_closes,
+    never_closing,
+    normals_rolled,
+    one_dropped,
+    rolled_sub_faces,
+    shared_nodes_free,
+    stays_closed,
+    template_off_by_one,
+    template_piece_lost,
+)
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 PLANE, SOLID = "ssnp170/c", "opening/overlap-tetra10-hexa8"
-CLOSING, OVERLAP, OPEN = (
-    "opening/closing-quad4",
-    "opening/overlap-quad4-tria3",
-    "opening/staying-open",
-)
-TILTED, PUNCH, BENT = (
-    "hydrostatic/tilted-tria3-quad8",
-    "opening/wide-punch-stiff",
-    "hydrostatic/coincident-quad8",
-)
-PARTLY, VARYING, LAYERS, TILTED_SOLID = (
-    "hertz/cylinder-tria3",
-    "manufactured/quad4",
-    "lame/cylinders-two-materials",
-    "hydrostatic/tilted-hexa20-tetra10",
-)
-SPHERES = "lame/spheres-hexa20"
+CLOSING, OPEN = "opening/closing-quad4", "opening/staying-open"
+TILTED, TILTED_SOLID = "hydrostatic/tilted-tria3-quad8", "hydrostatic/tilted-hexa20-tetra10"
+BENT, PARTLY, VARYING = "hydrostatic/coincident-quad8", "hertz/cylinder-tria3", "manufactured/quad4"
+LAYERS, SPHERES = "lame/cylinders-two-materials", "lame/spheres-hexa20"
 HEATED = "loads/heated"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
 UNLOADING, SECTOR = "loads/unloading", "lame/rings-sector"
 CORNER, SPLIT = "shared/corner-quad4-tria6", "shared/split-nodal"
-
 ENDING, EDGE, CYLINDER = "partial-waves/tria6", "contact-edge/tria3", "half-planes/hertz-quad4"
 RECEDING = "receding/quad8"
 TUBES = "axisymmetric/compound-tube"
@@ -62,13 +71,7 @@ RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 DIE, SHAFT, LINES = "rigid/tilted-die", "rigid/shaft-in-tube", "rigid/lines-of-the-mesh"
 STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
-
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
-
-# A segment below this share of the largest is round-off of the intersection.
-_SLIVER = 1e-6
-
-Wrapped = Callable[..., Any]
 
 
 @dataclass(frozen=True)
@@ -124,171 +127,6 @@ def planted(mutant: Mutant) -> Iterator[None]:
         yield
 
 
-# What the patches are made of
-
-
-def changed(change: Callable[[Any], Any]) -> Callable[[Wrapped], Wrapped]:
-    """A function whose result is changed."""
-    return lambda true: lambda *given, **named: change(true(*given, **named))
-
-
-def given(change: Callable[..., tuple]) -> Callable[[Wrapped], Wrapped]:
-    """A function that gets other arguments."""
-    return lambda true: lambda *arguments: true(*change(*arguments))
-
-
-def _first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
-    values = np.array(values)
-    values[0] *= factor
-    return values
-
-
-def _first_nodes_exchanged(found: Any) -> Any:
-    order = [1, 0, *range(2, found.on_reference.shape[1])]
-    return replace(found, on_reference=found.on_reference[:, order])
-
-
-def _one_dropped(parts: list) -> list:
-    """Without the smallest segment that is more than round-off."""
-    sizes = [part.area for part in parts]
-    if not parts:
-        return parts
-    least = _SLIVER * max(size.max() for size in sizes)
-    real = [np.where(size > least, size, np.inf) for size in sizes]
-    block = int(np.argmin([size.min() for size in real]))
-    keep = np.arange(len(real[block])) != real[block].argmin()
-    return [part.of(keep) if i == block else part for i, part in enumerate(parts)]
-
-
-def _master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    kept = pairs[1] != 3
-    return pairs[0][kept], pairs[1][kept]
-
-
-def _shared_nodes_free(true: Wrapped) -> Wrapped:
-    def zones(*given: Any) -> list[Any]:
-        first, *others = true(*given)
-        kept = np.ones((first.operator.matrix.shape[1] // 2, 2))
-        for faces in first.sub_faces:
-            kept[faces.nodes] = 0.0
-        cut_off = diags_array(kept.ravel())
-        rest = [replace(z.operator, matrix=z.operator.matrix @ cut_off) for z in others]
-        return [first, *(replace(z, operator=o) for z, o in zip(others, rest, strict=True))]
-
-    return zones
-
-
-def _never_closing(true: Wrapped) -> Wrapped:
-    def constraints(scene: Any) -> Any:
-        found = true(scene)
-        found.eligible[len(found.eligible) // 2] = False
-        return found
-
-    return constraints
-
-
-def _first_system_kept(true: Wrapped) -> Wrapped:
-    kept: dict[int, Any] = {}
-
-    def constrained(problem: Any, closed: np.ndarray) -> Any:
-        if id(problem) not in kept:
-            kept[id(problem)] = true(problem, closed)
-        return kept[id(problem)]
-
-    return constrained
-
-
-def _factor_of_half(true: Wrapped) -> Wrapped:
-    """As of another stiffness, and no refinement that would make up for it."""
-    return lambda matrix, *rest: true(matrix.tocsr() * 0.5, *rest)
-
-
-def _never_closes(true: Wrapped) -> Wrapped:
-    return lambda solve, start, eligible, *more: true(solve, start, eligible & False, *more)
-
-
-def _stays_closed(true: Wrapped) -> Wrapped:
-    """Tension is borne."""
-
-    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
-        def no_tension_seen(closed: np.ndarray) -> Any:
-            trial = solve(closed)
-            return replace(trial, pressure=np.abs(trial.pressure))
-
-        return true(no_tension_seen, eligible, eligible, *more)
-
-    return status
-
-
-def _first_guess_kept(true: Wrapped) -> Wrapped:
-    return lambda solve, start, eligible, *more: replace(
-        true(solve, start, eligible, *more), closed=start & eligible
-    )
-
-
-def _last_opened(found: Any) -> Any:
-    closed = found.closed.copy()
-    closed[np.flatnonzero(closed)[-1:]] = False
-    return replace(found, closed=closed)
-
-
-def _every_third_off(stress: np.ndarray) -> np.ndarray:
-    stress[::3, 0] -= 9e-4 * 25  # between the extremes: accepted values notice nothing
-    return stress
-
-
-def _lower_half_softer(true: Wrapped) -> Wrapped:
-    def by_material(self: Any, value: Callable[[Any], float], otherwise: float) -> Any:
-        found, height = true(self, value, otherwise), self.points[:, -1]
-        if value(Material(1.0, 0.3)) != 0.3:
-            return found
-        middle = (height.min() + height.max()) / 2
-        lower = {
-            kind: height[cells].mean(axis=1) < middle for kind, cells in self.cut.cells.items()
-        }
-        return {kind: np.where(lower[kind], 0.2991, values) for kind, values in found.items()}
-
-    return by_material
-
-
-def _rolled_sub_faces(result: Any) -> Any:
-    faces = [replace(f, macro=np.roll(f.macro, 1)) for f in result.sub_faces]
-    return replace(result, sub_faces=faces)
-
-
-def _template_off_by_one(result: Any) -> Any:
-    (kind, nodes), *others = result.sub_faces[0]
-    wrong = [(kind, [*nodes[1:], nodes[1]]), *others]
-    return replace(result, sub_faces=[wrong, *result.sub_faces[1:]])
-
-
-def _template_piece_lost(result: Any) -> Any:
-    return replace(result, pieces=result.pieces[1:])
-
-
-def _first_status_kept(true: Wrapped) -> Wrapped:
-    """What is open in the first step stays so."""
-    kept: list[np.ndarray] = []
-
-    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
-        found = true(solve, start, kept[0] if kept else eligible, *more)
-        kept.append(found.closed)
-        return found
-
-    return status
-
-
-def _normals_rolled(blocks: list) -> list:
-    turned = [b.directions if b.directions is None else b.directions[:, ::-1] for b in blocks]
-    return [replace(b, directions=d) for b, d in zip(blocks, turned, strict=True)]
-
-
-def _more_covered(operator: Any) -> Any:
-    at = operator.surface
-    more = np.where(at.covered < 0.999 * at.area, 1.001, 1.0) * at.covered
-    return replace(operator, covered=more, surface=replace(at, covered=more))
-
-
 MUTANTS = (
     Mutant("gap-sign", "the initial gap has the wrong sign", CLOSING,
            "solver.mechanics.mortar.operator:integrals",
@@ -306,37 +144,37 @@ MUTANTS = (
            "solver.mechanics.mortar.operator:integrals",
            changed(lambda p: replace(p, vectors=(0 * p.vectors[0], p.vectors[1])))),
     Mutant("sliver-lost", "the smallest segment is dropped", PLANE,
-           "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
+           "solver.mechanics.mortar.operator:intersect", changed(one_dropped)),
     Mutant("sliver-lost-3d", "the smallest segment is dropped, in 3D", TILTED_SOLID,
-           "solver.mechanics.mortar.operator:intersect", changed(_one_dropped)),
+           "solver.mechanics.mortar.operator:intersect", changed(one_dropped)),
     Mutant("pair-lost", "the pairing misses one master face", PLANE,
-           "solver.mechanics.mortar.pairing:candidate_pairs", changed(_master_overlooked)),
+           "solver.mechanics.mortar.pairing:candidate_pairs", changed(master_overlooked)),
     Mutant("macro-element-dropped", "one macro-element never closes", PLANE,
-           "solver.simulation.problem:contact_constraints", _never_closing),
+           "solver.simulation.problem:contact_constraints", never_closing),
     Mutant("macro-element-numbers", "sub-faces are assigned to the next macro-element", VARYING,
-           "solver.simulation.scene:cut", changed(_rolled_sub_faces)),
+           "solver.simulation.scene:cut", changed(rolled_sub_faces)),
     Mutant("template-off-by-one", "the nodes of the first sub-face of the cut are shifted by one",
-           PLANE, "solver.mechanics.mortar.cut:_template", changed(_template_off_by_one)),
+           PLANE, "solver.mechanics.mortar.cut:_template", changed(template_off_by_one)),
     Mutant("template-piece-lost", "the cut loses a piece of the cell", SOLID,
-           "solver.mechanics.mortar.cut:_template", changed(_template_piece_lost)),
+           "solver.mechanics.mortar.cut:_template", changed(template_piece_lost)),
     Mutant("jacobian", "the Jacobian of one cell is 1 % too large", PLANE,
            "solver.mechanics.fem.elasticity:shapes_in",
-           changed(lambda found: replace(found, measure=_first_scaled(found.measure, 1.01)))),
+           changed(lambda found: replace(found, measure=first_scaled(found.measure, 1.01)))),
     Mutant("node-order", "the first two nodes of every cell are exchanged", PLANE,
-           "solver.mechanics.fem.elasticity:shapes_in", changed(_first_nodes_exchanged)),
+           "solver.mechanics.fem.elasticity:shapes_in", changed(first_nodes_exchanged)),
     Mutant("quadrature-weight", "one quadrature weight of the cells is 10 % off", BENT,
            "solver.mechanics.fem.elasticity:volume_rule",
-           changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
+           changed(lambda rule: (rule[0], first_scaled(rule[1], 1.1)))),
     Mutant("segment-weight", "one quadrature weight of the segments is 10 % off", TILTED,
            "solver.mechanics.mortar.segments:simplex_rule",
-           changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
+           changed(lambda rule: (rule[0], first_scaled(rule[1], 1.1)))),
     Mutant("segment-arc", "the slopes of arcs in the reference face are 0.1 % too large", SPHERES,
            "solver.mechanics.mortar.segments:_into_reference",
            changed(lambda image: lambda *arcs: (image(*arcs)[0], 1.001 * image(*arcs)[1]))),
     Mutant("load-weight", "one quadrature weight of the loads is 10 % off", PLANE,
            "solver.mechanics.fem.loads:face_rule",
-           changed(lambda rule: (rule[0], _first_scaled(rule[1], 1.1)))),
-    Mutant("poisson-term", "Lamé's λ is that of plane stress", PLANE,
+           changed(lambda rule: (rule[0], first_scaled(rule[1], 1.1)))),
+    Mutant("poisson-term", "Lamé's λ has its value in plane stress", PLANE,
            "solver.simulation.attributes:lame_parameters",
            changed(lambda lm: (2 * lm[0] * lm[1] / (lm[0] + 2 * lm[1]), lm[1]))),
     Mutant("shear-modulus", "E / (2 + ν) instead of E / (2 (1 + ν))", PLANE,
@@ -360,7 +198,7 @@ MUTANTS = (
            "solver.simulation.attributes:Attributes._exact_force", changed(np.zeros_like)),
     Mutant("force-share", "a force on a group is 1 % too large", FORCES,
            "solver.simulation.attributes:Attributes._share", changed(lambda share: 1.01 * share)),
-    Mutant("selected-side", "selected faces are those of all bodies there", FORCES,
+    Mutant("selected-side", "selected faces belong to all bodies there", FORCES,
            "solver.simulation.selections:_within", changed(np.ones_like)),
     Mutant("spring-weight", "an elastic foundation is 1 % too stiff", FOUNDATION,
            "solver.simulation.relations:foundation", changed(lambda k: 1.01 * k)),
@@ -378,7 +216,7 @@ MUTANTS = (
            "solver.simulation.scene:Scene.acting",
            lambda made: lambda scene, step: made(scene, dict.fromkeys(step, 1.0))),
     Mutant("zone-ends", "a zone has no force at nodes that an earlier zone has", CORNER,
-           "solver.simulation.scene:_zones", _shared_nodes_free),
+           "solver.simulation.scene:_zones", shared_nodes_free),
     Mutant("zone-twice", "a node in two zones has a multiplier in each", SPLIT,
            "solver.mechanics.mortar.held:_held",
            given(lambda operator, nodes, basis, _: (operator, nodes, basis, None))),
@@ -396,26 +234,26 @@ MUTANTS = (
            "solver.mechanics.fem.elasticity:extrapolation",
            changed(lambda fit: np.roll(fit, 1, axis=0))),
     Mutant("stress-bits", "σ_xx is off by 9e-4 of the load at every third node", PLANE,
-           "solver.simulation.simulate:nodal_stress", changed(_every_third_off)),
+           "solver.simulation.simulate:nodal_stress", changed(every_third_off)),
     Mutant("poisson-digits", "ν of the lower block is 0.2991 instead of 0.3", PLANE,
-           "solver.simulation.attributes:Attributes.by_material", _lower_half_softer),
-    Mutant("stale-system", "the factored system is that of the first status", CLOSING,
-           "solver.simulation.problem:ContactProblem._constrained", _first_system_kept),
-    Mutant("wrong-factor", "the factorisation is that of half the stiffness", PLANE,
-           "solver.mechanics.linear.condensation:prepare", _factor_of_half),
+           "solver.simulation.attributes:Attributes.by_material", lower_half_softer),
+    Mutant("stale-system", "the factored system belongs to the first status", CLOSING,
+           "solver.simulation.problem:ContactProblem._constrained", first_system_kept),
+    Mutant("wrong-factor", "the factorisation belongs to half the stiffness", PLANE,
+           "solver.mechanics.linear.condensation:prepare", factor_of_half),
     Mutant("multiplier-sign", "the multiplier has the wrong sign in the equilibrium", PLANE,
            "solver.mechanics.linear.condensation:CondensedSystem.multiplier",
            changed(lambda p: -p)),
     Mutant("never-closes", "the contact status never closes a macro-element", CLOSING,
-           "solver.simulation.problem:find_status", _never_closes),
+           "solver.simulation.problem:find_status", never_closes),
     Mutant("bears-tension-beyond", "closed contact stays closed under tension where it should end",
-           RECEDING, "solver.simulation.problem:find_status", _stays_closed),
+           RECEDING, "solver.simulation.problem:find_status", stays_closed),
     Mutant("first-guess-kept", "the contact status is its first guess", ENDING,
-           "solver.simulation.problem:find_status", _first_guess_kept),
+           "solver.simulation.problem:find_status", first_guess_kept),
     Mutant("end-too-early", "the last macro-element of the contact stays open", EDGE,
-           "solver.simulation.problem:find_status", changed(_last_opened)),
+           "solver.simulation.problem:find_status", changed(last_opened)),
     Mutant("bears-tension", "closed contact stays closed under tension", OPEN,
-           "solver.simulation.problem:find_status", _stays_closed),
+           "solver.simulation.problem:find_status", stays_closed),
     Mutant("support-lost", "a support loses its last node", PLANE,
            "solver.simulation.attributes:Attributes.nodes", changed(lambda nodes: nodes[:-1])),
     Mutant("material-mixed-up", "the materials of the two bodies are exchanged", LAYERS,
@@ -444,7 +282,7 @@ MUTANTS = (
            "solver.simulation.operators:_recovery",
            changed(lambda asked: replace(asked, form=replace(asked.form, sweeps=2)))),
     Mutant("covered-share", "partly covered faces have 0.1 % too much of covered area", UNCOVERED,
-           "solver.simulation.operators:gap_operator", changed(_more_covered)),
+           "solver.simulation.operators:gap_operator", changed(more_covered)),
     Mutant("zone-interference", "every zone has the interference 0.02", TUBES,
            "solver.simulation.operators:_initial_gaps",
            given(lambda zone, *rest: (replace(zone, interference=0.02), *rest))),
@@ -452,12 +290,12 @@ MUTANTS = (
            "solver.mechanics.fem.mixed:_integrals",
            changed(lambda found: (*found[:2], 0.99 * found[2]))),
     Mutant("normals-rolled", "nodes of a face have the normals of its other end", NODAL_NORMALS,
-           "solver.simulation.operators:with_nodal_normals", changed(_normals_rolled)),
+           "solver.simulation.operators:with_nodal_normals", changed(normals_rolled)),
     Mutant("chords", "curved faces count as straight", RATIO,
            "solver.simulation.operators:facets",
            changed(lambda f: replace(f, affine=np.ones(len(f.affine), dtype=bool)))),
     Mutant("first-status", "what is open in the first step stays open", SIDES,
-           "solver.simulation.problem:find_status", _first_status_kept),
+           "solver.simulation.problem:find_status", first_status_kept),
     Mutant("moment-sign", "moments on rigid bodies have the wrong sign", DIE,
            "solver.simulation.simulate:rigid_bodies",
            changed(lambda bodies: [replace(body, moment=-body.moment) for body in bodies])),

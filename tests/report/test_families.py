@@ -1,4 +1,4 @@
-"""The page of a family: what its file tells, and kinds of reference that are kept apart."""
+"""The page of a family: what its file says, and kinds of reference that are kept apart."""
 
 import json
 import re

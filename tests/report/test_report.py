@@ -303,8 +303,8 @@ def test_exchanged_verdicts_are_found_out(tmp_path):
     write_report([one, two], tmp_path / "report")
     failures = (tmp_path / "report" / "failures.txt").read_text()
     assert failures == (
-        "fam-a: crashed: the verdict is that of fam/fam-b; solve again\n"
-        "fam-b: crashed: the verdict is that of fam/fam-a; solve again\n"
+        "fam-a: crashed: the verdict belongs to fam/fam-b; solve again\n"
+        "fam-b: crashed: the verdict belongs to fam/fam-a; solve again\n"
     )
 
 

@@ -263,8 +263,8 @@ def other_attributes(file):
     ("change", "fault"),
     [
         (lose_group, "balance"),
-        (lose_zone, "the contact zones are not those of the case"),
-        (lose_step, "the load steps are not those of the case"),
+        (lose_zone, "the contact zones differ from the case's"),
+        (lose_step, "the load steps differ from the case's"),
         (not_a_number, "zone interface: gap holds values that are not finite numbers"),
         (node_beyond_the_end, "zone interface: slave_nodes holds numbers outside 0"),
         (complex_numbers, "observation/gap holds complex numbers"),

@@ -1,4 +1,4 @@
-"""What a run tells: a line for each solve, its state on a terminal, next to nothing on request."""
+"""What a run reports: a line for each solve, its state on a terminal, almost nothing if quiet."""
 
 import io
 import logging
@@ -103,7 +103,7 @@ class Terminal(io.StringIO):
 
 
 def hear(status, *records):
-    """What a run tells on both streams."""
+    """What a run prints on both streams."""
     out = io.StringIO()
     progress = Progress(out, status)
     for each in records:

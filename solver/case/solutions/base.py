@@ -7,7 +7,7 @@ formula holds a little beyond its part, so that it can be evaluated on a mesh th
 exact geometry.
 """
 
-from dataclasses import field
+from dataclasses import field, fields
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,9 +26,12 @@ class ParameterError(ValueError):
 
 
 def parameter(doc: str, **options: Any) -> Any:
-    """A dataclass field with its meaning, and in `source` where a case file says it already."""
-    source = options.pop("source", None)
-    return field(metadata={"doc": doc, "source": source}, **options)
+    """A dataclass field with its meaning.
+
+    `source`: where a case file says it already. `positive`: it must be.
+    """
+    more = {key: options.pop(key, None) for key in ("source", "positive")}
+    return field(metadata={"doc": doc} | more, **options)
 
 
 class ExactSolution:
@@ -44,6 +47,11 @@ class ExactSolution:
     parts: ClassVar[tuple[str, ...]] = ("body",)
     quantities: ClassVar[frozenset[str]] = frozenset({"contact_pressure"})
     dim: int
+
+    def __post_init__(self) -> None:
+        for one in fields(self):  # type: ignore[arg-type] # every solution with parameters is one
+            if one.metadata.get("positive"):
+                self.require("must be positive", **{one.name: getattr(self, one.name) > 0})
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """Contact pressure (n,) at points of the interface."""
@@ -93,8 +101,11 @@ class ExactSolution:
         raise self._missing("half_width")
 
     def level(self, x: np.ndarray) -> np.ndarray:
-        """A distance (n,) from the interface, positive on the side of the second part."""
-        return np.full(len(x), -1.0)
+        """A distance (n,) from the interface, positive on the side of the second part.
+
+        By default the interface is the plane where the last coordinate is 0.
+        """
+        return x[:, -1] if len(self.parts) == 2 else np.full(len(x), -1.0)
 
     def body_part(self, nodes: np.ndarray) -> int:
         """The part that a body with these nodes (n, dim) is."""
@@ -128,8 +139,9 @@ class ElasticSolution(ExactSolution):
 
     @property
     def materials(self) -> tuple[Material, ...]:
-        """The material of each part."""
-        raise NotImplementedError
+        """The material of each part: the parameters that are materials."""
+        own = fields(self)  # type: ignore[arg-type]
+        return tuple(getattr(self, f.name) for f in own if f.metadata.get("source") == "material")
 
     def gap(self, x: np.ndarray) -> np.ndarray:
         """Closed everywhere."""

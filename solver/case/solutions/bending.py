@@ -40,19 +40,11 @@ class Bending(ElasticSolution):
     dim: int = parameter("2 or 3", source="dimension")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.require("must be 2 (plane strain) or 3", dim=self.dim in (2, 3))
         self.require("must lie below the interface, at 0", base=self.base < 0)
         fits = len(self.slope) == self.dim - 1
         self.require("must have a number for each axis of the interface", slope=fits)
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """Of the lower and the upper block."""
-        return self.bottom, self.top
-
-    def level(self, x: np.ndarray) -> np.ndarray:
-        """The height above the interface."""
-        return x[:, -1]
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """P."""

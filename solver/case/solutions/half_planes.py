@@ -39,13 +39,9 @@ class HalfPlanes(ElasticSolution):
     top: Material = parameter("of the upper body", source="material")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         finite = {name: isfinite(getattr(self, name).young) for name in self.parts}
         self.require("must not be rigid", **finite)
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """Of the lower and the upper body."""
-        return self.bottom, self.top
 
     @property
     def modulus(self) -> float:
@@ -64,10 +60,6 @@ class HalfPlanes(ElasticSolution):
         """g₀ (n,) at places (n,) along the interface."""
         raise NotImplementedError
 
-    def level(self, x: np.ndarray) -> np.ndarray:
-        """The height above the interface."""
-        return x[:, -1]
-
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """−Re Z where the bodies touch."""
         _, stress, _ = self.functions(x[:, 0] + 0j)
@@ -80,7 +72,7 @@ class HalfPlanes(ElasticSolution):
         return np.where(self.closed(x[:, 0]), 0.0, np.maximum(found, 0.0))
 
     def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
-        """U and v of each body, v with the sign of its side."""
+        """Displacement u, v of each body, v with the sign of its side."""
         side, height, (whole, stress, _), (shear, poisson) = self._at(x, part)
         u = (1 - 2 * poisson) * whole.real - height * stress.imag
         v = 2 * (1 - poisson) * whole.imag - height * stress.real
@@ -117,11 +109,7 @@ class ContactEdge(HalfPlanes):
     name: ClassVar[str] = "contact_edge"
 
     edge: float = parameter("e, where the contact ends: it is closed below", default=0.0)
-    factor: float = parameter("C, the factor of the pressure C √(e − x)")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("must be positive", factor=self.factor > 0)
+    factor: float = parameter("C, the factor of the pressure C √(e − x)", positive=True)
 
     def functions(self, z: np.ndarray) -> Functions:
         """Z = i C √z from the edge."""

@@ -6,98 +6,36 @@ half-spaces, so the theory holds for a ≪ R only. Source: Johnson, Contact Mech
 """
 
 from dataclasses import dataclass, field
-from math import inf, isfinite, pi, sqrt
+from math import inf, pi, sqrt
 from typing import ClassVar
 
 import numpy as np
 
-from ..material import Material
-from .base import ExactSolution, parameter
-
-# The pressure has a vertical tangent at the end of the contact.
-_REGULAR = 0.8
-
-
-def half_ellipse(
-    distance: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray, share: float
-) -> dict[str, float]:
-    """Half-width and peak of the half ellipse of a computed pressure, from this alone.
-
-    The mean of ρ² over the forces (n,) at distances ρ (n,) is `share` a². Within 0.8 of that a,
-    p² = p₀² − (p₀/a)² ρ² is a straight line in ρ²: p₀ by least squares over the means (m,) of
-    macro-elements at distances `centre` (m,). Neither is known where fewer than three are there.
-    """
-    whole = force.sum()
-    square = force @ distance**2 / whole if whole > 0 else 0.0
-    half_width = float(np.sqrt(square / share))
-    inside = centre <= _REGULAR * half_width
-    if np.count_nonzero(inside) < 3:
-        return {}
-    top = np.polyfit(centre[inside] ** 2, mean[inside] ** 2, 1)[1]
-    return {"half_width": half_width, "peak": float(np.sqrt(max(top, 0.0)))}
+from .base import parameter
+from .contact_area import HalfEllipse, TouchingBodies
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hertz(ExactSolution):
+class Hertz(HalfEllipse, TouchingBodies):
     """The common part: half an ellipse of pressure over the contact area."""
 
-    parts: ClassVar[tuple[str, ...]] = ("lower", "upper")
-    quantities: ClassVar[frozenset[str]] = frozenset({"contact_pressure", "half_width", "peak"})
-
-    radius: float = parameter("radius R₁ of the one body")
-    lower: Material = parameter("material of the one body", source="material")
-    upper: Material = parameter("material of the other body", source="material")
-    other_radius: float = parameter("radius R₂ of the other body", default=inf)
-    centre: tuple[float, ...] = parameter("where the bodies touch", default=(0.0, 0.0, 0.0))
-
-    def __post_init__(self) -> None:
-        self.require("must be positive", radius=self.radius > 0, other_radius=self.other_radius > 0)
-        self.require("must have a number for each axis", centre=len(self.centre) >= self.dim)
-        both_rigid = not (isfinite(self.lower.young) or isfinite(self.upper.young))
-        self.require("must not be rigid: the other body is", upper=not both_rigid)
+    radius: float = parameter("radius R₁ of the one body", positive=True)
+    other_radius: float = parameter("radius R₂ of the other body", default=inf, positive=True)
 
     @property
-    def modulus(self) -> float:
-        """E*."""
-        return 1 / sum((1 - m.poisson**2) / m.young for m in (self.lower, self.upper))
+    def moment(self) -> float:
+        """¼, in 3D ⅖."""
+        return 0.25 if self.dim == 2 else 0.4
 
     @property
     def relative_radius(self) -> float:
         """R."""
         return 1 / (1 / self.radius + 1 / self.other_radius)
 
-    @property
-    def half_width(self) -> float:
-        """a: half the width, or the radius, of the contact area."""
-        raise NotImplementedError
-
-    @property
-    def peak(self) -> float:
-        """p₀: the pressure in the middle."""
-        raise NotImplementedError
-
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """p₀ √(1 − ρ²/a²), ρ being the distance from the common normal; zero outside."""
-        share = self._distance(x) / self.half_width
+        share = self.distance(x) / self.half_width
         return self.peak * np.sqrt(np.maximum(1 - share**2, 0.0))
-
-    def regular(self, x: np.ndarray) -> np.ndarray:
-        """Within 0.8 a."""
-        return self._distance(x) <= _REGULAR * self.half_width
-
-    def measured(
-        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
-    ) -> dict[str, float]:
-        """Those of the half ellipse of a computed pressure: the mean of ρ² is a²/4, in 3D 2a²/5."""
-        share = 0.25 if self.dim == 2 else 0.4
-        return half_ellipse(self._distance(x), force, self._distance(centre), mean, share)
-
-    def level(self, x: np.ndarray) -> np.ndarray:
-        """Height above the point of contact."""
-        return x[:, -1] - self.centre[self.dim - 1]
-
-    def _distance(self, x: np.ndarray) -> np.ndarray:
-        return np.linalg.norm(x[:, :-1] - np.array(self.centre[: self.dim - 1]), axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,11 +45,7 @@ class HertzCylinder(Hertz):
     name: ClassVar[str] = "hertz_cylinder"
     dim: int = field(default=2, init=False)
 
-    force: float = parameter("the whole force F, per length")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("must be positive", force=self.force > 0)
+    force: float = parameter("the whole force F, per length", positive=True)
 
     @property
     def half_width(self) -> float:
@@ -131,11 +65,7 @@ class HertzSphere(Hertz):
     name: ClassVar[str] = "hertz_sphere"
     dim: int = field(default=3, init=False)
 
-    force: float = parameter("the whole force F")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("must be positive", force=self.force > 0)
+    force: float = parameter("the whole force F", positive=True)
 
     @property
     def half_width(self) -> float:
@@ -155,11 +85,9 @@ class HertzApproach(Hertz):
     name: ClassVar[str] = "hertz_approach"
     dim: int = field(default=3, init=False)
 
-    approach: float = parameter("how far δ distant points come nearer, both bodies together")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("must be positive", approach=self.approach > 0)
+    approach: float = parameter(
+        "how far δ distant points come nearer, both bodies together", positive=True
+    )
 
     @property
     def half_width(self) -> float:

@@ -18,40 +18,27 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..material import Material
-from .base import ExactSolution, parameter
+from .base import parameter
+from .contact_area import TouchingBodies
 
-# The pressure has a vertical tangent at the end of the contact, a cone's is infinite at its tip.
-_REGULAR = 0.8
+# The pressure of a cone is infinite at its tip.
 _TIP = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Indenter(ExactSolution):
+class Indenter(TouchingBodies):
     """Point contact of bodies at the distance A ρⁿ, under a force."""
 
     name: ClassVar[str] = "indenter"
-    parts: ClassVar[tuple[str, ...]] = ("lower", "upper")
-    quantities: ClassVar[frozenset[str]] = frozenset({"contact_pressure", "half_width"})
     dim: int = field(default=3, init=False)
 
     power: float = parameter("n, at least 1: the distance grows like ρⁿ")
-    factor: float = parameter("A: the distance at ρ = 1; of a cone its slope")
-    force: float = parameter("the whole force F")
-    lower: Material = parameter("material of the one body", source="material")
-    upper: Material = parameter("material of the other body", source="material")
-    centre: tuple[float, ...] = parameter("where the bodies touch", default=(0.0, 0.0, 0.0))
+    factor: float = parameter("A: the distance at ρ = 1; of a cone its slope", positive=True)
+    force: float = parameter("the whole force F", positive=True)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.require("must be at least 1", power=self.power >= 1)
-        self.require("must be positive", factor=self.factor > 0, force=self.force > 0)
-        self.require("must have a number for each axis", centre=len(self.centre) >= self.dim)
-        self.require("must not be rigid: the other body is", upper=self._compliance > 0)
-
-    @property
-    def _compliance(self) -> float:
-        """1/E*."""
-        return sum((1 - m.poisson**2) / m.young for m in (self.lower, self.upper))
 
     @property
     def _sinks(self) -> float:
@@ -63,7 +50,7 @@ class Indenter(ExactSolution):
     def half_width(self) -> float:
         """a: the radius of the contact area."""
         n = self.power
-        whole = self.force * self._compliance * (n + 1) / (2 * self._sinks * n)
+        whole = self.force * (n + 1) / (2 * self.modulus * self._sinks * n)
         return float(whole ** (1 / (n + 1)))
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
@@ -71,26 +58,16 @@ class Indenter(ExactSolution):
         from scipy.special import hyp2f1
 
         n, a = self.power, self.half_width
-        square = np.maximum(1 - (self._distance(x) / a) ** 2, 0.0)
-        scale = self._sinks * n * a ** (n - 1) / (pi * self._compliance)
+        square = np.maximum(1 - (self.distance(x) / a) ** 2, 0.0)
+        scale = self.modulus * self._sinks * n * a ** (n - 1) / pi
         return np.asarray(scale * np.sqrt(square) * hyp2f1(1, 1 - n / 2, 1.5, square))
 
     def regular(self, x: np.ndarray) -> np.ndarray:
         """Within 0.8 a; where n < 2, beyond 0.2 a."""
-        share = self._distance(x) / self.half_width
-        return (share <= _REGULAR) & ((share >= _TIP) | (self.power >= 2))
+        beyond = self.distance(x) >= _TIP * self.half_width
+        return super().regular(x) & (beyond | (self.power >= 2))
 
-    def measured(
-        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
-    ) -> dict[str, float]:
-        """The radius of a computed pressure: its mean of ρ² is ⅔ (n + 1)/(n + 3) a²."""
-        whole, n = force.sum(), self.power
-        square = force @ self._distance(x) ** 2 / whole if whole > 0 else 0.0
-        return {"half_width": float(np.sqrt(1.5 * (n + 3) / (n + 1) * square))}
-
-    def level(self, x: np.ndarray) -> np.ndarray:
-        """Height above the point of contact."""
-        return x[:, -1] - self.centre[self.dim - 1]
-
-    def _distance(self, x: np.ndarray) -> np.ndarray:
-        return np.linalg.norm(x[:, :-1] - np.array(self.centre[: self.dim - 1]), axis=1)
+    @property
+    def moment(self) -> float:
+        """⅔ (n + 1)/(n + 3)."""
+        return 2 * (self.power + 1) / (3 * (self.power + 3))

@@ -33,17 +33,16 @@ class Parabola2d(ElasticSolution):
     dim: int = field(default=2, init=False)
 
     material: Material = parameter("of the square or cube", source="material")
-    curvature: float = parameter("κ, half the curvature of the obstacle", default=0.05)
-    strain: float = parameter("c, so that E c is the lowest contact pressure", default=0.01)
+    curvature: float = parameter(
+        "κ, half the curvature of the obstacle", default=0.05, positive=True
+    )
+    strain: float = parameter(
+        "c, so that E c is the lowest contact pressure", default=0.01, positive=True
+    )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.require("must have a Poisson's ratio of 0", material=self.material.poisson == 0)
-        self.require("must be positive", curvature=self.curvature > 0, strain=self.strain > 0)
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """The one material."""
-        return (self.material,)
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """E (c + κ ρ²)."""

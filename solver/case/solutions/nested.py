@@ -174,11 +174,6 @@ class NestedCylinders(_Shells):
         self.require(allowed, radii=0 < a < b < c)
 
     @property
-    def materials(self) -> tuple[Material, ...]:
-        """Inner and outer part."""
-        return self.inner, self.outer
-
-    @property
     def _overlaps(self) -> tuple[float, ...]:
         return (self.interference,)
 

@@ -29,29 +29,20 @@ class PolynomialPressure2d(ElasticSolution):
 
     bottom: Material = parameter("of the lower block", source="material")
     top: Material = parameter("of the upper block", source="material")
-    size: float = parameter("L, the length that the polynomial is relative to")
+    size: float = parameter("L, the length that the polynomial is relative to", positive=True)
     coefficients: tuple[float, ...] = parameter("aⱼ, pressures by power, the constant first")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         at = np.linspace(0.0, 1.0, 201)
         positive = len(self.coefficients) > 0 and (Polynomial(self.coefficients)(at) > 0).all()
-        self.require("must be positive", size=self.size > 0)
         self.require("must give a positive pressure from 0 to L", coefficients=bool(positive))
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """Of the lower and the upper block."""
-        return self.bottom, self.top
 
     @property
     def _second(self) -> Polynomial:
         """Z″."""
         powers = self.size ** -np.arange(len(self.coefficients), dtype=float)
         return Polynomial(np.array(self.coefficients) * powers)
-
-    def level(self, x: np.ndarray) -> np.ndarray:
-        """The height above the interface."""
-        return x[:, -1]
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """The polynomial, summed over the axes of the interface."""

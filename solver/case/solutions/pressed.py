@@ -22,32 +22,22 @@ from typing import ClassVar
 import numpy as np
 
 from .base import parameter
+from .contact_area import ContactArea, HalfEllipse, half_ellipse
 from .half_planes import Functions, HalfPlanes
-from .hertz import half_ellipse
 
-# The pressure has a vertical tangent at the end of the contact.
-_REGULAR = 0.8
 # A point at a singularity of Z is moved by this share of the half-width.
 _ASIDE = 1e-14
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pressed(HalfPlanes):
+class Pressed(ContactArea, HalfPlanes):
     """The common part: a contact from −a to a."""
 
     quantities: ClassVar[frozenset[str]] = HalfPlanes.quantities | {"half_width"}
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("must be positive", half_width=self.half_width > 0)
-
     def closed(self, x: np.ndarray) -> np.ndarray:
         """Within the half-width."""
         return np.abs(x) < self.half_width
-
-    def regular(self, x: np.ndarray) -> np.ndarray:
-        """Within 0.8 a."""
-        return np.abs(x[:, 0]) <= _REGULAR * self.half_width
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,15 +47,18 @@ class PartialWaves(Pressed):
     name: ClassVar[str] = "partial_waves"
     quantities: ClassVar[frozenset[str]] = Pressed.quantities | {"peak"}
 
-    size: float = parameter("half a wavelength: from the middle of a contact to that of a gap")
-    amplitude: float = parameter("Δ, half the height of the waves: the gap is Δ (1 − cos(πx/size))")
+    size: float = parameter(
+        "half a wavelength: from the middle of a contact to the middle of a gap", positive=True
+    )
+    amplitude: float = parameter(
+        "Δ, half the height of the waves: the gap is Δ (1 − cos(πx/size))", positive=True
+    )
     mean_pressure: float = parameter("p̄, below π E* Δ/(2 size), which closes the waves")
 
     def __post_init__(self) -> None:
-        self.require("must be positive", size=self.size > 0, amplitude=self.amplitude > 0)
+        super().__post_init__()
         least = f"must be positive and below {self._closing:g}"
         self.require(least, mean_pressure=0 < self.mean_pressure < self._closing)
-        super().__post_init__()
 
     @property
     def _closing(self) -> float:
@@ -118,30 +111,12 @@ class PartialWaves(Pressed):
 class _Given(Pressed):
     """A contact whose half-width is given, and with it the force."""
 
-    end: float = parameter("a, half the width of the contact")
+    end: float = parameter("a, half the width of the contact", positive=True)
 
     @property
     def half_width(self) -> float:
         """a: half the width of the contact."""
         return self.end
-
-    @property
-    def force(self) -> float:
-        """The whole force per length."""
-        raise NotImplementedError
-
-    @property
-    def moment(self) -> float:
-        """The mean of x² over the contact force, in a²."""
-        raise NotImplementedError
-
-    def measured(
-        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
-    ) -> dict[str, float]:
-        """The half-width of a pressure of this shape with the second moment of the computed one."""
-        whole = force.sum()
-        square = force @ x[:, 0] ** 2 / whole if whole > 0 else 0.0
-        return {"half_width": float(np.sqrt(square / self.moment))}
 
     def _root(self, z: np.ndarray) -> np.ndarray:
         """R."""
@@ -154,18 +129,14 @@ class _Given(Pressed):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HertzHalfPlanes(_Given):
+class HertzHalfPlanes(HalfEllipse, _Given):
     """Hertz's contact of a parabola x²/(2R₁), without an error of the theory."""
 
     name: ClassVar[str] = "hertz_half_planes"
     quantities: ClassVar[frozenset[str]] = Pressed.quantities | {"peak"}
     moment: ClassVar[float] = 0.25
 
-    radius: float = parameter("R₁ of the parabola x²/(2R₁) that is the initial gap")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("must be positive", radius=self.radius > 0)
+    radius: float = parameter("R₁ of the parabola x²/(2R₁) that is the initial gap", positive=True)
 
     @property
     def peak(self) -> float:
@@ -189,12 +160,6 @@ class HertzHalfPlanes(_Given):
         """The parabola."""
         return x**2 / (2 * self.radius)
 
-    def measured(
-        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
-    ) -> dict[str, float]:
-        """Those of the half ellipse of a computed pressure."""
-        return half_ellipse(np.abs(x[:, 0]), force, np.abs(centre[:, 0]), mean, self.moment)
-
 
 @dataclass(frozen=True, kw_only=True)
 class RoundedPunch(_Given):
@@ -203,11 +168,10 @@ class RoundedPunch(_Given):
     name: ClassVar[str] = "rounded_punch"
 
     flat: float = parameter("b, half the width of the flat part")
-    radius: float = parameter("R₁ of the shoulders")
+    radius: float = parameter("R₁ of the shoulders", positive=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require("must be positive", radius=self.radius > 0)
         self.require("must be positive and below the end", flat=0 < self.flat < self.end)
 
     @property
@@ -269,11 +233,7 @@ class Wedge(_Given):
     name: ClassVar[str] = "wedge"
     moment: ClassVar[float] = 1 / 6
 
-    slope: float = parameter("m: the initial gap is m |x|")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("must be positive", slope=self.slope > 0)
+    slope: float = parameter("m: the initial gap is m |x|", positive=True)
 
     @property
     def force(self) -> float:

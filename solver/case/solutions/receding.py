@@ -20,10 +20,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from .base import ExactSolution, parameter
+from .base import parameter
+from .contact_area import ContactArea
 
-# The pressure has a vertical tangent at the end of the contact.
-_REGULAR = 0.8
 # Beyond this k h the layer is a half-plane: S and A differ from 1 by less than round-off.
 _LARGEST = 45.0
 # Terms of the series and points of the integral for a load that is narrow; more for a wide one.
@@ -32,19 +31,18 @@ _WIDEST = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecedingLayer(ExactSolution):
+class RecedingLayer(ContactArea):
     """A layer on a rigid base; it lifts off beside the load. Frictionless, for any material."""
 
     name: ClassVar[str] = "receding_layer"
-    quantities: ClassVar[frozenset[str]] = frozenset({"contact_pressure", "half_width"})
     dim: int = field(default=2, init=False)
 
-    height: float = parameter("h, the thickness of the layer")
+    height: float = parameter("h, the thickness of the layer", positive=True)
     loaded: float = parameter("c, half the width of the load, at most 4 h")
-    pressure: float = parameter("q, the pressure of the load", source="pressure")
+    pressure: float = parameter("q, the pressure of the load", source="pressure", positive=True)
 
     def __post_init__(self) -> None:
-        self.require("must be positive", height=self.height > 0, pressure=self.pressure > 0)
+        super().__post_init__()
         widest = _WIDEST * self.height
         self.require(f"must be positive and at most {widest:g}", loaded=0 < self.loaded <= widest)
 
@@ -107,14 +105,8 @@ class RecedingLayer(ExactSolution):
         mean = self.pressure * self.loaded / self.half_width
         return mean * np.sin(np.outer(angle, 2 * np.arange(len(b)) + 1)) @ b
 
-    def regular(self, x: np.ndarray) -> np.ndarray:
-        """Within 0.8 a."""
-        return np.abs(x[:, 0]) <= _REGULAR * self.half_width
-
-    def measured(
-        self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
-    ) -> dict[str, float]:
-        """The half-width of a pressure of this shape: its mean of x² is a² (1 + b₁/b₀)/4."""
-        whole, (_, b) = force.sum(), self._extent
-        square = force @ x[:, 0] ** 2 / whole if whole > 0 else 0.0
-        return {"half_width": float(np.sqrt(4 * square / (1 + b[1] / b[0])))}
+    @property
+    def moment(self) -> float:
+        """(1 + b₁/b₀)/4."""
+        b = self._extent[1]
+        return float(1 + b[1] / b[0]) / 4

@@ -23,7 +23,7 @@ class UniformCompression(ElasticSolution):
     name: ClassVar[str] = "uniform_compression"
     parts: ClassVar[tuple[str, ...]] = ("lower", "upper")
 
-    pressure: float = parameter("pressure p on the top", source="pressure")
+    pressure: float = parameter("pressure p on the top", source="pressure", positive=True)
     base: float = parameter("level at which the lower block stands")
     lower: Material = parameter("material below the interface", source="material")
     upper: Material = parameter("material above the interface", source="material")
@@ -32,17 +32,12 @@ class UniformCompression(ElasticSolution):
     centre: tuple[float, ...] = parameter("where lateral displacement is zero", default=(0.0, 0.0))
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.require(_DIMENSION, dim=self.dim in (2, 3))
-        self.require("must be positive", pressure=self.pressure > 0)
         self.require("must lie below the interface", base=self.base < self.interface)
         self.require(
             "must have a number for each lateral axis", centre=len(self.centre) >= self.dim - 1
         )
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """Lower and upper block."""
-        return self.lower, self.upper
 
     def level(self, x: np.ndarray) -> np.ndarray:
         """Height above the interface."""
@@ -95,20 +90,15 @@ class Hydrostatic(ElasticSolution):
 
     name: ClassVar[str] = "hydrostatic"
 
-    pressure: float = parameter("pressure p all round", source="pressure")
+    pressure: float = parameter("pressure p all round", source="pressure", positive=True)
     material: Material = parameter("of all bodies", source="material")
     dim: int = parameter("2 or 3", source="dimension")
     centre: tuple[float, ...] = parameter("the point that stays", default=(0.0, 0.0, 0.0))
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.require(_DIMENSION, dim=self.dim in (2, 3))
-        self.require("must be positive", pressure=self.pressure > 0)
         self.require("must have a number for each axis", centre=len(self.centre) >= self.dim)
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """The one material."""
-        return (self.material,)
 
     @property
     def strain(self) -> float:

@@ -72,23 +72,18 @@ class Waves2d(ElasticSolution):
 
     bottom: Material = parameter("of the lower layer", source="material")
     top: Material = parameter("of the upper layer", source="material")
-    size: float = parameter("width and height of each layer")
-    amplitude: float = parameter("Δ, half the height of the waves")
+    size: float = parameter("width and height of each layer", positive=True)
+    amplitude: float = parameter("Δ, half the height of the waves", positive=True)
     mean_pressure: float = parameter("p̄, at least the amplitude p₁ of the pressure")
     half_waves: tuple[float, ...] = parameter("half waves within the size, by axis", default=(1.0,))
 
     def __post_init__(self) -> None:
-        self.require("must be positive", size=self.size > 0, amplitude=self.amplitude > 0)
+        super().__post_init__()
         whole = all(n >= 0 and n == round(n) for n in self.half_waves) and any(self.half_waves)
         fits = len(self.half_waves) == self.dim - 1
         self.require("must be a whole number for each axis, not all 0", half_waves=whole and fits)
         least = self._wave_pressure
         self.require(f"must be at least {least:g}", mean_pressure=self.mean_pressure >= least)
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """Of the lower and the upper layer."""
-        return self.bottom, self.top
 
     @cached_property
     def _numbers(self) -> np.ndarray:
@@ -110,10 +105,6 @@ class Waves2d(ElasticSolution):
         """How far the upper layer's far face moves."""
         strain = sum(self.mean_pressure / layer.confined for layer in self._layers)
         return self.amplitude + strain * self.size
-
-    def level(self, x: np.ndarray) -> np.ndarray:
-        """The height above the interface."""
-        return x[:, -1]
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """p̄ + p₁ φ."""

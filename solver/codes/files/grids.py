@@ -102,7 +102,7 @@ _EXODUS = {
     ("HEX", 8): "hexahedron", ("HEX", 20): "hexahedron20", ("WED", 6): "wedge",
     ("WED", 15): "wedge15", ("PYR", 5): "pyramid", ("PYR", 13): "pyramid13",
 }  # fmt: skip
-# Upright edges before those of the top, unlike VTK.
+# Upright edges before the top edges, unlike VTK.
 _UPRIGHT = {
     "hexahedron20": [*range(12), *range(16, 20), *range(12, 16)],
     "wedge15": [*range(9), 12, 13, 14, 9, 10, 11],

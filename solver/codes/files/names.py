@@ -100,7 +100,7 @@ def _columns(raw: Raw, quantity: str) -> Iterator[Found]:
 
 
 def component_of(quantity: str, name: str) -> str:
-    """The component that a name stands for (xx, x), empty for none."""
+    """The component (xx, x) that a name means; empty for an unknown name."""
     pattern = _STRESS if quantity == "stress" else _DISPLACEMENT
     axes = "([xyz123])([xyz123])" if quantity == "stress" else "([xyz123])"
     match = re.fullmatch(f"{pattern}?{axes}", _plain(name))

@@ -15,7 +15,7 @@ from ...mesh.catalogue import BY_MESHIO
 class RawField(NamedTuple):
     """Values (k, c) with the names of their components (empty: not known), and their places.
 
-    `places` (k, 2 or 3); `nodes` (k,) numbers in the mesh of the file, None where they are none.
+    `places` (k, 2 or 3); `nodes` (k,) numbers in the mesh of the file, None for other places.
     """
 
     values: np.ndarray

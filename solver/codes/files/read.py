@@ -78,7 +78,7 @@ def read_result_files(
 
 
 def read_raw(path: Path, columns: Sequence[str] = ()) -> Raw:
-    """The content of one file; raises InputError for whatever keeps it from being read."""
+    """The content of one file; raises InputError where it cannot be read."""
     suffix = path.suffix.lower()
     if suffix not in _READERS:
         raise InputError(path, "extension", path.suffix, f"allowed: {', '.join(_READERS)}")

@@ -1,64 +1,80 @@
-"""Sums of cell matrices, each entry written straight to its place in the sparse sum.
+"""Sums of cell matrices, each block of entries added straight to its place in the sparse sum.
 
 Which nodes share a cell is known before any matrix is. So the sum's pattern is made first, and no
-list of all the entries of all cells is ever held: memory is that of the sum and of a few cells.
-Every degree of freedom belongs to a node (`dof = dim · node + component`).
+list of all the entries of all cells is ever held: memory is for the sum and a few cells only.
+Every degree of freedom belongs to a node (`dof = dim · node + component`), and every pair of nodes
+that share a cell has a block: an index for dim² entries.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from scipy import sparse
 
+from ...system.threads import ahead
+
+# Nodes whose neighbours are found at once.
+_NODES_AT_ONCE = 1 << 16
+
 
 class CellSum:
-    """A sum of matrices over cells, of all degrees of freedom or of those `kept` (k,), ascending.
+    """A sum of matrices over cells: `cells` are the nodes (n, n_nodes) of all of them, by type."""
 
-    `cells`: the nodes (n, n_nodes) of all cells that will be added, by type. `diagonal`
-    (dim · n_nodes,) is that of all degrees of freedom, kept or not.
-    """
-
-    def __init__(
-        self, cells: Sequence[np.ndarray], n_nodes: int, dim: int, kept: np.ndarray | None = None
-    ):
-        chosen = np.full(n_nodes * dim, kept is None)
-        chosen[slice(0) if kept is None else kept] = True
-        self._dim, self._chosen = dim, chosen.reshape(n_nodes, dim)
-        count = self._chosen.sum(axis=1, dtype=np.int32)
+    def __init__(self, cells: Sequence[np.ndarray], n_nodes: int, dim: int):
+        self._dim = dim
         self._near = _neighbours(cells, n_nodes)
-        # Where the columns of each neighbour begin among those of all neighbours of all nodes.
-        begin = np.concatenate([[0], np.cumsum(count[self._near.indices])])
-        self._pattern = _rows(self._near, count, begin)
-        within = np.repeat(begin[self._near.indptr[:-1]], np.diff(self._near.indptr))
-        self._near.data = begin[:-1] - within
-        # The start of each degree of freedom's row, and its place among those kept of its node.
-        number = np.maximum(np.cumsum(chosen) - 1, 0)
-        self._start = self._pattern.indptr[number].reshape(n_nodes, dim)
-        self._rank = np.cumsum(self._chosen, axis=1) - 1
-        # What is not kept is added up behind the end.
-        self._data = np.zeros(self._pattern.indptr[-1] + 1)
-        self.diagonal = np.zeros(n_nodes * dim)
+        self._data = np.zeros((self._near.nnz, dim, dim))
 
-    def add(self, cells: np.ndarray, matrices: np.ndarray) -> None:
-        """Add cell matrices (n, dim · n_nodes, dim · n_nodes) of cells (n, n_nodes)."""
+    def add(
+        self,
+        cells: np.ndarray,
+        matrices: Callable[[slice], np.ndarray],
+        parts: Iterable[slice] = (slice(None),),
+    ) -> None:
+        """Add the matrices of cells (n, n_nodes), part by part.
+
+        `matrices` yields those of a part of them, (n, dim · n_nodes, dim · n_nodes).
+        """
+        size = self._dim**2
+
+        def placed(part: slice) -> tuple[np.ndarray, np.ndarray]:
+            place, values = self._places(cells[part]), matrices(part)
+            n, k, _ = place.shape
+            values = values.reshape(n, k, self._dim, k, self._dim).swapaxes(2, 3)
+            entries = size * place[..., None].astype(np.intp) + np.arange(size)
+            return entries.ravel(), values.ravel()
+
+        for entries, values in ahead(placed, parts):
+            np.add.at(self._data.reshape(-1), entries, values)
+
+    def _places(self, cells: np.ndarray) -> np.ndarray:
+        """The numbers (n, n_nodes, n_nodes) of the blocks of cells (n, n_nodes)."""
         n, k = cells.shape
-        pairs = np.repeat(cells, k, axis=1).ravel(), np.tile(cells, k).ravel()
-        offset = np.asarray(self._near[pairs]).reshape(n, k, 1, k, 1)
-        place = self._start[cells][..., None, None] + offset
-        place = place + self._rank[cells][:, None, None]
-        chosen = self._chosen[cells]
-        if not chosen.all():
-            both = chosen[..., None, None] & chosen[:, None, None]
-            place = np.where(both, place, len(self._data) - 1)
-        np.add.at(self._data, place.ravel(), matrices.ravel())
-        dofs = degrees_of_freedom(cells, self._dim)
-        np.add.at(self.diagonal, dofs.ravel(), matrices.diagonal(axis1=1, axis2=2).ravel())
+        # A search takes time in proportion to all the rows that it is given.
+        nodes, row = np.unique(cells, return_inverse=True)
+        rows = np.repeat(row.reshape(n, k), k, axis=1).ravel()
+        found = self._near[nodes][rows, np.tile(cells, k).ravel()]
+        return np.asarray(found).reshape(n, k, k)
 
     @property
-    def matrix(self) -> sparse.csr_matrix:
-        """The sum (k, k), both halves stored, rows sorted; further sums are seen in it."""
-        arrays = self._data[:-1], self._pattern.indices, self._pattern.indptr
-        return sparse.csr_matrix(arrays, shape=self._pattern.shape)
+    def matrix(self) -> sparse.bsr_matrix:
+        """The sum (dim · n_nodes, dim · n_nodes) in blocks, both halves stored, rows sorted."""
+        arrays = self._data, self._near.indices, self._near.indptr
+        size = self._dim * self._near.shape[0]
+        return sparse.bsr_matrix(arrays, shape=(size, size))
+
+
+def selected(matrix: sparse.spmatrix, kept: np.ndarray) -> sparse.csr_matrix:
+    """The rows and columns `kept` (k,), ascending, of a matrix (n, n), entry by entry."""
+    whole = matrix.tocsr()
+    chosen = np.zeros(matrix.shape[0], dtype=bool)
+    chosen[kept] = True
+    there = chosen[whole.indices]
+    there &= np.repeat(chosen, np.diff(whole.indptr))
+    before = np.concatenate([[0], np.cumsum(there)])[whole.indptr]
+    number = np.cumsum(chosen, dtype=np.int32) - 1
+    arrays = whole.data[there], number[whole.indices[there]], before[np.r_[0, kept + 1]]
+    return sparse.csr_matrix(arrays, shape=(len(kept), len(kept)))
 
 
 def degrees_of_freedom(cells: np.ndarray, dim: int) -> np.ndarray:
@@ -67,23 +83,21 @@ def degrees_of_freedom(cells: np.ndarray, dim: int) -> np.ndarray:
 
 
 def _neighbours(cells: Sequence[np.ndarray], n_nodes: int) -> sparse.csr_matrix:
-    """Which nodes share a cell (n_nodes, n_nodes), rows sorted."""
-    nodes = np.concatenate([np.empty(0, dtype=int), *(c.ravel() for c in cells)])
+    """Which nodes share a cell (n_nodes, n_nodes), rows sorted; the entries are numbered."""
+    nodes = np.concatenate([np.empty(0, np.int32), *(c.ravel().astype(np.int32) for c in cells)])
     sizes = np.repeat([c.shape[1] for c in cells], [len(c) for c in cells])
-    starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
+    starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32)
     ones = np.ones(len(nodes), dtype=bool)
     owned = sparse.csr_matrix((ones, nodes, starts), shape=(len(sizes), n_nodes))
-    near = (owned.T.tocsr() @ owned).tocsr()
-    near.sort_indices()
-    return near
+    around = owned.T.tocsr()
 
+    def near(first: int) -> tuple[np.ndarray, np.ndarray]:
+        found = around[first : first + _NODES_AT_ONCE] @ owned
+        found.sort_indices()
+        return found.indices.astype(np.int32, copy=False), np.diff(found.indptr)
 
-def _rows(near: sparse.csr_matrix, count: np.ndarray, begin: np.ndarray) -> sparse.csr_matrix:
-    """The pattern of the rows of all kept degrees of freedom, `count` (n_nodes,) to a node."""
-    first = np.cumsum(count) - count
-    columns = np.repeat(first[near.indices] - begin[:-1], count[near.indices])
-    columns = (columns + np.arange(begin[-1])).astype(np.int32)
-    nothing = np.zeros(len(columns), dtype=np.int8)
-    shape = (len(count), int(count.sum()))
-    of_node = sparse.csr_matrix((nothing, columns, begin[near.indptr]), shape=shape)
-    return of_node[np.repeat(np.arange(len(count)), count)]
+    parts = list(ahead(near, range(0, n_nodes, _NODES_AT_ONCE)))
+    columns = np.concatenate([np.empty(0, np.int32), *(indices for indices, _ in parts)])
+    counts = np.concatenate([[0], *(count for _, count in parts)])
+    arrays = np.arange(len(columns), dtype=np.int32), columns, np.cumsum(counts, dtype=np.int32)
+    return sparse.csr_matrix(arrays, shape=(n_nodes, n_nodes))

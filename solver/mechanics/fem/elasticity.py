@@ -8,7 +8,7 @@ Source: Bathe, Finite Element Procedures, §5.3. Works on arrays alone.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy import sparse
@@ -202,19 +202,16 @@ def _products(values: np.ndarray, measure: np.ndarray) -> np.ndarray:
     return products.reshape(len(values), *values.shape[2:], *values.shape[2:])
 
 
-def stiffness(
-    points: np.ndarray, blocks: list[Block], kept: np.ndarray | None = None
-) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """The stiffness matrix (k, k), symmetric, both halves stored, and its whole diagonal (n_dofs,).
+def stiffness(points: np.ndarray, blocks: list[Block]) -> sparse.bsr_matrix:
+    """The stiffness matrix (n_dofs, n_dofs), symmetric, a block for each pair of nodes.
 
-    Of all degrees of freedom, or of those `kept` (k,), in ascending order, alone.
+    Both halves are stored; `assembly.selected` makes the matrix of some degrees of freedom.
     """
     n, dim = points.shape
-    total = CellSum([block.cells for block in blocks], n, dim, kept)
+    total = CellSum([block.cells for block in blocks], n, dim)
     for block in blocks:
-        for part in chunks(block, dim):
-            total.add(block.cells[part], element_matrices(points, block, part))
-    return total.matrix, total.diagonal
+        total.add(block.cells, partial(element_matrices, points, block), chunks(block, dim))
+    return total.matrix
 
 
 def internal_force(

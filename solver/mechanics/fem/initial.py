@@ -1,4 +1,4 @@
-"""Initial strain ε₀, such as that of heat: σ = C (ε(u) − ε₀), so that C ε₀ acts as a load.
+"""Initial strain ε₀, such as thermal strain: σ = C (ε(u) − ε₀), so that C ε₀ acts as a load.
 
 The forces ∫ Bᵀ C ε₀ are integrated at the points of the stiffness: where a displacement has the
 strain ε₀ at these points, no stress is left. In mixed form (see `mixed`) the blocks have λ = 0, and

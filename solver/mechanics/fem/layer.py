@@ -1,7 +1,7 @@
 """A layer of cells behind faces that have none: faces turned to one side, cells on the other.
 
 Rigid lines and surfaces of a mesh become bodies in this way. The layer has no stiffness; it carries
-the motion, and makes the faces those of a body like any other.
+the motion, and makes the faces part of a body like any other.
 """
 
 from collections.abc import Mapping

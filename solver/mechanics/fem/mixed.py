@@ -232,7 +232,7 @@ def _mean_stress(
 
 
 def _keys(block: Block, meshed: np.ndarray, dim: int) -> np.ndarray:
-    """What tells the unknowns of s of a block's cells apart: (n, k, 3) numbers."""
+    """What identifies the unknowns s of a block's cells: (n, k, 3) numbers."""
     if block.type.name in _AT_VERTICES:
         # s jumps where the material changes.
         material = np.stack([block.lame, block.shear], axis=1).view(np.int64)

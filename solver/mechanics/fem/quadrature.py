@@ -9,7 +9,6 @@ polynomials (Stroud, Approximate Calculation of Multiple Integrals, 1971, §2.4�
 from functools import cache
 
 import numpy as np
-from scipy.special import roots_jacobi
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefTet, RefTri
 
@@ -89,6 +88,8 @@ def _product(first: Rule, second: Rule) -> Rule:
 
 def _conical(base: int, axis: int) -> Rule:
     """`base` Gauss points each way over the square, `axis` Gauss–Jacobi points to the apex."""
+    from scipy.special import roots_jacobi
+
     x, u = np.polynomial.legendre.leggauss(base)
     t, v = roots_jacobi(axis, 2, 0)  # weight (1 − t)²: the shrinking cross-section
     z = (t + 1) / 2

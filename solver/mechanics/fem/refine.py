@@ -16,7 +16,7 @@ import numpy as np
 from ...mesh.catalogue import BY_NAME, CellType, cell_type
 from .shape import shape_functions
 
-# Weights of vertices are whole numbers of this part; those of the points of a pyramid are rounded.
+# Weights of vertices are whole multiples of this; the points of a pyramid have rounded ones.
 _PART = 2.0**20
 _APEX = 1 - 1e-12
 _MIX = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD6E8FEB86659FD93), np.uint64(32)
@@ -95,7 +95,7 @@ def _weights(kind: CellType, reference: np.ndarray) -> np.ndarray:
 
 
 def _values(name: str, reference: np.ndarray) -> np.ndarray:
-    """Shape functions (n, n_nodes) at reference points, those of pyramids just below the apex."""
+    """Shape functions (n, n_nodes) at reference points, in pyramids just below the apex."""
     if name.startswith("PYRA"):
         reference = np.minimum(reference, [np.inf, np.inf, _APEX])
     return shape_functions(name).values(reference)
@@ -136,7 +136,7 @@ def _children(name: str) -> _Children:
 
 
 def _type_of(kind: CellType, n_vertices: int) -> CellType:
-    """The type of a child: that of the parent, or the tetrahedron between those of a pyramid."""
+    """The type of a child: the parent's, or the tetrahedron between the pyramids of a pyramid."""
     if n_vertices == kind.n_vertices:
         return kind
     return BY_NAME["TETRA4" if kind.order == 1 else "TETRA10"]

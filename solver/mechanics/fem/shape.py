@@ -1,7 +1,7 @@
 """Shape functions by cell type, in the node order of the catalogue.
 
 Those of edges and faces are products of a matrix and monomials, since contact evaluates them at
-many points; those of solid cells are scikit-fem's.
+many points; solid cells have scikit-fem's.
 """
 
 from functools import cache
@@ -118,7 +118,7 @@ def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
 
 
 def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
-    from skfem import element
+    import skfem.element as element
 
     if name in ("PENTA15", "PYRA5", "PYRA13"):
         from .extra_elements import ElementPyramid, ElementWedgeS2

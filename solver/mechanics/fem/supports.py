@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from .assembly import selected
+
 DEPENDENT = 1e-8
 """Directions (unit vectors) whose part outside the others is smaller depend on them."""
 SAME = 1e-9
@@ -48,10 +50,10 @@ class FreeMotion:
     offset: np.ndarray
     selection: np.ndarray | None
 
-    def reduced(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+    def reduced(self, matrix: sparse.spmatrix) -> sparse.csr_matrix:
         """basisᵀ · matrix · basis."""
         if self.selection is not None:
-            return matrix[self.selection][:, self.selection]
+            return selected(matrix, self.selection)
         return (self.basis.T @ matrix @ self.basis).tocsr()
 
 
@@ -101,7 +103,7 @@ class CopyError(Exception):
 
 @dataclass(frozen=True)
 class Copies:
-    """Nodes `copy` (n,) whose displacement is that of nodes `of` (n,), turned by `turn`."""
+    """Nodes `copy` (n,) that have the displacement of nodes `of` (n,), turned by `turn`."""
 
     of: np.ndarray
     copy: np.ndarray

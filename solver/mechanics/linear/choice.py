@@ -11,6 +11,7 @@ from .condensed_matrix import Symmetric
 from .direct import Factor, factorise, wanted
 from .krylov import EPSILON
 from .multigrid import Multigrid, Unknowns
+from .nodal_matrix import NodalMatrix
 
 _LOG = logging.getLogger(__name__)
 
@@ -109,7 +110,7 @@ def prepare(matrix: Symmetric, unknowns: Unknowns | None = None, gave_up: str = 
     if unknowns is None:
         return LinearSolver(matrix, 3, None, "what multigrid asks for is not known")
     dim, size = unknowns.dim, matrix.shape[0]
-    against = gave_up or _against_multigrid(size, unknowns)
+    against = gave_up or against_multigrid(size, unknowns)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
         least = multigrid_from(unknowns.quadratic)
@@ -126,7 +127,7 @@ def prepare(matrix: Symmetric, unknowns: Unknowns | None = None, gave_up: str = 
     return chosen
 
 
-def _against_multigrid(size: int, unknowns: Unknowns) -> str:
+def against_multigrid(size: int, unknowns: Unknowns) -> str:
     """Why a system of that size is factored; empty where it is not."""
     if wanted() != "auto":
         return "" if wanted() == MULTIGRID else _ASKED
@@ -136,7 +137,7 @@ def _against_multigrid(size: int, unknowns: Unknowns) -> str:
     return f"fewer than {least} unknowns: a factor is faster than multigrid" * (size < least)
 
 
-def against_condensation(matrix: csr_matrix, constraints: csr_matrix) -> str:
+def against_condensation(matrix: csr_matrix | NodalMatrix, constraints: csr_matrix) -> str:
     """Why `matrix` (n, n) should not be condensed by `constraints` (m, n); empty if it should.
 
     A constraint over w unknowns leaves a block of w² entries in the condensed

@@ -8,7 +8,6 @@ Problems, §23.3 (there for W = AᵀA).
 """
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from ...system.errors import SolveError
 
@@ -65,6 +64,8 @@ def _free_minimum(
     matrix: np.ndarray, force: np.ndarray, x: np.ndarray, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """From x (k,) ≥ 0 to the minimum over unknowns that stay `free` (k,); both at the end."""
+    from scipy.linalg import cho_factor, cho_solve
+
     x, free = x.copy(), free.copy()
     while free.any():
         target = np.zeros(len(x))

@@ -20,6 +20,7 @@ from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise_indefinite
 from .krylov import EPSILON, ROUGH
 from .multigrid import Unknowns
+from .nodal_matrix import NodalMatrix
 
 _LOG = logging.getLogger(__name__)
 
@@ -206,7 +207,7 @@ def inverse_of(pivots: sparse.csr_matrix) -> sparse.csr_matrix:
 
 
 def condense(
-    matrix: sparse.csr_matrix,
+    matrix: sparse.csr_matrix | NodalMatrix,
     constraints: sparse.csr_matrix,
     own: np.ndarray,
     unknowns: Unknowns | None = None,

@@ -5,6 +5,8 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from .nodal_matrix import NodalMatrix
+
 
 class Symmetric(Protocol):
     """A symmetric matrix as its solvers see it: any `csr_matrix` with both halves stored is one."""
@@ -31,7 +33,7 @@ class CondensedMatrix:
     of the stiffness, which the next contact status needs as it is.
     """
 
-    def __init__(self, stiffness: csr_matrix, kept: np.ndarray, added: csr_matrix):
+    def __init__(self, stiffness: csr_matrix | NodalMatrix, kept: np.ndarray, added: csr_matrix):
         self._stiffness, self._kept, self._added = stiffness, kept, added
         self.shape: tuple[int, int] = added.shape
 

@@ -8,14 +8,16 @@ precision take the solution to round-off.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.errors import SolveError
 from .condensed_matrix import Symmetric
+from .galerkin import coarse, pattern, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
+from .products import Prolongation, multiply
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
@@ -27,7 +29,6 @@ one face: with hundreds of faces on it, coarse levels fill in."""
 MAX_ITERATIONS = 150
 _ROWS_AT_ONCE = 30_000  # whole nodes
 _BLOCKS_AT_ONCE = 100_000
-_PARTS = 8  # of a product of matrices that is formed in parts
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
 # The iteration approaches the largest eigenvalue from below.
@@ -58,21 +59,23 @@ class Unknowns:
 
 @dataclass(frozen=True)
 class Level:
-    """One level: scaled matrix, bound of its eigenvalues, and the ways to and from the next."""
+    """One level: scaled matrix, bound of its eigenvalues, and the way to and from the next."""
 
     matrix: bsr_matrix
     bound: np.float32
-    prolongation: bsr_matrix
-    restriction: bsr_matrix
+    way: Prolongation
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n, k): the Chebyshev polynomial applied to it."""
-        step = residual * (np.float32(4 / 3) / self.bound)
-        residual = residual - self.matrix @ step
-        change = _FIRST * step
-        step *= np.float32(1 / 5)
-        step += residual * (np.float32(12 / 5) / self.bound)
-        return change + _SECOND * step
+        """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
+        step = np.float32(4 / 3) / self.bound
+        change = multiply(self.matrix, residual, residual, -float(step))
+        change *= _SECOND * np.float32(12 / 5) / self.bound
+        change += (_FIRST + _SECOND / np.float32(5)) * step * residual
+        return change
+
+    def remaining(self, residual: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """The residual (n,) after a change."""
+        return multiply(self.matrix, change, residual, -1.0)
 
 
 class Multigrid:
@@ -110,7 +113,7 @@ class Multigrid:
         columns = columns if columns.ndim == 2 else columns[:, None]
         solution, iterations = conjugate_gradients(
             lambda x: self._scale * (self._matrix @ (self._scale * x)),
-            in_single(self._cycle),
+            in_single(partial(np.apply_along_axis, self._cycle, 0)),
             self._scale * columns,
             accuracy,
             MAX_ITERATIONS,
@@ -125,7 +128,7 @@ class Multigrid:
         self._levels = []
 
     def _cycle(self, residual: np.ndarray) -> np.ndarray:
-        padded = np.zeros((self._padded, residual.shape[1]), dtype=np.float32)
+        padded = np.zeros(self._padded, dtype=np.float32)
         padded[self._place] = residual
         return self._descend(0, padded)[self._place]
 
@@ -135,9 +138,9 @@ class Multigrid:
             return self._coarsest @ residual
         level = self._levels[depth]
         change = level.smooth(residual)
-        coarse = level.restriction @ (residual - level.matrix @ change)
-        change += level.prolongation @ self._descend(depth + 1, coarse)
-        change += level.smooth(residual - level.matrix @ change)
+        below = level.way.restrict(level.remaining(residual, change))
+        change = level.way.prolong(self._descend(depth + 1, below), change)
+        change += level.smooth(level.remaining(residual, change))
         return change
 
 
@@ -190,18 +193,12 @@ def _hierarchy(
         tentative, coarse_motions, coarse_body = _aggregate(matrix, motions, body)
         if tentative.nnz == 0 or 2 * tentative.shape[1] > matrix.shape[0]:
             break
-        smoothed = matrix @ tentative
-        smoothed.data *= -np.float32(_SMOOTHED / bound)
-        height, width = tentative.blocksize
-        smoothed = (tentative + smoothed).tobsr((height, width))
-        _refuse_fill(smoothed)
-        restriction = smoothed.T.tobsr((width, height))
-        coarse = _coarse(matrix, smoothed)
-        coarse, motions, scale = _scaled(coarse, coarse_motions)
-        _scale_blocks(smoothed, np.ones(smoothed.shape[0]), scale)
-        _scale_blocks(restriction, scale, np.ones(smoothed.shape[0]))
-        levels.append(Level(matrix, bound, smoothed, restriction))
-        matrix, body = coarse, coarse_body
+        way = smoothed(matrix, tentative, _SMOOTHED / float(bound))
+        _refuse_fill(way)
+        below, motions, scale = _scaled(coarse(matrix, way), coarse_motions)
+        _scale_blocks(way, np.ones(way.shape[0]), scale)
+        levels.append(Level(matrix, bound, Prolongation(way)))
+        matrix, body = below, coarse_body
     if matrix.shape[0] > LARGEST_DENSE:
         raise SolveError(f"its levels end at {matrix.shape[0]} unknowns: nothing coarsens further")
     dense = matrix.toarray().astype(float)
@@ -211,33 +208,10 @@ def _hierarchy(
 
 def _refuse_fill(prolongation: bsr_matrix) -> None:
     """Raise SolveError where the next level will have too many neighbours, before it is formed."""
-    height, width = prolongation.blocksize
-    shape = prolongation.shape[0] // height, prolongation.shape[1] // width
-    ones = np.ones(len(prolongation.indices), dtype=np.float32)
-    felt = csr_matrix((ones, prolongation.indices, prolongation.indptr), shape=shape)
-    near = (felt.T @ felt).nnz / shape[1]
+    felt = pattern(prolongation)
+    near = (felt.T @ felt).nnz / felt.shape[1]
     if near > MOST_NEIGHBOURS:
         raise SolveError(f"its coarse levels would fill in, to {near:.0f} neighbours or more")
-
-
-def _coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
-    """Pᵀ A P, formed from some rows of A at a time because A P is large."""
-    height, width = prolongation.blocksize
-    count, size = matrix.shape[0] // height, prolongation.shape[1]
-    total = bsr_matrix((size, size), dtype=np.float32, blocksize=(width, width))
-    step = -(-count // _PARTS)
-    for first in range(0, count, step):
-        some, fine = (_rows(each, first, first + step) for each in (matrix, prolongation))
-        total = total + (fine.T @ (some @ prolongation)).tobsr((width, width))
-    return total
-
-
-def _rows(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
-    """Some rows of blocks."""
-    starts = matrix.indptr[first : last + 1]
-    chosen = slice(starts[0], starts[-1])
-    arrays = matrix.data[chosen], matrix.indices[chosen], starts - starts[0]
-    return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
 
 
 def _aggregate(
@@ -300,12 +274,14 @@ def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> No
 
 def _largest_eigenvalue(matrix: bsr_matrix, steps: int = 10) -> float:
     """Largest eigenvalue by Lanczos' iteration, from below."""
+    from scipy.linalg import eigh_tridiagonal
+
     vector = np.random.default_rng(0).uniform(-1, 1, matrix.shape[0]).astype(np.float32)
     vector /= np.linalg.norm(vector)
     previous = np.zeros_like(vector)
     diagonal, beside = [], [np.float32(0)]
     for _ in range(steps):
-        image = matrix @ vector - beside[-1] * previous
+        image = multiply(matrix, vector, -beside[-1] * previous)
         diagonal.append(np.float32(vector @ image))
         image -= diagonal[-1] * vector
         beside.append(np.float32(np.linalg.norm(image)))

@@ -43,7 +43,7 @@ class Pardiso:
     """The factor of one symmetric matrix, in PARDISO's own memory while this object lives.
 
     `upper` (n, n) is the upper triangle: csr, int32 indices, sorted, every diagonal entry stored;
-    its precision (float64 or float32) is that of the factor. Raises PardisoError.
+    the factor has its precision (float64 or float32). Raises PardisoError.
     """
 
     def __init__(self, upper: csr_matrix, matrix_type: int = POSITIVE_DEFINITE):

@@ -23,6 +23,7 @@ from .condensation import (
 from .direct import Factor
 from .krylov import EPSILON
 from .multigrid import Unknowns
+from .nodal_matrix import NodalMatrix
 from .stabilised import stabilise
 
 _NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
@@ -111,7 +112,7 @@ class Systems:
 
     def __init__(
         self,
-        matrix: sparse.csr_matrix,
+        matrix: sparse.csr_matrix | NodalMatrix,
         constraints: sparse.csr_matrix,
         own: np.ndarray | None,
         unknowns: Unknowns,
@@ -164,15 +165,15 @@ class Systems:
         matrix, constraints = self._matrix, self._constraints[closed]
         own, unknowns = self._own, self._unknowns
         if chosen is not None:
-            matrix, constraints = matrix[chosen][:, chosen], constraints[:, chosen]
+            matrix, constraints = matrix.tocsr()[chosen][:, chosen], constraints[:, chosen]
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
-            return _augmented(matrix, constraints, unknowns.dim)
+            return _augmented(matrix.tocsr(), constraints, unknowns.dim)
         if self._compliance is not None and (soft := self._compliance(closed)).nnz:
-            return stabilise(matrix, constraints, own, soft)
+            return stabilise(matrix.tocsr(), constraints, own, soft)
         if why := against_condensation(matrix, constraints):
             try:
-                return saddle_point(matrix, constraints, why, weighted=False)
+                return saddle_point(matrix.tocsr(), constraints, why, weighted=False)
             except SolveError:
                 pass  # pivots that no order of elimination avoids: condensation needs none of them
         return condense(matrix, constraints, own, unknowns, self._gave_up.get(number, ""))

@@ -21,7 +21,7 @@ from ..fem.faces import FaceBlock
 
 # Faces without a node strictly inside, and TRIA6 and QUAD8, whose inner nodes are on the rim.
 CUT_FACES = ("SEG2", "TRIA3", "TRIA6", "QUAD4", "QUAD8")
-# Shape functions below this at a new node are zero there but for round-off.
+# Shape functions below this at a new node are zero there up to round-off.
 _NO_SHARE = 1e-14
 
 

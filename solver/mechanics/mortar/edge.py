@@ -19,7 +19,7 @@ from scipy import sparse
 
 from ..fem.faces import circumference
 
-# A macro-element is covered as a whole but for round-off.
+# Up to round-off a macro-element is covered as a whole.
 _WHOLE = 1 - 1e-6
 # How far from the edge found the true one is, in lengths of the last closed macro-element.
 _WITHIN = 0.25

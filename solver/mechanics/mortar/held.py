@@ -1,4 +1,4 @@
-"""Slave nodes that cannot answer a multiplier of their own: it joins those of neighbours.
+"""Slave nodes that cannot answer a multiplier: it is added to the neighbours' multipliers.
 
 Supports hold the displacement of a node along the normal; or the node has a multiplier of another
 zone in nearly the same direction, where zones share nodes. Where the master follows node by node

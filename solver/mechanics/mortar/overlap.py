@@ -71,7 +71,7 @@ def _contained(
         if kind.dim == 2:
             normal = (b - a)[:, ::-1] * [1.0, -1.0]
         else:
-            # of a quadrangle, that of its diagonals
+            # of a quadrangle, the angle of its diagonals
             one, other = (b - a, rest[0] - a) if len(rest) == 1 else (rest[0] - a, rest[1] - b)
             normal = np.cross(one, other)
         inside &= np.einsum("nd,nd->n", place - corner.mean(axis=1), normal) < 0

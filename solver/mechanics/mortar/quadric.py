@@ -38,7 +38,7 @@ class Quadric:
         There is one where the normal meets the body from outside; negative within the body, where
         the way out is back along the normal. Zero elsewhere.
 
-        Up to a circle of radius 2 about the origin; from (2.5, −3) up there is none:
+        Up to a circle of radius 2 about the origin; the line up from (2.5, −3) misses it:
 
         >>> up = np.array([0.0, 1.0])
         >>> gap, there = ball(np.zeros(2), 2.0).distance(np.array([[0.0, -3.0], [2.5, -3.0]]), up)

@@ -23,7 +23,7 @@ _LINES = {
     "T2D2": "SEG2", "T3D2": "SEG2", "B21": "SEG2", "B31": "SEG2", "R2D2": "SEG2",
     "T2D3": "SEG3", "T3D3": "SEG3", "B22": "SEG3", "B32": "SEG3",
 }  # fmt: skip
-# Node orders are those of the catalogue, except that lines have their middle node second.
+# Node orders are the catalogue's, except that lines have their middle node second.
 _MIDDLE_SECOND = [0, 2, 1]
 _PLANE = re.compile(r"(?:CPE|CPS|CAX|M3D|SFM3D|R3D|DS|STRI|S)(\d)")
 # Corners of the faces S1, S2, … of each shape, counted from 1.

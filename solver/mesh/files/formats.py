@@ -3,7 +3,7 @@
 | extension | read by | groups |
 |---|---|---|
 | .med, .mmed | `med` | of cells and of nodes |
-| .msh, versions 2 and 4 | gmsh | physical groups; those of points become groups of nodes |
+| .msh, versions 2 and 4 | gmsh | physical groups; points become groups of nodes |
 | .inp | `abaqus` | *ELSET, *SURFACE, *NSET |
 | .vtu | meshio | each integer array of 0 and 1 on cells or points is a group of its name |
 | .vtkhdf | `vtkhdf` | as this program writes them |

@@ -30,7 +30,7 @@ _HEXA27 = [*range(20), 24, 22, 21, 23, 20, 25, 26]
 
 
 def read(path: Path) -> meshio.Mesh:
-    """The mesh of a MED file (version 2.2 or later), as it stands there.
+    """The mesh of a MED file (version 2.2 or later), as it is in the file.
 
     Raises InputError for what has no meaning here: several meshes in one file, another kind of
     coordinates than Cartesian, cell types that are not in the catalogue.

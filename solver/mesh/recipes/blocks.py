@@ -63,7 +63,7 @@ def block(
 
 
 class _Block:
-    """One block: a rectangle or a box, its corners and sides those of QUAD4 or HEXA8."""
+    """One block: a rectangle or a box, with the corners and sides of QUAD4 or HEXA8."""
 
     def __init__(
         self, name: str, keys: BlockKeys, origin: np.ndarray, size: np.ndarray, refine: int

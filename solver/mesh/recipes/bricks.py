@@ -27,7 +27,7 @@ _ONE_PLACE = 1e-9
 
 
 def bricks(recipe: BricksKeys) -> meshio.Mesh:
-    """The bodies; those of different names share no nodes."""
+    """The bodies; bodies of different names share no nodes."""
     meshes = [_brick(brick, recipe.refine) for brick in recipe.bricks]
     mesh, dim = joined(meshes), len(recipe.bricks[0].low)
     owner = np.repeat(np.arange(len(meshes)), [len(m.points) for m in meshes])

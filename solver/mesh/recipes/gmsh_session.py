@@ -34,7 +34,7 @@ _OPTIONS = {
 
 @contextmanager
 def session(**options: float) -> Iterator[None]:
-    """Open gmsh with an empty model; close it whatever happens.
+    """Open gmsh with an empty model; close it in any event.
 
     Options are gmsh's own, with `__` for the dot in their names (`Mesh__Algorithm=5`).
     """

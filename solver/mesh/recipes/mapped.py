@@ -2,7 +2,7 @@
 
 Every node is mapped, mid-edge nodes too, so that quadratic cells have their nodes on the true
 curve. `bottom` and `top` are sections as in `blocks`; `refine` multiplies all divisions. The
-interface is the image of height 0, and all groups are those of `blocks`.
+interface is the image of height 0, and all groups are as in `blocks`.
 
     recipe: rings       # 2D, a quarter of two tubes: bottom inside, top outside
     radii: [20, 30, 40] # base is the bore, press the rim, symx lies on x = 0, farx on y = 0

@@ -124,7 +124,7 @@ def _chart(name: str, one: Converged, sizes: Sequence[float]) -> Chart:
         name,
         f"{one.name.capitalize()} against the size of cells",
         records,
-        Axis("h", "size of cells / that of the case", zero=True),
+        Axis("h", "size of cells / size in the case", zero=True),
         Axis("value", one.name),
         {record["series"]: _LOOKS[record["series"]] for record in records},
         layers=layers,

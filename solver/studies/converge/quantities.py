@@ -15,12 +15,12 @@ from ...mesh.catalogue import cell_type
 from ...simulation.exact import ExactValues, deformable
 from ...simulation.solution import Solution, ZoneResult
 
-# Normals of a surface that differ by less are those of a plane.
+# A surface whose normals differ by less is plane.
 _PLANE = 1e-12
 # An exact pressure whose peak exceeds the mean on a macro-element by more has no known peak: it is
 # infinite there, or the mesh is too coarse.
 _FINITE = 1.1
-_TWICE = np.array([1, 1, 1, 2, 2, 2])  # off-diagonal components stand for two
+_TWICE = np.array([1, 1, 1, 2, 2, 2])  # off-diagonal components count twice
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ def inf_sup_constant(scene: Scene) -> float:
     Raises SolveError where the system is singular.
     """
     basis = scene.free.basis
-    energy = stiffness(scene.points, scene.blocks)[0] + scene.mean.stiffness()
+    energy = stiffness(scene.points, scene.blocks) + scene.mean.stiffness()
     energy = energy + mass(scene.points, scene.blocks) / scene.length**2
     gaps = sparse.vstack([zone.operator.matrix for zone in scene.zones]) @ basis
     area = np.concatenate([zone.operator.area for zone in scene.zones])
@@ -37,7 +37,7 @@ def inf_sup_constant(scene: Scene) -> float:
     return float(np.sqrt(max(np.linalg.eigvalsh(scaled @ response)[0], 0.0)))
 
 
-def mass(points: np.ndarray, blocks: list[Block]) -> sparse.csr_matrix:
+def mass(points: np.ndarray, blocks: list[Block]) -> sparse.bsr_matrix:
     """The consistent mass matrix (n_dofs, n_dofs) of unit density."""
     n, dim = points.shape
     total = CellSum([block.cells for block in blocks], n, dim)
@@ -47,6 +47,5 @@ def mass(points: np.ndarray, blocks: list[Block]) -> sparse.csr_matrix:
         _, determinant = physical_gradients(points, block.cells, block.type, reference)
         scalar = np.einsum("cq,q,qa,qb->cab", determinant, weights, values, values, optimize=True)
         local = np.einsum("cab,ij->caibj", scalar, np.eye(dim))
-        size = dim * block.type.n_nodes
-        total.add(block.cells, local.reshape(-1, size, size))
+        total.add(block.cells, local.__getitem__)
     return total.matrix

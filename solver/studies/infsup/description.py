@@ -1,7 +1,7 @@
 """Ladders of the numerical inf-sup test: β_h on finer and finer meshes, for the record.
 
     levels: {plane: [4, 8, 16, 32], space: [2, 4, 6, 8]}  # slave divisions of the interface's edge
-    quick: {plane: [8, 16], space: [4, 8]}                # those of the quick version, which takes
+    quick: {plane: [8, 16], space: [4, 8]}                # of the quick version, which takes
                                                           # the last `coarser`, clamped
     coarser: {plane: [1, 4], space: [1, 2]}               # slave over master divisions
     cells:
@@ -9,7 +9,7 @@
       - {cells: HEXA8, hexahedra: hexahedra}              # how they are cut, where that is chosen
       - {cells: PENTA6, contact: QUAD4}                   # the faces on the interface, likewise
       - {cells: QUAD9, cut: false}                        # of those that need no cut
-      - {cells: HEXA20, levels: [2, 4, 6, 8]}             # its own, but for the quick version
+      - {cells: HEXA20, levels: [2, 4, 6, 8]}             # its own, except in the quick version
 
 Two unit blocks of the same cells lie on each other, the lower one slave. `clamped`, the sides
 opposite to the interface are held all over; `floating`, the upper block is free to move up and
@@ -33,7 +33,7 @@ from ..keys import Cell
 LEVEL = 0.4
 """β_h falls with the size of the faces to this power at most."""
 ZERO = 1e-6
-"""β_h below is zero but for round-off."""
+"""β_h below is zero up to round-off."""
 
 Level = Annotated[int, Meta(ge=1, description="a whole number, 1 or more")]
 Levels = Annotated[tuple[Level, ...], Meta(min_length=1)]
@@ -134,7 +134,7 @@ class InfSupFile(Section, frozen=True):
 
 
 def read_ladders(path: Path, quick: bool = False) -> list[InfSupLadder]:
-    """The ladders that a file asks for, none of them run; InputError says what is refused."""
+    """The ladders that a file asks for, before they run; InputError says what is refused."""
     return list(_ladders(read_as(InfSupFile, read_mapping(path), path), quick))
 
 

@@ -78,7 +78,7 @@ class Curve:
 
     @cached_property
     def sizes(self) -> list[float]:
-        """The mean size of a macro-element over that of the interface, level by level."""
+        """The mean size of a macro-element over the interface's, level by level."""
         return [element_size(row.verdict.macro_elements or 0, self.dim) for row in self.solved]
 
     def errors(self, error: str) -> tuple[np.ndarray, np.ndarray]:

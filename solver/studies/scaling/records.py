@@ -77,7 +77,7 @@ class SeriesSolves:
 
     @property
     def on_large(self) -> bool:
-        """Whether exponents are those of the sizes asked for, to the largest one."""
+        """Whether exponents cover the sizes asked for, up to the largest."""
         sizes = [m.point.size for m in self.fitted]
         low, high = self.series.fit
         return bool(sizes) and min(sizes) >= low and max(sizes) >= high

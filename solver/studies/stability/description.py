@@ -6,7 +6,7 @@
     state: compression                      # the exact answer: compression or hydrostatic
     values: [1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8]
     labels: [...]                           # how the values are shown, where not as they are
-    quick: [1e-8, 1e8]                      # those of the quick version
+    quick: [1e-8, 1e8]                      # of the quick version
     beyond: []                              # those past the end, where a clear refusal will do
     directions: first                       # first, swapped or both
     meshes:
@@ -73,7 +73,7 @@ class SweepFile(Section, frozen=True):
         for key in ("quick", "beyond"):
             for i, value in enumerate(getattr(self, key)):
                 if value not in self.values:
-                    raise FieldError((key, i), "is none of the values")
+                    raise FieldError((key, i), "is not one of the values")
 
 
 @dataclass(frozen=True)

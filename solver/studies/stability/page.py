@@ -31,7 +31,7 @@ MEASURES = {
 
 
 def read_records(paths: Sequence[Path]) -> list[Record]:
-    """The records of sweeps, in the order of the page; `InputError` for a file that is none."""
+    """The records of sweeps, in the order of the page; `InputError` for another kind of file."""
     records = []
     for path in paths:
         try:

@@ -106,7 +106,7 @@ def _known_to_itself(measured: dict[str, Any]) -> bool:
 
 
 def _attempt(point: _Point, safeguards: Safeguards) -> dict[str, Any]:
-    """The measures of the point, or the reason why there are none."""
+    """The measures of the point, or the reason why they are missing."""
     try:
         return _measured(point, safeguards)
     except InputError as error:
@@ -126,7 +126,7 @@ def _measured(point: _Point, safeguards: Safeguards) -> dict[str, Any]:
     solution = solve_problem(problem, clock)
     zones = solution.zones
     balance = solution.balance
-    # Of rounding alone: the strain of a sweep's points is that of no body.
+    # Of rounding alone: a sweep's points may have strains that no real body has.
     accuracy = Accuracy(solution.accuracy)
     measures: dict[str, Any] = {
         "word": UNRELIABLE if accuracy.reason else PASSED,

@@ -78,7 +78,7 @@ class StudyTreatment(Section, frozen=True):
 
 
 class Reference(Section, frozen=True):
-    """The regular mesh that stands for an exact solution, and how far it may be off, by error."""
+    """The regular mesh that replaces an exact solution, and its possible error by norm."""
 
     cells: Literal["QUAD4", "QUAD8", "QUAD9"]
     divisions: Annotated[
@@ -159,11 +159,11 @@ class StudyPoint:
         return f"{self.problem.name}/{pair}/{self.treatment.name}{solver}/{self.level}"
 
     def case(self) -> Case:
-        """The point as a case; InputError where there is no such treatment of these cells."""
+        """The point as a case; InputError if the treatment does not support these cells."""
         return self._case({"cells": self.slave}, {"cells": self.master}, self.level)
 
     def reference_case(self, reference: Reference) -> Case:
-        """The problem on the mesh that stands for an exact solution."""
+        """The problem on the mesh that replaces an exact solution."""
         section = {"cells": reference.cells, "divisions": list(reference.divisions)}
         return self._case(section, section, 1)
 

@@ -58,7 +58,7 @@ class TimedSolve(MeasuredPoint):
         return medians(times, self._kind)
 
     def error(self, name: str) -> float | None:
-        """An error against the exact solution; None if there is no such solution."""
+        """An error against the exact solution; None without such a solution."""
         return self.record["errors"].get(name) if self.solved else None
 
     @property

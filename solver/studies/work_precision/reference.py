@@ -1,17 +1,17 @@
 """A refined result in place of an exact solution: the fields of a fine mesh, anywhere in it.
 
 For two rectangular blocks on a plane interface, of regular QUAD cells. Displacement and gradient
-are those of the cell around a point. The pressure of the LAC method is right in the mean over each
-macro-element: a cubic spline through its integral is differentiated. The errors of this reference
-are those of the fine mesh; they are named as such wherever it is used.
+come from the cell around a point. The pressure of the LAC method is right in the mean over each
+macro-element: a cubic spline through its integral is differentiated. This reference has the errors
+of the fine mesh; wherever it is used, they are stated.
 """
 
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ...case.material import Material
 from ...case.solutions.base import ElasticSolution, Part
@@ -103,7 +103,9 @@ class RefinedSolution(ElasticSolution):
         return self._pressure(x[:, 0])
 
     @cached_property
-    def _pressure(self) -> CubicSpline:
+    def _pressure(self) -> Callable[[np.ndarray], np.ndarray]:
+        from scipy.interpolate import CubicSpline
+
         order = np.argsort(self.zone.centre[:, 0])
         length, force = self.zone.area[order], (self.zone.area * self.zone.multiplier)[order]
         start = self.zone.centre[order[0], 0] - length[0] / 2
@@ -120,7 +122,7 @@ class RefinedSolution(ElasticSolution):
 
 
 def read_reference(path: Path) -> RefinedSolution:
-    """The reference that a result file is; InputError for a file that is none."""
+    """The reference in a result file; InputError for another kind of file."""
     from ...verification.results import read_result
 
     return RefinedSolution(read_result(path).solution)

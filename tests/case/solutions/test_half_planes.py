@@ -192,7 +192,7 @@ def test_the_half_width_is_found_again(solution):
         (ContactEdge, {"factor": 0.0}, "factor"),
         (ContactEdge, {"factor": 1.0, "top": Material(np.inf, 0.0)}, "top"),
         (PartialWaves, {"size": 1.0, "amplitude": 0.01, "mean_pressure": 40.0}, "mean_pressure"),
-        (HertzHalfPlanes, {"end": 0.0, "radius": 1.0}, "half_width"),
+        (HertzHalfPlanes, {"end": 0.0, "radius": 1.0}, "end"),
         (RoundedPunch, {"end": 1.0, "flat": 1.0, "radius": 1.0}, "flat"),
         (Wedge, {"end": 1.0, "slope": -1.0}, "slope"),
     ],

@@ -32,8 +32,7 @@ BLOCK = Block(BY_NAME["QUAD4"], CELL, np.array([LAME]), np.array([SHEAR]), axisy
 
 
 def energy(displacement):
-    matrix, diagonal = stiffness(RING, [BLOCK])
-    assert matrix.diagonal() == pytest.approx(diagonal)
+    matrix = stiffness(RING, [BLOCK])
     assert abs(matrix - matrix.T).max() < 1e-12
     force = internal_force(RING, [BLOCK], displacement)
     assert matrix @ displacement.ravel() == pytest.approx(force.ravel(), abs=1e-11)

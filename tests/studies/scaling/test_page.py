@@ -71,7 +71,7 @@ def test_exponents_are_those_of_the_records(scaling, results):
     assert hexa.growth("pairing").value == pytest.approx(1.0, abs=1e-3)
     assert hexa.growth("memory").value == pytest.approx(1.0)
     assert (hexa.growth("whole").low, hexa.growth("whole").high) == (1e5, 1e6)
-    # What no stage tells is as much as all of them: it grows as the whole.
+    # The time outside all stages equals theirs: it grows as the whole.
     assert hexa.growth(OTHER).value == pytest.approx(hexa.growth("whole").value)
     assert [m.point.size for m in quad.fitted] == [100_000, 300_000]
 

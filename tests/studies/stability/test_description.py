@@ -64,7 +64,7 @@ def test_the_quick_version_has_fewer_values(file):
     [
         ("beyond: [1.0e+6]", "beyonds: []", "beyonds.*did you mean beyond"),
         ("[1, 2, 3, 4, 1.0e+6, [1, 2]]", "[1, 2]", "values.*at least six"),
-        ("quick: [1.0e+6]", "quick: [7]", r"quick\[0\] = 7: is none of the values"),
+        ("quick: [1.0e+6]", "quick: [7]", r"quick\[0\] = 7: is not one of the values"),
         ("quick: [1.0e+6]", "quick: []", "quick"),
         ("beyond: [1.0e+6]", "labels: [a]", r"labels = \['a'\]: must be as many as values: 6"),
         ("case: base.yaml", "case: other.yaml", "meshes.2D.case = 'other.yaml': no such file"),

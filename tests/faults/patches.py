@@ -1,0 +1,177 @@
+"""Patches: each makes a faulty function of the true one."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import diags_array
+
+from solver.case.model import Material
+
+# A segment below this share of the largest is round-off of the intersection.
+_SLIVER = 1e-6
+
+Wrapped = Callable[..., Any]
+
+
+def changed(change: Callable[[Any], Any]) -> Callable[[Wrapped], Wrapped]:
+    """A function whose result is changed."""
+    return lambda true: lambda *given, **named: change(true(*given, **named))
+
+
+def given(change: Callable[..., tuple]) -> Callable[[Wrapped], Wrapped]:
+    """A function that gets other arguments."""
+    return lambda true: lambda *arguments: true(*change(*arguments))
+
+
+def first_scaled(values: np.ndarray, factor: float) -> np.ndarray:
+    values = np.array(values)
+    values[0] *= factor
+    return values
+
+
+def first_nodes_exchanged(found: Any) -> Any:
+    order = [1, 0, *range(2, found.on_reference.shape[1])]
+    return replace(found, on_reference=found.on_reference[:, order])
+
+
+def one_dropped(parts: list) -> list:
+    """Without the smallest segment that is more than round-off."""
+    sizes = [part.area for part in parts]
+    if not parts:
+        return parts
+    least = _SLIVER * max(size.max() for size in sizes)
+    real = [np.where(size > least, size, np.inf) for size in sizes]
+    block = int(np.argmin([size.min() for size in real]))
+    keep = np.arange(len(real[block])) != real[block].argmin()
+    return [part.of(keep) if i == block else part for i, part in enumerate(parts)]
+
+
+def master_overlooked(pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    kept = pairs[1] != 3
+    return pairs[0][kept], pairs[1][kept]
+
+
+def shared_nodes_free(true: Wrapped) -> Wrapped:
+    def zones(*given: Any) -> list[Any]:
+        first, *others = true(*given)
+        kept = np.ones((first.operator.matrix.shape[1] // 2, 2))
+        for faces in first.sub_faces:
+            kept[faces.nodes] = 0.0
+        cut_off = diags_array(kept.ravel())
+        rest = [replace(z.operator, matrix=z.operator.matrix @ cut_off) for z in others]
+        return [first, *(replace(z, operator=o) for z, o in zip(others, rest, strict=True))]
+
+    return zones
+
+
+def never_closing(true: Wrapped) -> Wrapped:
+    def constraints(scene: Any) -> Any:
+        found = true(scene)
+        found.eligible[len(found.eligible) // 2] = False
+        return found
+
+    return constraints
+
+
+def first_system_kept(true: Wrapped) -> Wrapped:
+    kept: dict[int, Any] = {}
+
+    def constrained(problem: Any, closed: np.ndarray) -> Any:
+        if id(problem) not in kept:
+            kept[id(problem)] = true(problem, closed)
+        return kept[id(problem)]
+
+    return constrained
+
+
+def factor_of_half(true: Wrapped) -> Wrapped:
+    """As of another stiffness, and no refinement that would make up for it."""
+    return lambda matrix, *rest: true(matrix.tocsr() * 0.5, *rest)
+
+
+def never_closes(true: Wrapped) -> Wrapped:
+    return lambda solve, start, eligible, *more: true(solve, start, eligible & False, *more)
+
+
+def stays_closed(true: Wrapped) -> Wrapped:
+    """Tension is borne."""
+
+    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
+        def no_tension_seen(closed: np.ndarray) -> Any:
+            trial = solve(closed)
+            return replace(trial, pressure=np.abs(trial.pressure))
+
+        return true(no_tension_seen, eligible, eligible, *more)
+
+    return status
+
+
+def first_guess_kept(true: Wrapped) -> Wrapped:
+    return lambda solve, start, eligible, *more: replace(
+        true(solve, start, eligible, *more), closed=start & eligible
+    )
+
+
+def last_opened(found: Any) -> Any:
+    closed = found.closed.copy()
+    closed[np.flatnonzero(closed)[-1:]] = False
+    return replace(found, closed=closed)
+
+
+def every_third_off(stress: np.ndarray) -> np.ndarray:
+    stress[::3, 0] -= 9e-4 * 25  # between the extremes: accepted values notice nothing
+    return stress
+
+
+def lower_half_softer(true: Wrapped) -> Wrapped:
+    def by_material(self: Any, value: Callable[[Any], float], otherwise: float) -> Any:
+        found, height = true(self, value, otherwise), self.points[:, -1]
+        if value(Material(1.0, 0.3)) != 0.3:
+            return found
+        middle = (height.min() + height.max()) / 2
+        lower = {
+            kind: height[cells].mean(axis=1) < middle for kind, cells in self.cut.cells.items()
+        }
+        return {kind: np.where(lower[kind], 0.2991, values) for kind, values in found.items()}
+
+    return by_material
+
+
+def rolled_sub_faces(result: Any) -> Any:
+    faces = [replace(f, macro=np.roll(f.macro, 1)) for f in result.sub_faces]
+    return replace(result, sub_faces=faces)
+
+
+def template_off_by_one(result: Any) -> Any:
+    (kind, nodes), *others = result.sub_faces[0]
+    wrong = [(kind, [*nodes[1:], nodes[1]]), *others]
+    return replace(result, sub_faces=[wrong, *result.sub_faces[1:]])
+
+
+def template_piece_lost(result: Any) -> Any:
+    return replace(result, pieces=result.pieces[1:])
+
+
+def first_status_kept(true: Wrapped) -> Wrapped:
+    """What is open in the first step stays so."""
+    kept: list[np.ndarray] = []
+
+    def status(solve: Any, start: Any, eligible: Any, *more: Any) -> Any:
+        found = true(solve, start, kept[0] if kept else eligible, *more)
+        kept.append(found.closed)
+        return found
+
+    return status
+
+
+def normals_rolled(blocks: list) -> list:
+    turned = [b.directions if b.directions is None else b.directions[:, ::-1] for b in blocks]
+    return [replace(b, directions=d) for b, d in zip(blocks, turned, strict=True)]
+
+
+def more_covered(operator: Any) -> Any:
+    at = operator.surface
+    more = np.where(at.covered < 0.999 * at.area, 1.001, 1.0) * at.covered
+    return replace(operator, covered=more, surface=replace(at, covered=more))

@@ -1,0 +1,55 @@
+"""A matrix in blocks with free degrees of freedom: every operation against a dense matrix."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.sparse import bsr_matrix, csr_matrix
+
+from solver.mechanics.linear.condensed_matrix import CondensedMatrix
+from solver.mechanics.linear.nodal_matrix import NodalMatrix
+
+
+def example(seed, dim, share):
+    """Symmetric blocks of six nodes, some pairs apart, one node with no cell; and free dofs."""
+    rng, n = np.random.default_rng(seed), 6
+    near = rng.random((n, n)) < 0.5
+    near |= near.T | np.eye(n, dtype=bool)
+    near[n - 1] = near[:, n - 1] = False
+    dense = rng.standard_normal((n * dim, n * dim)) * np.kron(near, np.ones((dim, dim)))
+    dense += dense.T
+    blocks = bsr_matrix(dense, blocksize=(dim, dim))
+    free = np.flatnonzero(rng.random((n - 1) * dim) < share)
+    return NodalMatrix(blocks, free), dense[np.ix_(free, free)], np.kron(near, np.ones((dim, dim)))
+
+
+@given(
+    seed=st.integers(0, 10**6), dim=st.sampled_from([2, 3]), share=st.sampled_from([0.3, 0.8, 1])
+)
+def test_all_operations_are_those_of_the_dense_matrix(seed, dim, share):
+    matrix, dense, there = example(seed, dim, share)
+    rng, n = np.random.default_rng(seed), len(dense)
+    assert matrix.shape == dense.shape
+    x = rng.standard_normal((n, 2))
+    np.testing.assert_allclose(matrix @ x, dense @ x, atol=1e-12)
+    np.testing.assert_allclose(matrix @ x[:, 0], dense @ x[:, 0], atol=1e-12)
+    np.testing.assert_array_equal(matrix.diagonal(), np.diag(dense))
+    np.testing.assert_array_equal(matrix.tocsr().toarray(), dense)
+    rows = rng.permutation(n)[: n // 2]
+    for some in (rows, slice(1, 4), rng.random(n) < 0.5):
+        np.testing.assert_array_equal(matrix[some].toarray(), dense[some])
+    assert matrix.nnz == there[np.ix_(matrix.free, matrix.free)].sum() == matrix.tocsr().nnz
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_condensed_matrix_of_blocks_is_that_of_entries(dim):
+    matrix, dense, _ = example(3, dim, 0.9)
+    kept = np.arange(len(dense)) % 4 > 0
+    added = csr_matrix(np.diag(np.arange(kept.sum(), dtype=float)))
+    condensed = CondensedMatrix(matrix, np.flatnonzero(kept), added)
+    expected = dense[np.ix_(kept, kept)] + added.toarray()
+    x = np.eye(len(expected))
+    np.testing.assert_allclose(condensed @ x, expected, atol=1e-12)
+    np.testing.assert_allclose(condensed[2:5].toarray(), expected[2:5], atol=1e-12)
+    np.testing.assert_allclose(condensed.diagonal(), np.diag(expected), atol=1e-12)
+    np.testing.assert_allclose(condensed.tocsr().toarray(), expected, atol=1e-12)
