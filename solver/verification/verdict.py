@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -267,7 +267,7 @@ class Verdict:
 
     def plain(self) -> dict[str, Any]:
         """The verdict as plain values for strict JSON, with its digest."""
-        content = msgspec.json.decode(_encoded(self))
+        content = msgspec.json.decode(_encoded(asdict(self)))
         return content | {_DIGEST: _digest(content)}
 
 
