@@ -8,8 +8,8 @@ import meshio
 import numpy as np
 
 from ..case.model import Case, Step
-from ..mechanics.fem.elasticity import nodal_stress
 from ..mechanics.fem.faces import nodal_normals
+from ..mechanics.fem.nodal_stress import nodal_stress
 from ..mechanics.fem.stress import normal_stress
 from ..mesh.catalogue import BY_NAME
 from ..system.clock import Clock, processor_time

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from ..simulation.groups import ALL
 from ..simulation.initial import strain_at
 from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
+from ..system.threads import ahead
 
 Reference = Any
 # Pressures and gaps below this share of load and length are zero.
@@ -179,19 +181,34 @@ def integration_stress(solution: Solution, _: None, reference: Reference) -> Sam
     """The given components at the integration points of all cells, by Hooke's law.
 
     They follow from the displacement, less initial strains, without extrapolation to nodes and
-    averages.
+    averages. The sample has what decides a check: of each chunk of cells the extreme values, and
+    the largest reference and deviation.
     """
-    place, stress, node, cell = (np.concatenate(c) for c in zip(*_by_hooke(solution), strict=True))
-    if isinstance(reference, ExactValues):
-        exact = reference.exact.stress(place, reference.part[node])
-        expected = dict(zip(COMPONENTS, exact.T, strict=True))
-    else:
-        expected = {name: evaluate(value, place) for name, value in reference.items()}
-    listed, count = list(expected), len(place)
+    names = COMPONENTS if isinstance(reference, ExactValues) else tuple(reference)
+
+    def decisive(chunk: tuple[np.ndarray, ...]) -> list[tuple[np.ndarray, ...]]:
+        place, stress, node, cell = chunk
+        if isinstance(reference, ExactValues):
+            expected = reference.exact.stress(place, reference.part[node]).T
+        else:
+            expected = np.stack([evaluate(reference[name], place) for name in names])
+        found: list[tuple[np.ndarray, ...]] = []
+        for name, wanted in zip(names, expected, strict=True):
+            values = stress[:, COMPONENTS.index(name)]
+            worst = np.abs(values - wanted).argmax(), np.abs(wanted).argmax()
+            kept = np.unique([values.argmin(), values.argmax(), *worst])
+            found.append((values[kept], wanted[kept], cell[kept]))
+        return found
+
+    by_name = zip(*map(decisive, _by_hooke(solution)), strict=True)
+    listed = [
+        (name, *found) for name, chunks in zip(names, by_name, strict=True) for found in chunks
+    ]
+    places = [(cell, name) for name, _, _, cells in listed for cell in cells]
     return Sample(
-        np.concatenate([stress[:, COMPONENTS.index(name)] for name in listed]),
-        np.concatenate([expected[name] for name in listed]),
-        lambda i: f"cell {cell[i % count]} ({listed[i // count]})",
+        np.concatenate([values for _, values, _, _ in listed]),
+        np.concatenate([expected for _, _, expected, _ in listed]),
+        lambda i: "cell {} ({})".format(*places[i]),
     )
 
 
@@ -200,41 +217,47 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
 
     Place (k, dim), stress (k, 6), and of the cell: its first node (k,) and its number (k,).
     """
-    points, moving, first = solution.mesh.points, deformable(solution), 0
+    moving, first = deformable(solution), 0
     for i, (block, elastic) in enumerate(
         zip(solution.mesh.cells, _materials(solution), strict=True)
     ):
         kind = cell_type(block.type)
-        reference, _ = volume_rule(kind.name)
-        values = shape_functions(kind.name).values(reference)
-        mixed = solution.mean_stress.get(kind.name)
         chosen = np.flatnonzero(moving[block.data].all(axis=1))
-        step = max(1, _CHUNK // (len(reference) * kind.n_nodes * kind.dim))
-        for part in np.split(chosen, range(step, len(chosen), step)):
-            cells = block.data[part]
-            gradient, _ = physical_gradients(points, cells, kind, reference)
-            nodal = solution.displacement[cells]
-            slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ gradient
-            if solution.case.axisymmetric:
-                hoop, _ = hoop_values(points, cells, kind, reference)
-                slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
-            dim, place = slope.shape[-1], (values @ points[cells]).reshape(-1, kind.dim)
-            lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
-            initial = _initial_strain(solution, i, part, place).reshape(*slope.shape[:2], 6)
-            mean = lame * (np.einsum("cqii->cq", slope) - initial[..., :3].sum(axis=-1))
-            if mixed is not None:
-                own = mixed[part] @ values.T
-                mean = np.where(np.isnan(own), mean, own)
-            tensor = np.zeros((*mean.shape, 3, 3))
-            tensor[..., :dim, :dim] = slope + np.swapaxes(slope, 2, 3)
-            tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
-            if solution.case.thin:
-                tensor[..., 2, 2] = 0.0
-            stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
-            stress = (stress - 2 * shear[..., None] * initial).reshape(-1, 6)
-            owners = (np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
-            yield place, stress, *owners
+        step = max(1, _CHUNK // (len(volume_rule(kind.name)[1]) * kind.n_nodes * kind.dim))
+        parts = [chosen[start : start + step] for start in range(0, len(chosen), step)]
+        yield from ahead(partial(_hooke_in, solution, i, elastic, first), parts)
         first += len(block.data)
+
+
+def _hooke_in(
+    solution: Solution, block: int, elastic: np.ndarray, first: int, part: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """See `_by_hooke`: a part of the cells of a block, its first cell numbered `first`."""
+    points, kind = solution.mesh.points, cell_type(solution.mesh.cells[block].type)
+    reference, _ = volume_rule(kind.name)
+    values = shape_functions(kind.name).values(reference)
+    cells = solution.mesh.cells[block].data[part]
+    gradient, _ = physical_gradients(points, cells, kind, reference)
+    nodal = solution.displacement[cells]
+    slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ gradient
+    if solution.case.axisymmetric:
+        hoop, _ = hoop_values(points, cells, kind, reference)
+        slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
+    dim, place = slope.shape[-1], (values @ points[cells]).reshape(-1, kind.dim)
+    lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
+    initial = _initial_strain(solution, block, part, place).reshape(*slope.shape[:2], 6)
+    mean = lame * (np.einsum("cqii->cq", slope) - initial[..., :3].sum(axis=-1))
+    if (mixed := solution.mean_stress.get(kind.name)) is not None:
+        own = mixed[part] @ values.T
+        mean = np.where(np.isnan(own), mean, own)
+    tensor = np.zeros((*mean.shape, 3, 3))
+    tensor[..., :dim, :dim] = slope + np.swapaxes(slope, 2, 3)
+    tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
+    if solution.case.thin:
+        tensor[..., 2, 2] = 0.0
+    stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    stress = (stress - 2 * shear[..., None] * initial).reshape(-1, 6)
+    return place, stress, *(np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
 
 
 def _initial_strain(

@@ -3,7 +3,7 @@
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import bsr_matrix, csr_matrix
 
 from .nodal_matrix import NodalMatrix
 
@@ -39,9 +39,22 @@ class CondensedMatrix:
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """See `Symmetric`."""
-        whole = np.zeros((self._stiffness.shape[0], x.shape[1]))
+        whole = np.zeros((self._stiffness.shape[0], *x.shape[1:]))
         whole[self._kept] = x
         return (self._stiffness @ whole)[self._kept] + self._added @ x
+
+    def in_blocks(self, scale: np.ndarray) -> tuple[bsr_matrix, np.ndarray] | None:
+        """See `NodalMatrix.scaled`, and the row (k,) of each unknown; None of a csr stiffness."""
+        if not isinstance(self._stiffness, NodalMatrix):
+            return None
+        on_all = np.zeros(self._stiffness.shape[0])
+        on_all[self._kept] = scale
+        blocks, place = self._stiffness.scaled(on_all), self._stiffness.free[self._kept]
+        added = self._added.tocoo()
+        values = (scale[added.row] * added.data * scale[added.col]).astype(np.float32)
+        where = place[added.row], place[added.col]
+        contact = csr_matrix((values, where), shape=blocks.shape)
+        return blocks + contact.tobsr(blocks.blocksize), place
 
     def __getitem__(self, rows: Any) -> csr_matrix:
         """See `Symmetric`."""

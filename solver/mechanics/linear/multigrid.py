@@ -14,10 +14,11 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.errors import SolveError
-from .condensed_matrix import Symmetric
+from .condensed_matrix import CondensedMatrix, Symmetric
 from .galerkin import coarse, pattern, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
-from .products import Prolongation, multiply
+from .nodal_matrix import NodalMatrix
+from .products import in_pieces, multiply, multiply_transposed
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
@@ -28,7 +29,6 @@ MOST_NEIGHBOURS = 50
 one face: with hundreds of faces on it, coarse levels fill in."""
 MAX_ITERATIONS = 150
 _ROWS_AT_ONCE = 30_000  # whole nodes
-_BLOCKS_AT_ONCE = 100_000
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
 # The iteration approaches the largest eigenvalue from below.
@@ -59,11 +59,11 @@ class Unknowns:
 
 @dataclass(frozen=True)
 class Level:
-    """One level: scaled matrix, bound of its eigenvalues, and the way to and from the next."""
+    """One level: scaled matrix, bound of its eigenvalues, and the way up from the next."""
 
     matrix: bsr_matrix
     bound: np.float32
-    way: Prolongation
+    prolongation: bsr_matrix
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
         """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
@@ -93,14 +93,16 @@ class Multigrid:
         self.iterations = 0
         self._matrix = matrix
         self._scale = 1 / np.sqrt(diagonal)[:, None]
-        self._place, body = _places(unknowns)
-        motions = np.zeros((3 * len(body), unknowns.motions.shape[1]))
+        blocks, self._place = _in_blocks(matrix, self._scale[:, 0], unknowns)
+        # Nodes without unknowns belong to no body.
+        body = np.full(blocks.shape[0] // 3, -1)
+        body[self._place // 3] = unknowns.body
+        motions = np.zeros((blocks.shape[0], unknowns.motions.shape[1]))
         motions[self._place] = unknowns.motions / self._scale
-        blocks = _in_blocks(matrix, self._scale[:, 0], self._place, 3 * len(body))
         blocks, motions, scale = _scaled(blocks, motions)
         self._scale *= scale[self._place, None]
         self._levels, self._coarsest = _hierarchy(blocks, motions, body)
-        self._padded = 3 * len(body)
+        self._padded = blocks.shape[0]
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
 
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
@@ -138,28 +140,35 @@ class Multigrid:
             return self._coarsest @ residual
         level = self._levels[depth]
         change = level.smooth(residual)
-        below = level.way.restrict(level.remaining(residual, change))
-        change = level.way.prolong(self._descend(depth + 1, below), change)
+        below = multiply_transposed(level.prolongation, level.remaining(residual, change))
+        change = multiply(level.prolongation, self._descend(depth + 1, below), change)
         change += level.smooth(level.remaining(residual, change))
         return change
 
 
-def _places(unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
-    """Row (n,) of each unknown when every node has three, and the body of each such node."""
-    _, first, number, count = np.unique(
-        unknowns.node, return_index=True, return_inverse=True, return_counts=True
-    )
+def _in_blocks(
+    matrix: Symmetric, scale: np.ndarray, unknowns: Unknowns
+) -> tuple[bsr_matrix, np.ndarray]:
+    """The scaled matrix in single precision and blocks of three, and the row (n,) of each unknown.
+
+    Rows without unknown are zero.
+    """
+    if isinstance(matrix, NodalMatrix):
+        return matrix.scaled(scale), matrix.free
+    if isinstance(matrix, CondensedMatrix) and (found := matrix.in_blocks(scale)):
+        return found
+    number, count = np.unique(unknowns.node, return_inverse=True, return_counts=True)[1:]
     order = np.argsort(number, kind="stable")
     rank = np.empty(len(number), dtype=int)
     rank[order] = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
-    return 3 * number + rank, unknowns.body[first]
+    place = 3 * number + rank
+    return _of_rows(matrix, scale, place, 3 * len(count)), place
 
 
-def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
-    """The scaled matrix in single precision and blocks of three; rows without unknown are zero.
+def _of_rows(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
+    """The same, row and column i at `place[i]` (n,) of `size`.
 
-    Row and column i go to `place[i]` (n,) of `size`. Rows are copied in parts, so that there is no
-    second matrix in double precision.
+    Rows are copied in parts, so that there is no second matrix in double precision.
     """
     order, place = np.argsort(place), place.astype(np.int32)
     rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
@@ -197,7 +206,7 @@ def _hierarchy(
         _refuse_fill(way)
         below, motions, scale = _scaled(coarse(matrix, way), coarse_motions)
         _scale_blocks(way, np.ones(way.shape[0]), scale)
-        levels.append(Level(matrix, bound, Prolongation(way)))
+        levels.append(Level(matrix, bound, way))
         matrix, body = below, coarse_body
     if matrix.shape[0] > LARGEST_DENSE:
         raise SolveError(f"its levels end at {matrix.shape[0]} unknowns: nothing coarsens further")
@@ -228,7 +237,7 @@ def _aggregate(
 
     count = len(body)
     rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
-    within = body[rows] == body[matrix.indices]
+    within = (body[rows] == body[matrix.indices]) & (body[rows] >= 0)
     starts = np.zeros(count + 1, dtype=np.int32)
     np.cumsum(np.bincount(rows[within], minlength=count), out=starts[1:])
     columns = matrix.indices[within].astype(np.int32)
@@ -253,12 +262,19 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     there = diagonal > 0
     scale = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
     weights = scale.astype(np.float32).reshape(-1, size)
-    inner = np.empty(matrix.data.shape[:2], dtype=np.float32)
-    for first in range(0, len(inner), _BLOCKS_AT_ONCE):
-        some = slice(first, first + _BLOCKS_AT_ONCE)
-        columns = weights[matrix.indices[some], :, None]
-        inner[some] = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
-    sums = scale * np.add.reduceat(inner, matrix.indptr[:-1], axis=0).ravel()
+    sums = np.zeros(weights.shape)
+
+    def add_up(first: int, last: int) -> None:
+        starts = matrix.indptr[first : last + 1]
+        some, filled = slice(starts[0], starts[-1]), np.diff(starts) > 0
+        if filled.any():
+            columns = weights[matrix.indices[some], :, None]
+            inner = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
+            starts = starts[:-1][filled] - starts[0]
+            sums[first:last][filled] = np.add.reduceat(inner, starts, axis=0)
+
+    in_pieces(add_up, matrix)
+    sums = scale * sums.ravel()
     scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
     _scale_blocks(matrix, scale, scale)
     return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
@@ -267,9 +283,16 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
 def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> None:
     """Multiply rows and columns, in place."""
     height, width = matrix.blocksize
-    rows = np.repeat(left.astype(np.float32).reshape(-1, height), np.diff(matrix.indptr), axis=0)
-    matrix.data *= rows[:, :, None]
-    matrix.data *= right.astype(np.float32).reshape(-1, width)[matrix.indices][:, None, :]
+    rows = left.astype(np.float32).reshape(-1, height)
+    columns = right.astype(np.float32).reshape(-1, width)
+
+    def multiply_rows(first: int, last: int) -> None:
+        starts = matrix.indptr[first : last + 1]
+        some = slice(starts[0], starts[-1])
+        matrix.data[some] *= np.repeat(rows[first:last], np.diff(starts), axis=0)[:, :, None]
+        matrix.data[some] *= columns[matrix.indices[some]][:, None, :]
+
+    in_pieces(multiply_rows, matrix)
 
 
 def _largest_eigenvalue(matrix: bsr_matrix, steps: int = 10) -> float:

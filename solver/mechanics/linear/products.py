@@ -6,15 +6,15 @@ threads changes no digit.
 """
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from scipy.sparse import bsr_matrix, csr_matrix
+from scipy.sparse import bsr_matrix
 
 from ...system.compiled import available, compiled
-from ...system.threads import workers
+from ...system.threads import ahead, workers
 
 _LEAST = 200_000  # multiplications from which another thread pays for its start
+_PARTS = 16  # of a transposed product
 
 
 def multiply(
@@ -43,37 +43,31 @@ def multiply(
     return out
 
 
-class Prolongation:
-    """The way from coarse unknowns to fine ones, and by its transpose back: `matrix` (n, c)."""
+def multiply_transposed(matrix: bsr_matrix, x: np.ndarray) -> np.ndarray:
+    """The transpose of `matrix` (m, n) @ x (m,), of a matrix with many more rows than columns.
 
-    def __init__(self, matrix: bsr_matrix):
-        self.matrix = matrix
-        height, width = matrix.blocksize
-        if available():
-            # The transpose: for each of its rows the blocks of the matrix, which are not copied.
-            places = np.arange(len(matrix.indices), dtype=np.int32)
-            shape = matrix.shape[0] // height, matrix.shape[1] // width
-            self._by_columns = csr_matrix((places, matrix.indices, matrix.indptr), shape).tocsc()
-        else:
-            self._restriction = matrix.T.tobsr((width, height))
+    A fixed number of parts of the rows are added up in their order, whatever the threads.
 
-    def prolong(self, coarse: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """`base` (n,) + P @ `coarse` (c,)."""
-        return multiply(self.matrix, coarse, base)
+    >>> multiply_transposed(bsr_matrix(np.ones((9, 6)), blocksize=(3, 6)), np.ones(9))
+    array([9., 9., 9., 9., 9., 9.])
+    """
+    height = matrix.blocksize[0]
+    kernel = _TRANSPOSED.get(matrix.blocksize) if available() else None
+    arrays = matrix.indptr, matrix.indices, matrix.data
 
-    def restrict(self, fine: np.ndarray) -> np.ndarray:
-        """Pᵀ @ `fine` (n,)."""
-        if not available():
-            return multiply(self._restriction, fine)
-        out, kernel = np.empty(self.matrix.shape[1], fine.dtype), _RESTRICT[self.matrix.blocksize]
-        places = self._by_columns
-        arrays = places.indptr, places.indices, places.data, self.matrix.data
-
-        def rows(first: int, last: int) -> None:
-            kernel(first, last, *arrays, fine, out)
-
-        share_rows(rows, places.indptr, self.matrix.data[:1].size)
+    def part(some: tuple[int, int]) -> np.ndarray:
+        if kernel is None:
+            found: np.ndarray = rows_of(matrix, *some).T @ x[height * some[0] : height * some[1]]
+            return found
+        out = np.zeros(matrix.shape[1], dtype=matrix.dtype)
+        kernel(*some, *arrays, x, out)
         return out
+
+    parts = ahead(part, ranges(matrix.indptr, matrix.data[:1].size, _PARTS))
+    total = next(parts)
+    for other in parts:
+        total += other
+    return total
 
 
 def rows_of(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
@@ -84,23 +78,27 @@ def rows_of(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
     return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
 
 
-def share_rows(work: Callable[[int, int], None], starts: np.ndarray, weight: int = 1) -> None:
-    """Call `work` on ranges of rows, one for each thread, with about as many entries in each.
+def ranges(starts: np.ndarray, weight: int, most: int) -> list[tuple[int, int]]:
+    """Ranges of rows with about as many entries in each, `most` or fewer where that is little work.
 
     `starts` (n + 1,) of the rows among the entries; `weight`: multiplications for an entry.
     """
     entries = int(starts[-1])
-    count = min(workers(), 1 + weight * entries // _LEAST)
+    count = min(most, 1 + weight * entries // _LEAST)
     cuts = np.searchsorted(starts, entries * np.arange(1, count) // count).tolist()
-    ranges = list(zip([0, *cuts], [*cuts, len(starts) - 1], strict=True))
-    if count == 1:
-        work(*ranges[0])
-        return
-    with ThreadPoolExecutor(count - 1) as pool:
-        others = [pool.submit(work, *some) for some in ranges[1:]]
-        work(*ranges[0])
-        for other in others:
-            other.result()
+    return list(zip([0, *cuts], [*cuts, len(starts) - 1], strict=True))
+
+
+def share_rows(work: Callable[[int, int], None], starts: np.ndarray, weight: int = 1) -> None:
+    """Call `work` on a range of rows in each thread; see `ranges`."""
+    for _ in ahead(lambda some: work(*some), ranges(starts, weight, workers())):
+        pass
+
+
+def in_pieces(work: Callable[[int, int], None], matrix: bsr_matrix) -> None:
+    """Call `work` on ranges of rows of blocks so small that its own arrays stay small."""
+    for _ in ahead(lambda some: work(*some), ranges(matrix.indptr, matrix.data[:1].size, 1 << 30)):
+        pass
 
 
 def _product_of_three(width: int) -> Callable[..., None]:
@@ -144,32 +142,30 @@ def _product_of_six(first, last, starts, columns, blocks, x, factor, out):  # ty
         out[6 * i + 5] += factor * f
 
 
-def _restriction_of(height: int) -> Callable[..., None]:
-    """To six unknowns."""
-
+def _transposed_to_six(height: int) -> Callable[..., None]:
     @compiled
-    def kernel(first, last, starts, rows, places, blocks, x, out):  # type: ignore[no-untyped-def]
+    def kernel(first, last, starts, columns, blocks, x, out):  # type: ignore[no-untyped-def]
         for i in range(first, last):
-            a = b = c = d = e = f = x[0] - x[0]
-            for q in range(starts[i], starts[i + 1]):
-                j, k = height * rows[q], places[q]
+            for k in range(starts[i], starts[i + 1]):
+                a = b = c = d = e = f = x[0] - x[0]
                 for m in range(height):
-                    value = x[j + m]
+                    value = x[height * i + m]
                     a += blocks[k, m, 0] * value
                     b += blocks[k, m, 1] * value
                     c += blocks[k, m, 2] * value
                     d += blocks[k, m, 3] * value
                     e += blocks[k, m, 4] * value
                     f += blocks[k, m, 5] * value
-            out[6 * i] = a
-            out[6 * i + 1] = b
-            out[6 * i + 2] = c
-            out[6 * i + 3] = d
-            out[6 * i + 4] = e
-            out[6 * i + 5] = f
+                j = 6 * columns[k]
+                out[j] += a
+                out[j + 1] += b
+                out[j + 2] += c
+                out[j + 3] += d
+                out[j + 4] += e
+                out[j + 5] += f
 
     return kernel
 
 
 _PRODUCTS = {(3, 3): _product_of_three(3), (3, 6): _product_of_three(6), (6, 6): _product_of_six}
-_RESTRICT = {(3, 6): _restriction_of(3), (6, 6): _restriction_of(6)}
+_TRANSPOSED = {(3, 6): _transposed_to_six(3), (6, 6): _transposed_to_six(6)}

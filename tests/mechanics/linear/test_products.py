@@ -52,18 +52,17 @@ def test_product_is_the_dense_one(size, precision, monkeypatch):
         np.testing.assert_array_equal(products.multiply(matrix, x, base, -2.5), found)
 
 
-@pytest.mark.parametrize("height", [3, 6])
-def test_prolongation_and_its_transpose(height, monkeypatch):
-    matrix = blocks(31, 9, (height, 6))
-    dense = matrix.toarray().astype(float)
-    way, rng = products.Prolongation(matrix), np.random.default_rng(2)
-    fine, coarse = (rng.standard_normal(n).astype(np.float32) for n in matrix.shape)
-    up, down = way.prolong(coarse, fine), way.restrict(fine)
-    np.testing.assert_allclose(up, fine + dense @ coarse, atol=1e-5)
-    np.testing.assert_allclose(down, dense.T @ fine, atol=1e-5)
-    on_threads(3, monkeypatch)
-    np.testing.assert_array_equal(way.prolong(coarse, fine), up)
-    np.testing.assert_array_equal(way.restrict(fine), down)
+@pytest.mark.parametrize("size", [(3, 6), (6, 6), (2, 5)])
+def test_transposed_product_is_the_dense_one(size, monkeypatch):
+    monkeypatch.setattr(products, "_LEAST", 1)
+    matrix = blocks(31, 9, size)
+    x = np.random.default_rng(2).standard_normal(matrix.shape[0]).astype(np.float32)
+    found = products.multiply_transposed(matrix, x)
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, matrix.toarray().T.astype(float) @ x, atol=1e-5)
+    for count in (2, 3):
+        on_threads(count, monkeypatch)
+        np.testing.assert_array_equal(products.multiply_transposed(matrix, x), found)
 
 
 def test_rows_are_shared_out_by_their_entries(monkeypatch):
