@@ -36,5 +36,5 @@ def script(parser: argparse.ArgumentParser, shell: str) -> str:
         for action in command._actions:
             if action.type is Path:
                 folder = action.metavar == "DIR"
-                action.complete = shtab.DIRECTORY if folder else shtab.FILE  # type: ignore[attr-defined]
+                action.complete = shtab.DIRECTORY if folder else shtab.FILE
     return str(shtab.complete(parser, shell))
