@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..case.expressions import Expression, evaluate
+from ..case.model import EXACT
 from ..mechanics.fem.faces import surface_points
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution, ZoneResult
@@ -201,13 +202,13 @@ def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[di
             face = np.repeat(first + np.arange(len(nodes))[closed], len(_WITHIN))
             found += _records(RECOVERED, s=at[closed].ravel(), p=values[closed].ravel(), face=face)
         first += len(nodes)
-    reference = _reference(solution)
-    if reference is not None:
+    against = reference(solution, "contact_pressure")
+    if against is not None:
         where = surface_points(points, zone.faces).place
-        if isinstance(reference, ExactValues):
-            values = reference.exact.contact_pressure(where)
+        if isinstance(against, ExactValues):
+            values = against.exact.contact_pressure(where)
         else:
-            values = evaluate(reference, where)
+            values = evaluate(against, where)
         at = place(where)
         order = np.argsort(at, kind="stable")[:: max(1, len(at) // 400)]
         found += _records(REFERENCE, s=at[order], p=values[order])
@@ -216,18 +217,16 @@ def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[di
 
 def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
     """The pressure (m,) that the reference has on every macro-element; None where it has none."""
-    reference = _reference(solution)
-    return None if reference is None else expected_pressure(zone, reference)
+    against = reference(solution, "contact_pressure")
+    return None if against is None else expected_pressure(zone, against)
 
 
-def _reference(solution: Solution) -> float | Expression | ExactValues | None:
-    """The reference pressure, checked or not."""
-    given, exact = solution.case.reference.get("contact_pressure"), solution.case.solution
-    if isinstance(given, float | Expression):
+def reference(solution: Solution, key: str) -> Any:
+    """What the checks compare a quantity with, checked or not; None where the case has nothing."""
+    given, exact = solution.case.reference.get(key), solution.case.solution
+    if given is not None and given is not EXACT:
         return given
-    if exact and "contact_pressure" in exact.quantities:
-        return ExactValues(solution, exact)
-    return None
+    return ExactValues(solution, exact) if exact and key in exact.quantities else None
 
 
 def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:
