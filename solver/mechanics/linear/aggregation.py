@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix, diags
 
-from .unknowns import Nodes
+from .unknowns import LevelNodes
 
 # The distances of a node's neighbours differ by more than this where cells are slender. There only
 # those up to the second number times the nearest one join an aggregate.
@@ -12,7 +12,7 @@ _SLENDER, _NEAR = 3.5, 2.5
 _LINE = 6
 
 
-def aggregate(matrix: bsr_matrix, nodes: Nodes) -> tuple[bsr_matrix, Nodes]:
+def aggregate(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[bsr_matrix, LevelNodes]:
     """Tentative prolongation, whose columns are the orthonormal motions of each aggregate.
 
     And the aggregates, as the nodes of the next level.
@@ -39,7 +39,7 @@ def aggregate(matrix: bsr_matrix, nodes: Nodes) -> tuple[bsr_matrix, Nodes]:
     if nodes.points is not None:
         points = (aggregates.T @ nodes.points) / aggregates.sum(axis=0).reshape(-1, 1)
         points = np.asarray(points)
-    return bsr_matrix(tentative, dtype=np.float32), Nodes(motions, coarse_body, points)
+    return bsr_matrix(tentative, dtype=np.float32), LevelNodes(motions, coarse_body, points)
 
 
 def _along_lines(graph: csr_matrix) -> csr_matrix:

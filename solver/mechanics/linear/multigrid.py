@@ -26,7 +26,7 @@ from .galerkin import coarse, pattern, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
 from .products import in_pieces, multiply, multiply_transposed
-from .unknowns import Nodes, Unknowns, nodes_at, places
+from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
@@ -128,7 +128,7 @@ class Hierarchy:
             raise SolveError(f"its levels end at {size} unknowns: nothing coarsens further")
         self.last = blocks
 
-    def _add_linear(self, matrix: bsr_matrix, unknowns: Unknowns) -> tuple[bsr_matrix, Nodes]:
+    def _add_linear(self, matrix: bsr_matrix, unknowns: Unknowns) -> tuple[bsr_matrix, LevelNodes]:
         """Add the level of quadratic cells; return matrix and nodes of the linear ones."""
         assert unknowns.linear is not None
         vertices = unknowns.of_vertices()
@@ -140,8 +140,8 @@ class Hierarchy:
         return self._add(matrix, _bound_of(matrix), prolongation, nodes)
 
     def _add(
-        self, matrix: bsr_matrix, bound: np.float32, prolongation: bsr_matrix, nodes: Nodes
-    ) -> tuple[bsr_matrix, Nodes]:
+        self, matrix: bsr_matrix, bound: np.float32, prolongation: bsr_matrix, nodes: LevelNodes
+    ) -> tuple[bsr_matrix, LevelNodes]:
         """Add a level; return matrix and nodes of the next."""
         below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
         _scale_blocks(prolongation, np.ones(prolongation.shape[0]), scale)

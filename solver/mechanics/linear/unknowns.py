@@ -45,7 +45,7 @@ class Unknowns:
 
 
 @dataclass(frozen=True)
-class Nodes:
+class LevelNodes:
     """The nodes of a level: `motions` (n, 3 or 6) of their unknowns; `body`, `points` of each."""
 
     motions: np.ndarray
@@ -62,12 +62,12 @@ def places(unknowns: Unknowns) -> tuple[np.ndarray, int]:
     return 3 * number + rank, 3 * len(count)
 
 
-def nodes_at(unknowns: Unknowns, place: np.ndarray, size: int) -> Nodes:
+def nodes_at(unknowns: Unknowns, place: np.ndarray, size: int) -> LevelNodes:
     """The nodes of `size` rows; those without unknowns belong to no body, −1."""
     motions, body = np.zeros((size, unknowns.motions.shape[1])), np.full(size // 3, -1)
     motions[place], body[place // 3] = unknowns.motions, unknowns.body
     if unknowns.points is None:
-        return Nodes(motions, body, None)
+        return LevelNodes(motions, body, None)
     points = np.zeros((size // 3, unknowns.points.shape[1]))
     points[place // 3] = unknowns.points[unknowns.node]
-    return Nodes(motions, body, points)
+    return LevelNodes(motions, body, points)
