@@ -53,11 +53,11 @@ def right_side_out(
     The latter have a Jacobian that is zero at a vertex or changes its sign from one to another.
     """
 
-    def judged(first: int) -> tuple[np.ndarray, np.ndarray]:
+    def judged(first: int) -> list[np.ndarray]:
         jacobian = vertex_jacobians(points, cells[first : first + _AT_ONCE], cell)
         mirrored = (jacobian < 0).all(axis=1)
         flat = (np.abs(jacobian) <= _FLAT).any(axis=1)
-        return mirrored, flat | ((jacobian < 0).any(axis=1) & ~mirrored)
+        return [mirrored, flat | ((jacobian < 0).any(axis=1) & ~mirrored)]
 
     parts = list(ahead(judged, range(0, max(1, len(cells)), _AT_ONCE)))
     mirrored, bad = (np.concatenate(masks) for masks in zip(*parts, strict=True))

@@ -100,7 +100,7 @@ class Roughness:
 
     `strain`: the largest error of a strain, over the strain. `tilt` (n,): by what angle the contact
     faces around each node may be turned. `turned` (n,): the same for the directions of supports,
-    zero where they are those of the axes. `steep`: `steepness` of the scene's blocks, if any is not.
+    zero where they are those of the axes. `steep`: `steepness` of the blocks, if any is not.
     """
 
     strain: float

@@ -21,6 +21,7 @@ from ..mechanics.linear.nodal_matrix import NodalMatrix
 from ..mechanics.linear.systems import Systems, parts_of
 from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
 from ..system.errors import SolveError
+from ..system.memory import release
 from .accuracy import Accuracy, Roughness, estimate, judged, roughness
 from .constraints import (
     contact_constraints,
@@ -40,6 +41,8 @@ _CHANGE = 1e-4
 _CORRECTED = 4.0
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
+# From so many unknowns on, memory that was freed is given back before the matrix is made.
+_LARGE = 100_000
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
 _AT_ONCE = 1 << 23
 
@@ -101,6 +104,8 @@ class ContactProblem:
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
+        if scene.n_dofs > _LARGE:
+            release()
         self.matrix, self.diagonal = _stiffness(scene, unknowns)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
