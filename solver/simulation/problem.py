@@ -14,11 +14,12 @@ from ..mechanics.fem.bodies import (
     whole_motions,
 )
 from ..mechanics.fem.elasticity import stiffness
+from ..mechanics.fem.vertices import from_vertices, linear_unknowns
 from ..mechanics.linear.choice import against_multigrid
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
-from ..mechanics.linear.multigrid import Unknowns
 from ..mechanics.linear.nodal_matrix import NodalMatrix
 from ..mechanics.linear.systems import Systems, parts_of
+from ..mechanics.linear.unknowns import Unknowns
 from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
 from ..system.errors import SolveError
 from ..system.memory import release
@@ -347,5 +348,9 @@ def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
         # Those of the sections in their plane: they hardly strain rings far from the axis.
         motions = rigid_motions(scene.points, scene.body)
     together = basis.T @ whole_motions(motions, scene.n_bodies)
-    quadratic = any(block.type.order == 2 for block in scene.blocks)
-    return Unknowns(dim, node, together, scene.body[node], quadratic)
+    about = dim, node, together, scene.body[node], scene.points
+    if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
+        return Unknowns(*about)
+    return Unknowns(
+        *about, *linear_unknowns(basis, dim, *from_vertices(len(scene.points), scene.blocks))
+    )

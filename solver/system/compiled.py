@@ -20,14 +20,14 @@ def available() -> bool:
 def compiled(function: Callable[..., None]) -> Callable[..., None]:
     """The function compiled at its first call; ImportError there where Numba is missing.
 
-    Sums may be reordered, as for vector units; NaN and infinite values keep their meaning.
+    A product and a sum may be rounded together; the order of sums is kept.
     """
 
     @cache
     def machine_code() -> Any:
         from numba import njit
 
-        options = {"nogil": True, "fastmath": {"contract"}}
+        options: dict[str, Any] = {"nogil": True, "fastmath": {"contract"}}
         try:
             return njit(cache=True, **options)(function)
         except RuntimeError:  # no folder for the cache

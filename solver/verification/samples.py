@@ -128,8 +128,34 @@ def _nodes(solution: Solution) -> np.ndarray:
     return np.flatnonzero(deformable(solution))
 
 
-def _at_nodes(nodes: np.ndarray, values: np.ndarray, expected: np.ndarray) -> Sample:
-    return Sample(values, expected, lambda i: f"node {nodes[i]}")
+def _at_nodes(nodes: np.ndarray) -> Callable[[int], str]:
+    return lambda i: f"node {nodes[i]}"
+
+
+def by_component(
+    values: np.ndarray,
+    points: np.ndarray,
+    names: Sequence[str],
+    reference: Reference,
+    exact: Callable[[], np.ndarray],
+    place: Callable[[int], str],
+) -> Sample:
+    """The components of values (n, c) at points (n, dim) that the reference gives: on one scale.
+
+    They follow one another. `exact` has those of the case's exact solution (n, c), all of `names`.
+    """
+    if isinstance(reference, ExactValues):
+        expected = dict(zip(names, exact().T, strict=True))
+    else:
+        if not isinstance(reference, Mapping):
+            reference = dict(zip(names, reference, strict=True))
+        expected = {name: evaluate(value, points) for name, value in reference.items()}
+    listed, count = list(expected), len(points)
+    return Sample(
+        np.concatenate([values[:, names.index(name)] for name in listed]),
+        np.concatenate(list(expected.values())),
+        lambda i: f"{place(i % count)} ({listed[i // count]})",
+    )
 
 
 def surface_stress(side: str) -> Sampler:
@@ -141,8 +167,10 @@ def surface_stress(side: str) -> Sampler:
             return None
         if isinstance(reference, ExactValues):
             faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
-            return _at_nodes(nodes, values, reference.surface_stress(nodes, faces))
-        return _at_nodes(nodes, values, evaluate(reference, solution.mesh.points[nodes]))
+            expected = reference.surface_stress(nodes, faces)
+        else:
+            expected = evaluate(reference, solution.mesh.points[nodes])
+        return Sample(values, expected, _at_nodes(nodes))
 
     return sample
 
@@ -152,29 +180,28 @@ def nodal_stress(solution: Solution, _: None, reference: Reference) -> Sample:
     nodes = _nodes(solution)
     values = solution.nodal_normal_stress[nodes]
     if isinstance(reference, ExactValues):
-        return _at_nodes(nodes, values, reference.stress_along_contact(nodes))
-    return _at_nodes(nodes, values, evaluate(reference, solution.mesh.points[nodes]))
+        expected = reference.stress_along_contact(nodes)
+    else:
+        expected = evaluate(reference, solution.mesh.points[nodes])
+    return Sample(values, expected, _at_nodes(nodes))
 
 
 def displacement(solution: Solution, _: None, reference: Reference) -> Sample:
     """All components at all nodes."""
     nodes, axes = _nodes(solution), "xyz"[: solution.displacement.shape[1]]
-    if isinstance(reference, ExactValues):
-        expected = dict(zip(axes, reference.displacement(nodes).T, strict=True))
-    else:
-        given = dict(zip(axes, reference, strict=True))
-        expected = _evaluated(solution, nodes, given)
-    return _by_component(nodes, solution.displacement, axes, expected)
+    values, points = solution.displacement[nodes], solution.mesh.points[nodes]
+    return by_component(
+        values, points, axes, reference, lambda: reference.displacement(nodes), _at_nodes(nodes)
+    )
 
 
 def stress_components(solution: Solution, _: None, reference: Reference) -> Sample:
     """The given components at all nodes."""
     nodes = _nodes(solution)
-    if isinstance(reference, ExactValues):
-        expected = dict(zip(COMPONENTS, reference.stress(nodes).T, strict=True))
-    else:
-        expected = _evaluated(solution, nodes, reference)
-    return _by_component(nodes, solution.stress, COMPONENTS, expected)
+    values, points = solution.stress[nodes], solution.mesh.points[nodes]
+    return by_component(
+        values, points, COMPONENTS, reference, lambda: reference.stress(nodes), _at_nodes(nodes)
+    )
 
 
 def integration_stress(solution: Solution, _: None, reference: Reference) -> Sample:
@@ -283,25 +310,6 @@ def _materials(solution: Solution) -> list[np.ndarray]:
         for values, members in zip(found, solution.mesh.cell_sets[group], strict=True):
             values[np.asarray(members, dtype=int)] = given[group].young, given[group].poisson
     return found
-
-
-def _evaluated(
-    solution: Solution, nodes: np.ndarray, given: Mapping[str, Any]
-) -> dict[str, np.ndarray]:
-    points = solution.mesh.points[nodes]
-    return {name: evaluate(value, points) for name, value in given.items()}
-
-
-def _by_component(
-    nodes: np.ndarray, values: np.ndarray, names: Sequence[str], expected: Mapping[str, np.ndarray]
-) -> Sample:
-    """The expected components of a nodal field one after the other: all on one scale."""
-    listed = list(expected)
-    return Sample(
-        np.concatenate([values[nodes, names.index(name)] for name in listed]),
-        np.concatenate([expected[name] for name in listed]),
-        lambda i: f"node {nodes[i % len(nodes)]} ({listed[i // len(nodes)]})",
-    )
 
 
 def norm(name: str) -> Sampler:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,7 @@ def read_result_files(
                 continue
             if quantity in found:
                 raise InputError(file, quantity, None, "is in another file of the result too")
-            found[quantity] = field if raw.mesh is mesh else _unnumbered(field)
+            found[quantity] = field if raw.mesh is mesh else replace(field, nodes=None)
     if not found:
         there = ", ".join(sorted({name for _, raw in raws for name in raw.fields})) or "none"
         allowed = f"none is known as {', '.join(QUANTITIES)}; fields: {there}; see --map"
@@ -68,7 +69,7 @@ def read_result_files(
     return ForeignResult(
         code=code,
         version=mapping.version or next((raw.version for _, raw in raws if raw.version), ""),
-        mesh=mesh and _scaled(mesh, mapping.length),
+        mesh=mesh and meshio.Mesh(mesh.points * mapping.length, mesh.cells),
         step=mapping.step,
         digits=min((raw.digits for _, raw in raws if raw.digits), default=None),
         settings=mapping.settings,
@@ -131,11 +132,3 @@ def _mapped(raw: Raw, told: FieldMap, quantity: str, where: object) -> names.Fou
         problem = f"there are {count} components in the result; name each"
         raise InputError(where, key, ", ".join(components) or None, problem)
     return names.Found(", ".join(told.names), fields, components, told.factor)
-
-
-def _unnumbered(field: Field) -> Field:
-    return Field(places=field.places, values=field.values, area=field.area)
-
-
-def _scaled(mesh: meshio.Mesh, length: float) -> meshio.Mesh:
-    return meshio.Mesh(mesh.points * length, mesh.cells)
