@@ -14,13 +14,15 @@ from ..mechanics.fem.bodies import (
     whole_motions,
 )
 from ..mechanics.fem.elasticity import stiffness
+from ..mechanics.fem.vertices import from_vertices, linear_unknowns
 from ..mechanics.linear.choice import against_multigrid
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
-from ..mechanics.linear.multigrid import Unknowns
 from ..mechanics.linear.nodal_matrix import NodalMatrix
 from ..mechanics.linear.systems import Systems, parts_of
+from ..mechanics.linear.unknowns import Unknowns
 from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
 from ..system.errors import SolveError
+from ..system.memory import release
 from .accuracy import Accuracy, Roughness, estimate, judged, roughness
 from .constraints import (
     contact_constraints,
@@ -40,6 +42,8 @@ _CHANGE = 1e-4
 _CORRECTED = 4.0
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
+# From so many unknowns on, memory that was freed is given back before the matrix is made.
+_LARGE = 100_000
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
 _AT_ONCE = 1 << 23
 
@@ -101,6 +105,8 @@ class ContactProblem:
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
+        if scene.n_dofs > _LARGE:
+            release()
         self.matrix, self.diagonal = _stiffness(scene, unknowns)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
@@ -342,5 +348,9 @@ def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
         # Those of the sections in their plane: they hardly strain rings far from the axis.
         motions = rigid_motions(scene.points, scene.body)
     together = basis.T @ whole_motions(motions, scene.n_bodies)
-    quadratic = any(block.type.order == 2 for block in scene.blocks)
-    return Unknowns(dim, node, together, scene.body[node], quadratic)
+    about = dim, node, together, scene.body[node], scene.points
+    if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
+        return Unknowns(*about)
+    return Unknowns(
+        *about, *linear_unknowns(basis, dim, *from_vertices(len(scene.points), scene.blocks))
+    )

@@ -13,9 +13,10 @@ from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.krylov import ROUGH
-from solver.mechanics.linear.multigrid import Multigrid, Unknowns
+from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.nodal_matrix import NodalMatrix
 from solver.mechanics.linear.systems import Part, Systems
+from solver.mechanics.linear.unknowns import Unknowns
 from solver.mesh.catalogue import BY_NAME
 from solver.system.errors import SolveError
 from tests.scenes import grid
