@@ -27,7 +27,7 @@ from .svg import Drawing, mixed
 
 WIDTH, HEIGHT = 960, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
-# From no pressure to the largest, light to dark: told apart by lightness alone.
+# From no pressure to the largest, light to dark: distinguished by lightness alone.
 PRESSURE = ("#f3f6fa", "#cfe1ee", "#9cc3dc", "#5f9dc6", "#2f75a8", "#174f7c")
 LEVELS = 32
 MASTER = "#ffa45c"  # readable on every pressure
