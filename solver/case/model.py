@@ -184,7 +184,7 @@ class Case:
     an `expected` error follows from it. `units` names those of length and stress, for labels alone.
     `source` is the file's text. `family` is the name of the file's folder. `reference_uncertainty`
     is relative, `reference_code` has the keys name and version.
-    `swapped`, `hexahedra` and `recovery`: how the case is solved, as `as_solved` was told.
+    `swapped`, `hexahedra` and `recovery`: how the case is solved, see `as_solved`.
     """
 
     name: str

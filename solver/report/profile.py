@@ -124,18 +124,18 @@ def _view(
     layers: list[Spec] = []
     if steps:
         rule = {"type": "rule", "strokeWidth": 2.5, "clip": True}
-        channels = shared | {"x2": {"field": "end"}} | tips
+        channels = {"x2": {"field": "end"}} | tips
         layers.append({"mark": rule, "encoding": channels} | _only(steps))
     order = {"detail": {"field": "face", "type": "nominal"}}
     for name in lines:
         line = {"type": "line", "strokeWidth": 1.6, "strokeDash": looks[name].dashes, "clip": True}
-        layers.append({"mark": line, "encoding": shared | order} | _only([name]))
+        layers.append({"mark": line, "encoding": order} | _only([name]))
     marks = [name for name in found if name not in steps]
     size = {"type": "point", "strokeWidth": 1.3, "size": 22, "clip": True}
     shown = [name for name in marks if name not in (RECOVERED, REFERENCE) or not flat]
-    point = {"mark": size, "encoding": shared | {"shape": shape} | tips} | _only(shown)
+    point = {"mark": size, "encoding": {"shape": shape} | tips} | _only(shown)
     layers.append(point | {"params": interaction()} if first else point)
-    return {"width": 400, "height": height, "layer": layers}
+    return {"width": 400, "height": height, "encoding": shared, "layer": layers}
 
 
 def _only(names: Sequence[str]) -> Spec:

@@ -31,7 +31,7 @@ from .symbols import View, draw_axes, draw_symbols
 
 WIDTH, HEIGHT = 960, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
-# From no pressure to the largest, light to dark: told apart by lightness alone.
+# From no pressure to the largest, light to dark: distinguished by lightness alone.
 PRESSURE = ("#f3f6fa", "#cfe1ee", "#9cc3dc", "#5f9dc6", "#2f75a8", "#174f7c")
 LEVELS = 32
 # Bodies are drawn apart by this share of the model.

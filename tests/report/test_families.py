@@ -228,7 +228,7 @@ def drawn(solution, along=None):
     found = {}
     for record in chart.spec["data"]["values"]:
         found.setdefault(record["series"], []).append(record)
-    views = [view["layer"][-1]["encoding"] for view in chart.spec["vconcat"]]
+    views = [view["encoding"] for view in chart.spec["vconcat"]]
     return found, [view["y"]["title"] for view in views], views[0]["x"]["title"]
 
 

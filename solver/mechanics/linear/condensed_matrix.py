@@ -3,7 +3,7 @@
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse import bsr_matrix, csr_matrix
+from scipy.sparse import csr_matrix
 
 from .nodal_matrix import NodalMatrix
 
@@ -34,35 +34,22 @@ class CondensedMatrix:
     """
 
     def __init__(self, stiffness: csr_matrix | NodalMatrix, kept: np.ndarray, added: csr_matrix):
-        self._stiffness, self._kept, self._added = stiffness, kept, added
+        self.stiffness, self.kept, self.added = stiffness, kept, added
         self.shape: tuple[int, int] = added.shape
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """See `Symmetric`."""
-        whole = np.zeros((self._stiffness.shape[0], *x.shape[1:]))
-        whole[self._kept] = x
-        return (self._stiffness @ whole)[self._kept] + self._added @ x
-
-    def in_blocks(self, scale: np.ndarray) -> tuple[bsr_matrix, np.ndarray] | None:
-        """See `NodalMatrix.scaled`, and the row (k,) of each unknown; None of a csr stiffness."""
-        if not isinstance(self._stiffness, NodalMatrix):
-            return None
-        on_all = np.zeros(self._stiffness.shape[0])
-        on_all[self._kept] = scale
-        blocks, place = self._stiffness.scaled(on_all), self._stiffness.free[self._kept]
-        added = self._added.tocoo()
-        values = (scale[added.row] * added.data * scale[added.col]).astype(np.float32)
-        where = place[added.row], place[added.col]
-        contact = csr_matrix((values, where), shape=blocks.shape)
-        return blocks + contact.tobsr(blocks.blocksize), place
+        whole = np.zeros((self.stiffness.shape[0], *x.shape[1:]))
+        whole[self.kept] = x
+        return (self.stiffness @ whole)[self.kept] + self.added @ x
 
     def __getitem__(self, rows: Any) -> csr_matrix:
         """See `Symmetric`."""
-        return self._stiffness[self._kept[rows]][:, self._kept] + self._added[rows]
+        return self.stiffness[self.kept[rows]][:, self.kept] + self.added[rows]
 
     def diagonal(self) -> np.ndarray:
         """See `Symmetric`."""
-        return self._stiffness.diagonal()[self._kept] + self._added.diagonal()
+        return self.stiffness.diagonal()[self.kept] + self.added.diagonal()
 
     def tocsr(self) -> csr_matrix:
         """See `Symmetric`."""
