@@ -1,5 +1,6 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
+import logging
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -34,6 +35,8 @@ from .displacement import Displacement
 from .iterate import ContactIterate
 from .scene import Scene
 
+_LOG = logging.getLogger(__name__)
+
 # An estimated error of the pressure from which residuals are summed in extended precision.
 _EXTEND = 3e-11
 # How exactly the change of a sweep of recovery is solved for; its own error is far larger.
@@ -42,6 +45,12 @@ _CHANGE = 1e-4
 _CORRECTED = 4.0
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
+SINGLE_FROM = 1_000_000
+"""Degrees of freedom from which the stiffness is stored in single precision where multigrid solves:
+it takes half the memory, and refinement, by residuals of the cells in double precision, two steps
+more."""
+# Where refinement ends with a larger residual, the stiffness is assembled in double precision.
+_SINGLE_SERVES = 1e-11
 # From so many unknowns on, memory that was freed is given back before the matrix is made.
 _LARGE = 100_000
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
@@ -102,12 +111,17 @@ class ContactProblem:
         self.unsupported = loose
         if scene.springs.nnz:
             self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
-        on_free = self.constraints.on_free
+        refined = scene.options.safeguards.refinement
+        self.single = refined and scene.n_dofs >= SINGLE_FROM
+        self._assemble()
+
+    def _assemble(self) -> None:
+        scene, on_free = self.scene, self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
         if scene.n_dofs > _LARGE:
             release()
-        self.matrix, self.diagonal = _stiffness(scene, unknowns)
+        self.matrix, self.diagonal = _stiffness(scene, unknowns, self.single)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
         soft = self._compliance if stabilised else None
@@ -244,6 +258,13 @@ class ContactProblem:
         """Solved from an iterate; in extended precision where that gains digits."""
         system, cures = self._constrained(start.closed), self.scene.options.safeguards
         found = self._once(system, start, scale, status, correction, round_off)
+        if self.single and found.residual > _SINGLE_SERVES:
+            _LOG.info("the stiffness is assembled again, in double precision")
+            self.single = False
+            self._systems.forget()
+            self._assemble()
+            system = self._constrained(start.closed)
+            found = self._once(system, start, scale, status, correction, round_off)
         if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
             extended = replace(found.iterate, extended=True)
             found = self._once(system, extended, scale, status, correction, round_off)
@@ -321,16 +342,16 @@ def _force_scale(start: ContactIterate) -> float:
 
 
 def _stiffness(
-    scene: Scene, unknowns: Unknowns
+    scene: Scene, unknowns: Unknowns, single: bool
 ) -> tuple[sparse.csr_matrix | NodalMatrix, np.ndarray]:
     """The stiffness of the free unknowns, and the diagonal (n_dofs,) for all degrees of freedom."""
     free, mean = scene.free, scene.mean
-    blocks = stiffness(scene.points, scene.blocks)
-    diagonal = blocks.diagonal()
-    if free.selection is not None and not mean.size and not scene.springs.nnz:
-        matrix = NodalMatrix(blocks, free.selection)
-        large = not against_multigrid(len(free.selection), unknowns)
-        return (matrix if large else matrix.tocsr()), diagonal
+    plain = free.selection is not None and not mean.size and not scene.springs.nnz
+    in_blocks = plain and not against_multigrid(len(unknowns.node), unknowns)
+    blocks = stiffness(scene.points, scene.blocks, single and in_blocks)
+    diagonal = blocks.diagonal().astype(float)
+    if in_blocks and free.selection is not None:
+        return NodalMatrix(blocks, free.selection), diagonal
     matrix = free.reduced(blocks)
     if mean.size:
         matrix = matrix + free.reduced(mean.stiffness())
