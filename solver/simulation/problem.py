@@ -2,7 +2,7 @@
 
 import logging
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -53,6 +53,9 @@ more."""
 _SINGLE_SERVES = 1e-11
 # From so many unknowns on, memory that was freed is given back before the matrix is made.
 _LARGE = 100_000
+# While the contact status is sought by an iterative solver: residuals of the first solve and of
+# changes, and the share of pressures and motions below which such a solve decides nothing.
+_ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
 _AT_ONCE = 1 << 23
 
@@ -168,19 +171,31 @@ class ContactProblem:
         if not scene.options.shortcuts.status:
             start = eligible
         start = self._first_guess(step) if start is None else start
+        if bilateral:
+            first = self._at_rest(eligible, step, correction)
+            return self._solve_closed(first, correction, _force_scale(first))
         latest: list[Equilibrium] = []
+        rough, known = scene.options.shortcuts.status, None
 
         def attempt(closed: np.ndarray) -> Trial:
+            nonlocal known
             if not scene.options.shortcuts.status:
                 self._systems.forget()
-            latest[:] = [self._solve_closed(closed, step, correction)]
+            first = rest = self._at_rest(closed, step, correction)
+            if rough and self._constrained(closed).factor.iterative:
+                known, trial = self._roughly(rest, known)
+                if (eligible & (trial.offence(closed) > 1)).any():
+                    return trial
+                first = known
+            latest[:] = [self._solve_closed(first, correction, _force_scale(rest))]
             return latest[0].trial
 
-        if bilateral:
-            attempt(eligible)
-            return latest[0]
+        def stiffness() -> np.ndarray:
+            nonlocal rough
+            rough = False
+            return self._gap_stiffness(step)
+
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
-        stiffness = partial(self._gap_stiffness, step)
         status = find_status(attempt, start, eligible, area, stiffness, confirm)
         trial = latest[0].trial
         touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
@@ -226,26 +241,53 @@ class ContactProblem:
             self._moves = {key: free_motion(self.scene, self.motions, self.constraints, closed)}
         return self._moves[key]
 
-    def _solve_closed(
+    def _at_rest(
         self, closed: np.ndarray, step: Step, correction: np.ndarray | float
-    ) -> Equilibrium:
-        """Equilibrium with the given multipliers closed."""
+    ) -> ContactIterate:
+        """The start of a solve with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
             raise SolveError(f"{moves} once {int((~closed).sum())} macro-elements are open")
-        correction = np.zeros(scene.force.shape) + correction
         acting, offset = scene.acting(step)
-        force = acting + correction
-        start = ContactIterate(
+        return ContactIterate(
             scene=scene,
             constraints=self.constraints,
             closed=closed,
-            force=force,
+            force=acting + correction,
             displacement=self.at_rest.moved(offset),
             mean_stress=np.zeros(scene.mean.size),
             swelling=scene.straining(step, scene.initial.swelling),
         )
-        return self._refined(start, _force_scale(start), StatusResult(closed, 1, []), correction)
+
+    def _solve_closed(
+        self, start: ContactIterate, correction: np.ndarray | float, scale: float
+    ) -> Equilibrium:
+        """Equilibrium with the multipliers closed that are so at the start."""
+        correction = np.zeros(self.scene.force.shape) + correction
+        return self._refined(start, scale, StatusResult(start.closed, 1, []), correction)
+
+    def _roughly(
+        self, start: ContactIterate, known: ContactIterate | None
+    ) -> tuple[ContactIterate, Trial]:
+        """An approximate solution, from the one `known` of another status, and its trial.
+
+        What it leaves undecided counts as no offence: a solve to round-off then judges.
+        """
+        accuracy = _ROUGH_CHANGE if known else _ROUGH_STATUS
+        start = known.with_closed(start.closed) if known else start
+        system = self._constrained(start.closed)
+        force = start.condensed(start.residual())
+        found = start.advanced(system.correction(force, start.violation(), accuracy))
+        pressure = np.zeros(len(start.closed))
+        pressure[start.closed] = system.multiplier(found.residual())
+        trial, gaps = judged(found, pressure, self.diagonal), self.constraints.gaps
+        covered = np.where(self.constraints.eligible, self.constraints.covered, np.inf)
+        motion = abs(gaps) @ np.abs(found.displacement.total) / covered
+        return found, replace(
+            trial,
+            pressure_limit=trial.pressure_limit + _UNDECIDED * np.abs(pressure).max(initial=0.0),
+            gap_limit=trial.gap_limit + _UNDECIDED * motion,
+        )
 
     def _refined(
         self,

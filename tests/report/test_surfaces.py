@@ -143,8 +143,8 @@ def test_rigid_surfaces_in_space(tmp_path, body, implicit):
     low, high = found.points.min(axis=0), found.points.max(axis=0)
     assert (low[:2] < 0).all(), "beyond the slave"
     assert (high[:2] > 10).all()
-    across = np.linalg.norm(found.points[:, 1:] - [5, 0], axis=1)
-    assert across.min() < 1.8, "opposite to the slave"
+    assert ((low + high) / 2)[:2] == pytest.approx([5, 5], abs=0.5), "opposite to the slave"
+    assert np.abs(found.points[:, 2]).min() < 1.8
     assert found.out[:, 2].min() < -0.7, "out of the body, towards the slave below"
 
 

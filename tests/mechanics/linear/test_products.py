@@ -52,7 +52,7 @@ def test_product_is_the_dense_one(size, precision, monkeypatch):
         np.testing.assert_array_equal(products.multiply(matrix, x, base, -2.5), found)
 
 
-@pytest.mark.parametrize("size", [(3, 6), (6, 6), (2, 5)])
+@pytest.mark.parametrize("size", [(3, 3), (3, 6), (6, 6), (2, 5)])
 def test_transposed_product_is_the_dense_one(size, monkeypatch):
     monkeypatch.setattr(products, "_LEAST", 1)
     matrix = blocks(31, 9, size)
