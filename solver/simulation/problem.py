@@ -9,18 +9,11 @@ from scipy import sparse
 
 from ..case.model import Step
 from ..mechanics.fem.bodies import (
-    nodes_of_unknowns,
     rigid_motions,
     unsupported,
-    whole_motions,
 )
-from ..mechanics.fem.elasticity import stiffness
-from ..mechanics.fem.vertices import from_vertices, linear_unknowns
-from ..mechanics.linear.choice import against_multigrid
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
-from ..mechanics.linear.nodal_matrix import NodalMatrix
 from ..mechanics.linear.systems import Systems, parts_of
-from ..mechanics.linear.unknowns import Unknowns
 from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
 from ..system.errors import SolveError
 from ..system.memory import release
@@ -32,6 +25,7 @@ from .constraints import (
     unit_springs,
 )
 from .displacement import Displacement
+from .free_stiffness import free_stiffness, free_unknowns
 from .iterate import ContactIterate
 from .scene import Scene
 
@@ -121,10 +115,10 @@ class ContactProblem:
     def _assemble(self) -> None:
         scene, on_free = self.scene, self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
-        unknowns = _unknowns(scene, self.motions)
+        unknowns = free_unknowns(scene, self.motions)
         if scene.n_dofs > _LARGE:
             release()
-        self.matrix, self.diagonal = _stiffness(scene, unknowns, self.single)
+        self.matrix, self.diagonal = free_stiffness(scene, unknowns, self.single)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
         soft = self._compliance if stabilised else None
@@ -381,39 +375,3 @@ def _force_scale(start: ContactIterate) -> float:
     """The size of the forces at work: the loads, or those that imposed values bring up."""
     internal = start.internal - start.springs
     return float(max(np.abs(start.force).max(), np.abs(internal).max())) or 1.0
-
-
-def _stiffness(
-    scene: Scene, unknowns: Unknowns, single: bool
-) -> tuple[sparse.csr_matrix | NodalMatrix, np.ndarray]:
-    """The stiffness of the free unknowns, and the diagonal (n_dofs,) for all degrees of freedom."""
-    free, mean = scene.free, scene.mean
-    plain = free.selection is not None and not mean.size and not scene.springs.nnz
-    in_blocks = plain and not against_multigrid(len(unknowns.node), unknowns)
-    blocks = stiffness(scene.points, scene.blocks, single and in_blocks)
-    diagonal = blocks.diagonal().astype(float)
-    if in_blocks and free.selection is not None:
-        return NodalMatrix(blocks, free.selection), diagonal
-    matrix = free.reduced(blocks)
-    if mean.size:
-        matrix = matrix + free.reduced(mean.stiffness())
-    if scene.springs.nnz:
-        matrix = matrix + free.reduced(scene.springs)
-        diagonal = diagonal + scene.springs.diagonal()
-    return matrix, diagonal
-
-
-def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
-    """The meaning of a scene's free unknowns, given the rigid motions of its bodies."""
-    basis, dim = scene.free.basis, scene.points.shape[1]
-    node = nodes_of_unknowns(basis, dim)
-    if scene.case.axisymmetric:
-        # Those of the sections in their plane: they hardly strain rings far from the axis.
-        motions = rigid_motions(scene.points, scene.body)
-    together = basis.T @ whole_motions(motions, scene.n_bodies)
-    about = dim, node, together, scene.body[node], scene.points
-    if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
-        return Unknowns(*about)
-    return Unknowns(
-        *about, *linear_unknowns(basis, dim, *from_vertices(len(scene.points), scene.blocks))
-    )
