@@ -49,6 +49,10 @@ def test_plane_picture_shows_every_cell_of_both_blocks(tmp_path):
 def test_loads_and_supports_of_a_plane_picture(tmp_path):
     svg = draw_plane(handmade.plane(tmp_path), "two blocks")
     assert polygons(svg, stroke=GREEN, fill="#ffffff") == 4 + 6  # of 4 and of 7 nodes
+    held = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == "#ffffff"]
+    bases = [tuple(map(int, data.split("l")[1].split()[:2])) for data in held]
+    # From the tip to a corner of the base: to the left of x = 0, and below the foot.
+    assert sorted(bases) == [(-70, -42)] * 4 + [(-42, 70)] * 6
     heads = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == RED]
     assert len(heads) == 4
     for head in heads:  # the tip first, then what is behind it, above
@@ -135,6 +139,12 @@ def test_outline_of_a_macro_element_leaves_out_the_cut():
     # A triangle cut into three about node 3: the three inner edges are not its outline.
     faces = [("TRIA3", np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]]), np.zeros(3, dtype=int))]
     assert macro_edges(faces)[:, :2].tolist() == [[0, 1], [0, 2], [1, 2]]
+
+
+def test_edges_of_macro_elements_have_their_mid_nodes():
+    faces = [("TRIA6", np.array([[0, 1, 2, 10, 11, 12], [0, 2, 3, 12, 13, 14]]), np.array([5, 5]))]
+    found = {tuple(row) for row in macro_edges(faces).tolist()}
+    assert found == {(0, 1, 10), (1, 2, 11), (2, 3, 13), (0, 3, 14)}
 
 
 def test_mid_nodes_are_drawn_only_where_the_edge_bends():
