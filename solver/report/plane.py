@@ -124,8 +124,8 @@ def _names(
     middles, free = [float((y.min() + y.max()) / 2) for y in own], 0.0
     for number in np.argsort(middles):
         body, y = solution.bodies[number], max(middles[number], free) - 4
-        drawing.text(right + 14, y, body.name, weight="600")
+        drawing.text(right + 42, y, body.name, weight="600")
         for line in lines_of(solution, int(number)):
-            drawing.text(right + 14, y := y + 14, line, color=MUTED)
-        drawing.text(right + 14, y := y + 14, body.role, color=edge_color(body))
+            drawing.text(right + 42, y := y + 14, line, color=MUTED)
+        drawing.text(right + 42, y := y + 14, body.role, color=edge_color(body))
         free = y + 22

@@ -104,7 +104,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
         if body.role != "master":
             _macro_outlines(drawing, solution, points, lambda x: place(x @ screen.T))
         own = place(corners[number] @ screen.T)
-        at, y = float(own[:, 0].max()) + 10, float(own[:, 1].mean()) - 8
+        at, y = float(own[:, 0].max()) + 24, float(own[:, 1].mean()) - 8
         drawing.text(at, y, body.name, weight="600")
         for line in lines_of(solution, number):
             drawing.text(at, y := y + 14, line, color=MUTED)
