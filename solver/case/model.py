@@ -236,6 +236,13 @@ class Case:
         return tuple(float(n) if isinstance(step, dict) else step for n, step in numbered)
 
     @property
+    def acting(self) -> dict[str, str]:
+        """The groups of supports, and of loads that are not on cells, by key of the case file."""
+        held = {f"supports[{i}].group": s.group for i, s in enumerate(self.supports)}
+        loads = enumerate(self.loads)
+        return held | {f"loads[{i}].group": x.group for i, x in loads if not x.of_cells}
+
+    @property
     def histories(self) -> tuple[str, ...]:
         """The names of loads and supports that have factors of their own."""
         return tuple(self.steps[0]) if isinstance(self.steps[0], dict) else ()

@@ -186,6 +186,7 @@ def _recover(
         strain_energy=strain_energy(scene, last),
         reaction=at_nodes,
         probes=probed(scene, zones, last.displacement, stress),
+        acted=scene.acted,
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
     )
