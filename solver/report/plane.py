@@ -6,7 +6,6 @@ import numpy as np
 from markupsafe import Markup
 
 from ..mechanics.fem.faces import outer_faces
-from ..simulation.exact import deformable
 from ..simulation.solution import Solution
 from .charts import BLUE, MUTED, PAPER
 from .geometry import plane_cells
@@ -44,7 +43,7 @@ def draw_plane(solution: Solution, title: str) -> Markup:
     draw_axes(
         drawing,
         np.eye(2),
-        np.ptp(whole[deformable(solution)], axis=0),
+        np.ptp(whole[solution.deformable], axis=0),
         solution.case.units.get("length"),
     )
     if enlarged:

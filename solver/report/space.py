@@ -7,7 +7,6 @@ from markupsafe import Markup
 
 from ..mechanics.fem.faces import outer_faces
 from ..mesh.catalogue import cell_type
-from ..simulation.exact import deformable
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import BLUE, INK, MUTED, PAPER
@@ -113,7 +112,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     for kind, nodes in outer:
         seen[nodes[normals(outlines(points, kind, nodes)) @ eye > 1e-6].ravel()] = True
     draw_symbols(drawing, solution, View(points, lambda x: place(x @ screen.T), seen), outer)
-    size = np.ptp(solution.mesh.points[deformable(solution)], axis=0)
+    size = np.ptp(solution.mesh.points[solution.deformable], axis=0)
     draw_axes(drawing, screen, size, solution.case.units.get("length"))
 
 
