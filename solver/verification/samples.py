@@ -24,7 +24,7 @@ from ..mechanics.fem.elasticity import (
 )
 from ..mechanics.fem.stress import COMPONENTS
 from ..mesh.catalogue import cell_type
-from ..simulation.exact import ExactValues, deformable
+from ..simulation.exact import ExactValues
 from ..simulation.groups import ALL
 from ..simulation.initial import strain_at
 from ..simulation.solution import Solution, ZoneResult
@@ -127,7 +127,7 @@ def covered_pressure(solution: Solution, zone: ZoneResult, reference: Reference)
 
 def _nodes(solution: Solution) -> np.ndarray:
     """The nodes of bodies that are not rigid."""
-    return np.flatnonzero(deformable(solution))
+    return np.flatnonzero(solution.deformable)
 
 
 def _at_nodes(nodes: np.ndarray) -> Callable[[int], str]:
@@ -165,7 +165,7 @@ def surface_stress(side: str) -> Sampler:
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
         nodes, values = getattr(zone, f"{side}_nodes"), getattr(zone, f"stress_{side}")
-        if len(nodes) and not deformable(solution)[nodes].any():
+        if len(nodes) and not solution.deformable[nodes].any():
             return None
         if isinstance(reference, ExactValues):
             faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
@@ -246,7 +246,7 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
 
     Place (k, dim), stress (k, 6), and of the cell: its first node (k,) and its number (k,).
     """
-    moving, first = deformable(solution), 0
+    moving, first = solution.deformable, 0
     for i, (block, elastic) in enumerate(
         zip(solution.mesh.cells, _materials(solution), strict=True)
     ):
