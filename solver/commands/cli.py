@@ -21,11 +21,21 @@ from ..system.errors import InputError, SolveError, of_machine
 from ..system.imports import defer
 from ..system.package import PROGRAM, PROJECT, project_version
 from . import codes, completion, history, jobs, look, results, studies
-from .options import add_command, add_threads, limit_threads
+from .options import (
+    BUG,
+    FAILED,
+    INTERRUPTED,
+    NO_RESULT,
+    PASSED,
+    REFUSED,
+    add_command,
+    add_threads,
+    limit_threads,
+    print_checks,
+)
 
 if TYPE_CHECKING:
     from ..verification.run import Job
-    from ..verification.verdict import CheckResult, Verdict
 
 _EXAMPLES = f"""examples:
   {PROGRAM} new my-block -o my-block.yaml
@@ -35,7 +45,6 @@ _EXAMPLES = f"""examples:
 
 Exit status: 0 all checks hold; 1 a check fails; 2 the input is refused; 3 there is no solution.
 Batches and studies are targets of make: make help."""
-PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
 
 def run() -> int:
@@ -165,13 +174,6 @@ def _add_batch(commands: Any) -> None:
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
 
     command = add_command(
-        commands, "gallery", _gallery, "draw results with PyVista and write a page"
-    )
-    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
-
-    command = add_command(
         commands, "crashed", _crashed, "write the verdict of a solve that died", listed=False
     )
     _add_job(command)
@@ -272,20 +274,6 @@ def _check(options: argparse.Namespace) -> int:
     return PASSED if all(verdict.sound for verdict in verdicts) else FAILED
 
 
-def print_checks(verdict: "Verdict") -> None:
-    """Print a verdict, a line for each check."""
-    print(verdict.summary)
-    for row in verdict.checks:
-        print("  " + _row(row))
-
-
-def _row(check: "CheckResult") -> str:
-    extremes = f"{check.minimum:.10g} … {check.maximum:.10g}"
-    error = f"error {check.error:.1e} (allowed {check.tolerance:.0e})"
-    word = "ok" if check.passed else "FAILED"
-    return f"{word:<7}{check.name + ' ' + (check.zone or ''):<40}{extremes:<36}{error}"
-
-
 def _verdicts(options: argparse.Namespace) -> list[Path]:
     """The verdicts named, and all in the folder of results, but those of ladders' levels."""
     verdicts = list(options.verdicts)
@@ -297,13 +285,6 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
         where = options.results or options.run.__name__.strip("_")
         raise InputError(where, "VERDICT.json", None, "no verdict is named or found")
     return verdicts
-
-
-def _gallery(options: argparse.Namespace) -> int:
-    from ..report.gallery import write_gallery
-
-    print(write_gallery(_verdicts(options), options.output))
-    return PASSED
 
 
 def _report(options: argparse.Namespace) -> int:

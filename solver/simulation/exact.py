@@ -24,17 +24,6 @@ def node_parts(exact: ExactSolution, points: np.ndarray, body: np.ndarray) -> np
     return part
 
 
-def deformable(solution: Solution) -> np.ndarray:
-    """Which nodes (n,) belong to bodies that are not rigid."""
-    nodes = solution.body >= 0
-    for group in solution.case.rigid:
-        for block, members in zip(
-            solution.mesh.cells, solution.mesh.cell_sets.get(group, []), strict=False
-        ):
-            nodes[block.data[np.asarray(members, dtype=int)].ravel()] = False
-    return nodes
-
-
 def computed_pressure(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
     """The computed pressure (k,) at the `surface_points` of a zone on the mesh's `points`."""
     return np.concatenate(
@@ -75,6 +64,7 @@ class ExactValues:
 
     def __init__(self, solution: Solution, exact: ExactSolution):
         self.solution, self.exact = solution, exact
+        self._pressure: dict[str, np.ndarray] = {}
 
     def _surface(self, zone: ZoneResult) -> SurfacePoints:
         points, around = self.solution.mesh.points, self.solution.case.axisymmetric
@@ -110,9 +100,11 @@ class ExactValues:
         return normal_stress(self.stress(nodes), normals)
 
     def pressure(self, zone: ZoneResult) -> np.ndarray:
-        """The mean contact pressure (m,) of each macro-element."""
-        at = self._surface(zone)
-        return at.means(self.exact.contact_pressure(at.place))
+        """The mean contact pressure (m,) of each macro-element; several checks ask for it."""
+        if zone.name not in self._pressure:
+            at = self._surface(zone)
+            self._pressure[zone.name] = at.means(self.exact.contact_pressure(at.place))
+        return self._pressure[zone.name]
 
     def gap(self, zone: ZoneResult) -> np.ndarray:
         """The mean gap (m,) of each macro-element."""

@@ -49,6 +49,10 @@ def test_plane_picture_shows_every_cell_of_both_blocks(tmp_path):
 def test_loads_and_supports_of_a_plane_picture(tmp_path):
     svg = draw_plane(handmade.plane(tmp_path), "two blocks")
     assert polygons(svg, stroke=GREEN, fill="#ffffff") == 4 + 6  # of 4 and of 7 nodes
+    held = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == "#ffffff"]
+    bases = [tuple(map(int, data.split("l")[1].split()[:2])) for data in held]
+    # From the tip to a corner of the base: to the left of x = 0, and below the foot.
+    assert sorted(bases) == [(-70, -42)] * 4 + [(-42, 70)] * 6
     heads = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == RED]
     assert len(heads) == 4
     for head in heads:  # the tip first, then what is behind it, above
@@ -69,6 +73,18 @@ def test_arrows_follow_the_load(tmp_path):
     # At x = 0 there is none; the largest has 30 pixels.
     assert np.array(steps) == pytest.approx(np.array([(100, 0), (200, 0), (300, 0)]), abs=1)
     assert "traction (x, 0)" in svg
+    long = replace(load, value=(Expression("sin(x) * sin(x) + cos(x) * cos(x)"), 0.0))
+    acted = solution.acted["loads[0].group"]
+    solution.acted |= {f"loads[{i}].group": acted for i in (1, 2)}
+    solution.case = replace(solution.case, loads=(load, long, load))
+    texts = list(ET.fromstring(draw_plane(solution, "")).iter(f"{SVG}text"))
+    labels = {t.text: float(t.get("y")) for t in texts if t.get("fill") == RED}
+    assert [t.text for t in texts if t.get("fill") == RED] == [
+        "traction (x, 0)",
+        "traction f(x, y)",
+    ]
+    first, second = labels.values()
+    assert first - second == 110, "one above the other"
 
 
 def test_supports_of_a_picture_in_space(tmp_path):
@@ -135,6 +151,12 @@ def test_outline_of_a_macro_element_leaves_out_the_cut():
     # A triangle cut into three about node 3: the three inner edges are not its outline.
     faces = [("TRIA3", np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]]), np.zeros(3, dtype=int))]
     assert macro_edges(faces)[:, :2].tolist() == [[0, 1], [0, 2], [1, 2]]
+
+
+def test_edges_of_macro_elements_have_their_mid_nodes():
+    faces = [("TRIA6", np.array([[0, 1, 2, 10, 11, 12], [0, 2, 3, 12, 13, 14]]), np.array([5, 5]))]
+    found = {tuple(row) for row in macro_edges(faces).tolist()}
+    assert found == {(0, 1, 10), (1, 2, 11), (2, 3, 13), (0, 3, 14)}
 
 
 def test_mid_nodes_are_drawn_only_where_the_edge_bends():

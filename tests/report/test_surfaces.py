@@ -10,7 +10,7 @@ from solver.case.reader import load_case
 from solver.mesh.catalogue import cell_type
 from solver.report.layout import ways_apart
 from solver.report.obstacles import obstacle
-from solver.report.surfaces import _split, surfaces
+from solver.report.surfaces import _split, magnification, surfaces
 from tests import handmade
 
 
@@ -61,10 +61,10 @@ def test_the_map_of_an_error_shows_the_node_that_is_off(tmp_path):
     solution = handmade.plane(tmp_path)
     largest = 0.011375 * 100  # of the reference, at the top
     assert read(solution)[1]["top"]["fields"]["|Δu| / max |u|"].max() < 1e-15
-    solution.displacement[-1] += [0.003 * largest, 0.004 * largest]
+    solution.displacement[-1] += [0.3 * largest, -0.4 * largest]
     solution.stress[-1, 3] += 5.0  # xy, of 25
     parts = read(solution)[1]
-    for title, expected in (("|Δu| / max |u|", 0.005), ("|Δσ| / max |σ|", 0.2)):
+    for title, expected in (("|Δu| / max |u|", 0.5), ("|Δσ| / max |σ|", 0.2)):
         values = parts["top"]["fields"][title]
         assert values[-1] == pytest.approx(expected)
         assert np.abs(values[:-1]).max() < 1e-15
@@ -146,6 +146,13 @@ def test_rigid_surfaces_in_space(tmp_path, body, implicit):
     assert ((low + high) / 2)[:2] == pytest.approx([5, 5], abs=0.5), "opposite to the slave"
     assert np.abs(found.points[:, 2]).min() < 1.8
     assert found.out[:, 2].min() < -0.7, "out of the body, towards the slave below"
+
+
+@pytest.mark.parametrize(
+    ("largest", "expected"), [(1.0, 5.0), (0.003, 2000.0), (70.0, 0.05), (0.0, 1.0)]
+)
+def test_the_displacement_is_magnified_by_a_round_number(largest, expected):
+    assert magnification(np.array([[0.0, largest]]), 100.0) == expected
 
 
 def test_bodies_move_apart_with_their_masters(tmp_path):
