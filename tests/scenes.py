@@ -9,6 +9,9 @@ from solver.case.model import Case
 from solver.case.reader import parse_case
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME, cell_type
+from solver.simulation.simulate import simulate
+from solver.simulation.solution import Solution
+from solver.verification.run import mesh_of
 
 YOUNG, POISSON, PRESSURE = 2000.0, 0.3, 25.0
 
@@ -34,10 +37,23 @@ def changed_case(dim: int, *changes: tuple[str, str], normal: bool = False, **op
     text = block_case(dim, **options).source
     if normal:
         changes += tuple((f"fix: [{axis}]", "fix: [normal]") for axis in "xyz"[:dim])
+    return parse_case(replaced(text, *changes), Path("patch.yaml"))
+
+
+def replaced(text: str, *changes: tuple[str, str]) -> str:
+    """A text with parts of it replaced, all of which are in it."""
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
-    return parse_case(text, Path("patch.yaml"))
+    return text
+
+
+def solved(text: str, mesh: meshio.Mesh | None = None, **as_solved) -> Solution:
+    """The case in a text on a mesh, by default its own; its forces balance."""
+    case = parse_case(text, Path("case.yaml")).as_solved(**{"swapped": False} | as_solved)
+    solution = simulate(case, mesh or mesh_of(case))
+    assert max(solution.balance.values()) < 1e-12
+    return solution
 
 
 def block_mesh(bottom: str, top: str, counts: tuple[int, int] = (3, 2), size: float = 1.0):

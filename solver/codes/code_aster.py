@@ -12,9 +12,8 @@ import numpy as np
 
 from ..mechanics.fem.faces import FaceBlock
 from ..mesh.catalogue import BY_NAME
-from ..system.errors import SolveError
 from .deck import Deck, UnsupportedError
-from .foreign import ForeignResult
+from .plain import Plain
 
 _MESH = "mesh.med"
 # Face centres of HEXA27 have an order of their own; all cells are mirrored (see `mesh.files.med`).
@@ -23,18 +22,12 @@ _HEXA27 = [*range(20), 24, 22, 21, 23, 20, 25, 26]
 _VALUES = 12
 
 
-class CodeAster:
+class CodeAster(Plain):
     """Only written: no package contains code_aster."""
 
     name = "code_aster"
-    layer = False
     install = "in no package: export its input, run it, then check-result"
-    gave_up = ""
     settings: Mapping[str, str] = {"contact": "LAC, or continuous formulation"}
-
-    def version(self) -> str:
-        """There is nothing to run."""
-        return ""
 
     def write(self, deck: Deck, folder: Path) -> None:
         """Write the mesh and both command files; UnsupportedError for what is not written."""
@@ -47,10 +40,6 @@ class CodeAster:
     def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
         """The command to run, with `mesh.med` as unit 20 and `result.med` as unit 80."""
         return ["run_aster", "lac.comm"]
-
-    def read(self, deck: Deck, folder: Path) -> ForeignResult:  # noqa: ARG002
-        """There is nothing to read."""
-        raise SolveError("code_aster is not run here")
 
 
 Held = list[tuple[int, float, np.ndarray]]

@@ -53,7 +53,7 @@ class Compared:
         """The comparison; raises InputError where result and case do not belong together."""
         where = f"{case.name}@{foreign.code}"
         if foreign.step is not None and abs(foreign.step - case.factors[-1]) > _STEP:
-            allowed = f"the result must be that of load factor {case.factors[-1]:g}"
+            allowed = f"the result must belong to load factor {case.factors[-1]:g}"
             raise InputError(where, "step", foreign.step, allowed)
         foreign = flattened(foreign, mesh.points.shape[1], where, case.thin)
         model = Model.of(case, mesh)
@@ -194,24 +194,25 @@ class Compared:
 
     def _displacement(self, _: Solution, __: None, reference: Reference) -> Sample:
         placed, axes = self._deformable("displacement"), "xyz"[: self.model.dim]
-        if isinstance(reference, ExactValues):
-            field = reference.exact.displacement(placed.places, self._part(placed))
-            expected = dict(zip(axes, field.T, strict=True))
-        else:
-            expected = {
-                axis: evaluate(value, placed.places)
-                for axis, value in zip(axes, reference, strict=True)
-            }
-        return _by_component(placed, axes, expected)
+        return samples.by_component(
+            placed.values,
+            placed.places,
+            axes,
+            reference,
+            lambda: reference.exact.displacement(placed.places, self._part(placed)),
+            _place(placed),
+        )
 
     def _stress_components(self, _: Solution, __: None, reference: Reference) -> Sample:
         placed = self._deformable("stress")
-        if isinstance(reference, ExactValues):
-            field = reference.exact.stress(placed.places, self._part(placed))
-            expected = dict(zip(COMPONENTS, field.T, strict=True))
-        else:
-            expected = {n: evaluate(value, placed.places) for n, value in reference.items()}
-        return _by_component(placed, COMPONENTS, expected)
+        return samples.by_component(
+            placed.values,
+            placed.places,
+            COMPONENTS,
+            reference,
+            lambda: reference.exact.stress(placed.places, self._part(placed)),
+            _place(placed),
+        )
 
     def _along(self, placed: Placed, directions: np.ndarray, reference: Reference) -> Sample:
         """Stress along directions (dim,) or (k, dim) beside the reference's."""
@@ -265,8 +266,8 @@ class Compared:
             if check.name == "balance":
                 forces, wanted = (np.concatenate(each) for each in zip(*self._forces, strict=True))
                 sample = Sample(forces, wanted, "zone {}".format)
-            if sample is not None and (told := fault(sample, names)):
-                found[check.name] = told
+            if sample is not None and (cause := fault(sample, names)):
+                found[check.name] = cause
         return summed_up(found)
 
     def not_given(self, ran: Sequence[str]) -> list[str]:
@@ -314,19 +315,9 @@ class Compared:
 
 
 def _place(placed: Placed) -> Callable[[int], str]:
-    def told(i: int) -> str:
+    def name_of(i: int) -> str:
         if placed.node[i] >= 0:
             return f"node {placed.node[i]}"
         return f"({', '.join(f'{x:.6g}' for x in placed.places[i])})"
 
-    return told
-
-
-def _by_component(placed: Placed, names: Sequence[str], expected: dict[str, np.ndarray]) -> Sample:
-    """The expected components one after the other."""
-    listed, count, place = list(expected), len(placed.places), _place(placed)
-    return Sample(
-        np.concatenate([placed.values[:, list(names).index(name)] for name in listed]),
-        np.concatenate([expected[name] for name in listed]),
-        lambda i: f"{place(i % count)} ({listed[i // count]})",
-    )
+    return name_of

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ..mechanics.fem.faces import FaceBlock
 from ..system.errors import SolveError
 from ..system.process import printed_by
 from .deck import Deck, UnsupportedError, refuse_rings
@@ -137,7 +136,8 @@ def _mesh_lines(deck: Deck) -> Iterator[str]:
                 yield from _rows(np.column_stack([count, np.zeros_like(count), block.nodes + 1]))
                 yield "End Conditions"
                 number += len(block.nodes)
-            surfaces.append((_nodes(side), range(first, number)))
+            nodes = np.unique(np.concatenate([block.nodes.ravel() for block in side]))
+            surfaces.append((nodes, range(first, number)))
     yield from _loads(deck, number)
     yield from _values("DISPLACEMENT", deck.fixed(), "1")
     for material in used:
@@ -199,10 +199,6 @@ def _part(
 
 def _rows(table: np.ndarray) -> Iterator[str]:
     yield from (" ".join(map(str, row)) for row in table.tolist())
-
-
-def _nodes(side: Sequence[FaceBlock]) -> np.ndarray:
-    return np.unique(np.concatenate([block.nodes.ravel() for block in side]))
 
 
 def _laws(deck: Deck) -> dict[str, Any]:

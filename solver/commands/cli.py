@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.imports import defer
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import codes, history, jobs, look, results, studies
+from . import codes, completion, history, jobs, look, results, studies
 from .options import add_command, add_threads, limit_threads
 
 if TYPE_CHECKING:
@@ -103,6 +103,7 @@ def parser() -> argparse.ArgumentParser:
     history.add_commands(commands)
     jobs.add_commands(commands)
     studies.add_commands(commands)
+    completion.add_commands(commands)
     return parser
 
 

@@ -28,7 +28,9 @@ def add_commands(commands: Any) -> None:
 
     command = add_command(commands, "plot", _plot, "draw a result: meshes, contact pressure")
     command.add_argument("result", type=Path, metavar="RESULT.vtkhdf")
-    command.add_argument("-o", "--output", type=Path, metavar="PICTURE", help="SVG or PNG")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="PICTURE", help="SVG, PNG or HTML to turn"
+    )
     command.add_argument(
         "--profile", action="store_true", help="the pressure along the interface instead"
     )
@@ -94,7 +96,7 @@ def _row(group: "Group") -> str:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from ..report.pictures import draw, draw_pressure
+    from ..report.pictures import draw, draw_pressure, page
     from ..system.files import replacing, write_text
     from ..verification.results import read_result
 
@@ -103,6 +105,8 @@ def _plot(options: argparse.Namespace) -> int:
     try:
         if options.profile:
             picture = draw_pressure(solution, solution.job).svg()
+        elif output.suffix == ".html":
+            picture = page(solution, solution.job)
         else:
             picture = str(draw(solution, solution.job))
     except ValueError as error:
@@ -112,9 +116,11 @@ def _plot(options: argparse.Namespace) -> int:
 
         with replacing(output) as file:
             file.write_bytes(vl_convert.svg_to_png(picture, scale=2))
-    elif output.suffix == ".svg":
+    elif output.suffix == ".svg" or (output.suffix == ".html" and not options.profile):
         write_text(output, picture)
     else:
-        raise InputError(output, "output", output.suffix, "allowed: .svg, .png")
+        raise InputError(
+            output, "output", output.suffix, "allowed: .svg, .png, .html (without --profile)"
+        )
     print(f"Picture: {output}")
     return 0

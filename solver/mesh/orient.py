@@ -2,10 +2,13 @@
 
 import numpy as np
 
+from ..system.threads import ahead
 from .catalogue import CellType
 
 # Below this share of the product of the edges that span it, a corner counts as flat.
 _FLAT = 1e-12
+# Cells that are looked at together.
+_AT_ONCE = 1 << 14
 
 
 def vertex_jacobians(points: np.ndarray, cells: np.ndarray, cell: CellType) -> np.ndarray:
@@ -49,9 +52,15 @@ def right_side_out(
 
     The latter have a Jacobian that is zero at a vertex or changes its sign from one to another.
     """
-    jacobian = vertex_jacobians(points, cells, cell)
-    mirrored = (jacobian < 0).all(axis=1)
-    bad = (np.abs(jacobian) <= _FLAT).any(axis=1) | ((jacobian < 0).any(axis=1) & ~mirrored)
+
+    def judged(first: int) -> list[np.ndarray]:
+        jacobian = vertex_jacobians(points, cells[first : first + _AT_ONCE], cell)
+        mirrored = (jacobian < 0).all(axis=1)
+        flat = (np.abs(jacobian) <= _FLAT).any(axis=1)
+        return [mirrored, flat | ((jacobian < 0).any(axis=1) & ~mirrored)]
+
+    parts = list(ahead(judged, range(0, max(1, len(cells)), _AT_ONCE)))
+    mirrored, bad = (np.concatenate(masks) for masks in zip(*parts, strict=True))
     turned = cells.copy()
     turned[mirrored] = cells[mirrored][:, list(cell.mirror)]
     return turned, bad

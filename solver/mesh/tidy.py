@@ -107,10 +107,12 @@ class _Table:
     def merged(self, cell: CellType) -> _CellBlock:
         parts = [block for block in self.blocks if block.cell is cell]
         nodes = np.concatenate([part.nodes for part in parts])
-        key = np.sort(nodes, axis=1)
-        _, first, same = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        # Position in the merged block of each cell of the file, in the order of first appearance.
-        rank = np.argsort(np.argsort(first))[same.ravel()]
+        first = rank = np.arange(len(nodes))
+        if not _all_differ(nodes):
+            key = np.sort(nodes, axis=1)
+            _, first, same = np.unique(key, axis=0, return_index=True, return_inverse=True)
+            # Position in the merged block of each cell of the file, by its first appearance.
+            rank = np.argsort(np.argsort(first))[same.ravel()]
         groups = {}
         for name in sorted({name for part in parts for name in part.groups}):
             mask = [part.groups.get(name, np.zeros(len(part.nodes), bool)) for part in parts]
@@ -118,6 +120,20 @@ class _Table:
         number = np.concatenate([part.number for part in parts])
         first = np.sort(first)
         return _CellBlock(cell, nodes[first], number[first], groups)
+
+
+def _all_differ(cells: np.ndarray) -> bool:
+    """Whether no two cells (n, n_nodes) have the same nodes; by chance False, never True, if so.
+
+    A cell's sign is a sum of random numbers of its nodes: no rows of nodes need be sorted.
+    """
+    count = int(cells.max(initial=-1)) + 1
+    of_node = np.random.default_rng(0).integers(1 << 63, size=count, dtype=np.uint64)
+    signs = np.zeros(len(cells), dtype=np.uint64)
+    for nodes in cells.T:
+        signs += of_node[nodes]
+    signs.sort()
+    return not (signs[1:] == signs[:-1]).any()
 
 
 def _numbered(cell: CellType, numbers: np.ndarray) -> str:

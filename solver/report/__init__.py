@@ -27,6 +27,7 @@ def write_report(
     from .junit import to_junit
     from .matrix import matrix_page
     from .page import family_page, main_page
+    from .pictures import write_viewer
     from .rows import read_rows
     from .sections import sections
 
@@ -50,6 +51,7 @@ def write_report(
     for name, content in contents.items():
         write_text(folder / name, content)
     write_script(folder)
+    write_viewer(folder)
     complaints = "".join(f"{c}\n" for part in parts if (c := part.family.complaint))
     said = f"{tables.outcome(rows)} Report: {folder / PAGE}\n{_costs(parts)}"
     return f"{complaints}{contents['failures.txt']}{said}"

@@ -184,8 +184,8 @@ class Bench:
         for code in self.codes:
             of = [cells[code].row for cells in self.cells.values() if code in cells]
             refused = sum(row.word == REFUSED for row in of)
-            told = f"{code} passes {sum(row.sound for row in of)} of {len(of) - refused}"
-            words.append(told + (f" and cannot express {refused}" if refused else ""))
+            passes = f"{code} passes {sum(row.sound for row in of)} of {len(of) - refused}"
+            words.append(passes + (f" and cannot express {refused}" if refused else ""))
         return f"{'; '.join(words)}."
 
     @property

@@ -28,14 +28,12 @@ INK, MUTED, PAPER, FLOOR = "#1f2933", "#66727f", "#ffffff", "#e6eaee"
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "#aa5588"
 CROSS = "M-1,-1L1,1M1,-1L-1,1"
 SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
+# Digits of a number in a page.
+DIGITS = 7
 # The values of a mark under the pointer: powers of ten as 1.2e-10.
 _FORMAT = ".4~g"
-# Labels of a logarithmic axis: powers of ten, on less than so many times also 2 and 5 of them.
+# A logarithmic axis of less than so many times also has labels at 2 and 5 times the powers of ten.
 _FEW = 300.0
-_DECADES = (
-    "indexof([1], round(datum.value / pow(10, floor(log(datum.value) / LN10 + 1e-9)))) < 0 ? '' : "
-    "format(datum.value, datum.value >= 0.01 && datum.value < 10000 ? '~g' : '.0e')"
-)
 
 Spec = dict[str, Any]
 Record = Mapping[str, Any]
@@ -90,15 +88,14 @@ class Axis:
             scale = {"type": "log", "nice": False, "padding": 8}
         if self.domain:
             scale |= {"domain": list(self.domain), "padding": 0}
-        axis: Spec = {"labelExpr": _DECADES if self.log else "format(datum.value, '~g')"}
-        if self.log and self.domain and self.domain[1] < _FEW * self.domain[0]:
-            axis["labelExpr"] = _DECADES.replace("[1]", "[1, 2, 5]")
+        few = self.domain and self.domain[1] < _FEW * self.domain[0]
+        style = ("halves" if few else "decades") if self.log else "plain"
         return {
             "field": self.field,
             "type": "quantitative",
             "title": self.title,
             "scale": scale,
-            "axis": axis,
+            "axis": {"style": style},
         } | more
 
 
@@ -118,17 +115,18 @@ class Chart:
 
     def __html__(self) -> Markup:
         """Its place in a page that has the script; without it, a line that says what is missing."""
-        spec = json.dumps(self.spec, ensure_ascii=False, separators=(",", ":"), default=float)
+        spec = json.dumps(
+            _short(self.spec), ensure_ascii=False, separators=(",", ":"), default=float
+        )
         return Markup(
             '<div class=chart id="{}" role=img aria-label="{}" style="max-width:{}px">'
-            '<script type="application/json">{}</script><div class=drawn></div><p class=none>The '
-            "chart “{}” needs JavaScript and the file {} beside this page.</p></div>"
+            '<script type="application/json">{}</script><div class=drawn></div><p class=none>This '
+            "chart needs JavaScript and the file {} beside this page.</p></div>"
         ).format(
             re.sub(r"[^\w*-]+", "-", self.name),
             self.title,
             self.width,
             Markup(spec.replace("<", "\\u003c")),
-            self.title,
             SCRIPT,
         )
 
@@ -140,6 +138,15 @@ class Chart:
         import vl_convert
 
         return str(vl_convert.vegalite_to_svg(json.dumps(self.full, default=float)))
+
+
+def _short(value: Any) -> Any:
+    """A part of a specification with numbers to `DIGITS` digits: more cannot be seen."""
+    if isinstance(value, dict):
+        return {key: _short(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_short(part) for part in value]
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 def write_script(folder: Path) -> None:
@@ -199,23 +206,24 @@ def series_chart(
     shape, dash = shared.pop("shape"), shared.pop("strokeDash")
     titles = {"series": "series", x.field: x.title, y.field: y.title, **(tips or {})}
     of_marks: Spec = {"shape": shape, "tooltip": tooltip(records, titles)}
-    sequence: Spec = {}
+    of_lines: Spec = {"strokeDash": dash} if any(look.dashes for look in looks.values()) else {}
     if order:
         rank = {"field": order, "type": "quantitative"}
-        sequence = {"order": rank}
+        of_lines["order"] = rank
         of_marks["size"] = rank | {"legend": None, "scale": {"range": [marks / 2, 3 * marks]}}
     if any("url" in record for record in records):
         of_marks["href"] = {"field": "url"}
-    drawn: list[Spec] = [*layers]
+    drawn: list[Spec] = []
     if lines:
-        line = {"type": "line", "strokeWidth": 1.8}
-        drawn.append({"mark": line, "encoding": shared | {"strokeDash": dash} | sequence})
+        drawn.append({"mark": {"type": "line", "strokeWidth": 1.8}, "encoding": of_lines})
     if span:
-        ends = {"x": x.channel(field=span[0]), "x2": {"field": span[1]}}
-        drawn.append({"mark": "rule", "encoding": shared | ends})
+        low = {"field": span[0], "type": "quantitative", "title": x.title}
+        ends = {"x": low, "x2": {"field": span[1]}}
+        drawn.append({"mark": "rule", "encoding": ends})
     point = {"type": "point", "filled": not lines, "size": marks, "strokeWidth": 1.8}
-    drawn.append({"mark": point, "encoding": shared | of_marks, "params": interaction()})
-    spec = {"data": {"values": list(records)}, "width": width, "height": height, "layer": drawn}
+    drawn.append({"mark": point, "encoding": of_marks, "params": interaction()})
+    layer = [*layers, {"encoding": shared, "layer": drawn}]
+    spec = {"data": {"values": list(records)}, "width": width, "height": height, "layer": layer}
     return Chart(name, title, spec, width)
 
 
@@ -257,15 +265,15 @@ def level(
     value: float, label: str, color: str, dashes: Sequence[float] = (), left: bool = False
 ) -> Spec:
     """A line across the chart at a value of y, its label above, at the right or left end."""
-    place = {"y": {"datum": value}, "color": {"value": color}}
     words = {"type": "text", "text": label, "dy": -6}
     words |= {"align": "left", "dx": 3} if left else {"align": "right", "dx": -3}
-    end = 0 if left else "width"
+    end = {"x": {"value": 0 if left else "width"}}
     return {
         "data": {"values": [{}]},
+        "encoding": {"y": {"datum": value}, "color": {"value": color}},
         "layer": [
-            {"mark": {"type": "rule", "strokeDash": list(dashes)}, "encoding": place},
-            {"mark": words, "encoding": place | {"x": {"value": end}}},
+            {"mark": {"type": "rule", "strokeDash": list(dashes)}},
+            {"mark": words, "encoding": end},
         ],
     }
 

@@ -26,21 +26,37 @@ def tint(body: BodyInfo) -> str:
 
 def mean_normal(solution: Solution) -> np.ndarray:
     """The mean outward normal of the first zone's slave, (dim,); upward without a zone."""
-    dim = solution.mesh.points.shape[1]
-    upward = np.eye(dim)[-1]
-    if not solution.zones or not len(solution.zones[0].normal):
-        return upward
-    mean = solution.zones[0].normal.mean(axis=0)
+    upward = np.eye(solution.mesh.points.shape[1])[-1]
+    return _mean(solution.zones[0].normal, upward) if solution.zones else upward
+
+
+def _mean(normals: np.ndarray, upward: np.ndarray) -> np.ndarray:
+    mean = normals.mean(axis=0) if len(normals) else upward
     length = float(np.linalg.norm(mean))
     return mean / length if length > 1e-6 else upward
 
 
+def ways_apart(solution: Solution) -> np.ndarray:
+    """Where each body goes when they are moved apart, (bodies, dim): a master away from its slave.
+
+    A body that is master and slave takes its own masters along.
+    """
+    dim, names = solution.mesh.points.shape[1], [body.name for body in solution.bodies]
+    found, moved = np.zeros((len(names), dim)), set[int]()
+    for zone, given in zip(solution.zones, solution.case.zones, strict=True):
+        slaves = np.unique(solution.body[zone.slave_nodes]).tolist()
+        masters = np.unique(solution.body[zone.master_nodes]).tolist()
+        if given.master in solution.case.rigid and given.master in names:
+            masters = [names.index(given.master)]
+        for body in {*masters} - {*slaves} - moved:
+            found[body] = found[slaves[0]] + _mean(zone.normal, np.eye(dim)[-1])
+            moved.add(body)
+    return found
+
+
 def apart(solution: Solution, share: float) -> np.ndarray:
-    """Points with slave and master moved apart by `share` of the mesh's size, (n, dim)."""
-    side = {"slave": -0.5, "master": 0.5}
-    shift = np.array([side.get(body.role, 0.0) for body in solution.bodies] or [0.0])
-    away = share * solution.length * mean_normal(solution)
-    return solution.mesh.points + shift[solution.body][:, None] * away
+    """Points with bodies moved apart by `share` of the mesh's size, (n, dim)."""
+    return solution.mesh.points + share * solution.length * ways_apart(solution)[solution.body]
 
 
 def fit(points: np.ndarray, frame: Frame) -> Placement:
@@ -104,3 +120,16 @@ def extents(zone: ZoneResult, position: np.ndarray) -> tuple[np.ndarray, np.ndar
         np.minimum.at(start, owner, position[nodes].min(axis=1))
         np.maximum.at(end, owner, position[nodes].max(axis=1))
     return start, end
+
+
+def lines_of(solution: Solution, number: int) -> list[str]:
+    """What a picture says of a body: its cells or rigid surface, and how that moves."""
+    body = solution.bodies[number]
+    rigid = solution.case.rigid.get(body.name)
+    if rigid is None:
+        return [", ".join(body.cells)]
+    given = [("moved", rigid.move), ("force", rigid.force)]
+    told = [f"{what} {k} {v:.4g}" for what, values in given for k, v in values.items()]
+    flat = solution.mesh.points.shape[1] == 2 and not solution.case.axisymmetric
+    shape = {"plane": "line", "sphere": "circle"}.get(rigid.surface) if flat else None
+    return [f"rigid {shape or rigid.surface}".strip(), *told]

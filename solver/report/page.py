@@ -8,7 +8,7 @@ from . import stages
 from .charts import Chart
 from .errors import draw_strip, drawn
 from .html import MEANING, NORMS, TEMPLATES, render
-from .pictures import picture, profile
+from .pictures import VIEWER, picture, profile
 from .rows import Row, causes, choices, ours
 from .sections import FamilySection
 from .tables import outcome
@@ -71,6 +71,7 @@ def family_page(section: FamilySection, folder: Path) -> str:
         TEMPLATES / "family.html.jinja",
         title=section.family.title,
         charts=True,
+        viewer_script=VIEWER,
         sortable=True,
         outcome=section.outcome,
         good=not section.bad,

@@ -16,8 +16,12 @@ from ..system.files import write_text
 from ..verification.results import read_result
 from . import plane, space
 from .charts import Chart
+from .html import TEMPLATES, render
 from .profile import draw_profile
 from .rows import Row
+from .surfaces import surfaces
+
+VIEWER = "viewer.js"
 
 MOST_CELLS = 100_000
 # Width and height by the dimension of the bodies.
@@ -29,10 +33,40 @@ def picture(row: Row, folder: Path) -> Markup:
     kept = _kept(row, folder, ".svg", lambda row: draw(_solution(row), row.name))
     if isinstance(kept, Markup):
         return kept
+    turned = _turned(row, folder)
     source, (width, height) = f"{folder.name}/{_name(row)}.svg", SIZES.get(row.dim, SIZES[3])
     size = f"width={width} height={height}"
     tag = f'<img class=mesh loading=lazy {size} src="{{}}" alt="{{}}: meshes and contact">'
-    return Markup(tag).format(quote(source), row.name)
+    return Markup(tag).format(quote(source), row.name) + turned
+
+
+def _turned(row: Row, folder: Path) -> Markup:
+    """A button that turns the result, its surfaces in a file beside the picture; else nothing."""
+    source = quote(f"{folder.name}/{_name(row)}.js")
+    kept = _kept(row, folder, ".js", lambda row: surfaces(_solution(row), source))
+    button = "<button type=button data-surfaces='{}' hidden>Turn it, with maps of errors</button>"
+    return Markup() if isinstance(kept, Markup) else Markup(button).format(source)
+
+
+def write_viewer(folder: Path) -> None:
+    """Write the script that turns results into `folder`."""
+    write_text(folder / VIEWER, _viewer())
+
+
+def page(solution: Solution, name: str) -> str:
+    """A page of one result that stands alone: its picture, and its surfaces to be turned."""
+    return render(
+        TEMPLATES / "result.html.jinja",
+        title=name,
+        name=name,
+        picture=draw(solution, name),
+        surfaces=Markup(surfaces(solution, name)),
+        viewer=Markup(_viewer()),
+    )
+
+
+def _viewer() -> str:
+    return (TEMPLATES / VIEWER).read_text(encoding="utf-8")
 
 
 def profile(row: Row, folder: Path, along: Expression | None = None) -> Chart | Markup:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..case.expressions import Expression, evaluate
+from ..case.model import EXACT
 from ..mechanics.fem.faces import surface_points
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution, ZoneResult
@@ -123,18 +124,18 @@ def _view(
     layers: list[Spec] = []
     if steps:
         rule = {"type": "rule", "strokeWidth": 2.5, "clip": True}
-        channels = shared | {"x2": {"field": "end"}} | tips
+        channels = {"x2": {"field": "end"}} | tips
         layers.append({"mark": rule, "encoding": channels} | _only(steps))
     order = {"detail": {"field": "face", "type": "nominal"}}
     for name in lines:
         line = {"type": "line", "strokeWidth": 1.6, "strokeDash": looks[name].dashes, "clip": True}
-        layers.append({"mark": line, "encoding": shared | order} | _only([name]))
+        layers.append({"mark": line, "encoding": order} | _only([name]))
     marks = [name for name in found if name not in steps]
     size = {"type": "point", "strokeWidth": 1.3, "size": 22, "clip": True}
     shown = [name for name in marks if name not in (RECOVERED, REFERENCE) or not flat]
-    point = {"mark": size, "encoding": shared | {"shape": shape} | tips} | _only(shown)
+    point = {"mark": size, "encoding": {"shape": shape} | tips} | _only(shown)
     layers.append(point | {"params": interaction()} if first else point)
-    return {"width": 400, "height": height, "layer": layers}
+    return {"width": 400, "height": height, "encoding": shared, "layer": layers}
 
 
 def _only(names: Sequence[str]) -> Spec:
@@ -201,13 +202,13 @@ def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[di
             face = np.repeat(first + np.arange(len(nodes))[closed], len(_WITHIN))
             found += _records(RECOVERED, s=at[closed].ravel(), p=values[closed].ravel(), face=face)
         first += len(nodes)
-    reference = _reference(solution)
-    if reference is not None:
+    against = reference(solution, "contact_pressure")
+    if against is not None:
         where = surface_points(points, zone.faces).place
-        if isinstance(reference, ExactValues):
-            values = reference.exact.contact_pressure(where)
+        if isinstance(against, ExactValues):
+            values = against.exact.contact_pressure(where)
         else:
-            values = evaluate(reference, where)
+            values = evaluate(against, where)
         at = place(where)
         order = np.argsort(at, kind="stable")[:: max(1, len(at) // 400)]
         found += _records(REFERENCE, s=at[order], p=values[order])
@@ -216,18 +217,16 @@ def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[di
 
 def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
     """The pressure (m,) that the reference has on every macro-element; None where it has none."""
-    reference = _reference(solution)
-    return None if reference is None else expected_pressure(zone, reference)
+    against = reference(solution, "contact_pressure")
+    return None if against is None else expected_pressure(zone, against)
 
 
-def _reference(solution: Solution) -> float | Expression | ExactValues | None:
-    """The reference pressure, checked or not."""
-    given, exact = solution.case.reference.get("contact_pressure"), solution.case.solution
-    if isinstance(given, float | Expression):
+def reference(solution: Solution, key: str) -> Any:
+    """What the checks compare a quantity with, checked or not; None where the case has nothing."""
+    given, exact = solution.case.reference.get(key), solution.case.solution
+    if given is not None and given is not EXACT:
         return given
-    if exact and "contact_pressure" in exact.quantities:
-        return ExactValues(solution, exact)
-    return None
+    return ExactValues(solution, exact) if exact and key in exact.quantities else None
 
 
 def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from ..mesh.catalogue import BY_NAME
 from ..system.errors import InputError
@@ -50,6 +51,11 @@ class Row:
     def sound(self) -> bool:
         """Whether nothing is wrong: it passed, or has no reference to be verified against."""
         return self.verdict.sound
+
+    @cached_property
+    def plain(self) -> dict[str, Any]:
+        """The verdict as plain values."""
+        return self.verdict.plain()
 
     @cached_property
     def why(self) -> str:
@@ -183,7 +189,7 @@ def _read(path: Path) -> Verdict:
         verdict = read_verdict(path)
         fault = unbound(verdict, path)
     except InputError as error:
-        fault = error.told
+        fault = error.detail
     if not fault:
         return verdict
     *_, family, job = ("", "", *path.absolute().parts[:-1])

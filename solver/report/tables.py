@@ -33,7 +33,7 @@ _HEAD = (
 
 def to_json(rows: Sequence[Row]) -> str:
     """The verdicts as they are."""
-    return strict_json([row.verdict.plain() for row in rows]) + "\n"
+    return strict_json([row.plain for row in rows]) + "\n"
 
 
 def to_csv(rows: Sequence[Row]) -> str:

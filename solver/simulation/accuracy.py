@@ -100,7 +100,7 @@ class Roughness:
 
     `strain`: the largest error of a strain, over the strain. `tilt` (n,): by what angle the contact
     faces around each node may be turned. `turned` (n,): the same for the directions of supports,
-    zero where they are those of the axes. `steep`: `steepness` of the scene's blocks.
+    zero where they are those of the axes. `steep`: `steepness` of the blocks, if any is not.
     """
 
     strain: float
@@ -142,7 +142,7 @@ def roughness(scene: Scene) -> Roughness:
         entries = scene.free.basis.tocoo()
         node = entries.row[np.bincount(entries.col)[entries.col] > 1] // dim
         turned[node] = around[node]
-    return Roughness(float(around.max()), tilt, turned, steep)
+    return Roughness(float(around.max()), tilt, turned, steep if turned.any() else [])
 
 
 def _tilts(points: np.ndarray, faces: FaceBlock, noise: float) -> np.ndarray:

@@ -41,13 +41,12 @@ def _all(solution: Solution) -> Iterator[str]:
     known += solution.seconds.values()
     yield from _values("the solve's own numbers", np.array(known), (len(known),))
     if {zone.name for zone in solution.zones} != {zone.name for zone in solution.case.zones}:
-        yield "the contact zones are not those of the case"
+        yield "the contact zones differ from the case's"
     if solution.strain_energy is not None:
         yield from _values("strain energy", np.array([solution.strain_energy]), (1,))
     if solution.reaction is not None:
         yield from _values("reaction", solution.reaction, (n, dim))
-    if solution.probes.keys() - {probe.name for probe in solution.case.probes}:
-        yield "the probes are not those of the case"
+    yield from _by_key(solution, n)
     yield from _steps(solution, dim)
     for zone in solution.zones:
         for fault in chain(_zone(zone, n, dim), _edges(zone, dim)):
@@ -56,22 +55,32 @@ def _all(solution: Solution) -> Iterator[str]:
         yield from _status(zone, solution)
 
 
+def _by_key(solution: Solution, n: int) -> Iterator[str]:
+    """What belongs to supports, loads and probes of the case."""
+    if solution.acted.keys() - solution.case.acting.keys():
+        yield "the supports and loads differ from the case's"
+    for key, nodes in solution.acted.items():
+        yield from _numbers(key, nodes, (None,), n)
+    if solution.probes.keys() - {probe.name for probe in solution.case.probes}:
+        yield "the probes differ from the case's"
+
+
 def _steps(solution: Solution, dim: int) -> Iterator[str]:
     sizes = {zone.name: len(zone.multiplier) for zone in solution.zones}
     wanted = [item.zone for item in solution.case.observe]
     if [step.factor for step in solution.steps] != list(solution.case.factors):
-        yield "the load steps are not those of the case"
+        yield "the load steps differ from the case's"
     for step in solution.steps:
         seen = step.observations
         if [item["zone"] for item in seen] != wanted:
-            yield "the places observed are not those of the case"
+            yield "the places observed differ from the case's"
         for item in seen:
             number = np.array([item["macro_element"]])
             yield from _numbers("observed macro-element", number, (1,), sizes[item["zone"]])
         known = [step.residual, *(item[k] for item in seen for k in ("pressure", "gap"))]
         yield from _values("steps", np.array(known), (len(known),))
         if step.resultants.keys() - sizes.keys():
-            yield "the contact forces of a step are not those of the zones"
+            yield "the contact forces of a step differ from the zones'"
         for name, found in step.resultants.items():
             yield from _resultants(f"of contact in {name}", found, dim)
         for one in step.reactions:

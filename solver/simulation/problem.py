@@ -1,7 +1,7 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -14,13 +14,15 @@ from ..mechanics.fem.bodies import (
     whole_motions,
 )
 from ..mechanics.fem.elasticity import stiffness
+from ..mechanics.fem.vertices import from_vertices, linear_unknowns
 from ..mechanics.linear.choice import against_multigrid
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
-from ..mechanics.linear.multigrid import Unknowns
 from ..mechanics.linear.nodal_matrix import NodalMatrix
 from ..mechanics.linear.systems import Systems, parts_of
+from ..mechanics.linear.unknowns import Unknowns
 from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
 from ..system.errors import SolveError
+from ..system.memory import release
 from .accuracy import Accuracy, Roughness, estimate, judged, roughness
 from .constraints import (
     contact_constraints,
@@ -40,6 +42,11 @@ _CHANGE = 1e-4
 _CORRECTED = 4.0
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
+# From so many unknowns on, memory that was freed is given back before the matrix is made.
+_LARGE = 100_000
+# While the contact status is sought by an iterative solver: residuals of the first solve and of
+# changes, and the share of pressures and motions below which such a solve decides nothing.
+_ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
 _AT_ONCE = 1 << 23
 
@@ -101,6 +108,8 @@ class ContactProblem:
         on_free = self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
         unknowns = _unknowns(scene, self.motions)
+        if scene.n_dofs > _LARGE:
+            release()
         self.matrix, self.diagonal = _stiffness(scene, unknowns)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
@@ -148,19 +157,31 @@ class ContactProblem:
         if not scene.options.shortcuts.status:
             start = eligible
         start = self._first_guess(step) if start is None else start
+        if bilateral:
+            first = self._at_rest(eligible, step, correction)
+            return self._solve_closed(first, correction, _force_scale(first))
         latest: list[Equilibrium] = []
+        rough, known = scene.options.shortcuts.status, None
 
         def attempt(closed: np.ndarray) -> Trial:
+            nonlocal known
             if not scene.options.shortcuts.status:
                 self._systems.forget()
-            latest[:] = [self._solve_closed(closed, step, correction)]
+            first = rest = self._at_rest(closed, step, correction)
+            if rough and self._constrained(closed).factor.iterative:
+                known, trial = self._roughly(rest, known)
+                if (eligible & (trial.offence(closed) > 1)).any():
+                    return trial
+                first = known
+            latest[:] = [self._solve_closed(first, correction, _force_scale(rest))]
             return latest[0].trial
 
-        if bilateral:
-            attempt(eligible)
-            return latest[0]
+        def stiffness() -> np.ndarray:
+            nonlocal rough
+            rough = False
+            return self._gap_stiffness(step)
+
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
-        stiffness = partial(self._gap_stiffness, step)
         status = find_status(attempt, start, eligible, area, stiffness, confirm)
         trial = latest[0].trial
         touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
@@ -206,26 +227,53 @@ class ContactProblem:
             self._moves = {key: free_motion(self.scene, self.motions, self.constraints, closed)}
         return self._moves[key]
 
-    def _solve_closed(
+    def _at_rest(
         self, closed: np.ndarray, step: Step, correction: np.ndarray | float
-    ) -> Equilibrium:
-        """Equilibrium with the given multipliers closed."""
+    ) -> ContactIterate:
+        """The start of a solve with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
             raise SolveError(f"{moves} once {int((~closed).sum())} macro-elements are open")
-        correction = np.zeros(scene.force.shape) + correction
         acting, offset = scene.acting(step)
-        force = acting + correction
-        start = ContactIterate(
+        return ContactIterate(
             scene=scene,
             constraints=self.constraints,
             closed=closed,
-            force=force,
+            force=acting + correction,
             displacement=self.at_rest.moved(offset),
             mean_stress=np.zeros(scene.mean.size),
             swelling=scene.straining(step, scene.initial.swelling),
         )
-        return self._refined(start, _force_scale(start), StatusResult(closed, 1, []), correction)
+
+    def _solve_closed(
+        self, start: ContactIterate, correction: np.ndarray | float, scale: float
+    ) -> Equilibrium:
+        """Equilibrium with the multipliers closed that are so at the start."""
+        correction = np.zeros(self.scene.force.shape) + correction
+        return self._refined(start, scale, StatusResult(start.closed, 1, []), correction)
+
+    def _roughly(
+        self, start: ContactIterate, known: ContactIterate | None
+    ) -> tuple[ContactIterate, Trial]:
+        """An approximate solution, from the one `known` of another status, and its trial.
+
+        What it leaves undecided counts as no offence: a solve to round-off then judges.
+        """
+        accuracy = _ROUGH_CHANGE if known else _ROUGH_STATUS
+        start = known.with_closed(start.closed) if known else start
+        system = self._constrained(start.closed)
+        force = start.condensed(start.residual())
+        found = start.advanced(system.correction(force, start.violation(), accuracy))
+        pressure = np.zeros(len(start.closed))
+        pressure[start.closed] = system.multiplier(found.residual())
+        trial, gaps = judged(found, pressure, self.diagonal), self.constraints.gaps
+        covered = np.where(self.constraints.eligible, self.constraints.covered, np.inf)
+        motion = abs(gaps) @ np.abs(found.displacement.total) / covered
+        return found, replace(
+            trial,
+            pressure_limit=trial.pressure_limit + _UNDECIDED * np.abs(pressure).max(initial=0.0),
+            gap_limit=trial.gap_limit + _UNDECIDED * motion,
+        )
 
     def _refined(
         self,
@@ -342,5 +390,9 @@ def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
         # Those of the sections in their plane: they hardly strain rings far from the axis.
         motions = rigid_motions(scene.points, scene.body)
     together = basis.T @ whole_motions(motions, scene.n_bodies)
-    quadratic = any(block.type.order == 2 for block in scene.blocks)
-    return Unknowns(dim, node, together, scene.body[node], quadratic)
+    about = dim, node, together, scene.body[node], scene.points
+    if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
+        return Unknowns(*about)
+    return Unknowns(
+        *about, *linear_unknowns(basis, dim, *from_vertices(len(scene.points), scene.blocks))
+    )

@@ -108,7 +108,7 @@ def remarks(found: Validity) -> Iterator[Line]:
         yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")
     if found.slip > _NOTED_SLIP:
         what = f"contact slides by up to {found.slip:.2g} of a face"
-        yield Line(what, "pairs of faces are those of the undeformed bodies")
+        yield Line(what, "pairs of faces belong to the undeformed bodies")
     if found.partly_covered:
         what = f"the master ends inside {found.partly_covered} macro-elements in contact"
         yield Line(what, "their pressure is the mean over the part that it covers")

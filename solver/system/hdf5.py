@@ -11,7 +11,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5g, h5l, h5o
+from h5py import h5d, h5g, h5i, h5l, h5o
 
 from .errors import InputError
 
@@ -35,18 +35,19 @@ def new_file(path: Path) -> Iterator[h5py.File]:
 
 
 @contextmanager
-def read_file(path: str | Path) -> Iterator[h5py.File]:
+def read_file(path: str | Path, real: bool = False) -> Iterator[h5py.File]:
     """An HDF5 file to be read; InputError for one that takes data from another file.
 
     Such files have external links, external storage or virtual data sets. Groups may be nested 32
-    deep.
+    deep. `real`: raises TypeError for complex numbers, of which numpy makes real ones with a
+    warning only.
     """
     with h5py.File(path, "r") as file:
-        _refuse_foreign(file, path)
+        _look_through(file, path, real)
         yield file
 
 
-def _refuse_foreign(file: h5py.File, path: str | Path) -> None:
+def _look_through(file: h5py.File, path: str | Path, real: bool) -> None:
     """Look at each group and data set of a file, level by level."""
     level, seen = [file.id], set()
     for _ in range(_DEEPEST):
@@ -58,6 +59,8 @@ def _refuse_foreign(file: h5py.File, path: str | Path) -> None:
             if _takes_from_elsewhere(item) if item else kind != h5l.TYPE_SOFT:
                 allowed = "in another file: the file must hold all of its data itself"
                 raise InputError(path, name.decode(errors="replace"), None, allowed)
+            if real and isinstance(item, h5d.DatasetID) and item.dtype.kind == "c":
+                raise TypeError(f"{h5i.get_name(item).decode()} holds complex numbers")
             if isinstance(item, h5g.GroupID) and (place := h5o.get_info(item).addr) not in seen:
                 seen.add(place)
                 below.append(item)

@@ -1,5 +1,6 @@
 """Memory: what the machine has, and what a process has used."""
 
+import ctypes
 import resource
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +12,13 @@ _NO_LIMIT = 1 << 60
 def peak_mb(used: resource.struct_rusage) -> float:
     """The largest resident memory of a process, MB; the system reports KiB."""
     return used.ru_maxrss * 1024 / 1e6
+
+
+def release() -> None:
+    """Give freed memory back to the system, which the C library of Linux keeps for later."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim:
+        trim(0)
 
 
 def available() -> float:

@@ -30,7 +30,9 @@ quadrature is no part of what is seen.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
+import meshio
 import numpy as np
 
 from ..case.solutions.base import ElasticSolution, ExactSolution, lame_of
@@ -41,6 +43,7 @@ from ..mechanics.fem.gauss import gauss_rule
 from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues, computed_pressure, deformable
 from ..simulation.solution import Solution
+from ..system.threads import ahead
 from .oscillation import grown, macro_neighbours, oscillation
 
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.
@@ -79,36 +82,46 @@ def _field_errors(solution: Solution, exact: ElasticSolution) -> dict[str, float
 
 def _squares(solution: Solution, exact: ElasticSolution) -> Iterator[np.ndarray]:
     """By chunk of cells (3, 2): ∫ of squares of error and exact value, for u, ∇u, σ."""
-    points, parts = solution.mesh.points, ExactValues(solution, exact).part
-    moving = deformable(solution)
+    part, moving = ExactValues(solution, exact).part, deformable(solution)
     for block in solution.mesh.cells:
         kind = cell_type(block.type)
-        reference, weights = gauss_rule(kind.name, kind.order + 2)
-        values = shape_functions(kind.name).values(reference)
-        deforming = moving[block.data].all(axis=1)
-        cells = block.data[deforming]
-        mixed = solution.mean_stress.get(kind.name)
-        own = None if mixed is None else mixed[deforming]
-        step = max(1, _CHUNK // (len(weights) * kind.n_nodes * kind.dim))
-        for start in range(0, len(cells), step):
-            chunk = cells[start : start + step]
-            gradient, determinant = physical_gradients(points, chunk, kind, reference)
-            nodal = solution.displacement[chunk]
-            place, found = values @ points[chunk], values @ nodal
-            apart = np.swapaxes(nodal - nodal[:, :1], 1, 2)
-            slope = apart[:, None] @ gradient
-            if solution.case.axisymmetric:
-                hoop, around = hoop_values(points, chunk, kind, reference)
-                slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
-                determinant = determinant * around
-            part = np.repeat(parts[chunk[:, 0]], len(weights))
-            flat = place.reshape(-1, kind.dim)
-            slope = slope.reshape(len(flat), *slope.shape[2:])
-            mean = None if own is None else (own[start : start + step] @ values.T).ravel()
-            stress = _hooke(exact, slope, part, mean)
-            pairs = _with_exact(exact, flat, part, found.reshape(flat.shape), slope, stress)
-            weight = (determinant * weights).ravel()
-            yield np.array([[_integral(weight, error), _integral(weight, u)] for error, u in pairs])
+        rule = gauss_rule(kind.name, kind.order + 2)
+        chosen = np.flatnonzero(moving[block.data].all(axis=1))
+        step = max(1, _CHUNK // (len(rule[1]) * kind.n_nodes * kind.dim))
+        chunks = [chosen[start : start + step] for start in range(0, len(chosen), step)]
+        yield from ahead(partial(_squares_in, solution, exact, part, block, rule), chunks)
+
+
+def _squares_in(
+    solution: Solution,
+    exact: ElasticSolution,
+    parts: np.ndarray,
+    block: meshio.CellBlock,
+    rule: tuple[np.ndarray, np.ndarray],
+    chosen: np.ndarray,
+) -> np.ndarray:
+    """The integrals over the `chosen` cells of a block, with the `parts` (n_points,) of nodes."""
+    points, kind, (reference, weights) = solution.mesh.points, cell_type(block.type), rule
+    values = shape_functions(kind.name).values(reference)
+    cells = block.data[chosen]
+    gradient, determinant = physical_gradients(points, cells, kind, reference)
+    nodal = solution.displacement[cells]
+    place, found = values @ points[cells], values @ nodal
+    apart = np.swapaxes(nodal - nodal[:, :1], 1, 2)
+    slope = apart[:, None] @ gradient
+    if solution.case.axisymmetric:
+        hoop, around = hoop_values(points, cells, kind, reference)
+        slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
+        determinant = determinant * around
+    part = np.repeat(parts[cells[:, 0]], len(weights))
+    flat = place.reshape(-1, kind.dim)
+    slope = slope.reshape(len(flat), *slope.shape[2:])
+    mixed = solution.mean_stress.get(kind.name)
+    mean = None if mixed is None else (mixed[chosen] @ values.T).ravel()
+    stress = _hooke(exact, slope, part, mean)
+    pairs = _with_exact(exact, flat, part, found.reshape(flat.shape), slope, stress)
+    weight = (determinant * weights).ravel()
+    return np.array([[_integral(weight, error), _integral(weight, u)] for error, u in pairs])
 
 
 def _hooke(

@@ -16,6 +16,7 @@ that the checks need, so that it can be judged without solving:
                    what holds each group; area, force and moment of contact in each zone; motion of
                    rigid bodies and contact on them; by step (counted from 0)
     /probes        by name: places with displacement and stress, or pressure
+    /acted         by key of the case file: the nodes of each support and of each load on a surface
     /bodies /balance /steps /observation /plan /timings /checks
                    tables, a data set a column
     /provenance    versions, revision, hashes, machine
@@ -113,6 +114,9 @@ def _write(
     if solution.strain_energy is not None:
         file["solve"].attrs["strain_energy"] = solution.strain_energy
     write_probes(file.create_group("probes"), solution.probes)
+    acted = file.create_group("acted")
+    for key, nodes in solution.acted.items():
+        acted[key] = nodes.astype(np.int32)
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("validity").attrs.update(asdict(solution.validity))
     file.create_group("errors").attrs.update(solution.errors)
@@ -145,8 +149,7 @@ def read_result(path: str | Path) -> Result:
     if not (sha256 := seal_of(path)):
         raise _no_result(path, "damaged, of another version, or another kind of file")
     try:
-        with read_file(path) as file:
-            file.visititems(_refuse_complex)
+        with read_file(path, real=True) as file:
             lost = int(file.attrs["objects"]) - _objects(file)
             result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)
@@ -163,12 +166,6 @@ def read_result(path: str | Path) -> Result:
     return result
 
 
-def _refuse_complex(name: str, item: h5py.HLObject) -> None:
-    """Numpy makes real numbers of complex ones with a warning only."""
-    if isinstance(item, h5py.Dataset) and item.dtype.kind == "c":
-        raise TypeError(f"{name} holds complex numbers")
-
-
 def _no_result(path: str | Path, fault: str) -> InputError:
     allowed = f"must be a result written by `solve` ({fault}): solve again"
     return InputError(path, "file", None, allowed)
@@ -178,9 +175,9 @@ def _read_solution(file: h5py.File) -> Solution:
     grid, point_data, cell_data = read_grid(file[GRID])
     names = sorted(file["contact"], key=lambda name: file["contact"][name].attrs["number"])
     volumes = [i for i, block in enumerate(grid.cells) if block.dim == grid.points.shape[1]]
-    case = file["case"]
+    scalars = _plain(file["solve"].attrs)
     return Solution(
-        case=_read_case(case),
+        case=_read_case(file["case"]),
         mesh=meshio.Mesh(
             grid.points,
             [grid.cells[i] for i in volumes],
@@ -199,17 +196,18 @@ def _read_solution(file: h5py.File) -> Solution:
         steps=read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
         validity=Validity(**(_plain(file["validity"].attrs) if "validity" in file else {})),
-        strain_energy=_plain(file["solve"].attrs).get("strain_energy"),
+        strain_energy=scalars.get("strain_energy"),
         reaction=point_data["reaction"][:, : grid.points.shape[1]]
         if "reaction" in point_data
         else None,
         probes=read_probes(file),
+        acted={key: data[()] for key, data in file.get("acted", {}).items()},
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},
         seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
         stage_cpu_seconds=dict(_read_pairs(file["timings"], "stage", "cpu_seconds")),
-        **{key: _plain(file["solve"].attrs)[key] for key in _SCALARS},
+        **{key: scalars[key] for key in _SCALARS},
     )
 
 

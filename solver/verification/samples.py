@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from ..simulation.groups import ALL
 from ..simulation.initial import strain_at
 from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
+from ..system.threads import ahead
 
 Reference = Any
 # Pressures and gaps below this share of load and length are zero.
@@ -126,8 +128,34 @@ def _nodes(solution: Solution) -> np.ndarray:
     return np.flatnonzero(deformable(solution))
 
 
-def _at_nodes(nodes: np.ndarray, values: np.ndarray, expected: np.ndarray) -> Sample:
-    return Sample(values, expected, lambda i: f"node {nodes[i]}")
+def _at_nodes(nodes: np.ndarray) -> Callable[[int], str]:
+    return lambda i: f"node {nodes[i]}"
+
+
+def by_component(
+    values: np.ndarray,
+    points: np.ndarray,
+    names: Sequence[str],
+    reference: Reference,
+    exact: Callable[[], np.ndarray],
+    place: Callable[[int], str],
+) -> Sample:
+    """The components of values (n, c) at points (n, dim) that the reference gives: on one scale.
+
+    They follow one another. `exact` has those of the case's exact solution (n, c), all of `names`.
+    """
+    if isinstance(reference, ExactValues):
+        expected = dict(zip(names, exact().T, strict=True))
+    else:
+        if not isinstance(reference, Mapping):
+            reference = dict(zip(names, reference, strict=True))
+        expected = {name: evaluate(value, points) for name, value in reference.items()}
+    listed, count = list(expected), len(points)
+    return Sample(
+        np.concatenate([values[:, names.index(name)] for name in listed]),
+        np.concatenate(list(expected.values())),
+        lambda i: f"{place(i % count)} ({listed[i // count]})",
+    )
 
 
 def surface_stress(side: str) -> Sampler:
@@ -139,8 +167,10 @@ def surface_stress(side: str) -> Sampler:
             return None
         if isinstance(reference, ExactValues):
             faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
-            return _at_nodes(nodes, values, reference.surface_stress(nodes, faces))
-        return _at_nodes(nodes, values, evaluate(reference, solution.mesh.points[nodes]))
+            expected = reference.surface_stress(nodes, faces)
+        else:
+            expected = evaluate(reference, solution.mesh.points[nodes])
+        return Sample(values, expected, _at_nodes(nodes))
 
     return sample
 
@@ -150,48 +180,62 @@ def nodal_stress(solution: Solution, _: None, reference: Reference) -> Sample:
     nodes = _nodes(solution)
     values = solution.nodal_normal_stress[nodes]
     if isinstance(reference, ExactValues):
-        return _at_nodes(nodes, values, reference.stress_along_contact(nodes))
-    return _at_nodes(nodes, values, evaluate(reference, solution.mesh.points[nodes]))
+        expected = reference.stress_along_contact(nodes)
+    else:
+        expected = evaluate(reference, solution.mesh.points[nodes])
+    return Sample(values, expected, _at_nodes(nodes))
 
 
 def displacement(solution: Solution, _: None, reference: Reference) -> Sample:
     """All components at all nodes."""
     nodes, axes = _nodes(solution), "xyz"[: solution.displacement.shape[1]]
-    if isinstance(reference, ExactValues):
-        expected = dict(zip(axes, reference.displacement(nodes).T, strict=True))
-    else:
-        given = dict(zip(axes, reference, strict=True))
-        expected = _evaluated(solution, nodes, given)
-    return _by_component(nodes, solution.displacement, axes, expected)
+    values, points = solution.displacement[nodes], solution.mesh.points[nodes]
+    return by_component(
+        values, points, axes, reference, lambda: reference.displacement(nodes), _at_nodes(nodes)
+    )
 
 
 def stress_components(solution: Solution, _: None, reference: Reference) -> Sample:
     """The given components at all nodes."""
     nodes = _nodes(solution)
-    if isinstance(reference, ExactValues):
-        expected = dict(zip(COMPONENTS, reference.stress(nodes).T, strict=True))
-    else:
-        expected = _evaluated(solution, nodes, reference)
-    return _by_component(nodes, solution.stress, COMPONENTS, expected)
+    values, points = solution.stress[nodes], solution.mesh.points[nodes]
+    return by_component(
+        values, points, COMPONENTS, reference, lambda: reference.stress(nodes), _at_nodes(nodes)
+    )
 
 
 def integration_stress(solution: Solution, _: None, reference: Reference) -> Sample:
     """The given components at the integration points of all cells, by Hooke's law.
 
     They follow from the displacement, less initial strains, without extrapolation to nodes and
-    averages.
+    averages. The sample has what decides a check: of each chunk of cells the extreme values, and
+    the largest reference and deviation.
     """
-    place, stress, node, cell = (np.concatenate(c) for c in zip(*_by_hooke(solution), strict=True))
-    if isinstance(reference, ExactValues):
-        exact = reference.exact.stress(place, reference.part[node])
-        expected = dict(zip(COMPONENTS, exact.T, strict=True))
-    else:
-        expected = {name: evaluate(value, place) for name, value in reference.items()}
-    listed, count = list(expected), len(place)
+    names = COMPONENTS if isinstance(reference, ExactValues) else tuple(reference)
+
+    def decisive(chunk: tuple[np.ndarray, ...]) -> list[tuple[np.ndarray, ...]]:
+        place, stress, node, cell = chunk
+        if isinstance(reference, ExactValues):
+            expected = reference.exact.stress(place, reference.part[node]).T
+        else:
+            expected = np.stack([evaluate(reference[name], place) for name in names])
+        found: list[tuple[np.ndarray, ...]] = []
+        for name, wanted in zip(names, expected, strict=True):
+            values = stress[:, COMPONENTS.index(name)]
+            worst = np.abs(values - wanted).argmax(), np.abs(wanted).argmax()
+            kept = np.unique([values.argmin(), values.argmax(), *worst])
+            found.append((values[kept], wanted[kept], cell[kept]))
+        return found
+
+    by_name = zip(*map(decisive, _by_hooke(solution)), strict=True)
+    listed = [
+        (name, *found) for name, chunks in zip(names, by_name, strict=True) for found in chunks
+    ]
+    places = [(cell, name) for name, _, _, cells in listed for cell in cells]
     return Sample(
-        np.concatenate([stress[:, COMPONENTS.index(name)] for name in listed]),
-        np.concatenate([expected[name] for name in listed]),
-        lambda i: f"cell {cell[i % count]} ({listed[i // count]})",
+        np.concatenate([values for _, values, _, _ in listed]),
+        np.concatenate([expected for _, _, expected, _ in listed]),
+        lambda i: "cell {} ({})".format(*places[i]),
     )
 
 
@@ -200,41 +244,47 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
 
     Place (k, dim), stress (k, 6), and of the cell: its first node (k,) and its number (k,).
     """
-    points, moving, first = solution.mesh.points, deformable(solution), 0
+    moving, first = deformable(solution), 0
     for i, (block, elastic) in enumerate(
         zip(solution.mesh.cells, _materials(solution), strict=True)
     ):
         kind = cell_type(block.type)
-        reference, _ = volume_rule(kind.name)
-        values = shape_functions(kind.name).values(reference)
-        mixed = solution.mean_stress.get(kind.name)
         chosen = np.flatnonzero(moving[block.data].all(axis=1))
-        step = max(1, _CHUNK // (len(reference) * kind.n_nodes * kind.dim))
-        for part in np.split(chosen, range(step, len(chosen), step)):
-            cells = block.data[part]
-            gradient, _ = physical_gradients(points, cells, kind, reference)
-            nodal = solution.displacement[cells]
-            slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ gradient
-            if solution.case.axisymmetric:
-                hoop, _ = hoop_values(points, cells, kind, reference)
-                slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
-            dim, place = slope.shape[-1], (values @ points[cells]).reshape(-1, kind.dim)
-            lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
-            initial = _initial_strain(solution, i, part, place).reshape(*slope.shape[:2], 6)
-            mean = lame * (np.einsum("cqii->cq", slope) - initial[..., :3].sum(axis=-1))
-            if mixed is not None:
-                own = mixed[part] @ values.T
-                mean = np.where(np.isnan(own), mean, own)
-            tensor = np.zeros((*mean.shape, 3, 3))
-            tensor[..., :dim, :dim] = slope + np.swapaxes(slope, 2, 3)
-            tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
-            if solution.case.thin:
-                tensor[..., 2, 2] = 0.0
-            stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
-            stress = (stress - 2 * shear[..., None] * initial).reshape(-1, 6)
-            owners = (np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
-            yield place, stress, *owners
+        step = max(1, _CHUNK // (len(volume_rule(kind.name)[1]) * kind.n_nodes * kind.dim))
+        parts = [chosen[start : start + step] for start in range(0, len(chosen), step)]
+        yield from ahead(partial(_hooke_in, solution, i, elastic, first), parts)
         first += len(block.data)
+
+
+def _hooke_in(
+    solution: Solution, block: int, elastic: np.ndarray, first: int, part: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """See `_by_hooke`: a part of the cells of a block, its first cell numbered `first`."""
+    points, kind = solution.mesh.points, cell_type(solution.mesh.cells[block].type)
+    reference, _ = volume_rule(kind.name)
+    values = shape_functions(kind.name).values(reference)
+    cells = solution.mesh.cells[block].data[part]
+    gradient, _ = physical_gradients(points, cells, kind, reference)
+    nodal = solution.displacement[cells]
+    slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ gradient
+    if solution.case.axisymmetric:
+        hoop, _ = hoop_values(points, cells, kind, reference)
+        slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
+    dim, place = slope.shape[-1], (values @ points[cells]).reshape(-1, kind.dim)
+    lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
+    initial = _initial_strain(solution, block, part, place).reshape(*slope.shape[:2], 6)
+    mean = lame * (np.einsum("cqii->cq", slope) - initial[..., :3].sum(axis=-1))
+    if (mixed := solution.mean_stress.get(kind.name)) is not None:
+        own = mixed[part] @ values.T
+        mean = np.where(np.isnan(own), mean, own)
+    tensor = np.zeros((*mean.shape, 3, 3))
+    tensor[..., :dim, :dim] = slope + np.swapaxes(slope, 2, 3)
+    tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
+    if solution.case.thin:
+        tensor[..., 2, 2] = 0.0
+    stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    stress = (stress - 2 * shear[..., None] * initial).reshape(-1, 6)
+    return place, stress, *(np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
 
 
 def _initial_strain(
@@ -260,25 +310,6 @@ def _materials(solution: Solution) -> list[np.ndarray]:
         for values, members in zip(found, solution.mesh.cell_sets[group], strict=True):
             values[np.asarray(members, dtype=int)] = given[group].young, given[group].poisson
     return found
-
-
-def _evaluated(
-    solution: Solution, nodes: np.ndarray, given: Mapping[str, Any]
-) -> dict[str, np.ndarray]:
-    points = solution.mesh.points[nodes]
-    return {name: evaluate(value, points) for name, value in given.items()}
-
-
-def _by_component(
-    nodes: np.ndarray, values: np.ndarray, names: Sequence[str], expected: Mapping[str, np.ndarray]
-) -> Sample:
-    """The expected components of a nodal field one after the other: all on one scale."""
-    listed = list(expected)
-    return Sample(
-        np.concatenate([values[nodes, names.index(name)] for name in listed]),
-        np.concatenate([expected[name] for name in listed]),
-        lambda i: f"node {nodes[i % len(nodes)]} ({listed[i // len(nodes)]})",
-    )
 
 
 def norm(name: str) -> Sampler:

@@ -267,7 +267,7 @@ class Verdict:
 
     def plain(self) -> dict[str, Any]:
         """The verdict as plain values for strict JSON, with its digest."""
-        content = _strict(asdict(self))
+        content = msgspec.json.decode(_encoded(asdict(self)))
         return content | {_DIGEST: _digest(content)}
 
 
@@ -298,13 +298,13 @@ def unbound(verdict: Verdict, path: Path) -> str:
     """
     *_, root, family, job = ("", "", *path.absolute().parts[:-1])
     if root == "results" and (family, job) != (verdict.family, verdict.job):
-        return f"the verdict is that of {verdict.family}/{verdict.job}"
+        return f"the verdict belongs to {verdict.family}/{verdict.job}"
     if verdict.result is not None:
         seal = seal_of(path.parent / verdict.result)
         if not seal:
             return f"the result {verdict.result} is missing or damaged"
         if seal != verdict.result_sha256:
-            return f"the result {verdict.result} is that of another solve"
+            return f"the result {verdict.result} belongs to another solve"
     return ""
 
 
@@ -329,7 +329,17 @@ def _without_nulls(value: Any) -> Any:
 
 def to_json(content: Any) -> str:
     """Strict JSON of plain values, arrays and numbers; numbers that are not finite become null."""
-    return json.dumps(_strict(content), indent=1, ensure_ascii=False, allow_nan=False)
+    return msgspec.json.format(_encoded(content), indent=1).decode()
+
+
+def _encoded(content: Any) -> bytes:
+    return msgspec.json.encode(content, enc_hook=_of_numpy)
+
+
+def _of_numpy(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no place in JSON")
 
 
 def _damaged(path: Path, why: str) -> InputError:
@@ -340,17 +350,3 @@ def _digest(content: Mapping[str, Any]) -> str:
     """The hash of plain values, whatever the order of their keys."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _strict(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _strict(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return _strict(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_strict(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -125,7 +125,7 @@ FAULTS = {
     "deformed": (
         lambda a: a.changed(points=a.points + a.displacement),
         2,
-        "coordinates are those of the deformed mesh",
+        "coordinates belong to the deformed mesh",
     ),
     "longer": (lambda a: a.changed(points=a.points * [1.3, 1]), 2, "the case is from (0, -50)"),
     "a node without a value": (
@@ -239,7 +239,7 @@ def test_another_load_factor_is_refused():
     mesh, case = results.mesh_and_case("ssnp170/a")
     answer = results.patch()
     given = Field(places=answer.points, values=answer.displacement)
-    with pytest.raises(InputError, match=r"step = 0\.5: the result must be that of load factor 1"):
+    with pytest.raises(InputError, match=r"step = 0\.5: the result must belong to load factor 1"):
         check_foreign(case, foreign(displacement=given, step=0.5), mesh)
     with pytest.raises(InputError, match="the result gives nothing to check"):
         check_foreign(case, foreign(), mesh)

@@ -80,8 +80,17 @@ def test_plot(tmp_path, capsys):
     assert "<svg" in (tmp_path / "r.svg").read_text()
     assert main(["plot", str(file), "--profile", "-o", str(tmp_path / "p.png")]) == 0
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["plot", str(file), "-o", str(tmp_path / "p.html")]) == 0
+    page = (tmp_path / "p.html").read_text()
+    assert "<svg" in page
+    assert 'surfaces(...["two-blocks",' in page
+    assert 'data-surfaces="two-blocks"' in page
+    assert "src=" not in page, "it stands alone"
+    assert main(["plot", str(file), "--profile", "-o", str(tmp_path / "q.html")]) == 2
     assert main(["plot", str(file), "-o", str(tmp_path / "p.gif")]) == 2
-    assert capsys.readouterr().err.endswith("output = '.gif': allowed: .svg, .png\n")
+    assert capsys.readouterr().err.endswith(
+        "output = '.gif': allowed: .svg, .png, .html (without --profile)\n"
+    )
 
 
 def test_list(capsys):

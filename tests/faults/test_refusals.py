@@ -1,4 +1,4 @@
-"""The page of refusals is that of the sources; and refusals that no other test meets."""
+"""The page of refusals follows from the sources; and refusals that no other test meets."""
 
 import re
 from types import SimpleNamespace

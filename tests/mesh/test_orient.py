@@ -6,6 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import solver.mesh.orient
+import solver.system.threads
 from solver.mesh.catalogue import BY_NAME
 from solver.mesh.orient import right_side_out, vertex_jacobians
 from solver.mesh.tidy import tidy
@@ -53,6 +55,20 @@ def test_orientation_does_not_depend_on_size_or_aspect(name, size, stretch, seed
     assert not bad.any()
     is_turned = (turned != nodes).any()
     assert is_turned == (np.linalg.det(rotation) < 0)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("many", [1, 3, 100])
+def test_cells_in_parts_are_judged_as_one_by_one(monkeypatch, many, threads):
+    """Sound, mirrored and flat triangles in turn."""
+    monkeypatch.setattr(solver.mesh.orient, "_AT_ONCE", many)
+    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    points = np.array([(0, 0), (1, 0), (0, 1), (2, 0)], dtype=float)
+    cells = np.array([(0, 1, 2), (0, 2, 1), (0, 1, 3)] * 4)
+    turned, bad = right_side_out(points, cells, BY_NAME["TRIA3"])
+    assert bad.tolist() == [False, False, True] * 4
+    areas = np.linalg.det(points[turned[:, 1:]] - points[turned[:, :1]])
+    assert (areas[~bad] == 1).all()
 
 
 @pytest.mark.parametrize("name", KINDS)

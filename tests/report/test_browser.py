@@ -1,8 +1,10 @@
 """The pages in headless Chromium: narrow and wide, light and dark, with filters and links."""
 
+import re
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+import numpy as np
 import pytest
 
 from solver.report import write_report
@@ -122,3 +124,106 @@ def test_print_keeps_checks_and_provenance(pages, window):
     assert not window.run("[...document.querySelectorAll('article > details')].some((d) => d.open)")
     window.run("dispatchEvent(new Event('beforeprint'))")
     assert window.run("[...document.querySelectorAll('article > details')].every((d) => d.open)")
+
+
+CANVAS, CHOICE = (f"document.querySelector('.turned {tag}')" for tag in ("canvas", "select"))
+BOX = f"{CANVAS}.getBoundingClientRect()"
+# How many colours the result has, a sum over its pixels, and how many colours are frequent.
+SHADES = (
+    "(({width, height}, canvas) => { const size = {width, height};"
+    """
+const copy = Object.assign(document.createElement('canvas'), size);
+const brush = copy.getContext('2d'); brush.drawImage(canvas, 0, 0);
+const pixels = new Uint32Array(brush.getImageData(0, 0, copy.width, copy.height).data.buffer);
+let sum = 0; const counts = new Map();
+for (const p of pixels) { sum = (31 * sum + p) % 1000003; counts.set(p, (counts.get(p) ?? 0) + 1); }
+return [counts.size, sum, [...counts].filter(([, n]) => n > 500).length]; })"""
+    f"""(
+{CANVAS}, {CANVAS})"""
+)
+
+
+def turned(window, page, number, **look):
+    """Open a page and its result of that number in turn; whether it is drawn."""
+    window.open(page, **look)
+    window.run(f"document.querySelectorAll('[data-surfaces]')[{number}].click()")
+    window.wait("document.querySelector('.turned canvas')?.width > 100")
+    window.wait(f"{SHADES}[0] > 3")
+
+
+@pytest.mark.parametrize("number", [-1, -2], ids=["3D", "2D"])
+def test_a_result_is_turned_and_its_maps_change(pages, window, number):
+    buttons = (pages / "fam.html").read_text().count("data-surfaces=")
+    turned(window, pages / "fam.html", buttons + number)
+    first = window.run(SHADES)
+    assert first[2] >= 3, "background, slave, master"
+    window.run(f"{CANVAS}.scrollIntoView({{block: 'center'}})")
+    window.run(f"{CANVAS}.dispatchEvent(new KeyboardEvent('keydown', {{key: 'ArrowRight'}}))")
+    window.wait(f"{SHADES}[1] !== {first[1]}")
+    second = window.run(SHADES)
+    window.run(
+        """((choice) => { const error = [...choice.options].find((o) => o.text.includes('|Δu|'));
+        choice.value = error.value; choice.onchange(); })"""
+        f"({CHOICE})"
+    )
+    window.wait(f"{SHADES}[1] !== {second[1]}")
+    third = window.run(SHADES)
+    window.run(
+        """((slider) => { slider.value = slider.max; slider.oninput(); })(
+        document.querySelector('.turned input[type=range]'))"""
+    )
+    window.wait(f"{SHADES}[1] !== {third[1]}")
+    assert window.complaints() == []
+
+
+def test_pointing_at_a_face_says_its_value(pages, window):
+    turned(window, pages / "fam.html", 0)
+    window.run(f"{CANVAS}.scrollIntoView({{block: 'center'}})")
+    window.run(f"((choice) => {{ choice.value = 3; choice.onchange(); }})({CHOICE})")
+    assert window.run("document.querySelector('.turned select').selectedOptions[0].text") == (
+        "displacement |u|"
+    )
+    x, y = window.run(f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])({BOX})")
+    found = []
+    for step in range(-100, 101, 20):
+        window.point(x, y + step)
+        found.append(window.run("document.querySelector('.turned output').innerText"))
+    values = [
+        re.fullmatch(r"(\w+): displacement \|u\| = (\S+), at \((\S+), (\S+)\)", t) for t in found
+    ]
+    assert {m[1] for m in values if m} == {"bottom", "top"}
+    for m in filter(None, values):
+        at_x, at_y = float(m[3]), float(m[4])
+        # Linear between the corners of triangles; the height of the root is less than 1 % of it.
+        assert float(m[2]) == pytest.approx(
+            np.hypot(0.004875 * at_x, 0.011375 * (at_y + 50)), rel=0.15
+        )
+
+
+@pytest.mark.parametrize(("width", "dark"), [(390, True), (1280, False), (1600, False)])
+def test_a_turned_result_fits_every_width(pages, window, width, dark):
+    turned(window, pages / "fam.html", 0, width=width, dark=dark)
+    assert window.run("document.documentElement.scrollWidth <= innerWidth")
+    box = window.run(f"(({{width, height}}) => [width, height])({BOX})")
+    assert 250 < box[0] <= width
+    assert window.complaints() == []
+
+
+def test_one_result_is_open_at_a_time(pages, window):
+    buttons = "document.querySelectorAll('[data-surfaces]')"
+    turned(window, pages / "fam.html", 0)
+    whole = window.run(f"{buttons}.length")
+    window.run(f"{buttons}[0].click()")
+    window.wait(
+        f"document.querySelectorAll('.turned').length === 1 && {buttons}.length === {whole}"
+    )
+    window.wait(f"{SHADES}[0] > 3")
+    assert window.complaints() == []
+
+
+def test_without_javascript_there_is_the_picture(pages):
+    text = (pages / "fam.html").read_text()
+    assert text.count("<img class=mesh") == text.count("data-surfaces=") > 1
+    assert all("hidden" in part[:120] for part in text.split("data-surfaces=")[1:])
+    files = [path for path in pages.glob("pictures/*.js") if path.name in text]
+    assert len(files) == 2

@@ -46,8 +46,9 @@ def chart():
 def test_a_chart_is_its_records():
     spec = chart().spec
     assert spec["data"]["values"] == RECORDS
-    marks = spec["layer"][-1]["encoding"]
-    assert marks["color"]["scale"] == {"domain": list(LOOKS), "range": [BLUE, ORANGE]}
+    series = spec["layer"][-1]
+    assert series["encoding"]["color"]["scale"] == {"domain": list(LOOKS), "range": [BLUE, ORANGE]}
+    marks = series["layer"][-1]["encoding"]
     assert [t["title"] for t in marks["tooltip"]] == ["series", "size", "error", "cells"]
     assert [t["type"] for t in marks["tooltip"]] == ["nominal", *["quantitative"] * 2, "nominal"]
     assert marks["href"] == {"field": "url"}
@@ -55,7 +56,10 @@ def test_a_chart_is_its_records():
 
 def test_a_page_holds_the_specification_and_says_what_it_needs():
     html = str(chart().__html__())
-    assert specifications(html) == {"a": json.loads(json.dumps(chart().spec))}
+    seven = json.loads(
+        json.dumps(chart().spec), parse_float=lambda digits: float(f"{float(digits):.7g}")
+    )
+    assert specifications(html) == {"a": seven}
     assert f"needs JavaScript and the file {SCRIPT} beside this page" in html
 
 

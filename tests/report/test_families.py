@@ -1,4 +1,4 @@
-"""The page of a family: what its file tells, and kinds of reference that are kept apart."""
+"""The page of a family: what its file says, and kinds of reference that are kept apart."""
 
 import json
 import re
@@ -228,7 +228,7 @@ def drawn(solution, along=None):
     found = {}
     for record in chart.spec["data"]["values"]:
         found.setdefault(record["series"], []).append(record)
-    views = [view["layer"][-1]["encoding"] for view in chart.spec["vconcat"]]
+    views = [view["encoding"] for view in chart.spec["vconcat"]]
     return found, [view["y"]["title"] for view in views], views[0]["x"]["title"]
 
 

@@ -191,8 +191,9 @@ def test_pages_ask_for_nothing_from_outside(report, name):
     folder, _ = report
     page = Page(folder / name)
     assert not {"link", "iframe", "object"} & set(page.tags)
-    # Our own, the script of the charts with a chart, and nothing that a verdict brought in.
-    assert page.tags.count("script") == 3
+    # Our own, the script of the charts with a chart, that of results to turn on the page of a
+    # family, and nothing that a verdict brought in.
+    assert page.tags.count("script") == 3 + (name == "fam.html")
     for source in (v for key, v in page.values if key == "src"):
         assert (folder / unquote(source)).is_file()
     links = [v for key, v in page.values if key in ("href", "xlink:href")]
@@ -303,8 +304,8 @@ def test_exchanged_verdicts_are_found_out(tmp_path):
     write_report([one, two], tmp_path / "report")
     failures = (tmp_path / "report" / "failures.txt").read_text()
     assert failures == (
-        "fam-a: crashed: the verdict is that of fam/fam-b; solve again\n"
-        "fam-b: crashed: the verdict is that of fam/fam-a; solve again\n"
+        "fam-a: crashed: the verdict belongs to fam/fam-b; solve again\n"
+        "fam-b: crashed: the verdict belongs to fam/fam-a; solve again\n"
     )
 
 

@@ -41,7 +41,7 @@ def test_round_off_of_curved_faces_stays_round_off(swapped):
 def error_over_estimate(sweep, mesh, value, young=2000.0, refine=1, state="compression"):
     """The largest error of pressure and stress over the estimate, in a uniform state.
 
-    `young` is the modulus of the lower body, whose stress state is that of the upper one.
+    `young` is the modulus of the lower body, whose stress state is the upper one's.
     """
     case = read_sweep(SWEEPS / f"{sweep}.yaml").case(mesh, value)
     lower = "bottom" if "bottom" in case.materials else "all"

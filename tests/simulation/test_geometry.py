@@ -6,13 +6,12 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.case.reader import parse_case
 from solver.mechanics.mortar.facets import facets
 from solver.mesh.catalogue import BY_NAME
 from solver.mesh.tidy import tidy
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError, SolveError
-from tests.scenes import PRESSURE, block_case, block_mesh, with_points
+from tests.scenes import PRESSURE, block_mesh, changed_case, with_points
 
 
 @pytest.fixture
@@ -23,12 +22,7 @@ def mesh():
 
 def solved(mesh, *changes):
     """The patch test, its case text changed; the mesh as a file would give it."""
-    case = block_case(2)
-    source = case.source
-    for old, new in changes:
-        assert old in source
-        source = source.replace(old, new)
-    return simulate(parse_case(source, case.path), tidy(mesh, "mesh"))
+    return simulate(changed_case(2, *changes), tidy(mesh, "mesh"))
 
 
 def rebuilt(mesh, points=None, quads=None, groups=None):
@@ -191,7 +185,7 @@ def test_handled(change, mesh):
 
 
 def test_a_support_on_the_master_surface_takes_the_load(mesh):
-    """The upper block hangs on it, so that nothing reaches the interface; and the plan tells."""
+    """The upper block hangs on it, so that nothing reaches the interface; and the plan says so."""
     held = [("loads:", "  - {group: top_contact, fix: [y]}\nloads:")]
     zone = solved(mesh, *held).zones[0]
     np.testing.assert_allclose(zone.multiplier, 0, atol=1e-9 * PRESSURE)

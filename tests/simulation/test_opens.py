@@ -120,7 +120,7 @@ def test_without_units_there_are_none(tmp_path):
 def test_pictures_have_units(tmp_path):
     plane, solid = (labelled(make(tmp_path)) for make in (handmade.plane, handmade.solid))
     view = draw_profile(plane, plane.zones[0], "p", "").spec["vconcat"][0]
-    channels = view["layer"][0]["encoding"]
+    channels = view["encoding"]
     assert channels["y"]["title"] == "contact pressure [N/mm²]"
     assert channels["x"]["title"] == "x [mm]"
     plan = draw_space(solid, "")

@@ -25,7 +25,7 @@ reference:
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("pair", [("TRIA3", "QUAD8"), ("QUAD9", "TRIA6"), ("QUAD4", "QUAD4")])
 def test_patch(pair, swapped):
-    """ε = −p/E along the load, ν p/E across it; no stress but that of the load."""
+    """ε = −p/E along the load, ν p/E across it; no stress but the load's."""
     found = simulate(changed_case(2, THIN).as_solved(swapped), block_mesh(*pair, (4, 3)))
     x = found.mesh.points
     exact = np.c_[POISSON * x[:, 0], -(x[:, 1] + 1)] * PRESSURE / YOUNG
@@ -57,7 +57,7 @@ def test_equivalent_constants_keep_the_moduli_of_plane_stress():
 
 
 def test_a_press_fit_of_thin_rings():
-    """p = E δ (b² − a²)(c² − b²)/(2 b³ (c² − a²)): that of hubs with free ends."""
+    """p = E δ (b² − a²)(c² − b²)/(2 b³ (c² − a²)), for hubs with free ends."""
     steel = Material(200000.0, 0.3).in_plane_stress()
     rings = NestedCylinders(radii=(10.0, 20.0, 30.0), inner=steel, outer=steel, interference=0.0025)
     x = np.array([[20.0, 0.0]])

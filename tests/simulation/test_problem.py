@@ -203,7 +203,7 @@ def test_a_further_load_is_solved_with_the_status_kept(bent):
 
 
 def test_what_gaps_bring_up_is_what_opening_takes_away(bent):
-    """Forces |T| p = W ḡ + q of the state, with q those of all macro-elements closed."""
+    """Forces |T| p = W ḡ + q of the state, with q for all macro-elements closed."""
     assembled, state = bent
     area = assembled.constraints.covered
     stiffness = assembled._gap_stiffness(1.0)

@@ -192,7 +192,7 @@ def test_sweeps_converge(monkeypatch, bottom, top, form, n, bound):
 
 
 def test_a_wrong_sign_of_the_loads_shows(monkeypatch):
-    """The correction pushes the wrong way: the error is that of the constants and more."""
+    """The correction pushes the wrong way: the error is larger than the constants'."""
     right = error("QUAD8", "TRIA6", 20, "linear")
     true = Recovery.__init__
 

@@ -49,7 +49,7 @@ def test_zones_of_few_faces(faces, form):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_much_coarser_master(form):
-    """Four faces over forty: the error is that of the master, and recovery adds nothing to it."""
+    """Four faces over forty: the error is the master's, and recovery adds nothing to it."""
 
     def found(form):
         case = waves("QUAD8", "TRIA6", 40, form)

@@ -16,7 +16,7 @@ from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
-from tests.scenes import block_mesh
+from tests.scenes import block_mesh, replaced
 
 YOUNG, POISSON = 2000.0, 0.3
 # Two blocks between a plane below and one above: y, or z, from −1 to 1.
@@ -38,23 +38,18 @@ STIFF = YOUNG / (1 - POISSON**2)
 
 
 def case(*changes, text=CASE):
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return parse_case(text, Path("rigid.yaml"))
+    return parse_case(replaced(text, *changes), Path("rigid.yaml"))
 
 
 def in_space(text=CASE):
-    for old, new in (
+    return replaced(
+        text,
         ("plane: strain\n", ""),
         ("[0.3, -1], normal: [0, 2]", "[0.3, 0, -1], normal: [0, 0, 2]"),
         ("[3, 1], normal: [0, -1]", "[3, 2, 1], normal: [0, 0, -1]"),
         ("reference: [3, 1], move: {y:", "reference: [3, 2, 1], move: {z:"),
         ("[{group: symx, fix: [x]}]", "[{group: symx, fix: [x]}, {group: symy, fix: [y]}]"),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    return text
+    )
 
 
 def around(text=CASE):

@@ -15,7 +15,7 @@ from solver.studies.infsup.constant import inf_sup_constant
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
 from tests.faults.mutants import CASES
-from tests.scenes import block_mesh, changed_case
+from tests.scenes import block_mesh, changed_case, solved
 
 CORNER = (CASES / "shared/corner-quad4-tria6.yaml").read_text(encoding="utf-8")
 CHAIN = """\
@@ -48,11 +48,6 @@ contact:
 """
 
 
-def solved(text, swap=False, recovery=None):
-    case = parse_case(text, Path("shared.yaml")).as_solved(swap, None, recovery)
-    return simulate(case, mesh_of(case))
-
-
 def exact_at_the_corner(solution, allowed=1e-13):
     for zone, pressure in zip(solution.zones, (25.0, 10.0), strict=True):
         assert np.abs(zone.multiplier / pressure - 1).max() < allowed
@@ -67,7 +62,7 @@ def test_corner_with_other_treatments(treatment, swap):
     for name in ("under}", "side}"):
         text = text.replace(f"master: {name}", f"master: {name[:-1]}, treatment: {treatment}}}")
     assert text.count(treatment) == 2
-    exact_at_the_corner(solved(text, swap), 1e-12)
+    exact_at_the_corner(solved(text, swapped=swap), 1e-12)
 
 
 @pytest.mark.parametrize("recovery", ["linear", "quadratic", "smooth"])
@@ -98,7 +93,7 @@ def at_the_corner(n, treatment):
 
 
 def test_the_inf_sup_constant_at_a_corner():
-    """It is that of one zone, and levels off; without the cut it halves with the mesh."""
+    """It equals one zone's, and levels off; without the cut it halves with the mesh."""
     assert [at_the_corner(n, "lac") for n in (4, 8)] == pytest.approx([0.594, 0.579], abs=1e-3)
     coarse, fine = (at_the_corner(n, "uncut") for n in (4, 8))
     assert fine / coarse == pytest.approx(0.5, abs=0.02)
@@ -126,7 +121,7 @@ def mean_gaps(solution):
 @pytest.mark.parametrize("swap", [False, True])
 def test_a_face_that_is_slave_in_one_zone_and_master_in_another(swap):
     """The middle face of the base lies under both blocks: σ_yy = −25, no strain along x."""
-    solution = solved(CHAIN.replace("PRESSURE", "25.0"), swap)
+    solution = solved(CHAIN.replace("PRESSURE", "25.0"), swapped=swap)
     for zone in solution.zones[:2]:
         pressed = zone.coverage > 0.01
         assert np.abs(zone.multiplier[pressed] / 25 - 1).max() < 1e-12

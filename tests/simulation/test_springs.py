@@ -3,34 +3,27 @@
 E = 2000, ν = 0.3; the pressure 25 acts downwards on the upper one.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from solver.case.reader import parse_case
 from solver.mechanics.fem.springs import foundation
-from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
-from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh
+from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, solved
 
 STIFF = 40.0
 CASE = """\
 name: spring
-mesh: {recipe: blocks, size: 1.0}
+mesh:
+  recipe: blocks
+  size: 1.0
+  bottom: {cells: QUAD8, divisions: 2}
+  top: {cells: TRIA3, divisions: 3}
 plane: strain
 materials: {all: {young: 2000.0, poisson: 0.3}}
 supports: [{group: base, spring: {normal: 40.0}}, {group: symx, fix: [x]}]
 loads: [{group: press, pressure: 25.0}]
 contact: [{slave: bottom_contact, master: top_contact}]
 """
-
-
-def solved(text, mesh=None, swapped=False):
-    case = parse_case(text, Path("spring.yaml")).as_solved(swapped)
-    solution = simulate(case, mesh or block_mesh("QUAD8", "TRIA3", (2, 3)))
-    assert max(solution.balance.values()) < 1e-12
-    return solution
 
 
 def assert_stands(solution, sunk, lateral=POISSON * (1 + POISSON), axial=1 - POISSON**2):

@@ -1,17 +1,17 @@
 """Nodes that move as one: an eccentric force on them is the uniform state."""
 
-from pathlib import Path
-
 import pytest
 
-from solver.case.reader import parse_case
-from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
-from tests.scenes import block_mesh, errors
+from tests.scenes import block_mesh, errors, solved
 
 CASE = """\
 name: platen
-mesh: {recipe: blocks, size: 1.0}
+mesh:
+  recipe: blocks
+  size: 1.0
+  bottom: {cells: QUAD8, divisions: 3}
+  top: {cells: TRIA6, divisions: 2}
 plane: strain
 materials: {all: {young: 2000.0, poisson: 0.3}}
 supports:
@@ -21,13 +21,6 @@ supports:
 loads: [{at: [1, 1], force: [0, -25.0]}]
 contact: [{slave: bottom_contact, master: top_contact}]
 """
-
-
-def solved(text, mesh=None, swapped=False):
-    case = parse_case(text, Path("platen.yaml")).as_solved(swapped)
-    solution = simulate(case, mesh or block_mesh("QUAD8", "TRIA6", (3, 2)))
-    assert max(solution.balance.values()) < 1e-12
-    return solution
 
 
 @pytest.mark.parametrize("swapped", [False, True])

@@ -15,7 +15,7 @@ from solver.simulation.simulate import simulate
 from solver.simulation.unloaded import without_unloaded
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
-from tests.scenes import PRESSURE, block_mesh
+from tests.scenes import PRESSURE, block_mesh, replaced
 
 SOLVE_ALL = Options(Shortcuts(unloaded=False))
 CASES = Path(__file__).parents[2] / "cases"
@@ -74,11 +74,8 @@ def mesh():
 
 
 def solved(mesh, *changes, **options):
-    text = SCENE
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return simulate(parse_case(text, Path("beside.yaml")), mesh, **options)
+    case = parse_case(replaced(SCENE, *changes), Path("beside.yaml"))
+    return simulate(case, mesh, **options)
 
 
 def told(solution, skip):

@@ -1,18 +1,14 @@
 """What a solve takes for granted: slip, overlap and covered parts by hand, and the verdict."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from solver.case.reader import parse_case
 from solver.mechanics.mortar.overlap import inside_others
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation import validity
-from solver.simulation.simulate import simulate
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
-from solver.verification.run import mesh_of
+from tests import scenes
 
 # Two blocks with ν = 0, of width 1.5 and WIDE; the upper one is pushed along both axes.
 CASE = """\
@@ -46,8 +42,7 @@ SLIDING = {"LOW": "0", "HIGH": "1", "WIDE": "1.5", "DOWN": "-0.001"}
 def solved(text=CASE, **values):
     for name, value in (SLIDING | values).items():
         text = text.replace(name, value)
-    case = parse_case(text, Path("pushed.yaml"))
-    return simulate(case, mesh_of(case))
+    return scenes.solved(text)
 
 
 def lines(solution):

@@ -1,4 +1,4 @@
-"""What a solve tells while it works: lines with the time, where somebody may read them."""
+"""What a solve reports while it works: lines with the time, where somebody may read them."""
 
 import logging
 import re

@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import solver.system.threads
+import solver.verification.samples
 from solver.case.rules import ERRORS
 from solver.verification.checks import CHECKS, Accepted, block_size, run_checks
 from tests.handmade import PLANE, plane
@@ -33,6 +35,23 @@ def test_the_exact_state_passes_every_check_of_the_table(solution):
     assert len(named) > 15
     assert all(check.passed for check in checks)
     assert max(check.error for check in checks) < 1e-14
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("node", [0, 7, 20])
+@pytest.mark.parametrize("value", [-0.3, 0.3, float("nan")])
+def test_stress_of_cells_in_parts_is_judged_as_in_one(solution, monkeypatch, value, node, threads):
+    """The same extremes and the same worst place, wherever the parts of the cells begin."""
+    solution.displacement[node] += value
+    whole = by_name(solution)["integration_stress"]
+    assert not whole.passed
+    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    monkeypatch.setattr(solver.verification.samples, "_CHUNK", 1)
+    parts = by_name(solution)["integration_stress"]
+    assert parts.where == whole.where
+    for name in ("minimum", "maximum", "value", "reference", "scale", "error"):
+        ours, theirs = getattr(parts, name), getattr(whole, name)
+        assert ours == pytest.approx(theirs, rel=1e-13, nan_ok=True)
 
 
 def test_the_contracts_names_and_default_tolerances(solution):

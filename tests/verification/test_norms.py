@@ -6,6 +6,8 @@ import meshio
 import numpy as np
 import pytest
 
+import solver.system.threads
+import solver.verification.norms
 from solver.case.material import Material
 from solver.case.model import Rigid
 from solver.case.solutions.catalogue import SOLUTIONS
@@ -63,6 +65,16 @@ def test_the_exact_state_has_none(handmade):
         "pressure_inner",
     }
     assert max(found.values()) < 1e-14
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_parts_and_threads_change_no_number(handmade, monkeypatch, threads):
+    handmade.displacement *= 1.0 + 0.01 * np.arange(len(handmade.displacement))[:, None]
+    whole = errors(handmade)
+    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    monkeypatch.setattr(solver.verification.norms, "_CHUNK", 1)
+    assert whole["stress_l2"] > 0.01
+    assert errors(handmade) == pytest.approx(whole, rel=1e-13)
 
 
 def test_a_share_too_much_is_that_share(handmade):

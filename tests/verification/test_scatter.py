@@ -82,7 +82,7 @@ def test_both_situations_are_unreliable_and_the_advice_helps(given):
 
 
 def test_a_tolerance_may_allow_more():
-    """A case that allows errors of the pressure of this size is not told of them."""
+    """A case that allows errors of the pressure of this size gets no warning of them."""
     case = waves(**LYING)
     case["tolerance"] = {"multiplier": 0.5}
     assert oscillating(solve_case(case).solution) == ""

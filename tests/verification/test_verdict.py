@@ -36,7 +36,7 @@ def flaw(path):
     try:
         return unbound(read_verdict(path), path)
     except InputError as error:
-        return error.told
+        return error.detail
 
 
 def verdict_of(solution, **more):
@@ -236,12 +236,12 @@ def test_a_verdict_is_bound_to_its_result_and_folder(solved, tmp_path):
     other = plane(tmp_path)
     other.zones[0].multiplier[0] = 26.0
     write_result(result, other, [], {})
-    assert flaw(solved) == "the result result.vtkhdf is that of another solve"
+    assert flaw(solved) == "the result result.vtkhdf belongs to another solve"
     result.write_bytes(whole)
     assert flaw(solved) == ""
     swapped = solved.parent.with_name("two-blocks-swapped")
     solved.parent.rename(swapped)
-    assert "the verdict is that of" in flaw(swapped / "verdict.json")
+    assert "the verdict belongs to" in flaw(swapped / "verdict.json")
 
 
 def test_the_verdict_says_where_the_reference_comes_from(tmp_path):

@@ -2,7 +2,7 @@
 
 `python -m tests.workflow.kills --count 100` strikes in a temporary copy of the project with tiny
 cases. After each kill every file under a final name has to be whole; then the same is run again,
-and all that it leaves has to equal that of a run nobody disturbed, times aside.
+and all that it leaves has to equal an undisturbed run's, times aside.
 """
 
 import argparse
@@ -198,7 +198,7 @@ def _command(process):
 
 
 def _kill(process, number):
-    """Whether there was a process to kill: one that has ended but was not waited for is none."""
+    """Whether there was a process to kill: not one that has ended but was not waited for."""
     try:
         if Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
             return False

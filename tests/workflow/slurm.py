@@ -1,4 +1,4 @@
-"""The batch on a cluster: six solves through Snakemake's SLURM executor, held against a local run.
+"""The batch on a cluster: six solves through Snakemake's SLURM executor, compared with a local run.
 
 One case is wrong on purpose. One job is cancelled each time it runs: its case has to be `crashed`
 in the report, with the reason, and the next run has to do that one alone. The cluster is this
@@ -74,7 +74,7 @@ def expect(true, otherwise):
 
 
 def compare(told, expected):
-    """Hold a verdict against that of the local run, with one thread each: to the last digit."""
+    """Compare a verdict with the local run's, with one thread each: to the last digit."""
     for key in OUTCOME:
         expect(told[key] == expected[key], f"{key}: {told[key]}, without a cluster {expected[key]}")
     largest = 0.0
@@ -127,7 +127,7 @@ def try_cluster(cluster, project, expected):
     expect(solved == [CANCELLED], again)
     for job, verdict in sorted(summary(project).items()):
         compare(verdict, expected[job])
-        print(f"{job}: {verdict['verdict']}, all values those of the local run")
+        print(f"{job}: {verdict['verdict']}, all values as in the local run")
 
 
 def main():

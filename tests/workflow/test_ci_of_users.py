@@ -46,7 +46,7 @@ def read(file):
 
 
 def github_jobs():
-    """The steps of each job, those of the project's own action in their place."""
+    """The steps of each job, the project's own action replaced by its steps."""
     own = {"./.github/actions/environment": read(ENVIRONMENT)["runs"]["steps"]}
     return {
         name: (job, [each for step in job["steps"] for each in own.get(step.get("uses"), [step])])
@@ -100,7 +100,7 @@ def test_the_studies_are_those_of_the_project():
 
 
 def run_lines(project, lines, page):
-    """The statuses of shell lines; those of the installation find everything there."""
+    """The statuses of shell lines; the installation finds everything there."""
     # Tests run by make: its level would make it tell the folders that it enters.
     left_out = ("PYTEST", "MAKELEVEL")
     environment = {k: v for k, v in os.environ.items() if not k.startswith(left_out)}

@@ -65,7 +65,7 @@ rule run_code:
         " || test -s {output:q}/verdict.json"
 
 
-# The report of all solves: our own and those of other codes.
+# The report of all solves: our own and other codes'.
 rule bench:
     input:
         codes=lambda w: foreign_runs(),

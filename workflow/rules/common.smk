@@ -24,7 +24,7 @@ for package in ("solver", "workflow.progress"):
     import_module(package)
 sys.path.sort(key=lambda folder: Path(folder) == Path(workflow.basedir))
 
-# One solve, as `python -m solver jobs` lists it. `folder`: that of its family's results.
+# One solve, as `python -m solver jobs` lists it. `folder`: of its family's results.
 FIELDS = "family case name file mesh swap hexahedra points dim refusal folder"
 Job = namedtuple("Job", FIELDS)
 # Folders of results that are no family's.
@@ -233,7 +233,7 @@ def again(folder, kept=is_kept):
     return [AGAIN] if os.path.isdir(folder) and (LOST or not kept(folder)) else []
 
 
-# The wildcards stand for names that exist: no recursion is to be detected in a name that ends in
+# The wildcards match names that exist: no recursion is to be detected in a name that ends in
 # twenty zeros. This is for such names alone, not for time.
 snakemake.dag.PeriodicityDetector = lambda: type(
     "Never", (), {"is_periodic": lambda *_: None}

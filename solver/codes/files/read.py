@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -56,19 +57,19 @@ def read_result_files(
                 continue
             if quantity in found:
                 raise InputError(file, quantity, None, "is in another file of the result too")
-            found[quantity] = field if raw.mesh is mesh else _unnumbered(field)
+            found[quantity] = field if raw.mesh is mesh else replace(field, nodes=None)
     if not found:
         there = ", ".join(sorted({name for _, raw in raws for name in raw.fields})) or "none"
         allowed = f"none is known as {', '.join(QUANTITIES)}; fields: {there}; see --map"
         raise InputError(files[0], "fields", None, allowed)
-    told = next((raw.code for _, raw in raws if raw.code), "")
-    code = code or mapping.code or told or "other"
+    stated = next((raw.code for _, raw in raws if raw.code), "")
+    code = code or mapping.code or stated or "other"
     if not re.fullmatch(CODE, code):
         raise InputError("command line", "--code", code, "must be letters, digits, -, _ and .")
     return ForeignResult(
         code=code,
         version=mapping.version or next((raw.version for _, raw in raws if raw.version), ""),
-        mesh=mesh and _scaled(mesh, mapping.length),
+        mesh=mesh and meshio.Mesh(mesh.points * mapping.length, mesh.cells),
         step=mapping.step,
         digits=min((raw.digits for _, raw in raws if raw.digits), default=None),
         settings=mapping.settings,
@@ -93,10 +94,10 @@ def read_raw(path: Path, columns: Sequence[str] = ()) -> Raw:
 
 def _field(file: Path, raw: Raw, quantity: str, mapping: ResultMap, where: object) -> Field | None:
     """A quantity of one file in the units of the case; None where it has none."""
-    told: FieldMap | None = getattr(mapping.fields, quantity)
+    given: FieldMap | None = getattr(mapping.fields, quantity)
     found: names.Found | None
-    if told is not None:
-        found = _mapped(raw, told, quantity, where)
+    if given is not None:
+        found = _mapped(raw, given, quantity, where)
     else:
         candidates = names.known(raw, quantity)
         if len(candidates) > 1:
@@ -117,12 +118,12 @@ def _field(file: Path, raw: Raw, quantity: str, mapping: ResultMap, where: objec
     )
 
 
-def _mapped(raw: Raw, told: FieldMap, quantity: str, where: object) -> names.Found:
+def _mapped(raw: Raw, given: FieldMap, quantity: str, where: object) -> names.Found:
     """The fields that the map names."""
-    fields = names.named(raw, told.names, where, f"fields.{quantity}.name")
+    fields = names.named(raw, given.names, where, f"fields.{quantity}.name")
     count = sum(field.values.shape[1] for field in fields)
     first = fields[0]
-    components = told.components or (len(fields) == 1 and first.components) or ()
+    components = given.components or (len(fields) == 1 and first.components) or ()
     if not components and quantity not in names.SCALARS:
         joined = np.concatenate([field.values for field in fields], axis=1)
         components = names.layout(quantity, first._replace(values=joined))
@@ -130,12 +131,4 @@ def _mapped(raw: Raw, told: FieldMap, quantity: str, where: object) -> names.Fou
         key = f"fields.{quantity}.components"
         problem = f"there are {count} components in the result; name each"
         raise InputError(where, key, ", ".join(components) or None, problem)
-    return names.Found(", ".join(told.names), fields, components, told.factor)
-
-
-def _unnumbered(field: Field) -> Field:
-    return Field(places=field.places, values=field.values, area=field.area)
-
-
-def _scaled(mesh: meshio.Mesh, length: float) -> meshio.Mesh:
-    return meshio.Mesh(mesh.points * length, mesh.cells)
+    return names.Found(", ".join(given.names), fields, components, given.factor)

@@ -38,10 +38,11 @@ def rigid_motions(
         fields.append(turn / np.where(size > 0, size, 1.0)[body][:, None])
     fields = fields[1:2] if axisymmetric else fields
     per_body = len(fields)
-    rows = np.tile(np.arange(n * dim), per_body)
-    columns = np.concatenate([np.repeat(body * per_body + k, dim) for k in range(per_body)])
-    values = np.concatenate([f.ravel() for f in fields])
-    return sparse.csc_matrix((values, (rows, columns)), shape=(n * dim, len(count) * per_body))
+    rows = [np.flatnonzero(field).astype(np.int32) for field in fields]
+    columns = [body[some // dim] * per_body + k for k, some in enumerate(rows)]
+    values = [field.ravel()[some] for field, some in zip(fields, rows, strict=True)]
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return sparse.csc_matrix(entries, shape=(n * dim, len(count) * per_body))
 
 
 def whole_motions(motions: sparse.csc_matrix, n_bodies: int) -> np.ndarray:

@@ -6,15 +6,17 @@ whole rings, and their third axis is the circumference, with the hoop strain u_x
 Source: Bathe, Finite Element Procedures, §5.3. Works on arrays alone.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 from scipy import sparse
 
 from ...mesh.catalogue import CellType
 from ...system.errors import SolveError
+from ...system.threads import ahead
 from . import shape_functions, volume_rule
 from .assembly import CellSum
 from .faces import circumference
@@ -23,6 +25,8 @@ from .small_matrices import invert
 # Bytes of gradients handled at once: small enough to stay in the processor's cache.
 _CHUNK_BYTES = 1 << 20
 _ALL = slice(None)
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -116,7 +120,7 @@ def with_hoop(slope: np.ndarray, strain: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class _Shapes:
+class Shapes:
     """What strains and integrals of n cells are made of at q points.
 
     `on_reference` (q, n_nodes, dim), gradients on the reference cell; `inverse` (n, q, dim, dim) of
@@ -134,6 +138,18 @@ class _Shapes:
         """Gradients (n, q, n_nodes, dim) in the cells."""
         return _physical(self.on_reference, self.inverse)
 
+    def slopes(self, apart: np.ndarray, radial: np.ndarray) -> np.ndarray:
+        """The gradients (n, q, dim, dim) of a displacement, (n, q, 3, 3) in axisymmetric cells.
+
+        `apart` (n, n_nodes, dim): its differences from one node of each cell; `radial` (n, n_nodes)
+        its first component.
+        """
+        slope = _slopes(apart, self.on_reference)
+        slope = np.einsum("cqij,cqjk->cqik", slope, self.inverse)
+        if self.hoop is None:
+            return slope
+        return with_hoop(slope, np.einsum("cqa,ca->cq", self.hoop, radial))
+
     @property
     def divergence(self) -> np.ndarray:
         """The divergence (n, q, n_nodes, dim) of each component of displacement at a node."""
@@ -144,16 +160,14 @@ class _Shapes:
         return found
 
 
-def shapes_in(
-    points: np.ndarray, block: Block, cells: np.ndarray, reference: np.ndarray
-) -> _Shapes:
+def shapes_in(points: np.ndarray, block: Block, cells: np.ndarray, reference: np.ndarray) -> Shapes:
     """The shapes of some cells (n, n_nodes) of a block at reference points (q, dim)."""
     gradients = shape_functions(block.type.name).gradients(reference)
     measure, inverse = _inverse_jacobian(points, cells, block.type, gradients)
     if not block.axisymmetric:
-        return _Shapes(gradients, inverse, measure, None)
+        return Shapes(gradients, inverse, measure, None)
     hoop, around = hoop_values(points, cells, block.type, reference)
-    return _Shapes(gradients, inverse, measure * around, hoop)
+    return Shapes(gradients, inverse, measure * around, hoop)
 
 
 def chunks(block: Block, dim: int) -> Iterator[slice]:
@@ -165,13 +179,18 @@ def chunks(block: Block, dim: int) -> Iterator[slice]:
         yield slice(start, start + step)
 
 
-def _in_the_middle(points: np.ndarray, block: Block) -> Iterator[tuple[slice, _Shapes, np.ndarray]]:
-    """Parts of a block with what is in the middle (q = 1) of their cells, and sizes (n,)."""
+def _in_the_middle(
+    points: np.ndarray, block: Block, found: Callable[[slice, Shapes, np.ndarray], Found]
+) -> Iterator[tuple[slice, Found]]:
+    """Parts of a block, and what is `found` in the middle (q = 1) of their cells of sizes (n,)."""
     reference, weights = block.rule
     middle = (weights @ reference / weights.sum())[None]
-    for part in chunks(block, points.shape[1]):
-        found = shapes_in(points, block, block.cells[part], middle)
-        yield part, found, found.measure[:, 0] * weights.sum()
+
+    def of(part: slice) -> tuple[slice, Found]:
+        shapes = shapes_in(points, block, block.cells[part], middle)
+        return part, found(part, shapes, shapes.measure[:, 0] * weights.sum())
+
+    return ahead(of, chunks(block, points.shape[1]))
 
 
 def element_matrices(points: np.ndarray, block: Block, part: slice = _ALL) -> np.ndarray:
@@ -226,29 +245,37 @@ def internal_force(
     `extended`: in extended precision, as the result is then; some fifty times slower.
     """
     n, dim = points.shape
-    points, displacement = _in_precision(points, displacement, extended)
+    points, displacement = in_precision(points, displacement, extended)
     force = np.zeros((dim, n), dtype=points.dtype)
     if not displacement.any():
         return force.T.copy()
     for block in blocks:
-        reference, weights = block.rule
-        for part in chunks(block, dim):
-            cells = block.cells[part]
-            found = shapes_in(points, block, cells, reference)
-            stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
-            stress *= (weights * found.measure)[:, :, None, None]
-            pulled = np.einsum("cqij,cqkj->ikcq", stress[..., :dim, :dim], found.inverse)
-            nodal = (pulled @ np.moveaxis(found.on_reference, 2, 0)).sum(axis=1)
-            if found.hoop is not None:
-                nodal[0] += np.einsum("cqa,cq->ca", found.hoop, stress[..., 2, 2])
+        forces = partial(_cell_forces, points, block, displacement)
+        for part, nodal in zip(chunks(block, dim), ahead(forces, chunks(block, dim)), strict=True):
             for component, added in zip(force, nodal, strict=True):
-                np.add.at(component, cells.ravel(), added.ravel())
+                np.add.at(component, block.cells[part].ravel(), added.ravel())
     return force.T.copy()
 
 
-def _in_precision(
+def _cell_forces(
+    points: np.ndarray, block: Block, displacement: np.ndarray, part: slice
+) -> np.ndarray:
+    """The forces (dim, n, n_nodes) of a displacement on the nodes of a part of a block's cells."""
+    dim, (reference, weights) = points.shape[1], block.rule
+    found = shapes_in(points, block, block.cells[part], reference)
+    stress = stress_in(found, displacement, block, part)
+    stress *= (weights * found.measure)[:, :, None, None]
+    pulled = np.einsum("cqij,cqkj->ikcq", stress[..., :dim, :dim], found.inverse)
+    nodal = (pulled @ np.moveaxis(found.on_reference, 2, 0)).sum(axis=1)
+    if found.hoop is not None:
+        nodal[0] += np.einsum("cqa,cq->ca", found.hoop, stress[..., 2, 2])
+    return np.asarray(nodal)
+
+
+def in_precision(
     points: np.ndarray, displacement: np.ndarray, extended: bool
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Both in double precision, or `extended`."""
     kind = np.longdouble if extended else float
     return np.asarray(points, dtype=kind), np.asarray(displacement, dtype=kind)
 
@@ -272,30 +299,42 @@ class Sizes:
 
 def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> Sizes:
     """Taken at the middle of each cell, from a displacement (n_nodes, dim) or several parts."""
-    force, highest, slender = np.zeros(len(points)), 0.0, 0.0
-    largest = np.zeros(len(points))
+    force, largest = np.zeros((2, len(points)))
     displacement = displacement.reshape(-1, *points.shape).sum(axis=0)
+    highest = slender = 0.0
     for block in blocks:
-        for part, found, volume in _in_the_middle(points, block):
-            cells = block.cells[part]
-            slope = np.linalg.norm(found.gradient[:, 0], axis=2)
-            nodal = displacement[cells]
-            apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
-            stiff = block.lame[part] + 2 * block.shear[part]
-            terms = stiff * np.einsum("ca,ca->c", slope, apart)
-            if found.hoop is not None:
-                around = np.abs(found.hoop[:, 0]) * np.abs(nodal[..., 0])
-                terms += stiff * around.sum(axis=1)
-            extent = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
-            nodal_force = (volume * terms)[:, None] * slope
-            np.add.at(force, cells.ravel(), nodal_force.ravel())
-            highest = max(highest, float(terms.max(initial=0.0)))
-            on_small_faces = terms * extent * slope.max(axis=1)
-            slender = max(slender, float(on_small_faces.max(initial=0.0)))
-            stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
-            norm = np.repeat(np.linalg.norm(stress, axis=(2, 3)), cells.shape[1])
-            np.maximum.at(largest, cells.ravel(), norm)
+        seen = partial(_cell_sizes, points, block, displacement)
+        for part, (forces, term, on_small_faces, norm) in _in_the_middle(points, block, seen):
+            nodes = block.cells[part].ravel()
+            np.add.at(force, nodes, forces.ravel())
+            np.maximum.at(largest, nodes, np.repeat(norm, block.type.n_nodes))
+            highest, slender = max(highest, term), max(slender, on_small_faces)
     return Sizes(forces=force, highest=highest, slender=slender, stress=largest)
+
+
+def _cell_sizes(
+    points: np.ndarray,
+    block: Block,
+    displacement: np.ndarray,
+    part: slice,
+    found: Shapes,
+    volume: np.ndarray,
+) -> tuple[np.ndarray, float, float, np.ndarray]:
+    """By cell, for `sizes`: forces (n, n_nodes), the highest and slender stress, norms (n,)."""
+    cells = block.cells[part]
+    slope = np.linalg.norm(found.gradient[:, 0], axis=2)
+    nodal = displacement[cells]
+    apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
+    stiff = block.lame[part] + 2 * block.shear[part]
+    terms = stiff * np.einsum("ca,ca->c", slope, apart)
+    if found.hoop is not None:
+        around = np.abs(found.hoop[:, 0]) * np.abs(nodal[..., 0])
+        terms += stiff * around.sum(axis=1)
+    extent = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
+    on_small_faces = terms * extent * slope.max(axis=1)
+    norm = np.linalg.norm(stress_in(found, displacement, block, part), axis=(2, 3))[:, 0]
+    forces = (volume * terms)[:, None] * slope
+    return forces, float(terms.max(initial=0.0)), float(on_small_faces.max(initial=0.0)), norm
 
 
 def largest_strain(
@@ -305,108 +344,51 @@ def largest_strain(
 
     Of a displacement (n_nodes, dim). Both are small where linear elasticity holds.
     """
-    strain = rotation = 0.0
+    largest = np.zeros(2)
     for block in blocks:
-        for part, found, _ in _in_the_middle(points, block):
-            cells = block.cells[part]
-            nodal = displacement[cells] - displacement[cells[:, :1]]
-            slope = np.einsum("cai,caj->cij", nodal, found.gradient[:, 0])
-            if found.hoop is not None:
-                around = np.einsum("ca,ca->c", found.hoop[:, 0], displacement[cells, 0])
-                slope = with_hoop(slope[:, None], around[:, None])[:, 0]
-            turned = np.swapaxes(slope, 1, 2)
-            size = np.linalg.norm(slope + turned, axis=(1, 2))
-            # The largest principal value is at least this share of the norm.
-            near = size >= size.max() / np.sqrt(slope.shape[1])
-            principal = np.linalg.eigvalsh((slope + turned)[near]) / 2
-            strain = max(strain, float(np.abs(principal).max()))
-            angle = np.linalg.norm(slope - turned, axis=(1, 2)) / np.sqrt(8)
-            rotation = max(rotation, float(angle.max()))
-    return strain, rotation
+        seen = partial(_cell_strain, block, displacement)
+        for _, found in _in_the_middle(points, block, seen):
+            largest = np.maximum(largest, found)
+    return float(largest[0]), float(largest[1])
+
+
+def _cell_strain(
+    block: Block, displacement: np.ndarray, part: slice, found: Shapes, _: np.ndarray
+) -> tuple[float, float]:
+    nodal = displacement[block.cells[part]]
+    slope = found.slopes(nodal - nodal[:, :1], nodal[..., 0])[:, 0]
+    turned = np.swapaxes(slope, 1, 2)
+    size = np.linalg.norm(slope + turned, axis=(1, 2))
+    # The largest principal value is at least this share of the norm.
+    near = size >= size.max() / np.sqrt(slope.shape[1])
+    principal = np.linalg.eigvalsh((slope + turned)[near]) / 2
+    angle = np.linalg.norm(slope - turned, axis=(1, 2)) / np.sqrt(8)
+    return float(np.abs(principal).max()), float(angle.max())
 
 
 def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
     """The sizes of the gradients of the shape functions (n, n_nodes) in the middle of each cell."""
-    found = []
-    for block in blocks:
-        slope = np.empty(block.cells.shape)
-        for part, shapes, _ in _in_the_middle(points, block):
-            slope[part] = np.linalg.norm(shapes.gradient[:, 0], axis=2)
-        found.append(slope)
-    return found
+
+    def seen(_: slice, shapes: Shapes, __: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(shapes.gradient[:, 0], axis=2)
+
+    return [
+        np.concatenate([found for _, found in _in_the_middle(points, block, seen)])
+        for block in blocks
+    ]
 
 
-def _stress(
-    found: _Shapes,
-    displacement: np.ndarray,
-    cells: np.ndarray,
-    lame: np.ndarray,
-    shear: np.ndarray,
-) -> np.ndarray:
-    """In-plane or 3D stress tensors (n, q, dim, dim) in cells (n, n_nodes).
+def stress_in(found: Shapes, displacement: np.ndarray, block: Block, part: slice) -> np.ndarray:
+    """In-plane or 3D stress tensors (n, q, dim, dim) of a displacement (parts, n_nodes, dim).
 
-    Tensors of axisymmetric cells are 3D, the third axis the circumference.
+    `found`: the shapes in a part of the block's cells. Tensors of axisymmetric cells are 3D, the
+    third axis the circumference.
     """
+    cells, lame, shear = block.cells[part], block.lame[part], block.shear[part]
     nodal = displacement.reshape(-1, *displacement.shape[-2:])[:, cells]
-    difference = (nodal - nodal[:, :, :1]).sum(axis=0)
-    slope = np.einsum("cqij,cqjk->cqik", _slopes(difference, found.on_reference), found.inverse)
-    if found.hoop is not None:
-        slope = with_hoop(slope, np.einsum("cqa,ca->cq", found.hoop, nodal[..., 0].sum(axis=0)))
+    slope = found.slopes((nodal - nodal[:, :, :1]).sum(axis=0), nodal[..., 0].sum(axis=0))
     stress = shear[:, None, None, None] * (slope + np.swapaxes(slope, 2, 3))
     pressure = lame[:, None] * np.einsum("cqii->cq", slope)
     for i in range(slope.shape[-1]):
         stress[:, :, i, i] += pressure
     return stress
-
-
-def nodal_stress(
-    points: np.ndarray, blocks: list[Block], displacement: np.ndarray, extended: bool = False
-) -> np.ndarray:
-    """Stress (n_nodes, 6) as xx, yy, zz, xy, yz, xz, the mean over the cells around each node.
-
-    Of axisymmetric cells zz is the hoop stress.
-
-    In each cell the stress at the points of a low-order rule is fitted by the linear shape
-    functions of its vertices (least squares) and read at its nodes; gradients at a node itself
-    would not exist at a pyramid's apex. `extended`: strains are taken in extended precision.
-    """
-    n = len(points)
-    points, displacement = _in_precision(points, displacement, extended)
-    total, count = np.zeros(6 * n), np.zeros(n)
-    for block in blocks:
-        reference, _ = block.rule
-        fit = extrapolation(block.type, reference)
-        for part in chunks(block, points.shape[1]):
-            cells = block.cells[part]
-            found = shapes_in(points, block, cells, reference)
-            stress = _stress(found, displacement, cells, block.lame[part], block.shear[part])
-            full = _voigt(stress, block.lame[part], block.shear[part])
-            nodal = np.einsum("aq,cqs->cas", fit, full, optimize=True)
-            places = 6 * cells[:, :, None] + np.arange(6)
-            np.add.at(total, places.ravel(), nodal.ravel())
-        count += np.bincount(block.cells.ravel(), minlength=n)
-    return total.reshape(n, 6) / np.maximum(count, 1)[:, None]
-
-
-def extrapolation(kind: CellType, reference: np.ndarray) -> np.ndarray:
-    """The matrix (n_nodes, q): values at quadrature points to values at nodes, by a linear fit."""
-    if len(reference) == 1:
-        return np.ones((kind.n_nodes, 1))
-    linear = shape_functions(kind.skeleton)
-    vertices = linear.type.n_nodes
-    at_nodes = np.vstack([np.eye(vertices), linear.values(kind.nodes[vertices:])])
-    return at_nodes @ np.linalg.pinv(linear.values(reference))
-
-
-def _voigt(stress: np.ndarray, lame: np.ndarray, shear: np.ndarray) -> np.ndarray:
-    """(n, q, dim, dim) tensors as (n, q, 6); in plane strain σ_zz = ν (σ_xx + σ_yy)."""
-    full = np.zeros((*stress.shape[:2], 6))
-    for i in range(stress.shape[-1]):
-        full[:, :, i] = stress[:, :, i, i]
-    full[:, :, 3] = stress[:, :, 0, 1]
-    if stress.shape[-1] == 3:
-        full[:, :, 4], full[:, :, 5] = stress[:, :, 1, 2], stress[:, :, 0, 2]
-    else:
-        poisson = (lame / (2 * (lame + shear)))[:, None]
-        full[:, :, 2] = poisson * (full[:, :, 0] + full[:, :, 1])
-    return full

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .elasticity import Block, chunks, extrapolation, shapes_in
+from .elasticity import Block, chunks, shapes_in
 from .mixed import MeanStress
+from .nodal_stress import extrapolation
 
 # Strains (k, n, q, 6) of the cells of a block at its quadrature points, as COMPONENTS.
 Strains = Callable[[Block], np.ndarray]

@@ -10,8 +10,9 @@ from .backends import BACKENDS
 from .condensed_matrix import Symmetric
 from .direct import Factor, factorise, wanted
 from .krylov import EPSILON
-from .multigrid import Multigrid, Unknowns
+from .multigrid import Multigrid, Shared
 from .nodal_matrix import NodalMatrix
+from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)
 
@@ -64,6 +65,11 @@ class LinearSolver:
         return self._solver.name
 
     @property
+    def iterative(self) -> bool:
+        """Whether a less accurate solution takes less time."""
+        return isinstance(self._solver, Multigrid)
+
+    @property
     def iterations(self) -> int:
         """Largest number of iterations of one solution so far; 0 for a factor alone."""
         return self._solver.iterations
@@ -99,10 +105,15 @@ class LinearSolver:
         raise SolveError(self.doubt)
 
 
-def prepare(matrix: Symmetric, unknowns: Unknowns | None = None, gave_up: str = "") -> LinearSolver:
+def prepare(
+    matrix: Symmetric,
+    unknowns: Unknowns | None = None,
+    gave_up: str = "",
+    shared: Shared | None = None,
+) -> LinearSolver:
     """Prepare to solve with a symmetric positive definite `matrix` (n, n).
 
-    Without `unknowns`, which multigrid asks for, the matrix is factored.
+    Without `unknowns`, which multigrid asks for, the matrix is factored. `shared`: see `Multigrid`.
     `gave_up`: why multigrid failed on a similar matrix; it is then not tried again. Raises
     SolveError where the matrix is not positive definite beyond round-off; see `LinearSolver.doubt`.
     A singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
@@ -116,7 +127,7 @@ def prepare(matrix: Symmetric, unknowns: Unknowns | None = None, gave_up: str = 
         least = multigrid_from(unknowns.quadratic)
         why = f"{least} unknowns or more in 3D: faster and smaller than a factor"
         try:
-            solver = Multigrid(matrix, unknowns)
+            solver = Multigrid(matrix, unknowns, shared)
             return LinearSolver(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.

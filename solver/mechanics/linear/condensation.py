@@ -19,8 +19,9 @@ from .choice import LinearSolver, prepare
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise_indefinite
 from .krylov import EPSILON, ROUGH
-from .multigrid import Unknowns
+from .multigrid import Shared
 from .nodal_matrix import NodalMatrix
+from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)
 
@@ -212,11 +213,12 @@ def condense(
     own: np.ndarray,
     unknowns: Unknowns | None = None,
     gave_up: str = "",
+    shared: Shared | None = None,
 ) -> CondensedSystem:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
     `own` (n,) marks the unknowns that may be eliminated, `unknowns` describes all, `gave_up` says
-    why multigrid is not tried again; neither is needed (see `prepare`).
+    why multigrid is not tried again, `shared`; none is needed (see `prepare`).
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
@@ -237,7 +239,7 @@ def condense(
         pulled = (coupling[:, kept_columns].T @ follow).tocsr()
         added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
         condensed = CondensedMatrix(matrix, kept_columns, added.tocsr())
-    factor = prepare(condensed, unknowns and unknowns.of(kept_columns), gave_up)
+    factor = prepare(condensed, unknowns, gave_up, shared)
     return CondensedSystem(expansion, pivot, inverse, factor, coupling)
 
 

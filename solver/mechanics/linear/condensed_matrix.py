@@ -34,22 +34,22 @@ class CondensedMatrix:
     """
 
     def __init__(self, stiffness: csr_matrix | NodalMatrix, kept: np.ndarray, added: csr_matrix):
-        self._stiffness, self._kept, self._added = stiffness, kept, added
+        self.stiffness, self.kept, self.added = stiffness, kept, added
         self.shape: tuple[int, int] = added.shape
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """See `Symmetric`."""
-        whole = np.zeros((self._stiffness.shape[0], x.shape[1]))
-        whole[self._kept] = x
-        return (self._stiffness @ whole)[self._kept] + self._added @ x
+        whole = np.zeros((self.stiffness.shape[0], *x.shape[1:]))
+        whole[self.kept] = x
+        return (self.stiffness @ whole)[self.kept] + self.added @ x
 
     def __getitem__(self, rows: Any) -> csr_matrix:
         """See `Symmetric`."""
-        return self._stiffness[self._kept[rows]][:, self._kept] + self._added[rows]
+        return self.stiffness[self.kept[rows]][:, self.kept] + self.added[rows]
 
     def diagonal(self) -> np.ndarray:
         """See `Symmetric`."""
-        return self._stiffness.diagonal()[self._kept] + self._added.diagonal()
+        return self.stiffness.diagonal()[self.kept] + self.added.diagonal()
 
     def tocsr(self) -> csr_matrix:
         """See `Symmetric`."""

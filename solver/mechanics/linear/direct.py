@@ -62,6 +62,8 @@ class Factor:
     `iterations`: the most of one solution so far, 0 where the factor alone is accurate enough.
     """
 
+    iterative = False
+
     def __init__(self, name: str, solve: Iterative, scale: np.ndarray):
         """`solve` takes columns (n, k) and an accuracy, and returns the iterations too."""
         self.name = name
@@ -148,6 +150,21 @@ def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Fact
     upper = _scaled(upper, scale)
     backend = _choose(kind, ("pardiso",))
     return _factorise_double(backend, upper, scale, definite=False, limit=SINGULAR_INDEFINITE)
+
+
+def factorise_roughly(matrix: csr_matrix) -> Solve:
+    """Factor a positive definite `matrix` (n, n) with a diagonal near one, for a preconditioner.
+
+    The solve takes columns (n, k), in the precision of the library. Raises SolveError where a pivot
+    fails.
+    """
+    backend, upper = _choose("auto", ("pardiso", "cholmod")), _upper_triangle(matrix)
+    try:
+        return backend.factor(upper.astype(np.float32) if backend.single else upper, True)
+    except BreakdownError:
+        raise SolveError(
+            f"a part of the matrix is not positive definite ({backend.name})"
+        ) from None
 
 
 def _choose(kind: str, order: tuple[str, ...]) -> Backend:

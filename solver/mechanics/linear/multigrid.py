@@ -1,102 +1,199 @@
 """Algebraic multigrid for large 3D elasticity: smoothed aggregation within conjugate gradients.
 
 Nodes are gathered into aggregates, whose rigid motions are the unknowns of the next level (Vanek,
-Mandel, Brezina, Computing 56 (1996) 179). Every level is scaled to a diagonal of at most one and
+Mandel, Brezina, Computing 56 (1996) 179). Quadratic cells have a level of linear cells on their
+vertices first. Every level is scaled to a diagonal of at most one and
 kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer.
 Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in double
 precision take the solution to round-off.
+
+The hierarchy is that of the bodies alone. Contact corrects its levels (`contact_levels`), and a
+factor of the unknowns beside it solves there exactly, before and after each cycle.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.errors import SolveError
-from .condensed_matrix import Symmetric
+from .aggregation import aggregate
+from .condensed_matrix import CondensedMatrix, Symmetric
+from .contact_levels import Correction, Interface, correction_of
+from .galerkin import coarse, pattern, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
+from .nodal_matrix import NodalMatrix
+from .products import in_pieces, multiply, multiply_transposed
+from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
 LARGEST_DENSE = 4_000
 """Largest level that is inverted where nothing coarsens further; beyond it multigrid is refused."""
-MOST_NEIGHBOURS = 50
-"""Largest mean number of neighbouring aggregates (20–35 is typical). Contact couples everything on
-one face: with hundreds of faces on it, coarse levels fill in."""
+MOST_NEIGHBOURS = 100
+"""Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
 _ROWS_AT_ONCE = 30_000  # whole nodes
-_BLOCKS_AT_ONCE = 100_000
-_PARTS = 8  # of a product of matrices that is formed in parts
+_ONE = np.float32(1)
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
 # The iteration approaches the largest eigenvalue from below.
 _SAFETY = 1.05
 _SMOOTHED = 4 / 3
-
-
-@dataclass(frozen=True)
-class Unknowns:
-    """The meaning of the unknowns of a system, in `dim` dimensions.
-
-    `node` (n,): the node of each unknown, at most `dim` per node; `motions` (n, 3 or 6): the rigid
-    motions in these unknowns; `body` (n,): the number of the body. Bodies that slide on each other
-    share no aggregate. `quadratic`: some cells are quadratic.
-    """
-
-    dim: int
-    node: np.ndarray
-    motions: np.ndarray
-    body: np.ndarray
-    quadratic: bool = False
-
-    def of(self, chosen: np.ndarray) -> "Unknowns":
-        """The same for some of them."""
-        arrays = self.node[chosen], self.motions[chosen], self.body[chosen]
-        return Unknowns(self.dim, *arrays, self.quadratic)
+# A share of the unknowns: where more are beside contact, a factor of these is one of everything.
+_MOST_BESIDE = 1 / 4
 
 
 @dataclass(frozen=True)
 class Level:
-    """One level: scaled matrix, bound of its eigenvalues, and the ways to and from the next."""
+    """One level: scaled matrix, bound of its eigenvalues, and the way up from the next.
+
+    `correction` and `weight` (n,): what contact changes in the matrix and in the smoother;
+    `interface`: the exact solve beside it, if these unknowns are not too many.
+    """
 
     matrix: bsr_matrix
     bound: np.float32
     prolongation: bsr_matrix
-    restriction: bsr_matrix
+    correction: Correction | None = None
+    weight: np.ndarray | np.float32 = _ONE
+    interface: Interface | None = None
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n, k): the Chebyshev polynomial applied to it."""
-        step = residual * (np.float32(4 / 3) / self.bound)
-        residual = residual - self.matrix @ step
-        change = _FIRST * step
-        step *= np.float32(1 / 5)
-        step += residual * (np.float32(12 / 5) / self.bound)
-        return change + _SECOND * step
+        """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
+        step = (np.float32(4 / 3) / self.bound) * self.weight * residual
+        change = self.remaining(residual, step)
+        change *= (_SECOND * np.float32(12 / 5) / self.bound) * self.weight
+        step *= _FIRST + _SECOND / np.float32(5)
+        change += step
+        return change
+
+    def remaining(self, residual: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """The residual (n,) after a change."""
+        left = multiply(self.matrix, change, residual, -1.0)
+        if self.correction is not None:
+            self.correction.subtract_product(left, change)
+        return left
+
+    def corrected(self, correction: Correction, most: float) -> "Level":
+        """The level under contact, with an exact solve of up to `most` unknowns beside it."""
+        rows = correction.corrected_rows(self.matrix)
+        weight, interface = correction.weights(self.matrix, rows), None
+        if len(correction.rows) <= most:
+            interface = Interface(correction, rows)
+        changed = replace(self, correction=correction, weight=weight, interface=interface)
+        half = np.sqrt(changed.weight)
+
+        def symmetric(x: np.ndarray, base: np.ndarray) -> np.ndarray:
+            return base - half * changed.remaining(np.zeros_like(x), half * x)
+
+        return replace(changed, bound=_bound(symmetric, self.matrix.shape[0]))
 
 
-class Multigrid:
-    """A hierarchy for one matrix. `iterations`: the most that a solve has taken so far."""
+class Hierarchy:
+    """The levels of the bodies alone, each free to move.
+
+    `scale` (n,) of the unknowns and their rows `place` (n,) of `size` in the first level; the
+    matrix `last` of the last level.
+    """
 
     def __init__(self, matrix: Symmetric, unknowns: Unknowns):
-        """Set up for a symmetric positive definite `matrix` (n, n).
-
-        Raises SolveError where the diagonal is not positive, nothing coarsens, or coarse levels
-        would fill in.
-        """
+        """Set up for a symmetric `matrix` (n, n); raises SolveError as `Multigrid`."""
         diagonal = matrix.diagonal()
         if not (diagonal > 0).all():
             raise SolveError("the matrix is not positive definite: its diagonal is not positive")
+        self.scale = 1 / np.sqrt(diagonal)
+        blocks, self.place = _in_blocks(matrix, self.scale, unknowns)
+        self.size = blocks.shape[0]
+        nodes = nodes_at(unknowns, self.place, self.size)
+        nodes.motions[self.place] /= self.scale[:, None]
+        blocks, motions, scale = _scaled(blocks, nodes.motions)
+        self.scale *= scale[self.place]
+        self.levels: list[Level] = []
+        nodes = replace(nodes, motions=motions)
+        if unknowns.quadratic and self.size > COARSEST:
+            blocks, nodes = self._add_linear(blocks, unknowns)
+        while blocks.shape[0] > COARSEST:
+            bound = _bound_of(blocks)
+            tentative, coarse_nodes = aggregate(blocks, nodes)
+            if tentative.nnz == 0 or 2 * tentative.shape[1] > blocks.shape[0]:
+                break
+            way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            _refuse_fill(way)
+            blocks, nodes = self._add(blocks, bound, way, coarse_nodes)
+        if blocks.shape[0] > LARGEST_DENSE:
+            size = blocks.shape[0]
+            raise SolveError(f"its levels end at {size} unknowns: nothing coarsens further")
+        self.last = blocks
+
+    def _add_linear(self, matrix: bsr_matrix, unknowns: Unknowns) -> tuple[bsr_matrix, LevelNodes]:
+        """Add the level of quadratic cells; return matrix and nodes of the linear ones."""
+        assert unknowns.linear is not None
+        vertices = unknowns.of_vertices()
+        place, size = places(vertices)
+        way, nodes = unknowns.linear.tocoo(), nodes_at(vertices, place, size)
+        entries = (way.data / self.scale[way.row]).astype(np.float32)
+        where = self.place[way.row], place[way.col]
+        prolongation = csr_matrix((entries, where), shape=(self.size, size)).tobsr((3, 3))
+        return self._add(matrix, _bound_of(matrix), prolongation, nodes)
+
+    def _add(
+        self, matrix: bsr_matrix, bound: np.float32, prolongation: bsr_matrix, nodes: LevelNodes
+    ) -> tuple[bsr_matrix, LevelNodes]:
+        """Add a level; return matrix and nodes of the next."""
+        below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
+        _scale_blocks(prolongation, np.ones(prolongation.shape[0]), scale)
+        self.levels.append(Level(matrix, bound, prolongation))
+        return below, replace(nodes, motions=motions)
+
+
+class Shared:
+    """The hierarchy of one stiffness matrix, set up once for all contact statuses."""
+
+    def __init__(self) -> None:
+        """Nothing is set up yet."""
+        self._hierarchy: Hierarchy | None = None
+
+    def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
+        """The hierarchy of `matrix`, the same at each call until it is closed."""
+        if self._hierarchy is None:
+            self._hierarchy = Hierarchy(matrix, unknowns)
+        return self._hierarchy
+
+    def close(self) -> None:
+        """Release its memory."""
+        self._hierarchy = None
+
+
+class Multigrid:
+    """Multigrid for one matrix. `iterations`: the most that a solve has taken so far."""
+
+    def __init__(self, matrix: Symmetric, unknowns: Unknowns, shared: Shared | None = None):
+        """Set up for a symmetric positive definite `matrix` (n, n).
+
+        `unknowns` are its own, or those of the stiffness that it is condensed from, whose hierarchy
+        is `shared`. Raises SolveError where the diagonal is not positive, nothing coarsens, or
+        coarse levels would fill in.
+        """
         self.iterations = 0
-        self._matrix = matrix
-        self._scale = 1 / np.sqrt(diagonal)[:, None]
-        self._place, body = _places(unknowns)
-        motions = np.zeros((3 * len(body), unknowns.motions.shape[1]))
-        motions[self._place] = unknowns.motions / self._scale
-        blocks = _in_blocks(matrix, self._scale[:, 0], self._place, 3 * len(body))
-        blocks, motions, scale = _scaled(blocks, motions)
-        self._scale *= scale[self._place, None]
-        self._levels, self._coarsest = _hierarchy(blocks, motions, body)
-        self._padded = 3 * len(body)
+        self._matrix, self._shared = matrix, shared or Shared()
+        condensed = matrix if isinstance(matrix, CondensedMatrix) else None
+        kept = slice(None) if condensed is None else condensed.kept
+        hierarchy = self._shared.hierarchy(condensed.stiffness if condensed else matrix, unknowns)
+        self._size, self._place = hierarchy.size, hierarchy.place[kept]
+        self._scale = hierarchy.scale[kept, None]
+        self._levels, last = hierarchy.levels, hierarchy.last.toarray().astype(float)
+        if condensed is not None:
+            correction = correction_of(condensed, hierarchy.scale, hierarchy.place)
+            self._levels, most = [], _MOST_BESIDE * self._size
+            for level in hierarchy.levels:
+                self._levels.append(level.corrected(correction, most))
+                correction = correction.coarser(level.prolongation)
+            last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
+        inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
+        self._coarsest = inverse.astype(np.float32)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
 
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
@@ -109,7 +206,7 @@ class Multigrid:
         columns = columns if columns.ndim == 2 else columns[:, None]
         solution, iterations = conjugate_gradients(
             lambda x: self._scale * (self._matrix @ (self._scale * x)),
-            in_single(self._cycle),
+            in_single(partial(np.apply_along_axis, self._cycle, 0)),
             self._scale * columns,
             accuracy,
             MAX_ITERATIONS,
@@ -122,9 +219,10 @@ class Multigrid:
     def close(self) -> None:
         """Release the hierarchy; it solves no more."""
         self._levels = []
+        self._shared.close()
 
     def _cycle(self, residual: np.ndarray) -> np.ndarray:
-        padded = np.zeros((self._padded, residual.shape[1]), dtype=np.float32)
+        padded = np.zeros(self._size, dtype=np.float32)
         padded[self._place] = residual
         return self._descend(0, padded)[self._place]
 
@@ -133,29 +231,40 @@ class Multigrid:
         if depth == len(self._levels):
             return self._coarsest @ residual
         level = self._levels[depth]
+        if level.interface is None:
+            return self._through(depth, residual)
+        first, left = level.interface.before(residual)
+        change = self._through(depth, left)
+        level.interface.after(residual, change, first)
+        return change
+
+    def _through(self, depth: int, residual: np.ndarray) -> np.ndarray:
+        """Smoothing before and after the levels below."""
+        level = self._levels[depth]
         change = level.smooth(residual)
-        coarse = level.restriction @ (residual - level.matrix @ change)
-        change += level.prolongation @ self._descend(depth + 1, coarse)
-        change += level.smooth(residual - level.matrix @ change)
+        below = multiply_transposed(level.prolongation, level.remaining(residual, change))
+        change = multiply(level.prolongation, self._descend(depth + 1, below), change)
+        change += level.smooth(level.remaining(residual, change))
         return change
 
 
-def _places(unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
-    """Row (n,) of each unknown when every node has three, and the body of each such node."""
-    _, first, number, count = np.unique(
-        unknowns.node, return_index=True, return_inverse=True, return_counts=True
-    )
-    order = np.argsort(number, kind="stable")
-    rank = np.empty(len(number), dtype=int)
-    rank[order] = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
-    return 3 * number + rank, unknowns.body[first]
+def _in_blocks(
+    matrix: Symmetric, scale: np.ndarray, unknowns: Unknowns
+) -> tuple[bsr_matrix, np.ndarray]:
+    """The scaled matrix in single precision and blocks of three, and the row (n,) of each unknown.
+
+    Rows without unknown are zero.
+    """
+    if isinstance(matrix, NodalMatrix):
+        return matrix.scaled(scale), matrix.free
+    place, size = places(unknowns)
+    return _of_rows(matrix, scale, place, size), place
 
 
-def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
-    """The scaled matrix in single precision and blocks of three; rows without unknown are zero.
+def _of_rows(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
+    """The same, row and column i at `place[i]` (n,) of `size`.
 
-    Row and column i go to `place[i]` (n,) of `size`. Rows are copied in parts, so that there is no
-    second matrix in double precision.
+    Rows are copied in parts, so that there is no second matrix in double precision.
     """
     order, place = np.argsort(place), place.astype(np.int32)
     rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
@@ -179,91 +288,21 @@ def _in_blocks(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: in
     return bsr_matrix((blocks, columns, np.cumsum(np.concatenate(lengths))), shape=(size, size))
 
 
-def _hierarchy(
-    matrix: bsr_matrix, motions: np.ndarray, body: np.ndarray
-) -> tuple[list[Level], np.ndarray]:
-    """The levels below a scaled matrix, and the inverse of the last."""
-    levels: list[Level] = []
-    while matrix.shape[0] > COARSEST:
-        bound = np.float32(_SAFETY * _largest_eigenvalue(matrix))
-        tentative, coarse_motions, coarse_body = _aggregate(matrix, motions, body)
-        if tentative.nnz == 0 or 2 * tentative.shape[1] > matrix.shape[0]:
-            break
-        smoothed = matrix @ tentative
-        smoothed.data *= -np.float32(_SMOOTHED / bound)
-        height, width = tentative.blocksize
-        smoothed = (tentative + smoothed).tobsr((height, width))
-        _refuse_fill(smoothed)
-        restriction = smoothed.T.tobsr((width, height))
-        coarse = _coarse(matrix, smoothed)
-        coarse, motions, scale = _scaled(coarse, coarse_motions)
-        _scale_blocks(smoothed, np.ones(smoothed.shape[0]), scale)
-        _scale_blocks(restriction, scale, np.ones(smoothed.shape[0]))
-        levels.append(Level(matrix, bound, smoothed, restriction))
-        matrix, body = coarse, coarse_body
-    if matrix.shape[0] > LARGEST_DENSE:
-        raise SolveError(f"its levels end at {matrix.shape[0]} unknowns: nothing coarsens further")
-    dense = matrix.toarray().astype(float)
-    inverse = np.linalg.pinv((dense + dense.T) / 2, rcond=1e-7, hermitian=True)
-    return levels, inverse.astype(np.float32)
+def _bound_of(matrix: bsr_matrix) -> np.float32:
+    return _bound(partial(multiply, matrix), matrix.shape[0])
+
+
+def _bound(multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int) -> np.float32:
+    """A bound of the eigenvalues of A, given A x + y for x and y (n,)."""
+    return np.float32(_SAFETY * _largest_eigenvalue(multiplied, size))
 
 
 def _refuse_fill(prolongation: bsr_matrix) -> None:
     """Raise SolveError where the next level will have too many neighbours, before it is formed."""
-    height, width = prolongation.blocksize
-    shape = prolongation.shape[0] // height, prolongation.shape[1] // width
-    ones = np.ones(len(prolongation.indices), dtype=np.float32)
-    felt = csr_matrix((ones, prolongation.indices, prolongation.indptr), shape=shape)
-    near = (felt.T @ felt).nnz / shape[1]
+    felt = pattern(prolongation)
+    near = (felt.T @ felt).nnz / felt.shape[1]
     if near > MOST_NEIGHBOURS:
         raise SolveError(f"its coarse levels would fill in, to {near:.0f} neighbours or more")
-
-
-def _coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
-    """Pᵀ A P, formed from some rows of A at a time because A P is large."""
-    height, width = prolongation.blocksize
-    count, size = matrix.shape[0] // height, prolongation.shape[1]
-    total = bsr_matrix((size, size), dtype=np.float32, blocksize=(width, width))
-    step = -(-count // _PARTS)
-    for first in range(0, count, step):
-        some, fine = (_rows(each, first, first + step) for each in (matrix, prolongation))
-        total = total + (fine.T @ (some @ prolongation)).tobsr((width, width))
-    return total
-
-
-def _rows(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
-    """Some rows of blocks."""
-    starts = matrix.indptr[first : last + 1]
-    chosen = slice(starts[0], starts[-1])
-    arrays = matrix.data[chosen], matrix.indices[chosen], starts - starts[0]
-    return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
-
-
-def _aggregate(
-    matrix: bsr_matrix, motions: np.ndarray, body: np.ndarray
-) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
-    """Tentative prolongation, and the motions and body of the aggregates.
-
-    Its columns are the motions of each aggregate, orthonormalised.
-    """
-    from pyamg.aggregation import (
-        fit_candidates,
-        standard_aggregation,
-    )
-
-    count = len(body)
-    rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
-    within = body[rows] == body[matrix.indices]
-    starts = np.zeros(count + 1, dtype=np.int32)
-    np.cumsum(np.bincount(rows[within], minlength=count), out=starts[1:])
-    columns = matrix.indices[within].astype(np.int32)
-    graph = csr_matrix((np.ones(len(columns)), columns, starts), shape=(count, count))
-    aggregates, _ = standard_aggregation(graph)
-    tentative, coarse = fit_candidates(aggregates, motions)
-    members = aggregates.tocoo()
-    coarse_body = np.zeros(aggregates.shape[1], dtype=body.dtype)
-    coarse_body[members.col] = body[members.row]
-    return bsr_matrix(tentative, dtype=np.float32), coarse, coarse_body
 
 
 def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
@@ -278,12 +317,19 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     there = diagonal > 0
     scale = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
     weights = scale.astype(np.float32).reshape(-1, size)
-    inner = np.empty(matrix.data.shape[:2], dtype=np.float32)
-    for first in range(0, len(inner), _BLOCKS_AT_ONCE):
-        some = slice(first, first + _BLOCKS_AT_ONCE)
-        columns = weights[matrix.indices[some], :, None]
-        inner[some] = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
-    sums = scale * np.add.reduceat(inner, matrix.indptr[:-1], axis=0).ravel()
+    sums = np.zeros(weights.shape)
+
+    def add_up(first: int, last: int) -> None:
+        starts = matrix.indptr[first : last + 1]
+        some, filled = slice(starts[0], starts[-1]), np.diff(starts) > 0
+        if filled.any():
+            columns = weights[matrix.indices[some], :, None]
+            inner = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
+            starts = starts[:-1][filled] - starts[0]
+            sums[first:last][filled] = np.add.reduceat(inner, starts, axis=0)
+
+    in_pieces(add_up, matrix)
+    sums = scale * sums.ravel()
     scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
     _scale_blocks(matrix, scale, scale)
     return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
@@ -292,21 +338,30 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
 def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> None:
     """Multiply rows and columns, in place."""
     height, width = matrix.blocksize
-    rows = np.repeat(left.astype(np.float32).reshape(-1, height), np.diff(matrix.indptr), axis=0)
-    matrix.data *= rows[:, :, None]
-    matrix.data *= right.astype(np.float32).reshape(-1, width)[matrix.indices][:, None, :]
+    rows = left.astype(np.float32).reshape(-1, height)
+    columns = right.astype(np.float32).reshape(-1, width)
+
+    def multiply_rows(first: int, last: int) -> None:
+        starts = matrix.indptr[first : last + 1]
+        some = slice(starts[0], starts[-1])
+        matrix.data[some] *= np.repeat(rows[first:last], np.diff(starts), axis=0)[:, :, None]
+        matrix.data[some] *= columns[matrix.indices[some]][:, None, :]
+
+    in_pieces(multiply_rows, matrix)
 
 
-def _largest_eigenvalue(matrix: bsr_matrix, steps: int = 10) -> float:
+def _largest_eigenvalue(
+    multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int, steps: int = 10
+) -> float:
     """Largest eigenvalue by Lanczos' iteration, from below."""
     from scipy.linalg import eigh_tridiagonal
 
-    vector = np.random.default_rng(0).uniform(-1, 1, matrix.shape[0]).astype(np.float32)
+    vector: np.ndarray = np.random.default_rng(0).uniform(-1, 1, size).astype(np.float32)
     vector /= np.linalg.norm(vector)
     previous = np.zeros_like(vector)
     diagonal, beside = [], [np.float32(0)]
     for _ in range(steps):
-        image = matrix @ vector - beside[-1] * previous
+        image = multiplied(vector, -beside[-1] * previous)
         diagonal.append(np.float32(vector @ image))
         image -= diagonal[-1] * vector
         beside.append(np.float32(np.linalg.norm(image)))

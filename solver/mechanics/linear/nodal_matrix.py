@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ..fem.assembly import selected
+from .products import in_pieces, multiply
 
 
 class NodalMatrix:
@@ -34,9 +35,15 @@ class NodalMatrix:
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """The product with x (n,) or its columns (n, k)."""
-        whole = np.zeros((self.blocks.shape[0], *x.shape[1:]))
-        whole[self.free] = x
-        return np.asarray(self.blocks @ whole)[self.free]
+        if x.ndim > 1:
+            return np.stack([self @ column for column in x.T], axis=1)
+        return multiply(self.blocks, self._on_all(x))[self.free]
+
+    def _on_all(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,) on all degrees of freedom, zero on held ones."""
+        whole = np.zeros(self.blocks.shape[0], dtype=values.dtype)
+        whole[self.free] = values
+        return whole
 
     def __getitem__(self, rows: Any) -> csr_matrix:
         """Some of its rows, by mask, slice or numbers."""
@@ -49,6 +56,22 @@ class NodalMatrix:
         arrays = self.blocks.data[entries], self.blocks.indices[entries], ends
         some = bsr_matrix(arrays, shape=(dim * len(nodes), self.blocks.shape[1]))
         return some.tocsr()[dim * local + chosen % dim][:, self.free]
+
+    def scaled(self, scale: np.ndarray) -> bsr_matrix:
+        """Its blocks in single precision, scaled on both sides by `scale` (n,), held rows zero."""
+        by_node = self._on_all(scale).reshape(-1, self.blocks.blocksize[0])
+        data = np.empty(self.blocks.data.shape, dtype=np.float32)
+
+        def fill(first: int, last: int) -> None:
+            some = slice(*self.blocks.indptr[[first, last]])
+            counts = np.diff(self.blocks.indptr[first : last + 1])
+            values = self.blocks.data[some] * by_node[self.blocks.indices[some], None, :]
+            values *= np.repeat(by_node[first:last], counts, axis=0)[:, :, None]
+            data[some] = values
+
+        in_pieces(fill, self.blocks)
+        arrays = data, self.blocks.indices, self.blocks.indptr
+        return bsr_matrix(arrays, shape=self.blocks.shape)
 
     def diagonal(self) -> np.ndarray:
         """Its diagonal (n,)."""

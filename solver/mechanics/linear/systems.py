@@ -22,9 +22,10 @@ from .condensation import (
 )
 from .direct import Factor
 from .krylov import EPSILON
-from .multigrid import Unknowns
+from .multigrid import Shared
 from .nodal_matrix import NodalMatrix
 from .stabilised import stabilise
+from .unknowns import Unknowns
 
 _NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
 _DEPENDENT = "constraints that nearly depend on one another: a saddle point"
@@ -123,12 +124,14 @@ class Systems:
         self._unknowns, self._parts, self._compliance = unknowns, parts, compliance
         self._kept: dict[int, tuple[bytes, ConstrainedSystem]] = {}
         self._gave_up: dict[int, str] = {}
+        self._shared = [Shared() for _ in parts]
         self.latest: ConstrainedSystem | None = None
 
     def forget(self) -> None:
         """Keep no factor."""
         for number in list(self._kept):
             self._drop(number)
+            self._shared[number].close()
 
     def _drop(self, number: int) -> None:
         """Drop a part's system, and remember why multigrid failed on it, if it did."""
@@ -176,7 +179,8 @@ class Systems:
                 return saddle_point(matrix.tocsr(), constraints, why, weighted=False)
             except SolveError:
                 pass  # pivots that no order of elimination avoids: condensation needs none of them
-        return condense(matrix, constraints, own, unknowns, self._gave_up.get(number, ""))
+        gave_up, shared = self._gave_up.get(number, ""), self._shared[number]
+        return condense(matrix, constraints, own, unknowns, gave_up, shared)
 
 
 def _augmented(

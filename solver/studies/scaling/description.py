@@ -12,6 +12,7 @@
         divisions: [5, 4]              # of slave and master: their proportion
         slab: false                    # blocks as thick as the finer one's cells are wide
         fit: [1.0e+4, 1.0e+5]          # of this series, where it is another
+        threads: 1                     # of this series, to compare with the same on more
         sizes: [1.0e+4, 1.0e+5]        # unknowns that a mesh has at least
     goals:                        # numbers to reach, shown beside those measured
       - {title: …, series: hexa8, size: 1.0e+5, what: cpu, most: 12, unit: s, others: {…: 56}}
@@ -79,11 +80,17 @@ class SizeSeries(Section, frozen=True, dict=True):
     sizes: Annotated[tuple[Unknowns, ...], ONCE]
     slab: bool = False
     fit: SizeRange = (0, 0)
+    threads: Count | None = None
 
     @cached_property
     def template(self) -> dict[str, Any]:
         """The content of the case file."""
         return read_mapping(self.case)
+
+    @property
+    def problem(self) -> tuple[Any, ...]:
+        """What its meshes are of: equal for series that differ in sizes and threads alone."""
+        return self.case, self.cells, self.divisions, self.slab
 
     @property
     def dim(self) -> int:

@@ -35,6 +35,7 @@ from .records import (
     failures,
     reached,
     read_series,
+    speed_ups,
 )
 
 # Colour and mark by the number of a line: either shows which it is.
@@ -95,6 +96,7 @@ def _row(m: ScaledSolve, names: Sequence[str]) -> dict[str, Any]:
     row |= {key: record.get(key) for key in (*keys, "linear_iterations", "linear_solver")}
     process, errors = record.get("process") or {}, record.get("errors") or {}
     row |= {f"process_{key}": process.get(key) for key in ("wall", "cpu", "peak_memory_mb")}
+    row["bytes_per_unknown"] = m.bytes_per_unknown if m.solved else None
     for stage in names:
         row[f"{stage}_wall"] = (record.get("seconds") or {}).get(stage)
         row[f"{stage}_cpu"] = m.stages.get(stage) if m.solved else None
@@ -139,6 +141,7 @@ def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
         sections=[_section(title, lines, dim) for dim, title in _SIDES.items()],
         pairing=_pairing(lines),
         lines=lines,
+        speed_ups=speed_ups(lines),
         stages=colors,
         bars=[
             (line, _stage_chart(line, colors), _shares(line, colors))

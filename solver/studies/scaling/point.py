@@ -39,7 +39,7 @@ _FROM_VERDICT = (
 
 def measure_point(scaling: Scaling, point: ScalingPoint, output: Path) -> str:
     """Mesh and solve a point, write its record to `output`; the record in one line."""
-    started, free, cores = now(), available(), cores_for(scaling.threads)
+    started, free, cores = now(), available(), cores_for(point.series.threads or scaling.threads)
     about = {
         "point": point.name,
         "series": point.series.name,

@@ -12,6 +12,7 @@ from .description import GROWTH, Goal, Scaling, ScalingPoint, SizeSeries
 WHOLE, OTHER = "whole", "start-up"
 BY_FACES = ("cut", "pairing")
 """Stages whose work is the interface: they grow with its faces, not with the unknowns."""
+_SHORT = 0.05  # seconds, of which no speed-up is stated
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,17 @@ class ScaledSolve(MeasuredPoint):
         """Processor seconds by stage; the last one is the time outside all stages."""
         stages = dict(self.record["stage_cpu_seconds"])
         return stages | {OTHER: max(self.cpu - sum(stages.values()), 0.0)}
+
+    @property
+    def bytes_per_unknown(self) -> float:
+        """Peak memory over unknowns."""
+        return 1e9 * self.memory / self.record["dofs"]
+
+    @property
+    def wall(self) -> dict[str, float]:
+        """Wall seconds of the whole process and by stage."""
+        stages = {k: v for k, v in self.record["seconds"].items() if k in self.stages}
+        return {WHOLE: self.record["process"]["wall"]} | stages
 
     def work(self, stage: str) -> int:
         """The measure of a stage's work: faces of the interface, or unknowns."""
@@ -92,6 +104,32 @@ class SeriesSolves:
         """The unknowns between which exponents are fitted."""
         sizes = [m.record["dofs"] for m in self.fitted]
         return (min(sizes), max(sizes)) if sizes else None
+
+
+@dataclass(frozen=True)
+class SpeedUp:
+    """The same mesh solved on `few` threads and on `many`."""
+
+    few: ScaledSolve
+    many: ScaledSolve
+
+    def of(self, stage: str) -> float | None:
+        """Wall time on few threads over that on many; None for a stage of no measurable time."""
+        before, after = (m.wall.get(stage, 0.0) for m in (self.few, self.many))
+        return before / after if min(before, after) > _SHORT else None
+
+
+def speed_ups(lines: Sequence[SeriesSolves]) -> list[SpeedUp]:
+    """Solved points of series that differ in their threads alone, smallest first."""
+    solved = [m for line in lines for m in line.solved]
+    return [
+        SpeedUp(few, many)
+        for few in solved
+        for many in solved
+        if few.record["threads"] < many.record["threads"]
+        and few.point.size == many.point.size
+        and few.point.series.problem == many.point.series.problem
+    ]
 
 
 @dataclass(frozen=True)

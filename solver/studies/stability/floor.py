@@ -19,7 +19,8 @@ import meshio
 import numpy as np
 
 from ...case.model import Case
-from ...mechanics.fem.elasticity import internal_force, nodal_stress
+from ...mechanics.fem.elasticity import internal_force
+from ...mechanics.fem.nodal_stress import nodal_stress
 from ...mesh import transform
 from ...simulation.problem import ContactProblem
 from ...simulation.scene import Scene, carried_over

@@ -87,13 +87,13 @@ def _records(line: LevelLine, error: str) -> list[dict[str, object]]:
     """A record for each level; one without a solve has no error, and breaks the line."""
     having = line.having(error)
     return [
-        {"series": line.title, "pair": line.pair, "level": m.point.level}
+        {"series": line.title, "level": m.point.level}
         | (
             {
-                "time": m.time.median,
-                "low": m.time.low,
-                "high": m.time.high,
-                "error": shown(m.error(error) or 0),
+                "time": _short(m.time.median),
+                "low": _short(m.time.low),
+                "high": _short(m.time.high),
+                "error": _short(shown(m.error(error) or 0)),
                 "unknowns": m.record["dofs"],
             }
             if m in having
@@ -101,6 +101,11 @@ def _records(line: LevelLine, error: str) -> list[dict[str, object]]:
         )
         for m in line.levels
     ]
+
+
+def _short(value: float) -> float:
+    """Four digits, as under the pointer: the page holds thousands of numbers."""
+    return float(f"{value:.4g}")
 
 
 def draw_note(panel: Panel) -> str:

@@ -4,13 +4,12 @@ A reason compares the first treatment with the fastest recovered one: the mesh o
 the accuracy, its errors there, and its times by stage.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...mesh.catalogue import BY_NAME
 from ..fits import ROUND_OFF
 from .description import StudyTreatment
-from .records import LevelLine, Panel, TimedSolve
+from .records import Panel, TimedSolve
 
 TARGETS = {1e-2: "1 %", 1e-3: "0.1 %", 1e-4: "0.01 %"}
 RECOVERED, TIED, OTHER, NONE = "recovery", "tied", "other", "none"
@@ -71,7 +70,9 @@ def _reason(panel: Panel, target: float, solve: TimedSolve, recovered: set[str])
         )
         same = "both are exact" if exact else f"{errors} on the same mesh"
         return f"{same}; recovery takes {slower:.0%} longer, most in {stage} (+{1e3 * more:.1f} ms)"
-    there = next((m for m in _at(panel.of(title), level) if m.error(error) is not None), None)
+    there = next(
+        (m for line in panel.of(title) for m in line.having(error) if m.point.level == level), None
+    )
     if there is None:
         return f"recovery reaches it at level {ours.point.level}, not solved at {level}"
     if level > ours.point.level:
@@ -82,10 +83,6 @@ def _reason(panel: Panel, target: float, solve: TimedSolve, recovered: set[str])
         f"at level {level} its error is {solve.error(error) or 0:.1e}, the recovered one "
         f"{there.error(error) or 0:.1e}, which needs level {ours.point.level}"
     )
-
-
-def _at(lines: Sequence[LevelLine], level: int) -> list[TimedSolve]:
-    return [m for line in lines for m in line.levels if m.point.level == level]
 
 
 def _least(panel: Panel, titles: set[str]) -> float:

@@ -23,7 +23,7 @@ def test_the_published_contact_pressure(cls, expected):
 
 @pytest.mark.parametrize("cls", [NestedCylinders, NestedSpheres])
 def test_equal_materials_without_interference_are_one_shell(cls):
-    """Nested or not, the stress is that of the one shell from 20 to 40 (Lamé)."""
+    """Nested or not, the stress equals the one shell's from 20 to 40 (Lamé)."""
     solution = nested(cls, SOFT, SOFT, interference=0.0)
     dim, (a, _, c) = solution.dim, RADII
     for part in (0, 1):

@@ -8,13 +8,13 @@ from solver.mechanics.fem.elasticity import (
     Block,
     internal_force,
     largest_strain,
-    nodal_stress,
     sizes,
     stiffness,
 )
 from solver.mechanics.fem.faces import face_integrals, surface_points
 from solver.mechanics.fem.loads import body_forces, face_forces, stress_forces
 from solver.mechanics.fem.mixed import split
+from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mechanics.fem.supports import free_motion
 from solver.mechanics.mortar.edge import contact_edges
 from solver.mechanics.mortar.facets import facets

@@ -6,16 +6,22 @@ import skfem
 from skfem.models.elasticity import lame_parameters as skfem_lame
 from skfem.models.elasticity import linear_elasticity
 
+import solver.mechanics.fem.elasticity
+import solver.system.threads
 from solver.mechanics.fem import shape_functions, volume_rule
 from solver.mechanics.fem.elasticity import (
     Block,
     element_matrices,
     internal_force,
     lame_parameters,
-    nodal_stress,
+    largest_strain,
+    sizes,
+    steepness,
     stiffness,
 )
+from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh.catalogue import BY_NAME
+from tests.scenes import block_mesh
 
 VOLUMES = [n for n, t in BY_NAME.items() if t.dim > 1]
 
@@ -150,3 +156,34 @@ def test_the_matrix_is_the_one_of_scikit_fem(name, mesh, element):
     ours = stiffness(mesh.p.T.copy(), [block])
     dofs = basis.nodal_dofs.T.ravel()
     assert np.abs(ours - theirs[dofs][:, dofs]).max() < 1e-12 * np.abs(ours).max()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("size", [1, 20_000])
+@pytest.mark.parametrize("name", ["QUAD8", "HEXA8"])
+def test_parts_and_threads_change_no_number(monkeypatch, name, size, threads):
+    """Cells one by one, some at a time, or all at once: every field, plane rings too."""
+    mesh = block_mesh(name, name)
+    kind, cells = BY_NAME[name], mesh.cells[0].data
+    points, rng = mesh.points + 2.0, np.random.default_rng(1)
+    lame, shear = rng.uniform(1, 2, (2, len(cells)))
+    blocks = [Block(kind, cells, lame, shear, axisymmetric=kind.dim == 2)]
+    field = rng.standard_normal((2, *points.shape))
+
+    def found():
+        size = sizes(points, blocks, field)
+        return [
+            internal_force(points, blocks, field),
+            nodal_stress(points, blocks, field),
+            *steepness(points, blocks),
+            np.array(largest_strain(points, blocks, field[0])),
+            np.array([size.highest, size.slender]),
+            size.forces,
+            size.stress,
+        ]
+
+    whole = found()
+    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    monkeypatch.setattr(solver.mechanics.fem.elasticity, "_CHUNK_BYTES", size)
+    for ours, expected in zip(found(), whole, strict=True):
+        np.testing.assert_allclose(ours, expected, rtol=1e-13, atol=1e-13)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.mechanics.fem.elasticity import Block, internal_force, nodal_stress
+from solver.mechanics.fem.elasticity import Block, internal_force
 from solver.mechanics.fem.mixed import split
+from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh import generate
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.options import LEAN, Options, Safeguards

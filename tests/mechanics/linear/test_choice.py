@@ -13,7 +13,7 @@ from solver.mechanics.linear.choice import against_condensation
 from solver.mechanics.linear.condensation import condense, saddle_point
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.direct import force_solver
-from solver.mechanics.linear.multigrid import Unknowns
+from solver.mechanics.linear.unknowns import Unknowns
 
 needs_pardiso = pytest.mark.skipif(
     not BACKENDS["pardiso"].available(), reason="MKL PARDISO is not installed"

@@ -5,17 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse import block_array, block_diag, bsr_matrix, csr_matrix, eye, kron, random_array
+from scipy.sparse import block_array, block_diag, bsr_matrix, csr_matrix, eye
 
 from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
-from solver.mechanics.linear import choice, multigrid
+from solver.mechanics.linear import choice, multigrid, products
 from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.krylov import ROUGH
-from solver.mechanics.linear.multigrid import Multigrid, Unknowns
+from solver.mechanics.linear.multigrid import Multigrid
+from solver.mechanics.linear.nodal_matrix import NodalMatrix
 from solver.mechanics.linear.systems import Part, Systems
+from solver.mechanics.linear.unknowns import Unknowns
 from solver.mesh.catalogue import BY_NAME
+from solver.system import threads
 from solver.system.errors import SolveError
 from tests.scenes import grid
 
@@ -180,7 +183,7 @@ def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
         raise AssertionError("the coarse level is formed")
 
     matrix, unknowns = tied_to_one_node(14)
-    monkeypatch.setattr(multigrid, "_coarse", untouched)
+    monkeypatch.setattr(multigrid, "coarse", untouched)
     with pytest.raises(SolveError, match=r"its coarse levels would fill in, to \d+ neighbours"):
         Multigrid(matrix, unknowns)
     with force_solver("multigrid"):
@@ -189,26 +192,46 @@ def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
     assert chosen.gave_up == chosen.why
 
 
+def test_threads_change_no_digit(monkeypatch):
+    monkeypatch.setattr(products, "_LEAST", 1000)
+    matrix, unknowns = two_blocks(8)
+    right = np.random.default_rng(5).standard_normal(matrix.shape[0])
+    found = []
+    for count in (1, 2, 5):
+        for module in (products, threads):
+            monkeypatch.setattr(module, "workers", lambda n=count: n)
+        found.append(Multigrid(matrix, unknowns).solve(right))
+    np.testing.assert_array_equal(found[1], found[0])
+    np.testing.assert_array_equal(found[2], found[0])
+
+
 def test_parts_of_a_setup_make_no_difference(monkeypatch):
     matrix, unknowns = two_blocks(8)
     right = np.random.default_rng(2).standard_normal(matrix.shape[0])
     whole = Multigrid(matrix, unknowns).solve(right)
-    for name, few in (("_ROWS_AT_ONCE", 90), ("_BLOCKS_AT_ONCE", 500), ("_PARTS", 37)):
-        monkeypatch.setattr(multigrid, name, few)
+    monkeypatch.setattr(multigrid, "_ROWS_AT_ONCE", 90)
+    monkeypatch.setattr(products, "_LEAST", 500)
     found = Multigrid(matrix, unknowns).solve(right)
     np.testing.assert_allclose(found, whole, rtol=0, atol=1e-12 * np.abs(whole).max())
 
 
-def test_coarse_matrix_is_that_of_the_prolongation():
-    rng = np.random.default_rng(3)
-    fine = random_array((40, 40), density=0.2, rng=rng, format="csr")
-    fine = csr_matrix((fine + fine.T + 20 * eye(40)), dtype=np.float32)
-    matrix = bsr_matrix(kron(fine, np.ones((3, 3))), blocksize=(3, 3), dtype=np.float32)
-    way = kron(random_array((40, 7), density=0.5, rng=rng), np.ones((3, 6)))
-    way = bsr_matrix(way, blocksize=(3, 6), dtype=np.float32)
-    exact = way.toarray().astype(float).T @ matrix.toarray() @ way.toarray()
-    found = multigrid._coarse(matrix, way).toarray()
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+@pytest.mark.parametrize("tied", [False, True])
+def test_nodal_blocks_give_the_solution_of_the_entries(tied):
+    """Condensed or not; most of the held nodes have no unknown at all."""
+    points, entries = block(8)
+    free = points > [0, 0, 0.3]
+    matrix, unknowns = held(points, entries, free, np.zeros(len(points), dtype=int))
+    nodal = NodalMatrix(bsr_matrix(entries, blocksize=(3, 3)), np.flatnonzero(free.ravel()))
+    n = matrix.shape[0]
+    rows = csr_matrix(([1.0, -0.4, -0.6], ([0, 0, 0], [5, 90, n - 1])), shape=(1, n))[: int(tied)]
+    right, violation = np.random.default_rng(4).standard_normal(n), np.ones(int(tied))
+    own = np.arange(n) == 5
+    with force_solver("multigrid"):
+        systems = [condense(each, rows, own, unknowns) for each in (matrix, nodal)]
+    found = [system.correction(right, violation) for system in systems]
+    assert "multigrid" in systems[1].factor.name
+    np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-12 * np.abs(found[0]).max())
+    assert systems[1].factor.iterations <= systems[0].factor.iterations + 3
 
 
 def test_quadratic_cells_and_pardiso_put_multigrid_off(monkeypatch):
@@ -283,7 +306,7 @@ def test_free_body_is_in_doubt():
 
 def test_memory_beside_the_stiffness_is_less_than_one_and_a_half_of_its_own(monkeypatch):
     monkeypatch.setattr(multigrid, "_ROWS_AT_ONCE", 3_000)
-    monkeypatch.setattr(multigrid, "_BLOCKS_AT_ONCE", 10_000)
+    monkeypatch.setattr(products, "_LEAST", 100_000)
     matrix, unknowns = clamped(24)
     size = matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes
     rows = csr_matrix(([1.0, -1.0], ([0, 0], [0, 90])), shape=(1, matrix.shape[0]))

@@ -10,7 +10,7 @@ from msgspec import structs
 
 from solver.studies.scaling.description import read_scaling
 from solver.studies.scaling.page import write_scaling
-from solver.studies.scaling.records import OTHER, failures, reached, read_series
+from solver.studies.scaling.records import OTHER, failures, reached, read_series, speed_ups
 from tests.report.test_charts import specifications
 
 ROOT = Path(__file__).parents[3]
@@ -71,7 +71,7 @@ def test_exponents_are_those_of_the_records(scaling, results):
     assert hexa.growth("pairing").value == pytest.approx(1.0, abs=1e-3)
     assert hexa.growth("memory").value == pytest.approx(1.0)
     assert (hexa.growth("whole").low, hexa.growth("whole").high) == (1e5, 1e6)
-    # What no stage tells is as much as all of them: it grows as the whole.
+    # The time outside all stages equals theirs: it grows as the whole.
     assert hexa.growth(OTHER).value == pytest.approx(hexa.growth("whole").value)
     assert [m.point.size for m in quad.fitted] == [100_000, 300_000]
 
@@ -117,6 +117,34 @@ def test_the_page_says_what_the_records_do(scaling, results, tmp_path):
         exponents = {(r["series"], r["cost"]): r for r in csv.DictReader(stream)}
     assert float(exponents["hexa8", "solve"]["exponent"]) == pytest.approx(1.3)
     assert exponents["hexa8", "pairing"]["over"] == "faces"
+
+
+def test_speed_up_is_wall_time_on_few_threads_over_that_on_many(scaling, results, tmp_path):
+    hexa = next(s for s in scaling.series if s.name == "hexa8")
+    one = structs.replace(hexa, name="hexa8-one", title="HEXA8 on one thread", threads=1)
+    both = replace(scaling, series=(*scaling.series, one))
+    (results / "hexa8-one").mkdir()
+    for point in [p for p in both.points if p.series is one]:
+        slow = record(point, threads=1)
+        slow["seconds"] = slow["seconds"] | {"solve": 1.8 * slow["seconds"]["solve"]}
+        slow["process"] = slow["process"] | {"wall": 1.5}
+        (results / f"{point.name}.json").write_text(json.dumps(slow))
+    found = speed_ups(read_series(both, results))
+    assert [(u.few.point.series.name, u.many.point.size) for u in found] == [
+        ("hexa8-one", size) for size in hexa.sizes
+    ]
+    assert [u.of("whole") for u in found] == pytest.approx([1.5] * len(found))
+    assert found[-1].of("solve") == pytest.approx(1.8)
+    assert found[0].of("read") is None
+    write_scaling(both, results, tmp_path / "page")
+    page = (tmp_path / "page" / "scaling.html").read_text()
+    assert "Speed-up over threads" in page
+    assert "1 → 2" in page
+    assert ">1.80<" in page
+    # 0.01 MB for each unknown.
+    assert "<td class=n>10.00</td>" in page
+    write_scaling(scaling, results, tmp_path / "page")
+    assert "Speed-up" not in (tmp_path / "page" / "scaling.html").read_text()
 
 
 def test_points_whose_checks_fail_are_listed(scaling, results):

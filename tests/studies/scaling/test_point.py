@@ -34,6 +34,22 @@ def record(scaling, name, folder):
     return json.loads(output.read_text()), line
 
 
+def test_a_series_may_have_threads_of_its_own(scaling, tmp_path, monkeypatch):
+    asked = []
+
+    def cores_for(threads):
+        asked.append(threads)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(measuring, "cores_for", cores_for)
+    own = structs.replace(scaling.series[0], threads=3)
+    for series in (scaling.series[0], own):
+        some = replace(scaling, series=(series,))
+        with pytest.raises(KeyboardInterrupt):
+            measure_point(some, some.points[0], tmp_path / "record.json")
+    assert asked == [1, 3]
+
+
 def test_a_point_that_ends_well(scaling, tmp_path):
     found, line = record(scaling, "quad4/500", tmp_path)
     assert (found["outcome"], found["verdict"]) == ("solved", "passed")

@@ -4,7 +4,7 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.mechanics.fem.elasticity import nodal_stress
+from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh import transform
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene

@@ -1,4 +1,4 @@
-"""The page of numerical stability: a square a point, a reason where there is none."""
+"""The page of numerical stability: a square a point, a reason where the solve failed."""
 
 import re
 

@@ -1,0 +1,125 @@
+"""The levels of multigrid under contact: those of the bodies alone, and a small correction of each.
+
+With pivots p eliminated, a condensed system differs from the stiffness K near the closed contact
+alone: on all unknowns it is K + C, with rows and columns of p that are zero. Prolongations P are
+those of K. Coarse matrices are PᵀKP + PᵀCP, of which only the second part changes with the contact
+status. No prolongation is smoothed across an interface: however many faces meet on it, coarse
+levels do not fill in.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
+
+from .condensed_matrix import CondensedMatrix
+from .direct import factorise_roughly
+
+# A share of the diagonal: rows with less, those of pivots, are not smoothed.
+_NOTHING = 1e-4
+# Added to the diagonal of a factored part: its round-off in single precision.
+_SHIFT = np.float32(1e-6)
+
+
+@dataclass(frozen=True)
+class Correction:
+    """The change C of a level's matrix: `matrix` (r, r) in its `rows` (r,); zero elsewhere."""
+
+    rows: np.ndarray
+    matrix: csr_matrix
+
+    def subtract_product(self, left: np.ndarray, x: np.ndarray) -> None:
+        """Subtract C x from what is `left` (n,)."""
+        left[self.rows] -= self.matrix @ x[self.rows]
+
+    def coarser(self, prolongation: bsr_matrix) -> "Correction":
+        """PᵀCP."""
+        way = _chosen_rows(prolongation, self.rows)
+        columns, local = np.unique(way.indices, return_inverse=True)
+        way = csr_matrix((way.data, local, way.indptr), shape=(len(self.rows), len(columns)))
+        return Correction(columns, (way.T @ (self.matrix @ way)).tocsr())
+
+    def corrected_rows(self, matrix: bsr_matrix) -> csr_matrix:
+        """The rows (r, n) of K + C, given K (n, n)."""
+        columns = self.rows[self.matrix.indices]
+        shape = len(self.rows), matrix.shape[1]
+        own = csr_matrix((self.matrix.data, columns, self.matrix.indptr), shape=shape)
+        return (_chosen_rows(matrix, self.rows) + own).tocsr()
+
+    def weights(self, matrix: bsr_matrix, corrected: csr_matrix) -> np.ndarray:
+        """The weight (n,) of each row in the smoother: one where nothing changed, 0 at pivots.
+
+        Elsewhere the inverse of the diagonal of the `corrected` rows (r, n) of K + C; less where
+        the entries of a row add up to more than typical of K.
+        """
+        before = np.asarray(abs(_chosen_rows(matrix, self.rows)).sum(axis=1)).ravel()
+        diagonal = _own_diagonal(corrected, self.rows)
+        there = diagonal > _NOTHING
+        weight = np.ones(matrix.shape[0], dtype=np.float32)
+        weight[self.rows] = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
+        sums = weight[self.rows] * (abs(corrected) @ weight)
+        weight[self.rows] /= np.sqrt(np.maximum(1.0, sums / np.median(before)))
+        return weight * weight
+
+
+class Interface:
+    """The unknowns `chosen` (r,) of a level beside contact, solved exactly with the others held."""
+
+    def __init__(self, correction: Correction, corrected: csr_matrix):
+        """Factor, given the `corrected` rows (r, n) of the level's matrix.
+
+        Raises SolveError where that is not positive definite.
+        """
+        there = np.flatnonzero(_own_diagonal(corrected, correction.rows) > _NOTHING)
+        self.chosen, self._rows = correction.rows[there], corrected[there]
+        own = self._rows[:, self.chosen] + _SHIFT * identity(len(there), np.float32)
+        self._solve = factorise_roughly(own)
+
+    def before(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The change (r,) by a solve, and the residual (n,) left by it."""
+        first = self._solved(residual[self.chosen])
+        return first, residual - self._rows.T @ first
+
+    def after(self, residual: np.ndarray, change: np.ndarray, first: np.ndarray) -> None:
+        """Add the `first` solve and another one to the `change` (n,) of a `residual` (n,)."""
+        change[self.chosen] += first
+        change[self.chosen] += self._solved(residual[self.chosen] - self._rows @ change)
+
+    def _solved(self, right: np.ndarray) -> np.ndarray:
+        return self._solve(right[:, None])[:, 0].astype(np.float32)
+
+
+def correction_of(condensed: CondensedMatrix, scale: np.ndarray, place: np.ndarray) -> Correction:
+    """C of a condensed matrix, scaled by `scale` (n,); unknown i is in row `place[i]`."""
+    kept, added, stiffness = condensed.kept, condensed.added.tocoo(), condensed.stiffness
+    n = stiffness.shape[0]
+    eliminated = np.ones(n, dtype=bool)
+    eliminated[kept] = False
+    pivot = np.flatnonzero(eliminated)
+    gone = stiffness[pivot].tocoo()
+    rows, columns = pivot[gone.row], gone.col
+    once = ~eliminated[columns]
+    rows = np.concatenate([kept[added.row], rows, columns[once]])
+    columns = np.concatenate([kept[added.col], columns, pivot[gone.row][once]])
+    values = np.concatenate([added.data, -gone.data, -gone.data[once]])
+    values *= scale[rows] * scale[columns]
+    chosen, local = np.unique(place[np.concatenate([rows, columns])], return_inverse=True)
+    entries = values.astype(np.float32), (local[: len(rows)], local[len(rows) :])
+    return Correction(chosen, coo_matrix(entries, shape=(len(chosen),) * 2).tocsr())
+
+
+def _chosen_rows(matrix: bsr_matrix, rows: np.ndarray) -> csr_matrix:
+    """Some rows (r,) of a matrix in blocks."""
+    height, width = matrix.blocksize
+    blocks = np.unique(rows // height)
+    shape = matrix.shape[0] // height, matrix.shape[1] // width
+    number = np.arange(len(matrix.indices))
+    some = csr_matrix((number, matrix.indices, matrix.indptr), shape=shape)[blocks]
+    arrays = matrix.data[some.data], some.indices, some.indptr
+    found = bsr_matrix(arrays, shape=(height * len(blocks), matrix.shape[1])).tocsr()
+    return found[height * np.searchsorted(blocks, rows // height) + rows % height]
+
+
+def _own_diagonal(rows: csr_matrix, numbers: np.ndarray) -> np.ndarray:
+    """The entries (r,) on the diagonal of a matrix, of which `rows` (r, n) have these `numbers`."""
+    return np.asarray(rows[np.arange(len(numbers)), numbers]).ravel()

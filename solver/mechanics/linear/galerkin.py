@@ -1,0 +1,150 @@
+"""The matrices that smoothed aggregation forms: the smoothed prolongation and Pᵀ A P.
+
+With Numba one pass over the rows of A forms each of them: A P is never stored. Without it SciPy
+multiplies some rows at a time, each in a thread.
+"""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+from scipy.sparse import bsr_matrix, csr_matrix
+
+from ...system.compiled import available, compiled
+from ...system.threads import ahead
+from .products import rows_of, share_rows
+
+_PARTS = 8  # of a product that SciPy forms in parts
+
+
+def pattern(matrix: bsr_matrix) -> csr_matrix:
+    """Which blocks are stored, a row and column for each row and column of blocks."""
+    height, width = matrix.blocksize
+    shape = matrix.shape[0] // height, matrix.shape[1] // width
+    there = np.ones(len(matrix.indices), dtype=bool)
+    return csr_matrix((there, matrix.indices, matrix.indptr), shape=shape)
+
+
+def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_matrix:
+    """T − `weight` · A T for `matrix` A (n, n) and `tentative` T (n, c) in single precision."""
+    sizes = matrix.blocksize[0], tentative.blocksize[1]
+    if not available():
+        change = matrix @ tentative
+        change.data *= -np.float32(weight)
+        return (tentative + change).tobsr(sizes)
+    own = pattern(tentative)
+    total = _empty((pattern(matrix) @ own + own).tocsr(), tentative)
+    kernel = _smooth_rows(*sizes)
+    arrays = [a for m in (matrix, tentative, total) for a in (m.indptr, m.indices, m.data)]
+    share_rows(lambda *some: kernel(*some, *arrays, np.float32(-weight)), matrix.indptr, 54)
+    return total
+
+
+def coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
+    """Pᵀ A P for `matrix` A (n, n) and `prolongation` P (n, c) in single precision."""
+    width = prolongation.blocksize[1]
+    if not available():
+        count = matrix.shape[0] // matrix.blocksize[0]
+        step = -(-count // _PARTS)
+
+        def part(first: int) -> bsr_matrix:
+            some, fine = (
+                rows_of(m, first, min(first + step, count)) for m in (matrix, prolongation)
+            )
+            return (fine.T @ (some @ prolongation)).tobsr((width, width))
+
+        return sum(ahead(part, range(step, count, step)), part(0))
+    ways = pattern(prolongation)
+    total = _empty((ways.T @ (pattern(matrix) @ ways)).tocsr(), prolongation, width)
+    kernel, most = _coarse_rows(*prolongation.blocksize), np.diff(total.indptr).max(initial=0)
+    arrays = [a for m in (matrix, prolongation, total) for a in (m.indptr, m.indices, m.data)]
+    share_rows(lambda *some: kernel(*some, *arrays, most), total.indptr, 1000)
+    return total
+
+
+def _empty(pattern: csr_matrix, like: bsr_matrix, height: int | None = None) -> bsr_matrix:
+    """Zero blocks in a pattern, rows sorted."""
+    pattern.sort_indices()
+    size = like.blocksize if height is None else (height, like.blocksize[1])
+    data = np.zeros((len(pattern.indices), *size), dtype=np.float32)
+    shape = pattern.shape[0] * size[0], pattern.shape[1] * size[1]
+    indices, starts = (a.astype(np.int32, copy=False) for a in (pattern.indices, pattern.indptr))
+    return bsr_matrix((data, indices, starts), shape=shape)
+
+
+@cache
+def _smooth_rows(height: int, width: int) -> Callable[..., None]:  # noqa: C901 -- one kernel
+    @compiled
+    def kernel(  # type: ignore[no-untyped-def]
+        first, last, starts, columns, blocks, t_starts, t_columns, tentative,
+        into, places, out, weight,
+    ):  # fmt: skip
+        """Rows of T + weight · A T, whose pattern is known."""
+        for i in range(first, last):
+            low, high = into[i], into[i + 1]
+            for q in range(t_starts[i], t_starts[i + 1]):
+                place = low + np.searchsorted(places[low:high], t_columns[q])
+                for r in range(height):
+                    for m in range(width):
+                        out[place, r, m] += tentative[q, r, m]
+            for k in range(starts[i], starts[i + 1]):
+                j = columns[k]
+                for q in range(t_starts[j], t_starts[j + 1]):
+                    place = low + np.searchsorted(places[low:high], t_columns[q])
+                    for r in range(height):
+                        for c in range(height):
+                            value = weight * blocks[k, r, c]
+                            for m in range(width):
+                                out[place, r, m] += value * tentative[q, c, m]
+
+    return kernel
+
+
+@cache
+def _coarse_rows(height: int, width: int) -> Callable[..., None]:  # noqa: C901 -- one kernel
+    @compiled
+    def kernel(  # type: ignore[no-untyped-def]  # noqa: C901
+        first, last, starts, columns, blocks, p_starts, p_columns, ways,
+        into, places, out, most,
+    ):  # fmt: skip
+        """Rows of Pᵀ A P; a row of A P at a time, for all rows that it adds to."""
+        slot = np.full(len(into) - 1, -1, dtype=np.int32)
+        found = np.empty(most, dtype=np.int32)
+        product = np.empty((most, height, width), dtype=out.dtype)
+        for i in range(len(starts) - 1):
+            mine = False
+            for q in range(p_starts[i], p_starts[i + 1]):
+                mine = mine or first <= p_columns[q] < last
+            if not mine:
+                continue
+            count = 0
+            for k in range(starts[i], starts[i + 1]):
+                j = columns[k]
+                for q in range(p_starts[j], p_starts[j + 1]):
+                    s = slot[p_columns[q]]
+                    if s < 0:
+                        s = count
+                        count += 1
+                        slot[p_columns[q]] = s
+                        found[s] = p_columns[q]
+                        product[s] = 0
+                    for r in range(height):
+                        for c in range(height):
+                            value = blocks[k, r, c]
+                            for m in range(width):
+                                product[s, r, m] += value * ways[q, c, m]
+            for q in range(p_starts[i], p_starts[i + 1]):
+                row = p_columns[q]
+                if first <= row < last:
+                    low, high = into[row], into[row + 1]
+                    for s in range(count):
+                        place = low + np.searchsorted(places[low:high], found[s])
+                        for c in range(height):
+                            for r in range(width):
+                                value = ways[q, c, r]
+                                for m in range(width):
+                                    out[place, r, m] += value * product[s, c, m]
+            for s in range(count):
+                slot[found[s]] = -1
+
+    return kernel

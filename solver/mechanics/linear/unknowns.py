@@ -1,0 +1,73 @@
+"""The meaning of the unknowns of a system: what multigrid asks for beside the matrix."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """The meaning of the unknowns of a system, in `dim` dimensions.
+
+    `node` (n,): the node of each unknown, at most `dim` per node; `motions` (n, 3 or 6): the rigid
+    motions in these unknowns; `body` (n,): the number of the body. Bodies that slide on each other
+    share no aggregate. `points` (n_nodes, 3): coordinates of the nodes. Where cells are
+    quadratic, `linear` (n, m) interpolates from the unknowns `vertices` (m,) of linear cells.
+    """
+
+    dim: int
+    node: np.ndarray
+    motions: np.ndarray
+    body: np.ndarray
+    points: np.ndarray | None = None
+    vertices: np.ndarray | None = None
+    linear: csr_matrix | None = None
+
+    @property
+    def quadratic(self) -> bool:
+        """Whether some cells are quadratic."""
+        return self.linear is not None
+
+    def of(self, chosen: np.ndarray) -> "Unknowns":
+        """The same for some of them, in ascending order, where no interpolation joins others."""
+        arrays = self.node[chosen], self.motions[chosen], self.body[chosen], self.points
+        if self.linear is None or self.vertices is None:
+            return Unknowns(self.dim, *arrays)
+        mine = np.flatnonzero(np.isin(self.vertices, chosen))
+        vertices = np.searchsorted(chosen, self.vertices[mine])
+        return Unknowns(self.dim, *arrays, vertices, self.linear[chosen][:, mine])
+
+    def of_vertices(self) -> "Unknowns":
+        """Those of linear cells on the same vertices."""
+        assert self.vertices is not None
+        return replace(self, linear=None).of(self.vertices)
+
+
+@dataclass(frozen=True)
+class LevelNodes:
+    """The nodes of a level: `motions` (n, 3 or 6) of their unknowns; `body`, `points` of each."""
+
+    motions: np.ndarray
+    body: np.ndarray
+    points: np.ndarray | None
+
+
+def places(unknowns: Unknowns) -> tuple[np.ndarray, int]:
+    """The row (n,) of each unknown where every node that has some has three, and how many rows."""
+    number, count = np.unique(unknowns.node, return_inverse=True, return_counts=True)[1:]
+    order = np.argsort(number, kind="stable")
+    rank = np.empty(len(number), dtype=int)
+    rank[order] = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
+    return 3 * number + rank, 3 * len(count)
+
+
+def nodes_at(unknowns: Unknowns, place: np.ndarray, size: int) -> LevelNodes:
+    """The nodes of `size` rows; those without unknowns belong to no body, −1."""
+    motions, body = np.zeros((size, unknowns.motions.shape[1])), np.full(size // 3, -1)
+    motions[place], body[place // 3] = unknowns.motions, unknowns.body
+    if unknowns.points is None:
+        return LevelNodes(motions, body, None)
+    points = np.zeros((size // 3, unknowns.points.shape[1]))
+    points[place // 3] = unknowns.points[unknowns.node]
+    return LevelNodes(motions, body, points)

@@ -1,0 +1,40 @@
+"""Functions compiled for this machine by Numba, if it is installed: large solves alone need them.
+
+Numba is imported and a function compiled at its first call, so small cases pay for neither. The
+machine code is kept in `__pycache__` beside the source, or in the user's cache if that folder is
+read-only. A compiled function holds no lock of the interpreter: it may run in several threads.
+"""
+
+from collections.abc import Callable
+from functools import cache, wraps
+from importlib.util import find_spec
+from typing import Any
+
+
+@cache
+def available() -> bool:
+    """Whether Numba is installed."""
+    return find_spec("numba") is not None
+
+
+def compiled(function: Callable[..., None]) -> Callable[..., None]:
+    """The function compiled at its first call; ImportError there where Numba is missing.
+
+    A product and a sum may be rounded together; the order of sums is kept.
+    """
+
+    @cache
+    def machine_code() -> Any:
+        from numba import njit
+
+        options: dict[str, Any] = {"nogil": True, "fastmath": {"contract"}}
+        try:
+            return njit(cache=True, **options)(function)
+        except RuntimeError:  # no folder for the cache
+            return njit(**options)(function)
+
+    @wraps(function)
+    def call(*arguments: Any) -> None:
+        machine_code()(*arguments)
+
+    return call

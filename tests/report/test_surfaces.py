@@ -1,0 +1,155 @@
+"""Surfaces of results to be turned: triangles, edges, maps of values and errors."""
+
+import base64
+import json
+
+import numpy as np
+import pytest
+
+from solver.case.reader import load_case
+from solver.mesh.catalogue import cell_type
+from solver.report.layout import ways_apart
+from solver.report.obstacles import obstacle
+from solver.report.surfaces import _split, surfaces
+from tests import handmade
+
+
+def read(solution):
+    """The parts of a solution by name, arrays decoded."""
+    text = surfaces(solution, "name.js")
+    assert text.startswith('surfaces(...["name.js",')
+    _, content = json.loads(text.removeprefix("surfaces(...").removesuffix(");\n"))
+    for part in content["parts"]:
+        for key, kind, width in (
+            ("points", "<f4", 3),
+            ("displacement", "<f4", 3),
+            ("triangles", "<i4", 3),
+            ("edges", "<i4", 2),
+        ):
+            part[key] = np.frombuffer(base64.b64decode(part[key]), kind).reshape(-1, width)
+        for title, values in part["fields"].items():
+            part["fields"][title] = np.frombuffer(base64.b64decode(values), "<f4")
+    return content, {part["name"]: part for part in content["parts"]}
+
+
+def test_cells_of_a_plane_result(tmp_path):
+    content, parts = read(handmade.plane(tmp_path))
+    assert {name: len(part["triangles"]) for name, part in parts.items()} == {
+        "bottom": 12,
+        "top": 6,
+        "interface: slave faces": 0,
+    }
+    assert [len(part["edges"]) for part in parts.values()] == [7 + 12, 4 + 6, 6]
+    bottom = parts["bottom"]
+    area = (
+        np.cross(
+            *(
+                bottom["points"][bottom["triangles"][:, k]]
+                - bottom["points"][bottom["triangles"][:, 0]]
+                for k in (1, 2)
+            )
+        )[:, 2].sum()
+        / 2
+    )
+    assert area == pytest.approx(50 * 50)
+    assert content["whole"] == [[0, -50, 0], [50, 50, 0]]
+    assert content["contact"] == [[0, 0, 0], [50, 0, 0]]
+    assert bottom["fields"]["displacement |u|"].max() == pytest.approx(np.hypot(0.24375, 0.56875))
+
+
+def test_the_map_of_an_error_shows_the_node_that_is_off(tmp_path):
+    solution = handmade.plane(tmp_path)
+    largest = 0.011375 * 100  # of the reference, at the top
+    assert read(solution)[1]["top"]["fields"]["|Δu| / max |u|"].max() < 1e-15
+    solution.displacement[-1] += [0.003 * largest, 0.004 * largest]
+    solution.stress[-1, 3] += 5.0  # xy, of 25
+    parts = read(solution)[1]
+    for title, expected in (("|Δu| / max |u|", 0.005), ("|Δσ| / max |σ|", 0.2)):
+        values = parts["top"]["fields"][title]
+        assert values[-1] == pytest.approx(expected)
+        assert np.abs(values[:-1]).max() < 1e-15
+        assert np.abs(parts["bottom"]["fields"][title]).max() < 1e-15
+
+
+def test_pressure_and_deviation_jump_between_macro_elements(tmp_path):
+    content, parts = read(handmade.solid(tmp_path))
+    faces = parts["interface: slave faces"]
+    assert len(faces["points"]) == 4 + 4 * 3  # a quadrangle and four triangles
+    assert faces["fields"]["contact pressure p"].tolist() == [24.0] * 4 + [25.0] * 12
+    deviation = faces["fields"]["Δp / max p"]
+    assert deviation == pytest.approx([-0.04] * 4 + [0.0] * 12)
+    limits = {m["title"]: m["limits"] for m in content["maps"]}
+    assert limits["Δp / max p"] == pytest.approx([-0.04, 0.04])
+    assert limits["contact pressure p"] == [0.0, 25.0]
+    assert limits["normal stress σₙ"] == [-25.0, 0.0]
+    assert next(iter(limits)) == "contact pressure p"
+
+
+@pytest.mark.parametrize(
+    ("kind", "number"), [("TRIA3", 1), ("QUAD4", 2), ("TRIA6", 4), ("QUAD8", 6)]
+)
+def test_triangles_fill_a_face_and_use_its_mid_nodes(kind, number):
+    face = cell_type(kind)
+    found = _split([(kind, np.arange(face.n_nodes)[None])])
+    corners = face.nodes[found["triangles"]]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    assert len(areas) == number
+    assert (areas > 0).all()
+    assert areas.sum() == pytest.approx(0.5 if kind.startswith("TRIA") else 1.0)
+    assert set(found["edges"].ravel()) == set(range(face.n_nodes))
+
+
+def with_rigid(folder, body, make=handmade.plane):
+    """A solution whose master is a rigid surface."""
+    text = {handmade.plane: handmade.PLANE, handmade.solid: handmade.SOLID}[make]
+    text = text.partition("counts")[0].replace("both", "first").replace("upper", "die")
+    solution = make(folder)
+    (folder / "case.yaml").write_text(f"{text}bodies: {{die: {body}}}\n")
+    solution.case = load_case(folder / "case.yaml")
+    return solution
+
+
+SPHERE = "{sphere: {centre: [25, 80], radius: 80}}"
+
+
+def test_a_rigid_circle_is_drawn_opposite_to_the_slave(tmp_path):
+    found = obstacle(with_rigid(tmp_path, SPHERE), "die")
+    away = found.points - [25, 80]
+    assert np.linalg.norm(away, axis=1) == pytest.approx(80)
+    assert found.out == pytest.approx(away / 80)
+    assert found.points[:, 0].min() < 0 < 50 < found.points[:, 0].max()
+    assert found.points[:, 1].min() == pytest.approx(0, abs=0.1)  # between two points
+    assert obstacle(handmade.plane(tmp_path), "top") is None
+
+
+@pytest.mark.parametrize(
+    ("body", "implicit"),
+    [
+        ("{plane: {point: [3, 4, 1], normal: [0, 0, -2]}}", lambda x, y, z: z - 1),
+        ("{sphere: {centre: [5, 5, 30], radius: 30}}", lambda x, y, z: (
+            np.sqrt((x - 5) ** 2 + (y - 5) ** 2 + (z - 30) ** 2) - 30)),
+        ("{cylinder: {point: [0, 5, 20], axis: [3, 0, 0], radius: 20}}", lambda x, y, z: (
+            np.hypot(y - 5, z - 20) - 20)),
+        ("{parabola: {point: [5, 5, 0], normal: [0, 0, -1], radius: 40}}", lambda x, y, z: (
+            z - ((x - 5) ** 2 + (y - 5) ** 2) / 80)),
+        ("{parabola: {point: [5, 5, 0], normal: [0, 0, -1], radius: 40, hollow: true}}",
+         lambda x, y, z: z + ((x - 5) ** 2 + (y - 5) ** 2) / 80),
+    ],
+)  # fmt: skip
+def test_rigid_surfaces_in_space(tmp_path, body, implicit):
+    found = obstacle(with_rigid(tmp_path, body, handmade.solid), "die")
+    assert implicit(*found.points.T) == pytest.approx(0, abs=1e-9)
+    low, high = found.points.min(axis=0), found.points.max(axis=0)
+    assert (low[:2] < 0).all(), "beyond the slave"
+    assert (high[:2] > 10).all()
+    assert ((low + high) / 2)[:2] == pytest.approx([5, 5], abs=0.5), "opposite to the slave"
+    assert np.abs(found.points[:, 2]).min() < 1.8
+    assert found.out[:, 2].min() < -0.7, "out of the body, towards the slave below"
+
+
+def test_bodies_move_apart_with_their_masters(tmp_path):
+    solution = handmade.plane(tmp_path)
+    assert ways_apart(solution).tolist() == [[0, 0], [0, 1]]
+    solution = handmade.solid(tmp_path)
+    assert ways_apart(solution).tolist() == [[0, 0, 0], [0, 0, 1]]

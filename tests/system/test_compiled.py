@@ -1,0 +1,50 @@
+"""Compiled functions: only at their first call, and without a folder for the cache too."""
+
+import subprocess
+import sys
+
+import pytest
+
+from solver.system.compiled import available, compiled
+
+numba = pytest.mark.skipif(not available(), reason="Numba is not installed")
+
+
+@compiled
+def add(numbers, out):
+    """The sum."""
+    for number in numbers:
+        out[0] += number
+
+
+@numba
+def test_the_function_is_compiled_and_keeps_its_name():
+    import numpy as np
+
+    out = np.zeros(1)
+    add(np.arange(5.0), out)
+    assert out == [10.0]
+    assert (add.__name__, add.__doc__) == ("add", "The sum.")
+
+
+@numba
+def test_without_a_folder_for_the_cache_it_is_compiled_all_the_same(monkeypatch):
+    import numba
+    import numpy as np
+
+    make = numba.njit
+
+    def refuse(cache=False, **options):
+        if cache:
+            raise RuntimeError("cannot cache function: no locator available")
+        return make(**options)
+
+    monkeypatch.setattr(numba, "njit", refuse)
+    out = np.zeros(1)
+    compiled(add.__wrapped__)(np.ones(3), out)
+    assert out == [3.0]
+
+
+def test_small_cases_import_no_numba():
+    program = "import sys, solver.mechanics.linear.multigrid; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
