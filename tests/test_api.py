@@ -169,7 +169,7 @@ def test_only_public_names_are_listed():
 
 
 def test_pyvista_reads_what_was_solved():
-    pytest.importorskip("pyvista", reason="installed by `make gallery`")
+    pytest.importorskip("pyvista", reason="PyVista is not installed")
     solved = patch()
     grid = solved.to_pyvista()
     assert grid.n_points == len(solved.points)

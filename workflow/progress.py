@@ -27,7 +27,7 @@ COUNTED = {
 }
 # Rules whose jobs print by themselves: the last line is left to them while they run.
 TALKING = (
-    *("report", "orders_page", "stability_page", "infsup_page", "gallery"),
+    *("report", "orders_page", "stability_page", "infsup_page"),
     *("study", "study_point", "scaling", "scaling_point"),
 )
 # Lines of Snakemake that are useless beside the jobs.

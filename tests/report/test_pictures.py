@@ -137,6 +137,12 @@ def test_outline_of_a_macro_element_leaves_out_the_cut():
     assert macro_edges(faces)[:, :2].tolist() == [[0, 1], [0, 2], [1, 2]]
 
 
+def test_edges_of_macro_elements_have_their_mid_nodes():
+    faces = [("TRIA6", np.array([[0, 1, 2, 10, 11, 12], [0, 2, 3, 12, 13, 14]]), np.array([5, 5]))]
+    found = {tuple(row) for row in macro_edges(faces).tolist()}
+    assert found == {(0, 1, 10), (1, 2, 11), (2, 3, 13), (0, 3, 14)}
+
+
 def test_mid_nodes_are_drawn_only_where_the_edge_bends():
     straight = np.array([[0, 0], [2, 0], [0, 2], [1, 0], [1, 1], [0, 1]], dtype=float)
     bent = straight.copy()

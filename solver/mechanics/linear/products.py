@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import bsr_matrix
 
-from ...system.compiled import available, compiled
+from ...system.compiled import compiled, worthwhile
 from ...system.threads import ahead, workers
 
 _LEAST = 200_000  # multiplications from which another thread pays for its start
@@ -28,7 +28,7 @@ def multiply(
     """
     out = np.zeros(matrix.shape[0], dtype=matrix.dtype) if base is None else base.copy()
     height = matrix.blocksize[0]
-    kernel = _PRODUCTS.get(matrix.blocksize) if available() else None
+    kernel = _PRODUCTS.get(matrix.blocksize) if worthwhile(matrix.data.size) else None
     arrays = matrix.indptr, matrix.indices, matrix.data
 
     def rows(first: int, last: int) -> None:
@@ -52,7 +52,7 @@ def multiply_transposed(matrix: bsr_matrix, x: np.ndarray) -> np.ndarray:
     array([9., 9., 9., 9., 9., 9.])
     """
     height = matrix.blocksize[0]
-    kernel = _TRANSPOSED.get(matrix.blocksize) if available() else None
+    kernel = _TRANSPOSED.get(matrix.blocksize) if worthwhile(matrix.data.size) else None
     arrays = matrix.indptr, matrix.indices, matrix.data
 
     def part(some: tuple[int, int]) -> np.ndarray:

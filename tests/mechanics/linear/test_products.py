@@ -13,7 +13,7 @@ NUMBA = pytest.param(True, marks=pytest.mark.skipif(not compiled.available(), re
 @pytest.fixture(params=[NUMBA, False], autouse=True)
 def _with_numba(request, monkeypatch):
     for module in (products, galerkin):
-        monkeypatch.setattr(module, "available", lambda: request.param)
+        monkeypatch.setattr(module, "worthwhile", lambda numbers: request.param)
 
 
 def on_threads(count, monkeypatch):
