@@ -28,7 +28,6 @@ def label_fields(grid: h5py.Group, contact: h5py.Group, units: Mapping[str, str]
     `units` maps length and stress to their names. VTK shows no attributes, so the grid also lists
     the units of its fields as the field data `units`.
     """
-
     _label(contact, units)
     if listed := _label(grid, units):
         # VTK crashes on texts that are not declared as ASCII; their bytes may be UTF-8.
