@@ -6,6 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from ..mechanics.fem.faces import outer_faces
+from ..simulation.exact import deformable
 from ..simulation.solution import Solution
 from .charts import BLUE, MUTED, PAPER
 from .geometry import plane_cells
@@ -40,7 +41,12 @@ def draw_plane(solution: Solution, title: str) -> Markup:
     view = View(points, place, np.ones(len(points), dtype=bool))
     draw_symbols(drawing, solution, view, list(outer_faces(solution.mesh)))
     _names(drawing, solution, place, points, rigid, float(place(shown)[:, 0].max()))
-    draw_axes(drawing, np.eye(2), np.ptp(whole[meshed], axis=0), solution.case.units.get("length"))
+    draw_axes(
+        drawing,
+        np.eye(2),
+        np.ptp(whole[deformable(solution)], axis=0),
+        solution.case.units.get("length"),
+    )
     if enlarged:
         (x0, y1), (x1, y0) = place(np.stack([low, high]))
         drawing.rectangle(x0, y0, x1 - x0, y1 - y0, stroke=MUTED, stroke_width=1)

@@ -7,6 +7,7 @@ from markupsafe import Markup
 
 from ..mechanics.fem.faces import outer_faces
 from ..mesh.catalogue import cell_type
+from ..simulation.exact import deformable
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import BLUE, INK, MUTED, PAPER
@@ -112,8 +113,8 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     for kind, nodes in outer:
         seen[nodes[normals(outlines(points, kind, nodes)) @ eye > 1e-6].ravel()] = True
     draw_symbols(drawing, solution, View(points, lambda x: place(x @ screen.T), seen), outer)
-    meshed = solution.mesh.points[~np.isin(solution.body, list(rigid))]
-    draw_axes(drawing, screen, np.ptp(meshed, axis=0), solution.case.units.get("length"))
+    size = np.ptp(solution.mesh.points[deformable(solution)], axis=0)
+    draw_axes(drawing, screen, size, solution.case.units.get("length"))
 
 
 def far_to_near(groups: list[np.ndarray], eye: np.ndarray) -> list[tuple[int, np.ndarray]]:

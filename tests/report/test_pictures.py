@@ -49,6 +49,10 @@ def test_plane_picture_shows_every_cell_of_both_blocks(tmp_path):
 def test_loads_and_supports_of_a_plane_picture(tmp_path):
     svg = draw_plane(handmade.plane(tmp_path), "two blocks")
     assert polygons(svg, stroke=GREEN, fill="#ffffff") == 4 + 6  # of 4 and of 7 nodes
+    held = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == "#ffffff"]
+    bases = [tuple(map(int, data.split("l")[1].split()[:2])) for data in held]
+    # From the tip to a corner of the base: to the left of x = 0, and below the foot.
+    assert sorted(bases) == [(-70, -42)] * 4 + [(-42, 70)] * 6
     heads = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == RED]
     assert len(heads) == 4
     for head in heads:  # the tip first, then what is behind it, above
