@@ -87,22 +87,6 @@ def test_all_runs_again_where_snakemake_remembers_nothing(project):
     assert jobs(project) == {"mesh tiny-a", "mesh tiny-b"} | solves | REPORT
 
 
-def test_the_longest_cases_go_first_and_a_name_may_repeat_itself(tmp_path):
-    project = new_project(tmp_path / "sizes")
-    shutil.rmtree(project / "cases" / "tiny")
-    # Against the order of names, numbers and files; Snakemake takes twenty zeros for a recursion.
-    by_size = {"c": 12, "a": 9, f"d-1{'0' * 20}": 6, "b": 3}
-    for name in sorted(by_size):
-        write_case(project / "cases" / "sizes", name)
-        file = project / "cases" / "sizes" / f"{name}.yaml"
-        text = file.read_text()
-        assert text.count("[2, 2]") == 1
-        file.write_text(text.replace("[2, 2]", f"[{by_size[name]}, {by_size[name]}]"))
-    done = snakemake(project, "--cores", "1")
-    assert done.returncode == 0, done.stdout
-    assert re.findall(r"^(\S+): passed", done.stdout, re.MULTILINE) == list(by_size)
-
-
 def test_one_case_again_is_one_case(project):
     verdict = "results/tiny/tiny-a-swapped"
     assert jobs(project, "--forcerun", verdict) == {"solve tiny-a-swapped"} | REPORT
