@@ -186,7 +186,8 @@ class Bench:
             refused = sum(row.word == REFUSED for row in of)
             told = f"{code} passes {sum(row.sound for row in of)} of {len(of) - refused}"
             words.append(told + (f" and cannot express {refused}" if refused else ""))
-        return f"{'; '.join(words)}."
+        told = "; ".join(words)
+        return f"{told[:1].upper()}{told[1:]}."
 
     @property
     def records(self) -> list[dict[str, Any]]:

@@ -29,7 +29,7 @@ BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "
 CROSS = "M-1,-1L1,1M1,-1L-1,1"
 SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
 # Digits of a number in a page.
-DIGITS = 7
+DIGITS = 10
 # The values of a mark under the pointer: powers of ten as 1.2e-10.
 _FORMAT = ".4~g"
 # A logarithmic axis of less than so many times also has labels at 2 and 5 times the powers of ten.
