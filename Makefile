@@ -33,10 +33,10 @@ SILENCE = $(if $(QUIET),--quiet rules progress reason host)
 SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
 
-.PHONY: help all-cases family case report summary compare record gallery bench orders study
+.PHONY: help all-cases family case report summary compare record bench orders study
 .PHONY: stability infsup scaling benchmark converge test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
-.PHONY: environment code-environment gallery-environment test-environment lint-environment docs-environment
+.PHONY: environment code-environment test-environment lint-environment docs-environment
 .PHONY: bill-environment
 
 help: ## list the targets
@@ -71,10 +71,6 @@ compare: environment ## compare with another batch: make compare BASE=folder [TH
 
 record: environment ## record the last batch, show all records: HISTORY=folder keeps them there
 	@$(OURS) solver record $(if $(HISTORY),--history "$(HISTORY)")
-
-gallery: override CONFIG += $(CHOICE)
-gallery: gallery-environment ## draw each result with PyVista, off-screen: all or FAMILY=…
-	@$(SNAKEMAKE) gallery
 
 bench: override CONFIG += $(CHOICE) $(if $(CODES),"codes=$(CODES)")
 bench: environment ## run other codes on the cases: all installed, or CODES=calculix,kratos
@@ -159,9 +155,6 @@ code-environment: ## install another code into an environment of its own: CODE=k
 	@.venv-$(CODE)/bin/python -Es -m pip --disable-pip-version-check install --quiet \
 	  --require-hashes --only-binary :all: --requirement requirements-$(CODE).txt
 
-gallery-environment:
-	@$(INSTALL) run gallery
-
 test-environment:
 	@$(INSTALL) run test
 
@@ -195,7 +188,7 @@ lock: ## lock the packages of pyproject.toml again: make lock ARGS=--upgrade
 	  --output-file requirements.txt
 	@for code in kratos ngsolve; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$code --output-file requirements-$$code.txt || exit; done
-	@for group in build mkl slurm gallery test lint docs bill lock; do \
+	@for group in build mkl slurm test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 

@@ -1,4 +1,4 @@
-"""Targets of the batch: `all_cases` (default), `report`, `gallery`, `bench`, `orders`, `study`, `stability`, `scaling`, or the folder of a solve by its path."""
+"""Targets of the batch: `all_cases` (default), `report`, `bench`, `orders`, `study`, `stability`, `scaling`, or the folder of a solve by its path."""
 
 from snakemake.utils import min_version
 
@@ -28,7 +28,6 @@ rule again:
 include: "workflow/rules/mesh.smk"
 include: "workflow/rules/solve.smk"
 include: "workflow/rules/report.smk"
-include: "workflow/rules/gallery.smk"
 include: "workflow/rules/orders.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/infsup.smk"
@@ -51,5 +50,4 @@ localrules:
     stability_page,
     stability,
     scaling,
-    gallery,
     bench,

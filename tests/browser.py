@@ -105,7 +105,9 @@ def browser():
                 if (m := re.search(r"successfully on port (\d+)", line))
             )
             window = Browser(f"http://127.0.0.1:{port}")
-            yield window
-            window.close()
+            try:
+                yield window
+            finally:  # else the browser outlives its driver
+                window.close()
         finally:
             driver.terminate()

@@ -169,7 +169,7 @@ def test_only_public_names_are_listed():
 
 
 def test_pyvista_reads_what_was_solved():
-    pytest.importorskip("pyvista", reason="installed by `make gallery`")
+    pytest.importorskip("pyvista", reason="PyVista is not installed")
     solved = patch()
     grid = solved.to_pyvista()
     assert grid.n_points == len(solved.points)
@@ -224,7 +224,7 @@ def test_a_mapping_and_the_file_it_would_be_are_refused_in_the_same_words(tmp_pa
     for case in (bad, tmp_path / "c.yaml"):
         with pytest.raises(InputError) as refused:
             solve_case(case)
-        told.append(refused.value.told)
+        told.append(refused.value.detail)
     assert told[0] == told[1]
 
 

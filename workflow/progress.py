@@ -27,7 +27,7 @@ COUNTED = {
 }
 # Rules whose jobs print by themselves: the last line is left to them while they run.
 TALKING = (
-    *("report", "orders_page", "stability_page", "infsup_page", "gallery"),
+    *("report", "orders_page", "stability_page", "infsup_page"),
     *("study", "study_point", "scaling", "scaling_point"),
 )
 # Lines of Snakemake that are useless beside the jobs.
@@ -115,7 +115,7 @@ class State:
         spent = self.clock() - self.began
         return spent / self.done * (self.total - self.done) if spent > _LEAST_SECONDS else None
 
-    def told(self) -> str:
+    def text(self) -> str:
         """The state in one line."""
         parts = [f"{self.done} of {self.total} {self.word}s done"]
         parts += [f"{self.not_passed} not passed"] * bool(self.not_passed)
@@ -184,10 +184,10 @@ class Progress(logging.Filter):
         if self.terminal:
             width = shutil.get_terminal_size().columns - 1
             self._wipe()
-            self.status.write(state.told()[:width])
+            self.status.write(state.text()[:width])
             self._shown = True
         else:
-            self.status.write(f"{time.strftime('%H:%M:%S')} {state.told()}\n")
+            self.status.write(f"{time.strftime('%H:%M:%S')} {state.text()}\n")
         self.status.flush()
 
     def _wipe(self) -> None:

@@ -184,7 +184,7 @@ class Case:
     an `expected` error follows from it. `units` names those of length and stress, for labels alone.
     `source` is the file's text. `family` is the name of the file's folder. `reference_uncertainty`
     is relative, `reference_code` has the keys name and version.
-    `swapped`, `hexahedra` and `recovery`: how the case is solved, as `as_solved` was told.
+    `swapped`, `hexahedra` and `recovery`: how the case is solved, see `as_solved`.
     """
 
     name: str
@@ -234,6 +234,13 @@ class Case:
         """The load factor of each step; its number where loads have factors of their own."""
         numbered = enumerate(self.steps, start=1)
         return tuple(float(n) if isinstance(step, dict) else step for n, step in numbered)
+
+    @property
+    def acting(self) -> dict[str, str]:
+        """The groups of supports, and of loads that are not on cells, by key of the case file."""
+        held = {f"supports[{i}].group": s.group for i, s in enumerate(self.supports)}
+        loads = enumerate(self.loads)
+        return held | {f"loads[{i}].group": x.group for i, x in loads if not x.of_cells}
 
     @property
     def histories(self) -> tuple[str, ...]:

@@ -266,8 +266,8 @@ class Compared:
             if check.name == "balance":
                 forces, wanted = (np.concatenate(each) for each in zip(*self._forces, strict=True))
                 sample = Sample(forces, wanted, "zone {}".format)
-            if sample is not None and (told := fault(sample, names)):
-                found[check.name] = told
+            if sample is not None and (cause := fault(sample, names)):
+                found[check.name] = cause
         return summed_up(found)
 
     def not_given(self, ran: Sequence[str]) -> list[str]:
@@ -315,9 +315,9 @@ class Compared:
 
 
 def _place(placed: Placed) -> Callable[[int], str]:
-    def told(i: int) -> str:
+    def name_of(i: int) -> str:
         if placed.node[i] >= 0:
             return f"node {placed.node[i]}"
         return f"({', '.join(f'{x:.6g}' for x in placed.places[i])})"
 
-    return told
+    return name_of

@@ -152,8 +152,8 @@ def _at_nodes(
     if name != "pressure":
         return surface
     if missing := int((count[vertices] == 0).sum()):
-        told = f"{missing} of {len(vertices)} corners of the slave faces have none"
-        problem = f"{told}: it must be 0 where there is no contact"
+        missed = f"{missing} of {len(vertices)} corners of the slave faces have none"
+        problem = f"{missed}: it must be 0 where there is no contact"
         raise InputError(where, name, None, problem)
     known = zone.slave_nodes if count[zone.slave_nodes].all() else vertices
     nothing = np.zeros(len(known))

@@ -27,8 +27,8 @@ def fault(sample: Sample, names: Sequence[str] = ()) -> str:
         return ""  # nearly right, and not by a factor
     if not np.abs(values).max() > 0:
         return "all values are zero"
-    if told := _multiple(values, reference):
-        return told
+    if cause := _multiple(values, reference):
+        return cause
     if not names:
         return ""
     value, wanted = (array.reshape(len(names), -1) for array in (values, reference))
@@ -80,6 +80,6 @@ def _exchanged(value: np.ndarray, wanted: np.ndarray, names: Sequence[str]) -> s
 def summed_up(faults: dict[str, str]) -> str:
     """The faults by quantity in one line: equal ones are listed together."""
     by_fault: dict[str, list[str]] = {}
-    for name, told in faults.items():
-        by_fault.setdefault(told, []).append(name.replace("_", " "))
-    return "; ".join(f"{', '.join(names)}: {told}" for told, names in by_fault.items())
+    for name, cause in faults.items():
+        by_fault.setdefault(cause, []).append(name.replace("_", " "))
+    return "; ".join(f"{', '.join(names)}: {cause}" for cause, names in by_fault.items())

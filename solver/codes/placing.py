@@ -179,9 +179,9 @@ class Placer:
         """Refuse places that are not the case's, by what would make them so."""
         if self._all_near(places) or (not whole and self._at_faces(places)):
             return
-        for told, moved in self._hypotheses(places) if len(places) >= _FEW else ():
+        for problem, moved in self._hypotheses(places) if len(places) >= _FEW else ():
             if self._all_near(moved):
-                raise self._refused(name, told)
+                raise self._refused(name, problem)
         low, high = places.min(axis=0), places.max(axis=0)
         reach, size = high - low, self.high - self.low
         ratio = float(reach.max() / size.max())
@@ -192,9 +192,9 @@ class Placer:
         outside = (low < self.low - slack).any() or (high > self.high + slack).any()
         short = (reach < _REACH * size - slack).any() if whole else self._misses_contact(places)
         if outside or short:
-            told = f"it is from {_listed(low)} to {_listed(high)}"
-            told += f"; the case is from {_listed(self.low)} to {_listed(self.high)}"
-            raise self._refused(name, told)
+            problem = f"it is from {_listed(low)} to {_listed(high)}"
+            problem += f"; the case is from {_listed(self.low)} to {_listed(self.high)}"
+            raise self._refused(name, problem)
 
     def _at_faces(self, places: np.ndarray) -> bool:
         """Whether all places are centres of slave faces."""
@@ -223,8 +223,8 @@ class Placer:
         axes = "xyz"[: self.model.dim]
         moved = self.foreign.displacement
         if moved is not None and len(moved.places) == len(places):
-            told = "coordinates belong to the deformed mesh; the undeformed ones are needed"
-            yield told, places - moved.values[:, : self.model.dim]
+            problem = "coordinates belong to the deformed mesh; the undeformed ones are needed"
+            yield problem, places - moved.values[:, : self.model.dim]
         for factor, text in UNITS.items():
             yield f"lengths are {text} times the case's: another unit?", places / factor
         low, high = places.min(axis=0), places.max(axis=0)

@@ -83,8 +83,8 @@ def recorded_verdicts(family: Path) -> list[Verdict]:
         for i, result in enumerate(file.results):
             for case in result.cases:
                 if case not in solves:
-                    told = f"not a solve of {family.name}; {hint(case, solves)}"
-                    raise InputError(path, f"results[{i}].cases", case, told)
+                    problem = f"not a solve of {family.name}; {hint(case, solves)}"
+                    raise InputError(path, f"results[{i}].cases", case, problem)
             found += [_verdict(file, result, case, family.name) for case in result.cases]
     return found
 

@@ -102,9 +102,9 @@ def _judged(compared: Compared) -> Verdict:
     checks = run_checks(solution, samplers=compared.samplers, allow=compared.tolerance)
     ran = [check.name for check in checks]
     verdict = judge(solution, checks)
-    told = compared.faults([check for check in checks if not check.passed])
-    if told and verdict.verdict == FAILED:
-        verdict = replace(verdict, reason=f"{told} ({verdict.reason})")
+    cause = compared.faults([check for check in checks if not check.passed])
+    if cause and verdict.verdict == FAILED:
+        verdict = replace(verdict, reason=f"{cause} ({verdict.reason})")
     named = _named(verdict, foreign.code, foreign.version, foreign.settings)
     return replace(
         named,

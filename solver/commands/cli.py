@@ -165,13 +165,6 @@ def _add_batch(commands: Any) -> None:
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
 
     command = add_command(
-        commands, "gallery", _gallery, "draw results with PyVista and write a page"
-    )
-    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
-
-    command = add_command(
         commands, "crashed", _crashed, "write the verdict of a solve that died", listed=False
     )
     _add_job(command)
@@ -297,13 +290,6 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
         where = options.results or options.run.__name__.strip("_")
         raise InputError(where, "VERDICT.json", None, "no verdict is named or found")
     return verdicts
-
-
-def _gallery(options: argparse.Namespace) -> int:
-    from ..report.gallery import write_gallery
-
-    print(write_gallery(_verdicts(options), options.output))
-    return PASSED
 
 
 def _report(options: argparse.Namespace) -> int:

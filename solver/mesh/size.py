@@ -173,8 +173,8 @@ def check_memory(points: int, dim: int, where: object, free: float | None = None
             "to try all the same: --no-memory-check",
         )
     if need.usual > free:
-        told = _gigabytes(need.usual), _gigabytes(free)
-        _LOG.log(OUTCOME, "memory may run out: about %s of %s free", *told)
+        sizes = _gigabytes(need.usual), _gigabytes(free)
+        _LOG.log(OUTCOME, "memory may run out: about %s of %s free", *sizes)
 
 
 def _gigabytes(size: float) -> str:

@@ -184,10 +184,10 @@ class Bench:
         for code in self.codes:
             of = [cells[code].row for cells in self.cells.values() if code in cells]
             refused = sum(row.word == REFUSED for row in of)
-            told = f"{code} passes {sum(row.sound for row in of)} of {len(of) - refused}"
-            words.append(told + (f" and cannot express {refused}" if refused else ""))
-        told = "; ".join(words)
-        return f"{told[:1].upper()}{told[1:]}."
+            passes = f"{code} passes {sum(row.sound for row in of)} of {len(of) - refused}"
+            words.append(passes + (f" and cannot express {refused}" if refused else ""))
+        outcome = "; ".join(words)
+        return f"{outcome[:1].upper()}{outcome[1:]}."
 
     @property
     def records(self) -> list[dict[str, Any]]:

@@ -62,8 +62,8 @@ def to_markdown(found: Comparison) -> str:
     for name, batch in (("Before", found.base), ("Now", found.this)):
         parts.append(f"- {name}: `{batch.file}`, {md(batch.outcome)} {md(batch.origin)}")
     for heading, pairs in sections(found).items():
-        told = [(pair.name, pair.words, pair.row.why) for pair in pairs]
-        parts += [f"\n## {heading}\n", *_table(("solve", "verdict", "reason"), told)]
+        changed = [(pair.name, pair.words, pair.row.why) for pair in pairs]
+        parts += [f"\n## {heading}\n", *_table(("solve", "verdict", "reason"), changed)]
     if found.changes:
         rows = [change.cells for change in found.changes]
         parts += ["\n## Numbers\n", *_table(CHANGES, rows)]

@@ -129,8 +129,8 @@ class Pair:
     @property
     def words(self) -> str:
         """The verdicts, before and now."""
-        told = [row.word if row else "not there" for row in (self.base, self.this)]
-        return " → ".join(dict.fromkeys(told))
+        words = [row.word if row else "not there" for row in (self.base, self.this)]
+        return " → ".join(dict.fromkeys(words))
 
 
 @dataclass(frozen=True)

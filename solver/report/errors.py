@@ -141,6 +141,6 @@ def _record(row: Row) -> dict[str, Any]:
         "error": max(error, EPSILON / 4),
         "check": check,
         "verdict": row.word,
-        "stages": stages.told(row.stages),
+        "stages": stages.in_words(row.stages),
         "url": f"#{quote(row.anchor)}",
     }

@@ -101,14 +101,14 @@ def record(base: Path, folder: Path, page: Path | None = None) -> tuple[list[Cou
     page = page or batch.file.with_name(PAGE)
     write_text(page, to_html(courses))
     write_script(page.parent)
-    told = [
+    lines = [
         f"{course.name}: {mark.words}"
         for course in courses
         if course.current
         for mark in course.marks[-1]
     ]
     written = [f"Recorded: {file}" for file in files] or ["Nothing new to record."]
-    return courses, "\n".join([*told, *written, outcome(courses), f"History: {page}"])
+    return courses, "\n".join([*lines, *written, outcome(courses), f"History: {page}"])
 
 
 def _courses(batch: Batch, folder: Path) -> list[Course]:

@@ -26,6 +26,12 @@ class Obstacle:
     faces: np.ndarray
 
 
+def obstacles(solution: Solution) -> dict[int, Obstacle]:
+    """The surfaces of bodies without cells, by number of the body."""
+    found = ((number, obstacle(solution, body.name)) for number, body in enumerate(solution.bodies))
+    return {number: surface for number, surface in found if surface}
+
+
 def obstacle(solution: Solution, name: str) -> Obstacle | None:
     """The surface of a body; None where it has cells."""
     body = solution.case.rigid.get(name)
@@ -43,7 +49,9 @@ def obstacle(solution: Solution, name: str) -> Obstacle | None:
         place = np.concatenate([place, place * [-1.0, 1.0]])
     points, faces = _SHAPES[body.surface](place, **{k: np.array(v) for k, v in values.items()})
     if solution.case.axisymmetric:
-        used, faces = np.unique(faces[(points[faces, 0] > -_TINY).all(axis=1)], return_inverse=True)
+        used, faces = np.unique(
+            faces[(points[faces, 0] > -1e-9 * np.ptp(points)).all(axis=1)], return_inverse=True
+        )
         points, faces = points[used], faces.reshape(-1, 2)
     out = surface.gradient(points)
     size = np.linalg.norm(out, axis=1, keepdims=True)
@@ -58,7 +66,8 @@ def _plane(place: np.ndarray, point: np.ndarray, normal: np.ndarray) -> _Drawn:
     middle = (place.min(axis=0) + place.max(axis=0)) / 2
     foot = middle - ((middle - point) @ normal) * normal
     side = _MORE * np.linalg.norm(_across(place - foot, normal), axis=1).max()
-    return _turned(foot, normal, np.array([0.0, side]), np.zeros(2), corners=4)
+    points, faces = _turned(foot, normal, np.array([0.0, side]), np.zeros(2), corners=4)
+    return (points, faces) if len(foot) == 2 else (points[-4:], np.arange(4)[None])
 
 
 def _sphere(

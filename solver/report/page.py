@@ -21,7 +21,6 @@ _PAGES = {
     "stability": "numerical stability",
     "scaling": "scaling",
     "infsup": "inf-sup test",
-    "gallery": "gallery of all solves",
     "bench": "other codes on the same cases",
     "compare": "comparison with another batch",
     "history": "past batches",

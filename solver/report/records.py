@@ -132,13 +132,13 @@ def _batch(rows: Mapping[str, Row], batch: Batch) -> BatchRecord:
     Results of other codes and solves that crashed have no origin: they are of the time of the
     record, and have the revision and machine of the batch's latest solve.
     """
-    told = [r.verdict.provenance for r in rows.values() if r.verdict.provenance.get("time_utc")]
+    dated = [r.verdict.provenance for r in rows.values() if r.verdict.provenance.get("time_utc")]
     every = [r.verdict.provenance for r in batch.rows.values()]
-    origin = max(told or every, key=lambda each: str(each.get("time_utc", "")), default={})
+    origin = max(dated or every, key=lambda each: str(each.get("time_utc", "")), default={})
     machine = [str(origin[key]) for key in ("cpu", "cores", "threads") if key in origin]
     versions = {key: str(origin[key]) for key in ("python", PROJECT, *PACKAGES) if origin.get(key)}
     return BatchRecord(
-        time=datetime.fromisoformat(str(origin["time_utc"])) if told else datetime.now(UTC),
+        time=datetime.fromisoformat(str(origin["time_utc"])) if dated else datetime.now(UTC),
         revision=str(origin.get("revision", "")),
         machine=" / ".join(machine),
         versions=versions,

@@ -189,7 +189,7 @@ def _read(path: Path) -> Verdict:
         verdict = read_verdict(path)
         fault = unbound(verdict, path)
     except InputError as error:
-        fault = error.told
+        fault = error.detail
     if not fault:
         return verdict
     *_, family, job = ("", "", *path.absolute().parts[:-1])

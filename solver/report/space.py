@@ -17,19 +17,25 @@ from .layout import (
     apart,
     edge_color,
     fit,
+    lines_of,
     mean_normal,
     plan_axes,
     pressed_box,
     tint,
+    ways_apart,
 )
+from .obstacles import obstacles
 from .profile import expected
 from .svg import Drawing, mixed
+from .symbols import View, draw_axes, draw_symbols
 
 WIDTH, HEIGHT = 960, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
-# From no pressure to the largest, light to dark: told apart by lightness alone.
+# From no pressure to the largest, light to dark: distinguished by lightness alone.
 PRESSURE = ("#f3f6fa", "#cfe1ee", "#9cc3dc", "#5f9dc6", "#2f75a8", "#174f7c")
 LEVELS = 32
+# Bodies are drawn apart by this share of the model.
+_APART = 0.3
 MASTER = "#ffa45c"  # readable on every pressure
 # From too little to too much.
 DEVIATION = ("#b35806", "#f1a340", "#fee0b6", "#f7f7f7", "#d8daeb", "#998ec3", "#542788")
@@ -38,7 +44,7 @@ DEVIATION = ("#b35806", "#f1a340", "#fee0b6", "#f7f7f7", "#d8daeb", "#998ec3", "
 def draw_space(solution: Solution, title: str) -> Markup:
     """Axonometric view on the left, plan of the first zone on the right."""
     drawing = Drawing(WIDTH, HEIGHT, title)
-    _blocks(drawing, solution, (12, 12, 270, HEIGHT - 24))
+    _blocks(drawing, solution, (30, 40, 240, HEIGHT - 100))
     if solution.zones:
         zone = solution.zones[0]
         largest, unit = max(float(zone.multiplier.max()), 1e-300), solution.case.units.get("stress")
@@ -73,18 +79,20 @@ def axonometry(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     """The faces turned to the eye, from far to near, the bodies drawn apart."""
-    points = apart(solution, 0.3)
+    points, rigid = apart(solution, _APART), obstacles(solution)
+    ways = _APART * solution.length * ways_apart(solution)
     screen, eye = _camera(solution)
-    place = fit(points @ screen.T, frame)
-    numbers = range(len(solution.bodies))
-    distance = {k: float((points[solution.body == k] @ eye).mean()) for k in numbers}
-    faces = [
-        (outlines(points, kind, nodes), solution.body[nodes[:, 0]])
-        for kind, nodes in outer_faces(solution.mesh)
-    ]
-    for number in sorted(numbers, key=distance.__getitem__):
+    outer = list(outer_faces(solution.mesh))
+    faces = [(outlines(points, k, nodes), solution.body[nodes[:, 0]]) for k, nodes in outer]
+    owned = {n: [p[owner == n] for p, owner in faces] for n in range(len(solution.bodies))}
+    for number, surface in rigid.items():  # seen from both sides
+        sides = (surface.points + ways[number])[surface.faces]
+        owned[number] = [np.concatenate([sides, sides[:, ::-1]])]
+    corners = {n: np.concatenate([p.reshape(-1, 3) for p in own]) for n, own in owned.items()}
+    place = fit(np.concatenate(list(corners.values())) @ screen.T, frame)
+    for number in sorted(owned, key=lambda n: float((corners[n] @ eye).mean())):
         body = solution.bodies[number]
-        for _, polygons in far_to_near([p[owner == number] for p, owner in faces], eye):
+        for _, polygons in far_to_near(owned[number], eye):
             light = float(normals(polygons[:1])[0] @ np.array([0.25, -0.45, 0.85]))
             drawing.polygons(
                 place(polygons @ screen.T),
@@ -94,11 +102,18 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
             )
         if body.role != "master":
             _macro_outlines(drawing, solution, points, lambda x: place(x @ screen.T))
-        own = place(points[solution.body == number] @ screen.T)
-        at, middle = float(own[:, 0].max()) + 10, float(own[:, 1].mean())
-        drawing.text(at, middle - 8, body.name, weight="600")
-        drawing.text(at, middle + 6, ", ".join(body.cells), color=MUTED)
-        drawing.text(at, middle + 20, body.role, color=edge_color(body))
+        own = place(corners[number] @ screen.T)
+        at, y = float(own[:, 0].max()) + 10, float(own[:, 1].mean()) - 8
+        drawing.text(at, y, body.name, weight="600")
+        for line in lines_of(solution, number):
+            drawing.text(at, y := y + 14, line, color=MUTED)
+        drawing.text(at, y + 14, body.role, color=edge_color(body))
+    seen = np.zeros(len(points), dtype=bool)
+    for kind, nodes in outer:
+        seen[nodes[normals(outlines(points, kind, nodes)) @ eye > 1e-6].ravel()] = True
+    draw_symbols(drawing, solution, View(points, lambda x: place(x @ screen.T), seen), outer)
+    meshed = solution.mesh.points[~np.isin(solution.body, list(rigid))]
+    draw_axes(drawing, screen, np.ptp(meshed, axis=0), solution.case.units.get("length"))
 
 
 def far_to_near(groups: list[np.ndarray], eye: np.ndarray) -> list[tuple[int, np.ndarray]]:

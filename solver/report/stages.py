@@ -24,6 +24,6 @@ def colors(found: Iterable[str]) -> dict[str, str]:
     return {s: COLORS.get(s, _OTHER) for s in [*known, *(s for s in every if s not in COLORS)]}
 
 
-def told(seconds: Mapping[str, float]) -> str:
+def in_words(seconds: Mapping[str, float]) -> str:
     """The times of the stages in one line."""
     return ", ".join(f"{stage} {seconds[stage]:.3f} s" for stage in colors(seconds))

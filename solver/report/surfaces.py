@@ -19,7 +19,6 @@ from ..simulation.solution import Solution, ZoneResult
 from ..verification import samples
 from ..verification.units import with_unit
 from .charts import BLUE, PAPER
-from .gallery import magnification
 from .layout import edge_color, mean_normal, tint, ways_apart
 from .obstacles import obstacle
 from .profile import expected, reference
@@ -249,3 +248,15 @@ def _split(faces: _Faces) -> dict[str, Any]:
 def _three(vectors: np.ndarray) -> np.ndarray:
     """Vectors (…, dim) with a third component, zero in the plane."""
     return np.pad(vectors, [(0, 0)] * (vectors.ndim - 1) + [(0, 3 - vectors.shape[-1])])
+
+
+def magnification(displacement: np.ndarray, size: float) -> float:
+    """The factor by which a displacement (n, dim) is enlarged on a model of that size.
+
+    The largest becomes at most a sixteenth of the size; the factor is 1, 2 or 5 times a power of
+    ten.
+    """
+    largest = float(np.linalg.norm(displacement, axis=1).max(initial=0.0))
+    wanted = size / (16 * largest) if largest else 1.0
+    decade = 10.0 ** np.floor(np.log10(wanted))
+    return float(max(m * decade for m in (1, 2, 5) if m * decade <= wanted * (1 + 1e-9)))

@@ -273,8 +273,8 @@ class Attributes:
             raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
         except SupportClashError as clash:
             key = list(self.fixed)[clash.number]
-            told = " (on the axis x is fixed)" if len(self.fixed["plane"].nodes) else ""
-            raise InputError(self.case.path, key, clash.value, f"{clash}{told}") from None
+            remark = " (on the axis x is fixed)" if len(self.fixed["plane"].nodes) else ""
+            raise InputError(self.case.path, key, clash.value, f"{clash}{remark}") from None
 
     def _fixed(self) -> Iterator[tuple[str, Fixed]]:
         """The displacements fixed by supports, by key of the case file."""

@@ -77,7 +77,7 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
     for name in ("together", "cyclic"):
         if any(getattr(support, name) for support in scene.case.supports):
             found[name] = found.get(name, 0.0) + left
-            break  # what both of them hold is not told apart
+            break  # what both of them hold is not distinguished
     if state.iterate.springs.any():
         found["springs"] = found.get("springs", 0.0) + _of_springs(state)
     at_nodes = sum(found.values(), np.zeros_like(left))

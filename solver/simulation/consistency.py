@@ -46,14 +46,23 @@ def _all(solution: Solution) -> Iterator[str]:
         yield from _values("strain energy", np.array([solution.strain_energy]), (1,))
     if solution.reaction is not None:
         yield from _values("reaction", solution.reaction, (n, dim))
-    if solution.probes.keys() - {probe.name for probe in solution.case.probes}:
-        yield "the probes differ from the case's"
+    yield from _by_key(solution, n)
     yield from _steps(solution, dim)
     for zone in solution.zones:
         for fault in chain(_zone(zone, n, dim), _edges(zone, dim)):
             yield f"zone {zone.name}: {fault}"
     for zone in solution.zones:
         yield from _status(zone, solution)
+
+
+def _by_key(solution: Solution, n: int) -> Iterator[str]:
+    """What belongs to supports, loads and probes of the case."""
+    if solution.acted.keys() - solution.case.acting.keys():
+        yield "the supports and loads differ from the case's"
+    for key, nodes in solution.acted.items():
+        yield from _numbers(key, nodes, (None,), n)
+    if solution.probes.keys() - {probe.name for probe in solution.case.probes}:
+        yield "the probes differ from the case's"
 
 
 def _steps(solution: Solution, dim: int) -> Iterator[str]:

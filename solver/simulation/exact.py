@@ -75,6 +75,7 @@ class ExactValues:
 
     def __init__(self, solution: Solution, exact: ExactSolution):
         self.solution, self.exact = solution, exact
+        self._pressure: dict[str, np.ndarray] = {}
 
     def _surface(self, zone: ZoneResult) -> SurfacePoints:
         points, around = self.solution.mesh.points, self.solution.case.axisymmetric
@@ -110,9 +111,11 @@ class ExactValues:
         return normal_stress(self.stress(nodes), normals)
 
     def pressure(self, zone: ZoneResult) -> np.ndarray:
-        """The mean contact pressure (m,) of each macro-element."""
-        at = self._surface(zone)
-        return at.means(self.exact.contact_pressure(at.place))
+        """The mean contact pressure (m,) of each macro-element; several checks ask for it."""
+        if zone.name not in self._pressure:
+            at = self._surface(zone)
+            self._pressure[zone.name] = at.means(self.exact.contact_pressure(at.place))
+        return self._pressure[zone.name]
 
     def gap(self, zone: ZoneResult) -> np.ndarray:
         """The mean gap (m,) of each macro-element."""

@@ -106,6 +106,11 @@ class ContactIterate:
         """
         return replace(self, force=force)._knowing(self, "defect", "internal", "springs", "sizes")
 
+    def with_closed(self, closed: np.ndarray) -> "ContactIterate":
+        """The same displacement with other multipliers closed (k,)."""
+        known = "defect", "internal", "springs", "sizes"
+        return replace(self, closed=closed)._knowing(self, *known)
+
     def _knowing(self, other: "ContactIterate", *names: str) -> "ContactIterate":
         known = vars(other)
         vars(self).update({name: known[name] for name in names if name in known})

@@ -1,25 +1,19 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
+import logging
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
 from ..case.model import Step
 from ..mechanics.fem.bodies import (
-    nodes_of_unknowns,
     rigid_motions,
     unsupported,
-    whole_motions,
 )
-from ..mechanics.fem.elasticity import stiffness
-from ..mechanics.fem.vertices import from_vertices, linear_unknowns
-from ..mechanics.linear.choice import against_multigrid
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
-from ..mechanics.linear.nodal_matrix import NodalMatrix
 from ..mechanics.linear.systems import Systems, parts_of
-from ..mechanics.linear.unknowns import Unknowns
 from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
 from ..system.errors import SolveError
 from ..system.memory import release
@@ -31,8 +25,11 @@ from .constraints import (
     unit_springs,
 )
 from .displacement import Displacement
+from .free_stiffness import free_stiffness, free_unknowns
 from .iterate import ContactIterate
 from .scene import Scene
+
+_LOG = logging.getLogger(__name__)
 
 # An estimated error of the pressure from which residuals are summed in extended precision.
 _EXTEND = 3e-11
@@ -42,8 +39,17 @@ _CHANGE = 1e-4
 _CORRECTED = 4.0
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
+SINGLE_FROM = 1_000_000
+"""Degrees of freedom from which the stiffness is stored in single precision where multigrid solves:
+it takes half the memory, and refinement, by residuals of the cells in double precision, two steps
+more."""
+# Where refinement ends with a larger residual, the stiffness is assembled in double precision.
+_SINGLE_SERVES = 1e-11
 # From so many unknowns on, memory that was freed is given back before the matrix is made.
 _LARGE = 100_000
+# While the contact status is sought by an iterative solver: residuals of the first solve and of
+# changes, and the share of pressures and motions below which such a solve decides nothing.
+_ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
 _AT_ONCE = 1 << 23
 
@@ -102,12 +108,17 @@ class ContactProblem:
         self.unsupported = loose
         if scene.springs.nnz:
             self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
-        on_free = self.constraints.on_free
+        refined = scene.options.safeguards.refinement
+        self.single = refined and scene.n_dofs >= SINGLE_FROM
+        self._assemble()
+
+    def _assemble(self) -> None:
+        scene, on_free = self.scene, self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
-        unknowns = _unknowns(scene, self.motions)
+        unknowns = free_unknowns(scene, self.motions)
         if scene.n_dofs > _LARGE:
             release()
-        self.matrix, self.diagonal = _stiffness(scene, unknowns)
+        self.matrix, self.diagonal = free_stiffness(scene, unknowns, self.single)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
         soft = self._compliance if stabilised else None
@@ -154,19 +165,31 @@ class ContactProblem:
         if not scene.options.shortcuts.status:
             start = eligible
         start = self._first_guess(step) if start is None else start
+        if bilateral:
+            first = self._at_rest(eligible, step, correction)
+            return self._solve_closed(first, correction, _force_scale(first))
         latest: list[Equilibrium] = []
+        rough, known = scene.options.shortcuts.status, None
 
         def attempt(closed: np.ndarray) -> Trial:
+            nonlocal known
             if not scene.options.shortcuts.status:
                 self._systems.forget()
-            latest[:] = [self._solve_closed(closed, step, correction)]
+            first = rest = self._at_rest(closed, step, correction)
+            if rough and self._constrained(closed).factor.iterative:
+                known, trial = self._roughly(rest, known)
+                if (eligible & (trial.offence(closed) > 1)).any():
+                    return trial
+                first = known
+            latest[:] = [self._solve_closed(first, correction, _force_scale(rest))]
             return latest[0].trial
 
-        if bilateral:
-            attempt(eligible)
-            return latest[0]
+        def stiffness() -> np.ndarray:
+            nonlocal rough
+            rough = False
+            return self._gap_stiffness(step)
+
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
-        stiffness = partial(self._gap_stiffness, step)
         status = find_status(attempt, start, eligible, area, stiffness, confirm)
         trial = latest[0].trial
         touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
@@ -212,26 +235,53 @@ class ContactProblem:
             self._moves = {key: free_motion(self.scene, self.motions, self.constraints, closed)}
         return self._moves[key]
 
-    def _solve_closed(
+    def _at_rest(
         self, closed: np.ndarray, step: Step, correction: np.ndarray | float
-    ) -> Equilibrium:
-        """Equilibrium with the given multipliers closed."""
+    ) -> ContactIterate:
+        """The start of a solve with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
             raise SolveError(f"{moves} once {int((~closed).sum())} macro-elements are open")
-        correction = np.zeros(scene.force.shape) + correction
         acting, offset = scene.acting(step)
-        force = acting + correction
-        start = ContactIterate(
+        return ContactIterate(
             scene=scene,
             constraints=self.constraints,
             closed=closed,
-            force=force,
+            force=acting + correction,
             displacement=self.at_rest.moved(offset),
             mean_stress=np.zeros(scene.mean.size),
             swelling=scene.straining(step, scene.initial.swelling),
         )
-        return self._refined(start, _force_scale(start), StatusResult(closed, 1, []), correction)
+
+    def _solve_closed(
+        self, start: ContactIterate, correction: np.ndarray | float, scale: float
+    ) -> Equilibrium:
+        """Equilibrium with the multipliers closed that are so at the start."""
+        correction = np.zeros(self.scene.force.shape) + correction
+        return self._refined(start, scale, StatusResult(start.closed, 1, []), correction)
+
+    def _roughly(
+        self, start: ContactIterate, known: ContactIterate | None
+    ) -> tuple[ContactIterate, Trial]:
+        """An approximate solution, from the one `known` of another status, and its trial.
+
+        What it leaves undecided counts as no offence: a solve to round-off then judges.
+        """
+        accuracy = _ROUGH_CHANGE if known else _ROUGH_STATUS
+        start = known.with_closed(start.closed) if known else start
+        system = self._constrained(start.closed)
+        force = start.condensed(start.residual())
+        found = start.advanced(system.correction(force, start.violation(), accuracy))
+        pressure = np.zeros(len(start.closed))
+        pressure[start.closed] = system.multiplier(found.residual())
+        trial, gaps = judged(found, pressure, self.diagonal), self.constraints.gaps
+        covered = np.where(self.constraints.eligible, self.constraints.covered, np.inf)
+        motion = abs(gaps) @ np.abs(found.displacement.total) / covered
+        return found, replace(
+            trial,
+            pressure_limit=trial.pressure_limit + _UNDECIDED * np.abs(pressure).max(initial=0.0),
+            gap_limit=trial.gap_limit + _UNDECIDED * motion,
+        )
 
     def _refined(
         self,
@@ -244,6 +294,13 @@ class ContactProblem:
         """Solved from an iterate; in extended precision where that gains digits."""
         system, cures = self._constrained(start.closed), self.scene.options.safeguards
         found = self._once(system, start, scale, status, correction, round_off)
+        if self.single and found.residual > _SINGLE_SERVES:
+            _LOG.info("the stiffness is assembled again, in double precision")
+            self.single = False
+            self._systems.forget()
+            self._assemble()
+            system = self._constrained(start.closed)
+            found = self._once(system, start, scale, status, correction, round_off)
         if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
             extended = replace(found.iterate, extended=True)
             found = self._once(system, extended, scale, status, correction, round_off)
@@ -318,39 +375,3 @@ def _force_scale(start: ContactIterate) -> float:
     """The size of the forces at work: the loads, or those that imposed values bring up."""
     internal = start.internal - start.springs
     return float(max(np.abs(start.force).max(), np.abs(internal).max())) or 1.0
-
-
-def _stiffness(
-    scene: Scene, unknowns: Unknowns
-) -> tuple[sparse.csr_matrix | NodalMatrix, np.ndarray]:
-    """The stiffness of the free unknowns, and the diagonal (n_dofs,) for all degrees of freedom."""
-    free, mean = scene.free, scene.mean
-    blocks = stiffness(scene.points, scene.blocks)
-    diagonal = blocks.diagonal()
-    if free.selection is not None and not mean.size and not scene.springs.nnz:
-        matrix = NodalMatrix(blocks, free.selection)
-        large = not against_multigrid(len(free.selection), unknowns)
-        return (matrix if large else matrix.tocsr()), diagonal
-    matrix = free.reduced(blocks)
-    if mean.size:
-        matrix = matrix + free.reduced(mean.stiffness())
-    if scene.springs.nnz:
-        matrix = matrix + free.reduced(scene.springs)
-        diagonal = diagonal + scene.springs.diagonal()
-    return matrix, diagonal
-
-
-def _unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
-    """The meaning of a scene's free unknowns, given the rigid motions of its bodies."""
-    basis, dim = scene.free.basis, scene.points.shape[1]
-    node = nodes_of_unknowns(basis, dim)
-    if scene.case.axisymmetric:
-        # Those of the sections in their plane: they hardly strain rings far from the axis.
-        motions = rigid_motions(scene.points, scene.body)
-    together = basis.T @ whole_motions(motions, scene.n_bodies)
-    about = dim, node, together, scene.body[node], scene.points
-    if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
-        return Unknowns(*about)
-    return Unknowns(
-        *about, *linear_unknowns(basis, dim, *from_vertices(len(scene.points), scene.blocks))
-    )

@@ -107,8 +107,8 @@ class Scene:
     cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
     up for it. `fixed`: the displacements that are held, by key of the case file, `rigid`: the rigid
     bodies. `springs` (n_dofs, n_dofs) is the stiffness of springs to the ground. `probed`: nodes by
-    probe. `force` (n, dim), all but that of `initial` strains, and `free.offset` are for load
-    factor 1.
+    probe; `acted`: nodes by the key of the support, or of the load on a surface. `force` (n, dim),
+    all but that of `initial` strains, and `free.offset` are for load factor 1.
     """
 
     case: Case
@@ -129,6 +129,7 @@ class Scene:
     initial: StrainLoads
     springs: sparse.csr_matrix
     probed: dict[str, np.ndarray]
+    acted: dict[str, np.ndarray]
     histories: dict[str, tuple[np.ndarray, np.ndarray]]
     zones: list[ZoneScene]
     rest: Rest
@@ -222,6 +223,7 @@ def build_scene(
         initial=initial,
         springs=springs,
         probed={p.name: groups.nodes(p.group, "probes") for p in case.probes if p.group},
+        acted={key: groups.nodes(group, key) for key, group in case.acting.items()},
         histories=groups.histories(),
         zones=zones,
         rest=Rest(

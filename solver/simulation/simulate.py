@@ -110,9 +110,9 @@ def _tell_forces(solution: Solution) -> None:
             _LOG.log(OUTCOME, "probe %s %s", name, line)
     largest, place = solution.largest_displacement
     at = ", ".join(f"{x:.5g}" for x in place)
-    told = largest, at, solution.validity.strain, solution.strain_energy
+    values = largest, at, solution.validity.strain, solution.strain_energy
     text = "largest displacement %.6g at (%s), largest strain %.3g, strain energy %.6g"
-    _LOG.log(OUTCOME, text, *told)
+    _LOG.log(OUTCOME, text, *values)
 
 
 def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
@@ -133,8 +133,8 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
         fields.append(field)
         closed = int(state.status.closed.sum())
         count = state.status.iterations
-        told = _called(step, factor), count, "" if count == 1 else "s", closed, state.residual
-        _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *told)
+        values = _called(step, factor), count, "" if count == 1 else "s", closed, state.residual
+        _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *values)
     return states, fields
 
 
@@ -186,6 +186,7 @@ def _recover(
         strain_energy=strain_energy(scene, last),
         reaction=at_nodes,
         probes=probed(scene, zones, last.displacement, stress),
+        acted=scene.acted,
         accuracy=last.accuracy.causes,
         mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
     )

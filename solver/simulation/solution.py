@@ -310,6 +310,7 @@ class Solution:
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
     `strain_energy` is that of the last load factor, and so is `reaction` (n, dim), the forces at
     nodes with which supports, rigid bodies, springs and ties hold the bodies; `probes` by name.
+    `acted`: nodes by the key of the support, or of the load on a surface; empty in older files.
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
     `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
     the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
@@ -340,6 +341,7 @@ class Solution:
     strain_energy: float | None = None
     reaction: np.ndarray | None = None
     probes: dict[str, ProbeResult] = field(default_factory=dict)
+    acted: dict[str, np.ndarray] = field(default_factory=dict)
     accuracy: dict[str, float] = field(default_factory=dict)
     mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)

@@ -132,7 +132,7 @@ def _work(task: Mapping[str, Any]) -> None:
         found = getattr(import_module(task["module"]), task["work"])(task["job"])
         found = ended(SOLVED, "") | found
     except InputError as error:
-        found = ended(REFUSED, error.told)
+        found = ended(REFUSED, error.detail)
     except SolveError as error:
         found = ended(FAILED, str(error))
     Path(task["output"]).write_text(to_json(found), encoding="utf-8")

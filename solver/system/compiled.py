@@ -5,16 +5,27 @@ machine code is kept in `__pycache__` beside the source, or in the user's cache 
 read-only. A compiled function holds no lock of the interpreter: it may run in several threads.
 """
 
+import sys
 from collections.abc import Callable
 from functools import cache, wraps
 from importlib.util import find_spec
 from typing import Any
+
+_WORTH = 5_000_000  # numbers: 60,000 unknowns of HEXA8
 
 
 @cache
 def available() -> bool:
     """Whether Numba is installed."""
     return find_spec("numba") is not None
+
+
+def worthwhile(numbers: int) -> bool:
+    """Whether compiled functions pay for a matrix of so many `numbers`.
+
+    Numba takes half a second of processor time to load, and then serves smaller matrices too.
+    """
+    return available() and (numbers >= _WORTH or "numba" in sys.modules)
 
 
 def compiled(function: Callable[..., None]) -> Callable[..., None]:

@@ -16,12 +16,12 @@ class InputError(Exception):
     def __init__(self, where: object, key: str, value: object, problem: str):
         """Compose the line. A `value` of None is not shown: the key is missing.
 
-        `told` is the line without the file.
+        `detail` is the line without the file.
         """
         self.where, self.key, self.value, self.problem = printable(where), key, value, problem
         shown = "" if value is None else f" = {_shorten(value)}"
-        self.told = f"{key}{shown}: {problem}"
-        super().__init__(f"{self.where}: {self.told}")
+        self.detail = f"{key}{shown}: {problem}"
+        super().__init__(f"{self.where}: {self.detail}")
 
 
 class MachineError(InputError):

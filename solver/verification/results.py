@@ -16,6 +16,7 @@ that the checks need, so that it can be judged without solving:
                    what holds each group; area, force and moment of contact in each zone; motion of
                    rigid bodies and contact on them; by step (counted from 0)
     /probes        by name: places with displacement and stress, or pressure
+    /acted         by key of the case file: the nodes of each support and of each load on a surface
     /bodies /balance /steps /observation /plan /timings /checks
                    tables, a data set a column
     /provenance    versions, revision, hashes, machine
@@ -113,6 +114,9 @@ def _write(
     if solution.strain_energy is not None:
         file["solve"].attrs["strain_energy"] = solution.strain_energy
     write_probes(file.create_group("probes"), solution.probes)
+    acted = file.create_group("acted")
+    for key, nodes in solution.acted.items():
+        acted[key] = nodes.astype(np.int32)
     file.create_group("accuracy").attrs.update(solution.accuracy)
     file.create_group("validity").attrs.update(asdict(solution.validity))
     file.create_group("errors").attrs.update(solution.errors)
@@ -197,6 +201,7 @@ def _read_solution(file: h5py.File) -> Solution:
         if "reaction" in point_data
         else None,
         probes=read_probes(file),
+        acted={key: data[()] for key, data in file.get("acted", {}).items()},
         accuracy=_plain(file["accuracy"].attrs) if "accuracy" in file else {},
         mean_stress={kind: data[()] for kind, data in file.get("mean_stress", {}).items()},
         errors=_plain(file["errors"].attrs) if "errors" in file else {},

@@ -114,13 +114,6 @@ def test_every_command_works_in_its_order(project: Path):
     run_all(README, project)
     assert (project / "results" / "report" / "workflow.html").is_file()
     assert (project / "results" / "my-cases" / "my-block" / "result.vtkhdf").is_file()
-    environment = os.environ | {"MAKEFLAGS": "INSTALL=:"}
-    made = subprocess.run(
-        ["make", "gallery"], cwd=project, env=environment, capture_output=True, text=True
-    )
-    drawn = (project / "results" / "report" / "gallery.html").is_file()
-    assert drawn == (made.returncode == 0), made.stdout + made.stderr
-    assert drawn or "cannot draw here (EGL" in made.stdout + made.stderr
 
 
 def test_the_tutorial_ends_with_a_verdict_in_the_batch(project: Path):

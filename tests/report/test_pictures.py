@@ -2,13 +2,15 @@
 
 import os
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import meshio
 import numpy as np
 import pytest
 
+from solver.case.expressions import Expression
 from solver.mechanics.fem.faces import outer_faces
-from solver.report.charts import BLUE, ORANGE
+from solver.report.charts import BLUE, GREEN, ORANGE, RED
 from solver.report.geometry import macro_edges, normals, outlines
 from solver.report.layout import pressed_box
 from solver.report.pictures import picture
@@ -16,8 +18,10 @@ from solver.report.plane import draw_plane
 from solver.report.rows import Row
 from solver.report.space import DEVIATION, draw_space, shade
 from solver.report.svg import Drawing, mixed
+from solver.simulation.solution import BodyInfo
 from solver.verification.results import write_result
 from tests import handmade
+from tests.report.test_surfaces import with_rigid
 from tests.report.verdicts import record
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -39,7 +43,58 @@ def test_plane_picture_shows_every_cell_of_both_blocks(tmp_path):
     assert polygons(svg, stroke=slave) == 6
     assert polygons(svg, stroke=master) == 3
     words = {text.text for text in ET.fromstring(svg).iter(f"{SVG}text")}
-    assert {"bottom", "top", "slave", "master", "QUAD4"} <= words
+    assert {"bottom", "top", "slave", "master", "QUAD4", "x", "y", "50 × 100"} <= words
+
+
+def test_loads_and_supports_of_a_plane_picture(tmp_path):
+    svg = draw_plane(handmade.plane(tmp_path), "two blocks")
+    assert polygons(svg, stroke=GREEN, fill="#ffffff") == 4 + 6  # of 4 and of 7 nodes
+    heads = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == RED]
+    assert len(heads) == 4
+    for head in heads:  # the tip first, then what is behind it, above
+        tip, behind = head.removeprefix("M").rstrip("Z").split("l")
+        assert float(behind.split()[1]) == -60.0
+        assert float(tip.split()[1]) == pytest.approx(480, abs=1), "the top of the upper block"
+    words = {text.text for text in ET.fromstring(svg).iter(f"{SVG}text")}
+    assert "pressure 25" in words
+
+
+def test_arrows_follow_the_load(tmp_path):
+    solution = handmade.plane(tmp_path)
+    load = replace(solution.case.loads[0], kind="traction", value=(Expression("x"), 0.0))
+    solution.case = replace(solution.case, loads=(load,))
+    svg = draw_plane(solution, "two blocks")
+    lines = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("stroke") == RED]
+    steps = sorted(tuple(map(float, line.split("l")[1].split())) for line in lines)
+    # At x = 0 there is none; the largest has 30 pixels.
+    assert np.array(steps) == pytest.approx(np.array([(100, 0), (200, 0), (300, 0)]), abs=1)
+    assert "traction (x, 0)" in svg
+
+
+def test_supports_of_a_picture_in_space(tmp_path):
+    solution = handmade.solid(tmp_path)
+    svg = draw_space(solution, "solid")
+    seen = 3  # corners of the foot: the eye is above
+    assert polygons(svg, stroke=GREEN, fill="#ffffff") == seen
+    assert polygons(svg, fill=RED) == 4
+    words = {text.text for text in ET.fromstring(svg).iter(f"{SVG}text")}
+    assert {"10 × 10 × 20", "pressure 25", "z"} <= words
+    solution.acted = {}
+    assert polygons(draw_space(solution, "solid"), stroke=GREEN) == 0
+
+
+def test_a_rigid_circle_is_drawn_as_a_hatched_line(tmp_path):
+    solution = with_rigid(tmp_path, "{sphere: {centre: [25, 80], radius: 80}}")
+    solution.bodies.append(BodyInfo("die", {}, 0, "master"))
+    svg = draw_plane(solution, "rigid")
+    words = {text.text for text in ET.fromstring(svg).iter(f"{SVG}text")}
+    assert {"die", "rigid circle"} <= words
+    lines = [
+        p.get("d").count("M")
+        for p in ET.fromstring(svg).iter(f"{SVG}path")
+        if p.get("stroke") == ORANGE and p.get("stroke-width") == "20"
+    ]
+    assert lines == [46]
 
 
 def test_space_picture_colours_sub_faces_by_pressure(tmp_path):
@@ -80,6 +135,12 @@ def test_outline_of_a_macro_element_leaves_out_the_cut():
     # A triangle cut into three about node 3: the three inner edges are not its outline.
     faces = [("TRIA3", np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]]), np.zeros(3, dtype=int))]
     assert macro_edges(faces)[:, :2].tolist() == [[0, 1], [0, 2], [1, 2]]
+
+
+def test_edges_of_macro_elements_have_their_mid_nodes():
+    faces = [("TRIA6", np.array([[0, 1, 2, 10, 11, 12], [0, 2, 3, 12, 13, 14]]), np.array([5, 5]))]
+    found = {tuple(row) for row in macro_edges(faces).tolist()}
+    assert found == {(0, 1, 10), (1, 2, 11), (2, 3, 13), (0, 3, 14)}
 
 
 def test_mid_nodes_are_drawn_only_where_the_edge_bends():

@@ -10,7 +10,7 @@ from solver.case.reader import load_case
 from solver.mesh.catalogue import cell_type
 from solver.report.layout import ways_apart
 from solver.report.obstacles import obstacle
-from solver.report.surfaces import _split, surfaces
+from solver.report.surfaces import _split, magnification, surfaces
 from tests import handmade
 
 
@@ -143,9 +143,16 @@ def test_rigid_surfaces_in_space(tmp_path, body, implicit):
     low, high = found.points.min(axis=0), found.points.max(axis=0)
     assert (low[:2] < 0).all(), "beyond the slave"
     assert (high[:2] > 10).all()
-    across = np.linalg.norm(found.points[:, 1:] - [5, 0], axis=1)
-    assert across.min() < 1.8, "opposite to the slave"
+    assert ((low + high) / 2)[:2] == pytest.approx([5, 5], abs=0.5), "opposite to the slave"
+    assert np.abs(found.points[:, 2]).min() < 1.8
     assert found.out[:, 2].min() < -0.7, "out of the body, towards the slave below"
+
+
+@pytest.mark.parametrize(
+    ("largest", "expected"), [(1.0, 5.0), (0.003, 2000.0), (70.0, 0.05), (0.0, 1.0)]
+)
+def test_the_displacement_is_magnified_by_a_round_number(largest, expected):
+    assert magnification(np.array([[0.0, largest]]), 100.0) == expected
 
 
 def test_bodies_move_apart_with_their_masters(tmp_path):

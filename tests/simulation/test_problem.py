@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
+from solver.mechanics.linear.choice import MULTIGRID
+from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.mortar.status import StatusResult
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.mesh import generate
@@ -257,3 +259,33 @@ def test_nodal_multipliers_on_quadratic_edges_own_an_unknown(slave, alone):
     case = block_case(2, zone=", treatment: nodal")
     problem = ContactProblem(build_scene(case, block_mesh(slave, "QUAD4", (5, 4))))
     assert (len(problem.constraints.dependent) == 0) == alone
+
+
+@pytest.mark.parametrize("serves", [1e-11, 0.0])
+@pytest.mark.parametrize("young", [2000.0, 2.0])
+def test_a_stiffness_in_single_precision_costs_no_digit(monkeypatch, serves, young):
+    """Blocks of different stiffness; where single precision does not serve, in double again."""
+    text = block_case(3).source.replace("{all: {young: 2000.0", f"{{bottom: {{young: {young}")
+    text = text.replace("0.3}}", "0.3}, top: {young: 2000.0, poisson: 0.2}}", 1)
+    case, mesh = parse_case(text, Path("patch.yaml")), block_mesh("HEXA8", "HEXA8", (6, 5))
+    monkeypatch.setattr(problem, "_SINGLE_SERVES", serves)
+    found = []
+    for least in (10**9, 0):
+        monkeypatch.setattr(problem, "SINGLE_FROM", least)
+        with force_solver(MULTIGRID):
+            contact = ContactProblem(build_scene(case, mesh))
+            assert contact.matrix.blocks.dtype == (np.float64 if least else np.float32)
+            found.append(contact.solve(1.0))
+    double, single = found
+    assert contact.single == (serves > 0)
+    assert contact.matrix.blocks.dtype == (np.float32 if serves else np.float64)
+    assert single.residual < 1e-14
+    assert single.pressure == pytest.approx(double.pressure, rel=1e-12)
+    scale = np.abs(double.displacement).max()
+    assert single.displacement == pytest.approx(double.displacement, abs=1e-12 * scale)
+
+
+def test_a_stiffness_that_is_factored_is_in_double_precision(monkeypatch):
+    monkeypatch.setattr(problem, "SINGLE_FROM", 0)
+    contact = ContactProblem(build_scene(block_case(3), block_mesh("HEXA8", "HEXA8", (3, 2))))
+    assert contact.matrix.dtype == np.float64

@@ -205,3 +205,14 @@ def test_force_on_the_bodies_is_balanced():
     solution = simulate(block_case(3), block_mesh("TETRA4", "HEXA27"))
     assert set(solution.balance) >= {"zone interface: force", "reactions and loads: moment"}
     assert errors(solution)["balance"] < 1e-13
+
+
+def test_a_solution_knows_the_nodes_of_supports_and_loads():
+    solution = simulate(block_case(2), block_mesh("QUAD4", "QUAD8", (4, 3)))
+    y = solution.mesh.points[:, 1]
+    base = solution.case.supports.index(
+        next(s for s in solution.case.supports if s.group == "base")
+    )
+    assert set(solution.acted[f"supports[{base}].group"]) == set(np.flatnonzero(y == y.min()))
+    assert set(solution.acted["loads[0].group"]) == set(np.flatnonzero(y == y.max()))
+    assert len(solution.acted["loads[0].group"]) == 2 * 3 + 1  # mid-nodes too

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from solver.system import compiled as module
 from solver.system.compiled import available, compiled
 
 numba = pytest.mark.skipif(not available(), reason="Numba is not installed")
@@ -43,6 +44,17 @@ def test_without_a_folder_for_the_cache_it_is_compiled_all_the_same(monkeypatch)
     out = np.zeros(1)
     compiled(add.__wrapped__)(np.ones(3), out)
     assert out == [3.0]
+
+
+def test_numba_is_loaded_for_large_matrices_alone(monkeypatch):
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    monkeypatch.setattr(module, "available", lambda: True)
+    assert not module.worthwhile(100_000)
+    assert module.worthwhile(10_000_000)
+    monkeypatch.setitem(sys.modules, "numba", None)
+    assert module.worthwhile(100_000)
+    monkeypatch.setattr(module, "available", lambda: False)
+    assert not module.worthwhile(10_000_000)
 
 
 def test_small_cases_import_no_numba():

@@ -249,6 +249,14 @@ def node_beyond_the_end(file):
     file["contact/interface/slave_nodes"][0] = 10**6
 
 
+def another_support(file):
+    file["acted"].move("supports[0].group", "supports[9].group")
+
+
+def load_beyond_the_end(file):
+    file["acted/loads[0].group"][0] = 10**6
+
+
 def complex_numbers(file):
     values = file["observation/gap"][()] + 0j
     del file["observation/gap"]
@@ -267,6 +275,8 @@ def other_attributes(file):
         (lose_step, "the load steps differ from the case's"),
         (not_a_number, "zone interface: gap holds values that are not finite numbers"),
         (node_beyond_the_end, "zone interface: slave_nodes holds numbers outside 0"),
+        (another_support, "the supports and loads differ from the case's"),
+        (load_beyond_the_end, "loads[0].group holds numbers outside 0"),
         (complex_numbers, "observation/gap holds complex numbers"),
         (lose_what_need_not_be_there, "1 of its HDF5 objects are missing"),
         (other_attributes, "the solve's own numbers holds"),

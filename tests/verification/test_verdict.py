@@ -36,7 +36,7 @@ def flaw(path):
     try:
         return unbound(read_verdict(path), path)
     except InputError as error:
-        return error.told
+        return error.detail
 
 
 def verdict_of(solution, **more):

@@ -46,17 +46,17 @@ def log(tmp_path, *lines):
 def test_solves_are_counted_and_nothing_else(state, tmp_path):
     state.start(1, "mesh", "mesh a", None)
     state.start(2, "solve", "solve a", log(tmp_path, "18:43:22 write", "a: passed, 0.25 s"))
-    assert state.told() == "0 of 10 solves done, 2 running – mesh a"
+    assert state.text() == "0 of 10 solves done, 2 running – mesh a"
     assert state.end(1) is None
     assert state.end(2) == "a: passed, 0.25 s [1/10]"
-    assert state.told() == "1 of 10 solves done"
+    assert state.text() == "1 of 10 solves done"
 
 
 @pytest.mark.parametrize("word", ["failed", "unreliable", "refused", "crashed"])
 def test_what_did_not_pass_is_counted(state, tmp_path, word):
     state.start(1, "solve", "solve a", log(tmp_path, f"a: {word}: b: passed, it said"))
     state.end(1)
-    assert state.told() == "1 of 10 solves done, 1 not passed"
+    assert state.text() == "1 of 10 solves done, 1 not passed"
     state.start(2, "solve", "solve b", log(tmp_path, "b: passed, failed: 0"))
     state.end(2)
     assert state.not_passed == 1
@@ -65,10 +65,10 @@ def test_what_did_not_pass_is_counted(state, tmp_path, word):
 def test_a_job_that_breaks_off_may_begin_once_more(state, tmp_path):
     state.start(1, "solve", "solve a", log(tmp_path, "a: passed, 0.25 s"))
     state.fail(1)
-    assert state.told() == "0 of 10 solves done, 1 not passed"
+    assert state.text() == "0 of 10 solves done, 1 not passed"
     state.start(1, "solve", "solve a", tmp_path / "log")
     assert state.end(1) == "a: passed, 0.25 s [1/10]"
-    assert state.told() == "1 of 10 solves done"
+    assert state.text() == "1 of 10 solves done"
 
 
 def test_time_left_goes_by_what_is_done(state, clock):
@@ -78,15 +78,15 @@ def test_time_left_goes_by_what_is_done(state, clock):
         assert state.left is None or number >= 3
         state.end(number)
     assert state.left == pytest.approx(60)
-    assert "about 60 s left" in state.told()
+    assert "about 60 s left" in state.text()
 
 
 def test_the_job_that_runs_longest_tells_its_stage(state, clock, tmp_path):
     state.start(1, "solve", "solve big", log(tmp_path, "18:43:22 solution 1: residual 1.0e-12"))
     clock.now += 2
-    assert state.told().endswith("1 running – solve big")
+    assert state.text().endswith("1 running – solve big")
     clock.now += 118
-    assert state.told().endswith("– solve big (2 min): 18:43:22 solution 1: residual 1.0e-12")
+    assert state.text().endswith("– solve big (2 min): 18:43:22 solution 1: residual 1.0e-12")
 
 
 def record(event=None, message=None, **more):

@@ -4,7 +4,7 @@ OTHERS = [job for key, job in BATCH.items() if key not in RUN]
 # of the solver the report must not run ladders and studies first.
 PAGES = [
     f"results/report/{name}.html"
-    for name in ("orders", "study", "stability", "scaling", "infsup", "gallery")
+    for name in ("orders", "study", "stability", "scaling", "infsup")
 ]
 PAGES = [page for page in PAGES if os.path.isfile(page)]
 

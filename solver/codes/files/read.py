@@ -62,8 +62,8 @@ def read_result_files(
         there = ", ".join(sorted({name for _, raw in raws for name in raw.fields})) or "none"
         allowed = f"none is known as {', '.join(QUANTITIES)}; fields: {there}; see --map"
         raise InputError(files[0], "fields", None, allowed)
-    told = next((raw.code for _, raw in raws if raw.code), "")
-    code = code or mapping.code or told or "other"
+    stated = next((raw.code for _, raw in raws if raw.code), "")
+    code = code or mapping.code or stated or "other"
     if not re.fullmatch(CODE, code):
         raise InputError("command line", "--code", code, "must be letters, digits, -, _ and .")
     return ForeignResult(
@@ -94,10 +94,10 @@ def read_raw(path: Path, columns: Sequence[str] = ()) -> Raw:
 
 def _field(file: Path, raw: Raw, quantity: str, mapping: ResultMap, where: object) -> Field | None:
     """A quantity of one file in the units of the case; None where it has none."""
-    told: FieldMap | None = getattr(mapping.fields, quantity)
+    given: FieldMap | None = getattr(mapping.fields, quantity)
     found: names.Found | None
-    if told is not None:
-        found = _mapped(raw, told, quantity, where)
+    if given is not None:
+        found = _mapped(raw, given, quantity, where)
     else:
         candidates = names.known(raw, quantity)
         if len(candidates) > 1:
@@ -118,12 +118,12 @@ def _field(file: Path, raw: Raw, quantity: str, mapping: ResultMap, where: objec
     )
 
 
-def _mapped(raw: Raw, told: FieldMap, quantity: str, where: object) -> names.Found:
+def _mapped(raw: Raw, given: FieldMap, quantity: str, where: object) -> names.Found:
     """The fields that the map names."""
-    fields = names.named(raw, told.names, where, f"fields.{quantity}.name")
+    fields = names.named(raw, given.names, where, f"fields.{quantity}.name")
     count = sum(field.values.shape[1] for field in fields)
     first = fields[0]
-    components = told.components or (len(fields) == 1 and first.components) or ()
+    components = given.components or (len(fields) == 1 and first.components) or ()
     if not components and quantity not in names.SCALARS:
         joined = np.concatenate([field.values for field in fields], axis=1)
         components = names.layout(quantity, first._replace(values=joined))
@@ -131,4 +131,4 @@ def _mapped(raw: Raw, told: FieldMap, quantity: str, where: object) -> names.Fou
         key = f"fields.{quantity}.components"
         problem = f"there are {count} components in the result; name each"
         raise InputError(where, key, ", ".join(components) or None, problem)
-    return names.Found(", ".join(told.names), fields, components, told.factor)
+    return names.Found(", ".join(given.names), fields, components, given.factor)

@@ -18,12 +18,16 @@ _NODES_AT_ONCE = 1 << 16
 
 
 class CellSum:
-    """A sum of matrices over cells: `cells` are the nodes (n, n_nodes) of all of them, by type."""
+    """A sum of matrices over cells: `cells` are the nodes (n, n_nodes) of all of them, by type.
 
-    def __init__(self, cells: Sequence[np.ndarray], n_nodes: int, dim: int):
+    `single`: the sum is in single precision.
+    """
+
+    def __init__(self, cells: Sequence[np.ndarray], n_nodes: int, dim: int, single: bool = False):
         self._dim = dim
         self._near = _neighbours(cells, n_nodes)
-        self._data = np.zeros((self._near.nnz, dim, dim))
+        kind = np.float32 if single else float
+        self._data = np.zeros((self._near.nnz, dim, dim), dtype=kind)
 
     def add(
         self,

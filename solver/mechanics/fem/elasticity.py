@@ -221,13 +221,14 @@ def _products(values: np.ndarray, measure: np.ndarray) -> np.ndarray:
     return products.reshape(len(values), *values.shape[2:], *values.shape[2:])
 
 
-def stiffness(points: np.ndarray, blocks: list[Block]) -> sparse.bsr_matrix:
+def stiffness(points: np.ndarray, blocks: list[Block], single: bool = False) -> sparse.bsr_matrix:
     """The stiffness matrix (n_dofs, n_dofs), symmetric, a block for each pair of nodes.
 
     Both halves are stored; `assembly.selected` makes the matrix of some degrees of freedom.
+    `single`: in single precision.
     """
     n, dim = points.shape
-    total = CellSum([block.cells for block in blocks], n, dim)
+    total = CellSum([block.cells for block in blocks], n, dim, single)
     for block in blocks:
         total.add(block.cells, partial(element_matrices, points, block), chunks(block, dim))
     return total.matrix

@@ -4,7 +4,7 @@ Those of edges and faces are products of a matrix and monomials, since contact e
 many points; solid cells have scikit-fem's.
 """
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from ...mesh.catalogue import BY_NAME, CellType
 
 # Mid-edge nodes off the middle by less than this share of the edge make no bent edge.
 _STRAIGHT = 1e-9
+# Values at points of at most so many coordinates are kept.
+_KEPT = 1 << 10
 
 
 class ShapeFunctions:
@@ -43,6 +45,18 @@ class ShapeFunctions:
         return self._evaluate(points)
 
     def _evaluate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        points = np.ascontiguousarray(points, dtype=float)
+        if points.size > _KEPT:
+            return self._computed(points)
+        # Every part of the cells asks for the same points of quadrature.
+        values, gradients = self._known(points.tobytes(), points.shape)
+        return values.copy(), gradients.copy()
+
+    @lru_cache(64)  # noqa: B019 -- there is one object for each cell type
+    def _known(self, points: bytes, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        return self._computed(np.frombuffer(points).reshape(shape))
+
+    def _computed(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         flat = np.ascontiguousarray(np.reshape(points, (-1, self.type.dim)).T, dtype=float)
         values = np.empty((flat.shape[1], self.type.n_nodes))
         gradients = np.empty((flat.shape[1], self.type.n_nodes, self.type.dim))

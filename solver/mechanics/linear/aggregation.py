@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix, diags
 
+from .products import in_pieces
 from .unknowns import LevelNodes
 
 # The distances of a node's neighbours differ by more than this where cells are slender. There only
@@ -22,16 +23,8 @@ def aggregate(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[bsr_matrix, LevelN
         standard_aggregation,
     )
 
-    body, count = nodes.body, len(nodes.body)
-    rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
-    joined = (body[rows] == body[matrix.indices]) & (body[rows] >= 0)
-    if nodes.points is not None:
-        joined[joined] = _near(rows[joined], matrix.indices[joined], nodes.points)
-    starts = np.zeros(count + 1, dtype=np.int32)
-    np.cumsum(np.bincount(rows[joined], minlength=count), out=starts[1:])
-    columns = matrix.indices[joined].astype(np.int32)
-    graph = csr_matrix((np.ones(len(columns)), columns, starts), shape=(count, count))
-    aggregates, _ = standard_aggregation(_along_lines(graph))
+    body = nodes.body
+    aggregates, _ = standard_aggregation(_along_lines(_graph(matrix, nodes)))
     tentative, motions = fit_candidates(aggregates, nodes.motions)
     members, points = aggregates.tocoo(), None
     coarse_body = np.zeros(aggregates.shape[1], dtype=body.dtype)
@@ -49,15 +42,48 @@ def _along_lines(graph: csr_matrix) -> csr_matrix:
     return (graph + lines @ lines).tocsr() if lines.nnz else graph
 
 
-def _near(rows: np.ndarray, columns: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Which pairs (k,) of neighbours may share an aggregate: where cells are slender, near ones.
+def _graph(matrix: bsr_matrix, nodes: LevelNodes) -> csr_matrix:
+    """Which neighbours may share an aggregate: those of one body, no held node.
 
-    There a smooth error is smooth along the short edges alone.
+    Where cells are slender, near ones only: a smooth error is smooth along the short edges alone.
     """
-    distance = np.linalg.norm(points[rows] - points[columns], axis=1)
-    nearest, furthest = np.full(len(points), np.inf), np.zeros(len(points))
-    others = rows != columns
-    np.minimum.at(nearest, rows[others], distance[others])
-    np.maximum.at(furthest, rows, distance)
-    limit = np.where(furthest > _SLENDER * nearest, _NEAR * nearest, np.inf)
-    return np.asarray(distance <= np.maximum(limit[rows], limit[columns]))
+    body, count = nodes.body, len(nodes.body)
+    joined = np.empty(len(matrix.indices), dtype=bool)
+    nearest, furthest = np.full(count, np.inf), np.zeros(count)
+
+    def join(first: int, last: int) -> None:
+        some, rows, columns = _pairs(matrix, first, last)
+        joined[some] = (body[rows] == body[columns]) & (body[rows] >= 0)
+        if nodes.points is not None:
+            rows, columns = rows[joined[some]], columns[joined[some]]
+            distance, others = _distance(nodes.points, rows, columns), rows != columns
+            np.minimum.at(nearest, rows[others], distance[others])
+            np.maximum.at(furthest, rows, distance)
+
+    in_pieces(join, matrix)
+    slender = furthest > _SLENDER * nearest
+    if nodes.points is not None and slender.any():
+        limit = np.where(slender, _NEAR * nearest, np.inf)
+
+        def part(first: int, last: int) -> None:
+            some, rows, columns = _pairs(matrix, first, last)
+            within = np.maximum(limit[rows], limit[columns])
+            joined[some] &= _distance(nodes.points, rows, columns) <= within
+
+        in_pieces(part, matrix)
+    before = np.concatenate([[0], np.cumsum(joined, dtype=np.int32)], dtype=np.int32)
+    columns = matrix.indices[joined].astype(np.int32, copy=False)
+    ones = np.ones(len(columns), dtype=np.int8)
+    return csr_matrix((ones, columns, before[matrix.indptr]), shape=(count, count))
+
+
+def _pairs(matrix: bsr_matrix, first: int, last: int) -> tuple[slice, np.ndarray, np.ndarray]:
+    """The entries in some rows of blocks, and the row and column of each."""
+    starts = matrix.indptr[first : last + 1]
+    some = slice(starts[0], starts[-1])
+    return some, np.repeat(np.arange(first, last), np.diff(starts)), matrix.indices[some]
+
+
+def _distance(points: np.ndarray | None, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    assert points is not None
+    return np.asarray(np.linalg.norm(points[rows] - points[columns], axis=1))

@@ -65,6 +65,11 @@ class LinearSolver:
         return self._solver.name
 
     @property
+    def iterative(self) -> bool:
+        """Whether a less accurate solution takes less time."""
+        return isinstance(self._solver, Multigrid)
+
+    @property
     def iterations(self) -> int:
         """Largest number of iterations of one solution so far; 0 for a factor alone."""
         return self._solver.iterations

@@ -62,6 +62,8 @@ class Factor:
     `iterations`: the most of one solution so far, 0 where the factor alone is accurate enough.
     """
 
+    iterative = False
+
     def __init__(self, name: str, solve: Iterative, scale: np.ndarray):
         """`solve` takes columns (n, k) and an accuracy, and returns the iterations too."""
         self.name = name

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
-from ...system.compiled import available, compiled
+from ...system.compiled import compiled, worthwhile
 from ...system.threads import ahead
 from .products import rows_of, share_rows
 
@@ -28,7 +28,7 @@ def pattern(matrix: bsr_matrix) -> csr_matrix:
 def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_matrix:
     """T − `weight` · A T for `matrix` A (n, n) and `tentative` T (n, c) in single precision."""
     sizes = matrix.blocksize[0], tentative.blocksize[1]
-    if not available():
+    if not worthwhile(matrix.data.size):
         change = matrix @ tentative
         change.data *= -np.float32(weight)
         return (tentative + change).tobsr(sizes)
@@ -43,7 +43,7 @@ def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_ma
 def coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
     """Pᵀ A P for `matrix` A (n, n) and `prolongation` P (n, c) in single precision."""
     width = prolongation.blocksize[1]
-    if not available():
+    if not worthwhile(matrix.data.size):
         count = matrix.shape[0] // matrix.blocksize[0]
         step = -(-count // _PARTS)
 

@@ -35,6 +35,9 @@ LARGEST_DENSE = 4_000
 MOST_NEIGHBOURS = 100
 """Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
+# A matrix in single precision differs from the true one by more than this of the residual: further
+# digits are those of a refinement.
+_LEAST_SINGLE = 1e-5
 _ROWS_AT_ONCE = 30_000  # whole nodes
 _ONE = np.float32(1)
 # Lottes' optimised weights of the polynomial of degree two.
@@ -181,7 +184,10 @@ class Multigrid:
         self._matrix, self._shared = matrix, shared or Shared()
         condensed = matrix if isinstance(matrix, CondensedMatrix) else None
         kept = slice(None) if condensed is None else condensed.kept
-        hierarchy = self._shared.hierarchy(condensed.stiffness if condensed else matrix, unknowns)
+        stiffness = condensed.stiffness if condensed else matrix
+        single = isinstance(stiffness, NodalMatrix) and stiffness.blocks.dtype == np.float32
+        self._least = _LEAST_SINGLE if single else 0.0
+        hierarchy = self._shared.hierarchy(stiffness, unknowns)
         self._size, self._place = hierarchy.size, hierarchy.place[kept]
         self._scale = hierarchy.scale[kept, None]
         self._levels, last = hierarchy.levels, hierarchy.last.toarray().astype(float)
@@ -204,6 +210,7 @@ class Multigrid:
         """
         columns = np.asarray(right, dtype=float)
         columns = columns if columns.ndim == 2 else columns[:, None]
+        accuracy = max(accuracy, self._least)
         solution, iterations = conjugate_gradients(
             lambda x: self._scale * (self._matrix @ (self._scale * x)),
             in_single(partial(np.apply_along_axis, self._cycle, 0)),

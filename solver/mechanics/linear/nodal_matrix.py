@@ -37,7 +37,8 @@ class NodalMatrix:
         """The product with x (n,) or its columns (n, k)."""
         if x.ndim > 1:
             return np.stack([self @ column for column in x.T], axis=1)
-        return multiply(self.blocks, self._on_all(x))[self.free]
+        # In double precision, whatever that of the blocks.
+        return multiply(self.blocks, self._on_all(x), np.zeros(self.blocks.shape[0]))[self.free]
 
     def _on_all(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) on all degrees of freedom, zero on held ones."""
@@ -75,7 +76,7 @@ class NodalMatrix:
 
     def diagonal(self) -> np.ndarray:
         """Its diagonal (n,)."""
-        return np.asarray(self.blocks.diagonal()[self.free])
+        return np.asarray(self.blocks.diagonal()[self.free], dtype=float)
 
     def tocsr(self) -> csr_matrix:
         """All of it, entry by entry."""

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import bsr_matrix
 
-from ...system.compiled import available, compiled
+from ...system.compiled import compiled, worthwhile
 from ...system.threads import ahead, workers
 
 _LEAST = 200_000  # multiplications from which another thread pays for its start
@@ -28,7 +28,7 @@ def multiply(
     """
     out = np.zeros(matrix.shape[0], dtype=matrix.dtype) if base is None else base.copy()
     height = matrix.blocksize[0]
-    kernel = _PRODUCTS.get(matrix.blocksize) if available() else None
+    kernel = _PRODUCTS.get(matrix.blocksize) if worthwhile(matrix.data.size) else None
     arrays = matrix.indptr, matrix.indices, matrix.data
 
     def rows(first: int, last: int) -> None:
@@ -52,7 +52,7 @@ def multiply_transposed(matrix: bsr_matrix, x: np.ndarray) -> np.ndarray:
     array([9., 9., 9., 9., 9., 9.])
     """
     height = matrix.blocksize[0]
-    kernel = _TRANSPOSED.get(matrix.blocksize) if available() else None
+    kernel = _TRANSPOSED.get(matrix.blocksize) if worthwhile(matrix.data.size) else None
     arrays = matrix.indptr, matrix.indices, matrix.data
 
     def part(some: tuple[int, int]) -> np.ndarray:
@@ -142,6 +142,16 @@ def _product_of_six(first, last, starts, columns, blocks, x, factor, out):  # ty
         out[6 * i + 5] += factor * f
 
 
+@compiled
+def _transposed_to_three(first, last, starts, columns, blocks, x, out):  # type: ignore[no-untyped-def]
+    for i in range(first, last):
+        a, b, c = x[3 * i], x[3 * i + 1], x[3 * i + 2]
+        for k in range(starts[i], starts[i + 1]):
+            j = 3 * columns[k]
+            for m in range(3):
+                out[j + m] += blocks[k, 0, m] * a + blocks[k, 1, m] * b + blocks[k, 2, m] * c
+
+
 def _transposed_to_six(height: int) -> Callable[..., None]:
     @compiled
     def kernel(first, last, starts, columns, blocks, x, out):  # type: ignore[no-untyped-def]
@@ -168,4 +178,8 @@ def _transposed_to_six(height: int) -> Callable[..., None]:
 
 
 _PRODUCTS = {(3, 3): _product_of_three(3), (3, 6): _product_of_three(6), (6, 6): _product_of_six}
-_TRANSPOSED = {(3, 6): _transposed_to_six(3), (6, 6): _transposed_to_six(6)}
+_TRANSPOSED = {
+    (3, 3): _transposed_to_three,
+    (3, 6): _transposed_to_six(3),
+    (6, 6): _transposed_to_six(6),
+}

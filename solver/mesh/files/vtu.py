@@ -24,10 +24,10 @@ def read(path: Path) -> meshio.Mesh:
         allowed = f"allowed: none, {', '.join(_COMPRESSORS)}"
         raise InputError(path, "compressor", compressor[1].decode(), allowed)
     mesh = meshio.vtu.read(path)
-    told = sum(map(int, re.findall(rb'<Piece[^>]*\sNumberOfCells="\s*(\d+)', header)))
+    stated = sum(map(int, re.findall(rb'<Piece[^>]*\sNumberOfCells="\s*(\d+)', header)))
     known = sum(len(block.data) for block in mesh.cells)
-    if known != told:
-        left_out = f"{told - known} of {told} cells are of other types"
+    if known != stated:
+        left_out = f"{stated - known} of {stated} cells are of other types"
         raise InputError(path, "cell type", None, f"{left_out}; allowed: {', '.join(BY_NAME)}")
     cells = {
         name: [np.flatnonzero(array) for array in arrays]

@@ -18,6 +18,7 @@ from solver.mechanics.linear.nodal_matrix import NodalMatrix
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
 from solver.mesh.catalogue import BY_NAME
+from solver.system import threads
 from solver.system.errors import SolveError
 from tests.scenes import grid
 
@@ -189,6 +190,19 @@ def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
         chosen = choice.prepare(matrix, unknowns)
     assert "multigrid" not in chosen.name
     assert chosen.gave_up == chosen.why
+
+
+def test_threads_change_no_digit(monkeypatch):
+    monkeypatch.setattr(products, "_LEAST", 1000)
+    matrix, unknowns = two_blocks(8)
+    right = np.random.default_rng(5).standard_normal(matrix.shape[0])
+    found = []
+    for count in (1, 2, 5):
+        for module in (products, threads):
+            monkeypatch.setattr(module, "workers", lambda n=count: n)
+        found.append(Multigrid(matrix, unknowns).solve(right))
+    np.testing.assert_array_equal(found[1], found[0])
+    np.testing.assert_array_equal(found[2], found[0])
 
 
 def test_parts_of_a_setup_make_no_difference(monkeypatch):
