@@ -6,7 +6,6 @@ import numpy as np
 from markupsafe import Markup
 
 from ..mechanics.fem.faces import outer_faces
-from ..simulation.exact import deformable
 from ..simulation.solution import Solution
 from .charts import BLUE, MUTED, PAPER
 from .geometry import plane_cells
@@ -44,7 +43,7 @@ def draw_plane(solution: Solution, title: str) -> Markup:
     draw_axes(
         drawing,
         np.eye(2),
-        np.ptp(whole[deformable(solution)], axis=0),
+        np.ptp(whole[solution.deformable], axis=0),
         solution.case.units.get("length"),
     )
     if enlarged:
@@ -124,8 +123,8 @@ def _names(
     middles, free = [float((y.min() + y.max()) / 2) for y in own], 0.0
     for number in np.argsort(middles):
         body, y = solution.bodies[number], max(middles[number], free) - 4
-        drawing.text(right + 14, y, body.name, weight="600")
+        drawing.text(right + 42, y, body.name, weight="600")
         for line in lines_of(solution, int(number)):
-            drawing.text(right + 14, y := y + 14, line, color=MUTED)
-        drawing.text(right + 14, y := y + 14, body.role, color=edge_color(body))
+            drawing.text(right + 42, y := y + 14, line, color=MUTED)
+        drawing.text(right + 42, y := y + 14, body.role, color=edge_color(body))
         free = y + 22

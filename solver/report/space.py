@@ -7,7 +7,6 @@ from markupsafe import Markup
 
 from ..mechanics.fem.faces import outer_faces
 from ..mesh.catalogue import cell_type
-from ..simulation.exact import deformable
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import BLUE, INK, MUTED, PAPER
@@ -104,7 +103,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
         if body.role != "master":
             _macro_outlines(drawing, solution, points, lambda x: place(x @ screen.T))
         own = place(corners[number] @ screen.T)
-        at, y = float(own[:, 0].max()) + 10, float(own[:, 1].mean()) - 8
+        at, y = float(own[:, 0].max()) + 24, float(own[:, 1].mean()) - 8
         drawing.text(at, y, body.name, weight="600")
         for line in lines_of(solution, number):
             drawing.text(at, y := y + 14, line, color=MUTED)
@@ -113,7 +112,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     for kind, nodes in outer:
         seen[nodes[normals(outlines(points, kind, nodes)) @ eye > 1e-6].ravel()] = True
     draw_symbols(drawing, solution, View(points, lambda x: place(x @ screen.T), seen), outer)
-    size = np.ptp(solution.mesh.points[deformable(solution)], axis=0)
+    size = np.ptp(solution.mesh.points[solution.deformable], axis=0)
     draw_axes(drawing, screen, size, solution.case.units.get("length"))
 
 
