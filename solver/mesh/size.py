@@ -5,8 +5,9 @@ and 20,000 to 640,000 unknowns: 100 MB for the program, then for each unknown (n
 dimensions) 1.9 to 7.4 kB in 2D and 4.4 to 16 kB in 3D, less for more elongated bodies. With
 multigrid the program takes 200 MB, and an unknown 1.9 kB (HEXA8, 2,100,000 unknowns), 2.1 kB
 (TETRA4, 520,000) to 4 kB (HEXA20, 1,100,000) with a stiffness in double precision, 1.5 kB (HEXA8,
-1,040,000, until the hierarchy is set up) with one in single precision. The smallest figure decides a refusal, so that no solve that fits is refused;
-the usual one decides a warning; a cluster is asked for the largest, in case a factor is needed.
+1,040,000, until the hierarchy is set up) with one in single precision. The smallest figure decides
+a refusal, so that no solve that fits is refused; the usual one decides a warning; a cluster is
+asked for the largest, in case a factor is needed.
 Time was measured from 10,000 to 1,000,000 unknowns on two cores, meshing included.
 """
 
