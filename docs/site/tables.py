@@ -80,7 +80,7 @@ def _solution(name: str, cls: type) -> str:
     rows = [
         (f"`{field.name}`", field.metadata["doc"], _left_out(field))
         for field in fields(cls)
-        if field.init and field.metadata["source"] != "dimension"
+        if field.init and field.name != "dim"
     ]
     known = ", ".join(f"`{quantity}`" for quantity in sorted(cls.quantities))  # type: ignore[attr-defined]
     table = _table(("parameter", "what it is", "where left out"), rows)

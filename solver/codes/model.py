@@ -143,10 +143,8 @@ class Model:
     @cached_property
     def rigid(self) -> np.ndarray:
         """Which bodies are rigid."""
-        from ..simulation.exact import deformable
-
         found = np.ones(int(self.body.max()) + 1, dtype=bool)
-        found[self.body[deformable(self.solution)]] = False
+        found[self.body[self.solution.deformable]] = False
         return found
 
     @cached_property

@@ -21,11 +21,21 @@ from ..system.errors import InputError, SolveError, of_machine
 from ..system.imports import defer
 from ..system.package import PROGRAM, PROJECT, project_version
 from . import codes, completion, history, jobs, look, results, studies
-from .options import add_command, add_threads, limit_threads
+from .options import (
+    BUG,
+    FAILED,
+    INTERRUPTED,
+    NO_RESULT,
+    PASSED,
+    REFUSED,
+    add_command,
+    add_threads,
+    limit_threads,
+    print_checks,
+)
 
 if TYPE_CHECKING:
     from ..verification.run import Job
-    from ..verification.verdict import CheckResult, Verdict
 
 _EXAMPLES = f"""examples:
   {PROGRAM} new my-block -o my-block.yaml
@@ -35,7 +45,6 @@ _EXAMPLES = f"""examples:
 
 Exit status: 0 all checks hold; 1 a check fails; 2 the input is refused; 3 there is no solution.
 Batches and studies are targets of make: make help."""
-PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
 
 def run() -> int:
@@ -263,20 +272,6 @@ def _check(options: argparse.Namespace) -> int:
         for verdict in verdicts:
             print_checks(verdict)
     return PASSED if all(verdict.sound for verdict in verdicts) else FAILED
-
-
-def print_checks(verdict: "Verdict") -> None:
-    """Print a verdict, a line for each check."""
-    print(verdict.summary)
-    for row in verdict.checks:
-        print("  " + _row(row))
-
-
-def _row(check: "CheckResult") -> str:
-    extremes = f"{check.minimum:.10g} … {check.maximum:.10g}"
-    error = f"error {check.error:.1e} (allowed {check.tolerance:.0e})"
-    word = "ok" if check.passed else "FAILED"
-    return f"{word:<7}{check.name + ' ' + (check.zone or ''):<40}{extremes:<36}{error}"
 
 
 def _verdicts(options: argparse.Namespace) -> list[Path]:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError
-from .options import add_command
+from .options import FAILED, PASSED, add_command, print_checks
 
 if TYPE_CHECKING:
     import meshio
@@ -67,7 +67,6 @@ def _export(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     from ..codes.run import Limits, run_case
-    from .cli import FAILED, PASSED, print_checks
 
     code, case, mesh = _chosen(options)
     limits = Limits(seconds=options.seconds, memory=1e6 * options.memory)

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .options import add_command
+from .options import FAILED, PASSED, add_command
 
 
 def add_commands(commands: Any) -> None:
@@ -30,7 +30,6 @@ def add_commands(commands: Any) -> None:
 
 def _record(options: argparse.Namespace) -> int:
     from ..report.history import record
-    from .cli import FAILED, PASSED
 
     courses, text = record(options.batch, options.history, options.output)
     print(text)

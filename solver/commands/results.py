@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .options import add_command
+from .options import FAILED, PASSED, add_command, print_checks
 
 
 def add_commands(commands: Any) -> None:
@@ -39,7 +39,6 @@ def _check_result(options: argparse.Namespace) -> int:
     from ..codes.verdicts import check_foreign, folder_of, store
     from ..mesh import read_mesh
     from ..verification.verdict import to_json
-    from .cli import FAILED, PASSED, print_checks
 
     case = load_case(options.case).as_solved(options.swap)
     mapping = ResultMap()

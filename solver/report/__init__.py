@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-PAGE = "summary.html"
-
 
 def write_report(
     verdicts: Sequence[Path],
@@ -24,6 +22,7 @@ def write_report(
     from . import tables
     from .bench import write_bench
     from .charts import write_script
+    from .html import PAGE
     from .junit import to_junit
     from .matrix import matrix_page
     from .page import family_page, main_page

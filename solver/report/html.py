@@ -7,7 +7,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from . import PAGE, formats
+from . import formats
 from .charts import SCRIPT
 from .families import page_name, paragraphs
 
@@ -61,6 +61,7 @@ KINDS = {
 }
 
 
+PAGE = "summary.html"
 TEMPLATES = Path(__file__).parent / "templates"
 
 

@@ -44,7 +44,7 @@ def _turned(row: Row, folder: Path) -> Markup:
     """A button that turns the result, its surfaces in a file beside the picture; else nothing."""
     source = quote(f"{folder.name}/{_name(row)}.js")
     kept = _kept(row, folder, ".js", lambda row: surfaces(_solution(row), source))
-    button = "<button type=button data-surfaces='{}' hidden>Turn it, with maps of errors</button>"
+    button = "<button type=button data-surfaces='{}' hidden>Turn, zoom, maps of errors</button>"
     return Markup() if isinstance(kept, Markup) else Markup(button).format(source)
 
 

@@ -40,7 +40,12 @@ def draw_plane(solution: Solution, title: str) -> Markup:
     view = View(points, place, np.ones(len(points), dtype=bool))
     draw_symbols(drawing, solution, view, list(outer_faces(solution.mesh)))
     _names(drawing, solution, place, points, rigid, float(place(shown)[:, 0].max()))
-    draw_axes(drawing, np.eye(2), np.ptp(whole[meshed], axis=0), solution.case.units.get("length"))
+    draw_axes(
+        drawing,
+        np.eye(2),
+        np.ptp(whole[solution.deformable], axis=0),
+        solution.case.units.get("length"),
+    )
     if enlarged:
         (x0, y1), (x1, y0) = place(np.stack([low, high]))
         drawing.rectangle(x0, y0, x1 - x0, y1 - y0, stroke=MUTED, stroke_width=1)
@@ -118,8 +123,8 @@ def _names(
     middles, free = [float((y.min() + y.max()) / 2) for y in own], 0.0
     for number in np.argsort(middles):
         body, y = solution.bodies[number], max(middles[number], free) - 4
-        drawing.text(right + 14, y, body.name, weight="600")
+        drawing.text(right + 42, y, body.name, weight="600")
         for line in lines_of(solution, int(number)):
-            drawing.text(right + 14, y := y + 14, line, color=MUTED)
-        drawing.text(right + 14, y := y + 14, body.role, color=edge_color(body))
+            drawing.text(right + 42, y := y + 14, line, color=MUTED)
+        drawing.text(right + 42, y := y + 14, body.role, color=edge_color(body))
         free = y + 22

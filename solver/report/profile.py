@@ -16,7 +16,7 @@ from ..case.model import EXACT
 from ..mechanics.fem.faces import surface_points
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution, ZoneResult
-from ..verification.samples import expected_pressure
+from ..verification.samples import expected_coverage, reference_where_covered
 from ..verification.units import with_unit
 from .charts import (
     BLUE,
@@ -209,11 +209,12 @@ def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[di
         first += len(nodes)
     against = reference(solution, "contact_pressure")
     if against is not None:
-        where = surface_points(points, zone.faces).place
+        on_faces = surface_points(points, zone.faces)
+        where, covered = on_faces.place, expected_coverage(solution, zone, against) > 0
         if isinstance(against, ExactValues):
             values = against.exact.contact_pressure(where)
         else:
-            values = evaluate(against, where)
+            values = np.where(covered[on_faces.macro], evaluate(against, where), 0.0)
         at = place(where)
         order = np.argsort(at, kind="stable")[:: -(-len(at) // _MOST) or 1]
         found += _records(REFERENCE, s=at[order], p=values[order])
@@ -221,9 +222,9 @@ def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[di
 
 
 def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
-    """The pressure (m,) that the reference has on every macro-element; None where it has none."""
+    """The reference's pressure (m,) on macro-elements, zero on uncovered ones; None without one."""
     against = reference(solution, "contact_pressure")
-    return None if against is None else expected_pressure(zone, against)
+    return None if against is None else reference_where_covered(solution, zone, against)
 
 
 def reference(solution: Solution, key: str) -> Any:

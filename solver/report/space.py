@@ -103,7 +103,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
         if body.role != "master":
             _macro_outlines(drawing, solution, points, lambda x: place(x @ screen.T))
         own = place(corners[number] @ screen.T)
-        at, y = float(own[:, 0].max()) + 10, float(own[:, 1].mean()) - 8
+        at, y = float(own[:, 0].max()) + 24, float(own[:, 1].mean()) - 8
         drawing.text(at, y, body.name, weight="600")
         for line in lines_of(solution, number):
             drawing.text(at, y := y + 14, line, color=MUTED)
@@ -112,8 +112,8 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
     for kind, nodes in outer:
         seen[nodes[normals(outlines(points, kind, nodes)) @ eye > 1e-6].ravel()] = True
     draw_symbols(drawing, solution, View(points, lambda x: place(x @ screen.T), seen), outer)
-    meshed = solution.mesh.points[~np.isin(solution.body, list(rigid))]
-    draw_axes(drawing, screen, np.ptp(meshed, axis=0), solution.case.units.get("length"))
+    size = np.ptp(solution.mesh.points[solution.deformable], axis=0)
+    draw_axes(drawing, screen, size, solution.case.units.get("length"))
 
 
 def far_to_near(groups: list[np.ndarray], eye: np.ndarray) -> list[tuple[int, np.ndarray]]:

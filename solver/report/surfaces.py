@@ -14,7 +14,6 @@ import numpy as np
 
 from ..mechanics.fem.faces import outer_faces
 from ..mesh.catalogue import cell_type
-from ..simulation.exact import deformable
 from ..simulation.solution import Solution, ZoneResult
 from ..verification import samples
 from ..verification.units import with_unit
@@ -207,7 +206,7 @@ def _nodal_fields(solution: Solution) -> dict[str, np.ndarray]:
         with_unit("displacement |u|", units.get("length")): size,
         with_unit("normal stress σₙ", units.get("stress")): solution.nodal_normal_stress,
     }
-    nodes = np.flatnonzero(deformable(solution))
+    nodes = np.flatnonzero(solution.deformable)
     for key, (title, sampler) in _ERRORS.items():
         against = reference(solution, key)
         if against is None:

@@ -18,7 +18,11 @@ from .svg import Drawing
 
 # Arrows of a load and symbols of a support, at most; lengths in pixels.
 _MOST, _ARROW, _HEAD, _SIDE = 6, 30.0, 6.0, 7.0
+# Texts nearer than this to each other are one above the other (pixels); longer ones are cut.
+_WIDE, _LINE, _LONGEST = 110.0, 11.0, 24
 _UNITS = {"pressure": "stress", "traction": "stress"}
+
+_Labels = dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ def draw_symbols(
     drawing: Drawing, solution: Solution, view: View, faces: Sequence[tuple[str, np.ndarray]]
 ) -> None:
     """Loads and supports at the nodes of their groups; `faces` are the outer ones of the mesh."""
-    points = solution.mesh.points
+    points, labels = solution.mesh.points, _Labels()
 
     def outward(nodes: np.ndarray) -> np.ndarray:
         """The normals (n, dim) of the faces of a group; where it has none, of all faces."""
@@ -71,7 +75,7 @@ def draw_symbols(
                 _triangle(drawing, view, node, direction)
     for i, load in enumerate(solution.case.loads):
         nodes = solution.acted.get(f"loads[{i}].group", np.empty(0, int))
-        _arrows(drawing, solution, view, load, nodes, outward(nodes))
+        _arrows(drawing, solution, view, load, nodes, outward(nodes), labels)
 
 
 def draw_axes(drawing: Drawing, screen: np.ndarray, size: np.ndarray, unit: str | None) -> None:
@@ -117,6 +121,7 @@ def _arrows(
     load: Load,
     nodes: np.ndarray,
     outward: np.ndarray,
+    labels: _Labels,
 ) -> None:
     """Arrows along a load at some nodes, as long as it is large; its value at one of them."""
     chosen = view.some(nodes)
@@ -134,8 +139,18 @@ def _arrows(
         start = at if vector @ outward[node] > 0 else at - way
         _arrow(drawing, start, start + way, RED, _HEAD)
     places = view.place(view.points[chosen])
-    first = places[places[:, 0].argmax()]
-    drawing.text(first[0] + 8, first[1] - _ARROW + 4, _title(solution, load), color=RED, size=10)
+    x, y = places[places[:, 0].argmax()]
+    _label(drawing, labels, float(x) + 8, float(y) - _ARROW + 4, _title(solution, load))
+
+
+def _label(drawing: Drawing, labels: _Labels, x: float, y: float, text: str) -> None:
+    """A text once, above those that are there already."""
+    if text in labels:
+        return
+    while any(abs(x - left) < _WIDE and abs(y - line) < _LINE for left, line in labels.values()):
+        y -= _LINE
+    labels[text] = (x, y)
+    drawing.text(x, y, text, color=RED, size=10)
 
 
 def _vectors(solution: Solution, load: Load, nodes: np.ndarray, outward: np.ndarray) -> np.ndarray:
@@ -161,6 +176,8 @@ def _title(solution: Solution, load: Load) -> str:
     if not words:
         return f"{load.kind} of the exact solution"
     value = words[0] if len(words) == 1 else f"({', '.join(words)})"
+    if len(value) > _LONGEST:
+        value = f"f({', '.join('xyz'[: solution.mesh.points.shape[1]])})"
     unit = solution.case.units.get(_UNITS.get(load.kind, ""), "")
     return f"{load.kind} {value} {unit}".strip()
 

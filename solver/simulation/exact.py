@@ -24,17 +24,6 @@ def node_parts(exact: ExactSolution, points: np.ndarray, body: np.ndarray) -> np
     return part
 
 
-def deformable(solution: Solution) -> np.ndarray:
-    """Which nodes (n,) belong to bodies that are not rigid."""
-    nodes = solution.body >= 0
-    for group in solution.case.rigid:
-        for block, members in zip(
-            solution.mesh.cells, solution.mesh.cell_sets.get(group, []), strict=False
-        ):
-            nodes[block.data[np.asarray(members, dtype=int)].ravel()] = False
-    return nodes
-
-
 def computed_pressure(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
     """The computed pressure (k,) at the `surface_points` of a zone on the mesh's `points`."""
     return np.concatenate(

@@ -63,11 +63,16 @@ class Check:
         return self.key is not None or self.norm == "error"
 
     def tolerance_in(self, overrides: Mapping[str, float]) -> float:
-        """The tolerance under a case's overrides: by check, or `all` for the relative ones."""
+        """The tolerance under a case's overrides: by check, or `all`.
+
+        `all` takes the place of the relative tolerance, and of smaller ones where it is smaller.
+        """
         for name in (self.name, self.like):
             if name in overrides:
                 return overrides[name]
-        return overrides.get("all", RELATIVE) if self.tolerance is None else self.tolerance
+        if self.tolerance is None:
+            return overrides.get("all", RELATIVE)
+        return min(self.tolerance, overrides.get("all", self.tolerance))
 
     def expected_in(self, expected: Mapping[str, float]) -> float | None:
         """The expected error by a case's; None where a tolerance is stated."""

@@ -41,7 +41,7 @@ from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoo
 from ..mechanics.fem.faces import surface_points
 from ..mechanics.fem.gauss import gauss_rule
 from ..mesh.catalogue import cell_type
-from ..simulation.exact import ExactValues, computed_pressure, deformable
+from ..simulation.exact import ExactValues, computed_pressure
 from ..simulation.solution import Solution
 from ..system.threads import ahead
 from .oscillation import grown, macro_neighbours, oscillation
@@ -74,7 +74,7 @@ def _field_errors(solution: Solution, exact: ElasticSolution) -> dict[str, float
     squares = sum(_squares(solution, exact), np.zeros((3, 2)))
     names = ("displacement_l2", "displacement_h1", "stress_l2")
     found = {name: _root(*pair) for name, pair in zip(names, squares, strict=True)}
-    nodes = np.flatnonzero(deformable(solution))
+    nodes = np.flatnonzero(solution.deformable)
     expected = ExactValues(solution, exact).stress(nodes)
     deviation = np.abs(solution.stress[nodes] - expected).max()
     return found | {"stress_max": _over(deviation, np.abs(expected).max())}
@@ -82,7 +82,7 @@ def _field_errors(solution: Solution, exact: ElasticSolution) -> dict[str, float
 
 def _squares(solution: Solution, exact: ElasticSolution) -> Iterator[np.ndarray]:
     """By chunk of cells (3, 2): ∫ of squares of error and exact value, for u, ∇u, σ."""
-    part, moving = ExactValues(solution, exact).part, deformable(solution)
+    part, moving = ExactValues(solution, exact).part, solution.deformable
     for block in solution.mesh.cells:
         kind = cell_type(block.type)
         rule = gauss_rule(kind.name, kind.order + 2)

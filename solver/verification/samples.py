@@ -24,7 +24,7 @@ from ..mechanics.fem.elasticity import (
 )
 from ..mechanics.fem.stress import COMPONENTS
 from ..mesh.catalogue import cell_type
-from ..simulation.exact import ExactValues, deformable
+from ..simulation.exact import ExactValues
 from ..simulation.groups import ALL
 from ..simulation.initial import strain_at
 from ..simulation.solution import Solution, ZoneResult
@@ -71,7 +71,9 @@ def expected_coverage(solution: Solution, zone: ZoneResult, reference: Reference
     return np.ones(len(zone.coverage))
 
 
-def _covered(solution: Solution, zone: ZoneResult, reference: Reference) -> np.ndarray:
+def reference_where_covered(
+    solution: Solution, zone: ZoneResult, reference: Reference
+) -> np.ndarray:
     """The reference's pressure (m,), zero where nothing is covered."""
     expected = expected_pressure(zone, reference)
     return np.where(expected_coverage(solution, zone, reference) > 0, expected, 0.0)
@@ -79,13 +81,13 @@ def _covered(solution: Solution, zone: ZoneResult, reference: Reference) -> np.n
 
 def pressure(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The multiplier of every macro-element."""
-    return _at_macro_elements(zone.multiplier, _covered(solution, zone, reference))
+    return _at_macro_elements(zone.multiplier, reference_where_covered(solution, zone, reference))
 
 
 def pressure_of_forces(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The pressure by forces at slave nodes; the multiplier where they do not determine it."""
     found = zone.multiplier if zone.pressure_of_forces is None else zone.pressure_of_forces
-    return _at_macro_elements(found, _covered(solution, zone, reference))
+    return _at_macro_elements(found, reference_where_covered(solution, zone, reference))
 
 
 def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
@@ -101,7 +103,7 @@ def status(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample
     Either status is right at the edge of contact, and where surfaces touch without pressure.
     """
     found = zone.closed.astype(float)
-    expected = (_covered(solution, zone, reference) > 0).astype(float)
+    expected = (reference_where_covered(solution, zone, reference) > 0).astype(float)
     touching = zone.multiplier <= _TOUCHING * solution.load_scale
     touching &= zone.gap <= _TOUCHING * solution.length
     expected = np.where(touching & (expected == 0), found, expected)
@@ -125,7 +127,7 @@ def covered_pressure(solution: Solution, zone: ZoneResult, reference: Reference)
 
 def _nodes(solution: Solution) -> np.ndarray:
     """The nodes of bodies that are not rigid."""
-    return np.flatnonzero(deformable(solution))
+    return np.flatnonzero(solution.deformable)
 
 
 def _at_nodes(nodes: np.ndarray) -> Callable[[int], str]:
@@ -163,7 +165,7 @@ def surface_stress(side: str) -> Sampler:
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
         nodes, values = getattr(zone, f"{side}_nodes"), getattr(zone, f"stress_{side}")
-        if len(nodes) and not deformable(solution)[nodes].any():
+        if len(nodes) and not solution.deformable[nodes].any():
             return None
         if isinstance(reference, ExactValues):
             faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
@@ -244,7 +246,7 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
 
     Place (k, dim), stress (k, 6), and of the cell: its first node (k,) and its number (k,).
     """
-    moving, first = deformable(solution), 0
+    moving, first = solution.deformable, 0
     for i, (block, elastic) in enumerate(
         zip(solution.mesh.cells, _materials(solution), strict=True)
     ):

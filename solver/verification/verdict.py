@@ -164,8 +164,8 @@ class Body:
 class Verdict:
     """The verdict of one solve; None and empty without a result.
 
-    `judged` says how strictly a solve that passed was judged: `exact`, if all tolerances but those
-    of gap, status and coverage are at most 1e-10; `expected error`, if the others follow from
+    `judged` says how strictly a solve that passed was judged: `exact`, if the tolerances of all
+    checks against the reference are at most 1e-10; `expected error`, if the others follow from
     expected errors; else `stated tolerance`. `worst` is the check with the largest relative error,
     `closest_to_tolerance` the one nearest to its tolerance or furthest past it. Pairs are minimum
     and maximum over all zones; `seconds` has wall times by stage and their `total`.

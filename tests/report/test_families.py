@@ -243,6 +243,16 @@ def test_a_profile_shows_every_macro_element_and_its_deviation(tmp_path):
     assert {r["p"] for r in found[MASTER]} == {25.0}
 
 
+def test_the_reference_of_a_profile_is_zero_where_nothing_is_covered(tmp_path):
+    key = "  contact_pressure: 25.0\n"
+    text = handmade.PLANE.replace(key, f"{key}  coverage: max(0, min(1, 26 - x))\n")
+    solution = handmade.plane(tmp_path, text)
+    solution.zones[0].multiplier[1] = 0.0
+    found, _, _ = drawn(solution)
+    assert [r["deviation"] for r in found[CONSTANT]] == [0, 0]
+    assert {(r["s"] > 25, r["p"]) for r in found[REFERENCE]} == {(False, 25.0), (True, 0.0)}
+
+
 def test_a_profile_without_a_reference_shows_no_deviation(tmp_path):
     text = handmade.PLANE.replace("  contact_pressure: 25.0\n", "")
     found, titles, _ = drawn(handmade.plane(tmp_path, text))

@@ -49,6 +49,10 @@ def test_plane_picture_shows_every_cell_of_both_blocks(tmp_path):
 def test_loads_and_supports_of_a_plane_picture(tmp_path):
     svg = draw_plane(handmade.plane(tmp_path), "two blocks")
     assert polygons(svg, stroke=GREEN, fill="#ffffff") == 4 + 6  # of 4 and of 7 nodes
+    held = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == "#ffffff"]
+    bases = [tuple(map(int, data.split("l")[1].split()[:2])) for data in held]
+    # From the tip to a corner of the base: to the left of x = 0, and below the foot.
+    assert sorted(bases) == [(-70, -42)] * 4 + [(-42, 70)] * 6
     heads = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("fill") == RED]
     assert len(heads) == 4
     for head in heads:  # the tip first, then what is behind it, above
@@ -69,6 +73,18 @@ def test_arrows_follow_the_load(tmp_path):
     # At x = 0 there is none; the largest has 30 pixels.
     assert np.array(steps) == pytest.approx(np.array([(100, 0), (200, 0), (300, 0)]), abs=1)
     assert "traction (x, 0)" in svg
+    long = replace(load, value=(Expression("sin(x) * sin(x) + cos(x) * cos(x)"), 0.0))
+    acted = solution.acted["loads[0].group"]
+    solution.acted |= {f"loads[{i}].group": acted for i in (1, 2)}
+    solution.case = replace(solution.case, loads=(load, long, load))
+    texts = list(ET.fromstring(draw_plane(solution, "")).iter(f"{SVG}text"))
+    labels = {t.text: float(t.get("y")) for t in texts if t.get("fill") == RED}
+    assert [t.text for t in texts if t.get("fill") == RED] == [
+        "traction (x, 0)",
+        "traction f(x, y)",
+    ]
+    first, second = labels.values()
+    assert first - second == 110, "one above the other"
 
 
 def test_supports_of_a_picture_in_space(tmp_path):

@@ -322,6 +322,11 @@ def test_the_recovery_asked_for_takes_the_place_of_the_cases_own(tmp_path):
     assert given.zones["contact"].recovered is None
     assert asked.zones["contact"].recovered.form == "linear"
     assert [given.record["job"], asked.record["job"]] == ["recovered", "recovered-linear"]
+    # The tolerance is of the case's own recovery; the errors of the other one are measured.
+    assert [given.record["verdict"], asked.record["verdict"]] == ["passed", "solved"]
+    assert asked.outcome.errors["pressure_l2"] < 0.1 * given.outcome.errors["pressure_l2"]
+    own = solve_case(case, recovery="none").record
+    assert (own["verdict"], own["checks"]) == ("passed", given.record["checks"])
     estimates = [given.outcome.pressure_error_estimate, asked.outcome.pressure_error_estimate]
     assert estimates == pytest.approx([0.0116] * 2, rel=0.05)
     assert "constant pressures within 1.2e-02 (estimated)" in str(given)

@@ -235,6 +235,12 @@ def test_one_tolerance_for_the_relative_checks_only(tmp_path):
     assert tolerance["element_gap"] == 2e-5
 
 
+def test_a_small_tolerance_for_all_holds_for_gap_and_coverage_too(tmp_path):
+    checks = by_name(plane(tmp_path, PLANE + "tolerance: {all: 1.0e-10, coverage: 1.0e-8}\n"))
+    wanted = {"multiplier": 1e-10, "element_gap": 1e-10, "coverage": 1e-8, "element_status": 0.0}
+    assert {name: checks[name].tolerance for name in wanted} == wanted
+
+
 def test_a_tolerance_for_one_check(tmp_path):
     solution = plane(tmp_path, PLANE + "tolerance: {multiplier: 1.0e-9}\n")
     solution.zones[0].multiplier[0] = 25 + 1e-7

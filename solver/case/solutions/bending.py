@@ -37,7 +37,7 @@ class Bending(ElasticSolution):
     base: float = parameter("level of the rollers; the interface is at 0")
     bottom: Material = parameter("of the lower block", source="material")
     top: Material = parameter("of the upper block", source="material")
-    dim: int = parameter("2 or 3", source="dimension")
+    dim: int = parameter("2 or 3", source="extruded")
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -81,6 +81,11 @@ class Known:
     axisymmetric: bool = False
     plane_stress: bool = False
 
+    @property
+    def extruded(self) -> int:
+        """The dimension for a plane state, which is not one of bodies around an axis."""
+        return 2 if self.axisymmetric else self.dimension
+
 
 def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
     """The solution that a case file names, alone or with parameters.
@@ -96,7 +101,7 @@ def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
         raise InputError(known.where, place, name, f"{allowed}; {hint(str(name), SOLUTIONS)}")
     cls = SOLUTIONS[name]
     parameters = {f.name: f for f in fields(cls) if f.init}  # type: ignore[arg-type]
-    settable = [n for n, f in parameters.items() if f.metadata["source"] != "dimension"]
+    settable = [n for n in parameters if n != "dim"]
     for unknown in values:
         if unknown not in settable:
             allowed = f"{name} has no such parameter; {hint(unknown, settable)}"
@@ -132,7 +137,7 @@ class _ParameterReader:
                 allowed = f"this parameter is needed: {parameter.metadata['doc']}"
                 raise InputError(self.known.where, f"{self.key}.{name}", None, allowed)
             return None
-        if source == "dimension":
+        if name == "dim":
             return given
         if "tuple" in str(parameter.type):
             return self.numbers(name, given)

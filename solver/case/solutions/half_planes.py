@@ -6,16 +6,16 @@ its integral Ẑ and derivative Z′, in plane strain and with v pointing away f
     σ_x = Re Z − |y| Im Z′,    σ_y = Re Z + |y| Im Z′,    τ = −|y| Re Z′
     2 μ u = (1 − 2ν) Re Ẑ − |y| Im Z,    2 μ v = 2 (1 − ν) Im Ẑ − |y| Re Z
 
-hold in each body with its own μ, ν: there is no shear at the interface, and the pressure −Re Z is
-the same from both sides. With 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂ and the initial gap g₀, the gap is
-g₀ + (2/E*) Im Ẑ; Ẑ is zero in the middle of the contact. With these fields as displacement and
-traction on the outside of two blocks, their contact is an exact problem of linear elasticity.
-Sources: H. M. Westergaard, J. Appl. Mech. 6 (1939) A49–A53; K. L. Johnson, Contact Mechanics
-(1985), §2.7, §5.2, §13.2; the punch: M. Ciavarella, D. A. Hills, G. Monno, Proc. IMechE C 212
-(1998) 319–328.
+hold in each body with its own μ, ν. In 3D the last axis is y, and nothing changes along the one
+between. There is no shear at the interface, and the pressure −Re Z is the same from both sides.
+With 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂ and the initial gap g₀, the gap is g₀ + (2/E*) Im Ẑ; Ẑ is
+zero in the middle of the contact. With these fields as displacement and traction on the outside of
+two blocks, their contact is an exact problem of linear elasticity. Sources: H. M. Westergaard,
+J. Appl. Mech. 6 (1939) A49–A53; K. L. Johnson, Contact Mechanics (1985), §2.7, §5.2, §13.2; the
+punch: M. Ciavarella, D. A. Hills, G. Monno, Proc. IMechE C 212 (1998) 319–328.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isfinite
 from typing import ClassVar
 
@@ -33,7 +33,7 @@ class HalfPlanes(ElasticSolution):
     """The common part: the fields, and what follows from the pressure's second moment."""
 
     parts: ClassVar[tuple[str, ...]] = ("bottom", "top")
-    dim: int = field(default=2, init=False)
+    dim: int = parameter("2 or 3", source="extruded", default=2)
 
     bottom: Material = parameter("of the lower body", source="material")
     top: Material = parameter("of the upper body", source="material")
@@ -76,17 +76,19 @@ class HalfPlanes(ElasticSolution):
         side, height, (whole, stress, _), (shear, poisson) = self._at(x, part)
         u = (1 - 2 * poisson) * whole.real - height * stress.imag
         v = 2 * (1 - poisson) * whole.imag - height * stress.real
-        return np.column_stack([u, side * v]) / (2 * shear[:, None])
+        found = np.zeros((len(x), self.dim))
+        found[:, 0], found[:, -1] = u, side * v
+        return found / (2 * shear[:, None])
 
     def gradient(self, x: np.ndarray, part: Part = None) -> np.ndarray:
         """By differentiation."""
         side, _, (_, stress, rest), (shear, poisson) = self._at(x, part)
         both = 2 * (1 - poisson) * stress.imag
-        found = np.empty((len(x), 2, 2))
+        found = np.zeros((len(x), self.dim, self.dim))
         found[:, 0, 0] = (1 - 2 * poisson) * stress.real - rest.imag
-        found[:, 0, 1] = side * (-both - rest.real)
-        found[:, 1, 0] = side * (both - rest.real)
-        found[:, 1, 1] = (1 - 2 * poisson) * stress.real + rest.imag
+        found[:, 0, -1] = side * (-both - rest.real)
+        found[:, -1, 0] = side * (both - rest.real)
+        found[:, -1, -1] = (1 - 2 * poisson) * stress.real + rest.imag
         return found / (2 * shear[:, None, None])
 
     def _at(
@@ -95,7 +97,7 @@ class HalfPlanes(ElasticSolution):
         """Side (n,), height (n,), Ẑ, Z and |y| Z′ (n,), and μ, ν (2, n) of points."""
         upper = self.part_of(x, part)
         side = np.where(upper == 1, 1.0, -1.0)
-        height = np.maximum(side * x[:, 1], 0.0)
+        height = np.maximum(side * x[:, -1], 0.0)
         whole, stress, slope = self.functions(x[:, 0] + 1j * height)
         rest = np.where(height > 0, height * np.where(height > 0, slope, 0), 0)
         elastic = np.array([(lame_of(m)[1], m.poisson) for m in self.materials]).T

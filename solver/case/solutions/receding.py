@@ -10,16 +10,19 @@ q̂ on the upper one lifts the lower face by
 the sum of its symmetric and its antisymmetric half. The slope of the lower face is zero where it
 touches. With x = a t and p = √(1 − t²) Σ bₙ U₂ₙ(t), whose part in 2 p̂ is the singular integral
 2π Σ bₙ T₂ₙ₊₁(t), this is an equation at each of N points for b₁ … and a, since b₀ = 4 c q/(π a) by
-the balance of forces. Chebyshev series: F. Erdogan, G. D. Gupta, Q. Appl. Math. 29 (1972) 525–534;
-the problem: L. M. Keer, J. Dundurs, K. C. Tsai, J. Appl. Mech. 39 (1972) 1115–1120.
+the balance of forces. Beyond the contact T₂ₙ₊₁ becomes w²ⁿ⁺¹ with w = t − √(t² − 1), and the gap is
+the integral of the slope. A mirrored layer in place of the base has the same pressure. Chebyshev
+series: F. Erdogan, G. D. Gupta, Q. Appl. Math. 29 (1972) 525–534; the problem: L. M. Keer, J.
+Dundurs, K. C. Tsai, J. Appl. Mech. 39 (1972) 1115–1120.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
+from ..material import Material
 from .base import parameter
 from .contact_area import ContactArea
 
@@ -32,14 +35,20 @@ _WIDEST = 4.0
 
 @dataclass(frozen=True, kw_only=True)
 class RecedingLayer(ContactArea):
-    """A layer on a rigid base; it lifts off beside the load. Frictionless, for any material."""
+    """A layer on a rigid base, or on its mirror image; it lifts off beside the load.
+
+    The pressure is the same for all materials. In 3D nothing changes along the second axis.
+    """
 
     name: ClassVar[str] = "receding_layer"
-    dim: int = field(default=2, init=False)
+    quantities: ClassVar[frozenset[str]] = ContactArea.quantities | {"gap"}
+    dim: int = parameter("2 or 3", source="extruded", default=2)
 
     height: float = parameter("h, the thickness of the layer", positive=True)
     loaded: float = parameter("c, half the width of the load, at most 4 h")
     pressure: float = parameter("q, the pressure of the load", source="pressure", positive=True)
+    top: Material = parameter("of the layer", source="material")
+    bottom: Material = parameter("of the base, or of the layer below", source="material")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -68,17 +77,20 @@ class RecedingLayer(ContactArea):
     def _more(self, count: int) -> int:
         return int(count * (1 + self.loaded / self.height / 2))
 
-    def _residual(self, end: float) -> tuple[float, np.ndarray]:
-        """The first coefficient of the slope that is left for a/h = `end`, and bₙ/p_mean (N,)."""
+    def _pressed(self, end: float, terms: int) -> tuple[np.ndarray, np.ndarray]:
+        """p̂ₙ (m, N) and q̂ (m,) for a force 2 a p_mean of 2, with a/h = `end`: b₀ = 4/π then."""
         from scipy.special import jv
 
+        k, n = self._waves[0], np.arange(terms)
+        wave = np.pi * (-1.0) ** n * (2 * n + 1) * jv(2 * n + 1, k[:, None] * end)
+        return wave / (k[:, None] * end), 2 * np.sinc(k * self.loaded / self.height / np.pi)
+
+    def _residual(self, end: float) -> tuple[float, np.ndarray]:
+        """The first coefficient of the slope that is left for a/h = `end`, and bₙ/p_mean (N,)."""
         k, weight, symmetric, other = self._waves
         terms = self._more(_TERMS)
-        # p̂ₙ for a force 2 a p_mean of 2: b₀ = 4/π then, and q̂ = 2 sin(kc)/(kc).
         n = np.arange(terms)
-        wave = np.pi * (-1.0) ** n * (2 * n + 1) * jv(2 * n + 1, k[:, None] * end)
-        wave /= k[:, None] * end
-        above = 2 * np.sinc(k * self.loaded / self.height / np.pi)
+        wave, above = self._pressed(end, terms)
         first = 4 / np.pi * wave[:, 0]
         angle = np.pi * (2 * n + 1) / (4 * terms)
         sines = weight * np.sin(np.cos(angle)[:, None] * end * k)
@@ -104,6 +116,23 @@ class RecedingLayer(ContactArea):
         angle = np.arccos(np.minimum(share, 1.0))
         mean = self.pressure * self.loaded / self.half_width
         return mean * np.sin(np.outer(angle, 2 * np.arange(len(b)) + 1)) @ b
+
+    def gap(self, x: np.ndarray) -> np.ndarray:
+        """The integral of the slope from the end of the contact."""
+        (end, b), (k, weight, symmetric, other) = self._extent, self._waves
+        wave, above = self._pressed(end, len(b))
+        own = wave @ b
+        # S and A differ from 1 by a layer's own part; that of a half-plane is in closed form.
+        rest = weight / k * (symmetric * (own + above) - 2 * own + other * (own - above))
+        t = np.maximum(np.abs(x[:, 0]) / self.half_width, 1.0)
+        shape = (np.cos(np.outer(t * end, k)) - np.cos(end * k)) @ rest
+        w = (t - np.sqrt(t**2 - 1))[:, None]
+        even = 2 * np.arange(1, len(b))
+        part = (w ** (even + 2) - 1) / (even + 2) - (w**even - 1) / even
+        whole = np.column_stack([(w**2 - 1) / 2 - np.log(w), part]) / 2
+        compliance = sum((1 - m.poisson**2) / m.young for m in (self.top, self.bottom))
+        mean = self.pressure * self.loaded / np.pi
+        return np.maximum(compliance * mean * (shape - 2 * np.pi * whole @ b), 0.0)
 
     @property
     def moment(self) -> float:

@@ -22,8 +22,8 @@ from .assembly import CellSum
 from .faces import circumference
 from .small_matrices import invert
 
-# Bytes of gradients handled at once: small enough to stay in the processor's cache.
-_CHUNK_BYTES = 1 << 20
+# Bytes of gradients, and of matrices, handled at once: so few stay in the processor's cache.
+_CHUNK_BYTES, _MATRIX_BYTES = 1 << 20, 3 << 20
 _ALL = slice(None)
 
 Found = TypeVar("Found")
@@ -173,8 +173,12 @@ def shapes_in(points: np.ndarray, block: Block, cells: np.ndarray, reference: np
 def chunks(block: Block, dim: int) -> Iterator[slice]:
     """Parts of a block whose gradients fit into the processor's cache."""
     points, _ = block.rule
-    size = len(points) * block.type.n_nodes * dim * 8
-    step = max(1, _CHUNK_BYTES // size)
+    return _parts(block, len(points) * block.type.n_nodes * dim * 8, _CHUNK_BYTES)
+
+
+def _parts(block: Block, size: int, together: int) -> Iterator[slice]:
+    """Parts of a block's cells that need `together` bytes, one cell `size` bytes."""
+    step = max(1, together // size)
     for start in range(0, len(block.cells), step):
         yield slice(start, start + step)
 
@@ -230,7 +234,8 @@ def stiffness(points: np.ndarray, blocks: list[Block], single: bool = False) -> 
     n, dim = points.shape
     total = CellSum([block.cells for block in blocks], n, dim, single)
     for block in blocks:
-        total.add(block.cells, partial(element_matrices, points, block), chunks(block, dim))
+        matrices, size = partial(element_matrices, points, block), dim * block.type.n_nodes
+        total.add(block.cells, matrices, _parts(block, 8 * size**2, _MATRIX_BYTES))
     return total.matrix
 
 

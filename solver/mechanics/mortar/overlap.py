@@ -3,7 +3,11 @@
 import numpy as np
 
 from ...mesh.catalogue import CellType, cell_type
+from ...system.threads import ahead
 from .pairing import candidate_pairs
+
+# Cells that are looked at together.
+_AT_ONCE = 1 << 14
 
 
 def inside_others(points: np.ndarray, cells: dict[str, np.ndarray], body: np.ndarray) -> int:
@@ -31,11 +35,13 @@ def inside_others(points: np.ndarray, cells: dict[str, np.ndarray], body: np.nda
     if not meet.any():
         return 0
     blocks = [(cell_type(name), nodes) for name, nodes in cells.items()]
-    vertices = [points[nodes[:, : kind.n_vertices]] for kind, nodes in blocks]
-    middle = np.concatenate([v.mean(axis=1) for v in vertices])
-    radius = np.concatenate(
-        [np.linalg.norm(v - v.mean(axis=1, keepdims=True), axis=2).max(axis=1) for v in vertices]
-    )
+    parts = [
+        nodes[first : first + _AT_ONCE, : kind.n_vertices]
+        for kind, nodes in blocks
+        for first in range(0, len(nodes), _AT_ONCE)
+    ]
+    balls = ahead(lambda nodes: _ball(points[nodes]), parts)
+    middle, radius = (np.concatenate(each) for each in zip(*balls, strict=True))
     owner = np.concatenate([body[nodes[:, 0]] for _, nodes in blocks])
     inside = np.zeros(len(owner), dtype=bool)
     for a in np.unique(np.nonzero(meet)[0]):
@@ -49,8 +55,8 @@ def inside_others(points: np.ndarray, cells: dict[str, np.ndarray], body: np.nda
         near = (middle + radius[:, None] > middle[mine].min(axis=0)) & (owner != a)[:, None]
         near &= middle - radius[:, None] < middle[mine].max(axis=0)
         theirs = np.flatnonzero(near.all(axis=1))
-        balls = middle[theirs], radius[theirs]
-        i, j = candidate_pairs(middle[mine], np.zeros(len(mine)), *balls, 0.0)
+        around = middle[theirs], radius[theirs]
+        i, j = candidate_pairs(middle[mine], np.zeros(len(mine)), *around, 0.0)
         i, j, first = mine[i], theirs[j], 0
         for kind, nodes in blocks:
             pick = (j >= first) & (j < first + len(nodes))
@@ -58,6 +64,12 @@ def inside_others(points: np.ndarray, cells: dict[str, np.ndarray], body: np.nda
             inside[i[pick][hit]] = True
             first += len(nodes)
     return int(inside.sum())
+
+
+def _ball(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Middle (n, dim) of cells with vertices (n, n_vertices, dim), and radius (n,) around it."""
+    middle = vertices.mean(axis=1)
+    return middle, np.linalg.norm(vertices - middle[:, None], axis=2).max(axis=1)
 
 
 def _contained(

@@ -12,7 +12,7 @@ from ...mechanics.fem.elasticity import physical_gradients
 from ...mechanics.fem.faces import circumference, surface_points
 from ...mechanics.fem.gauss import gauss_rule
 from ...mesh.catalogue import cell_type
-from ...simulation.exact import ExactValues, deformable
+from ...simulation.exact import ExactValues
 from ...simulation.solution import Solution, ZoneResult
 
 # A surface whose normals differ by less is plane.
@@ -135,7 +135,7 @@ def _displacement(solution: Solution) -> float | None:
     exact = solution.case.solution
     if exact is None or "displacement" not in exact.quantities:
         return None
-    nodes = np.flatnonzero(deformable(solution))
+    nodes = np.flatnonzero(solution.deformable)
     found = ExactValues(solution, exact).displacement(nodes)
     return float(np.linalg.norm(found, axis=1).max())
 
@@ -146,7 +146,7 @@ def _energy(solution: Solution) -> float | None:
     if not isinstance(exact, ElasticSolution) or "gradient" not in exact.quantities:
         return None
     points, part = solution.mesh.points, ExactValues(solution, exact).part
-    moving, energy = deformable(solution), 0.0
+    moving, energy = solution.deformable, 0.0
     for block in solution.mesh.cells:
         kind = cell_type(block.type)
         reference, weights = gauss_rule(kind.name, kind.order + 2)

@@ -86,6 +86,17 @@ def test_several_pressures_are_none():
     assert parse(plain=plain).solution.pressure == 0.0
 
 
+def test_a_plane_state_fills_three_dimensions_but_is_not_around_an_axis():
+    wedge = "{name: wedge, end: 1, slope: 0.1}"
+    solid, plane = (
+        parse(wedge, plain=CASE.replace("plane: strain\n", text))
+        for text in ("", "plane: strain\n")
+    )
+    assert (solid.solution.dim, plane.solution.dim) == (3, 2)
+    with pytest.raises(InputError, match="is for 2 dimensions; the case has 3"):
+        parse(wedge, plain=CASE.replace("strain", "axisymmetric"))
+
+
 @pytest.mark.parametrize(
     ("solution", "message"),
     [

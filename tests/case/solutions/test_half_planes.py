@@ -1,5 +1,7 @@
 """Half-planes in contact: equilibrium, Hooke's law, conditions of contact, published formulas."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -70,6 +72,31 @@ def test_the_conditions_of_contact(solution):
         np.testing.assert_array_equal(stress[:, 3], 0.0)
     jump = (solution.displacement(x, 1) - solution.displacement(x, 0))[:, 1]
     np.testing.assert_allclose(solution.initial_gap(x[:, 0]) + jump, gap, atol=1e-15)
+
+
+@both
+@each
+def test_in_3d_the_second_axis_is_that_of_a_plane_state(solution, part):
+    """x, z for x, y; no strain along y, and σ_yy = ν (σ_xx + σ_zz)."""
+    solid, plane = replace(solution, dim=3), inside(part)
+    x = np.c_[plane[:, 0], np.linspace(-5, 5, len(plane)), plane[:, 1]]
+    along = [0, 2]
+    moved, slope = solid.displacement(x, part), solid.gradient(x, part)
+    np.testing.assert_array_equal(moved[:, along], solution.displacement(plane, part))
+    np.testing.assert_array_equal(slope[:, along][:, :, along], solution.gradient(plane, part))
+    assert not moved[:, 1].any()
+    assert not slope[:, 1].any()
+    assert not slope[:, :, 1].any()
+    xx, yy, zz, xy, yz, xz = solid.stress(x, part).T
+    expected = solution.stress(plane, part)
+    np.testing.assert_allclose(np.c_[xx, zz, yy, xz], expected[:, :4], atol=1e-10)
+    np.testing.assert_allclose(yy, solid.materials[part].poisson * (xx + zz), atol=1e-10)
+    assert not xy.any()
+    assert not yz.any()
+    flat = x * [1, 1, 0]
+    for known in ("contact_pressure", "gap"):
+        same = getattr(solution, known)(plane * [1, 0])
+        np.testing.assert_array_equal(getattr(solid, known)(flat), same)
 
 
 @pytest.mark.parametrize("solution", ALL[1:], ids=lambda solution: solution.name)

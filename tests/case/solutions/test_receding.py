@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from solver.case.material import Material
 from solver.case.solutions.base import ParameterError
 from solver.case.solutions.receding import RecedingLayer
 
+SOFT, RIGID = Material(1.0, 0.3), Material(np.inf, 0.0)
 
-def layer(loaded, height=1.0, pressure=1.0):
-    return RecedingLayer(height=height, loaded=loaded, pressure=pressure)
+
+def layer(loaded, height=1.0, pressure=1.0, bottom=RIGID):
+    sizes = {"height": height, "loaded": loaded, "pressure": pressure}
+    return RecedingLayer(**sizes, top=SOFT, bottom=bottom)
 
 
 @pytest.mark.parametrize(
@@ -78,9 +82,28 @@ def test_the_lower_face_is_flat_in_contact_and_rises_beyond():
         at = found.half_width * np.asarray(share)
         return -np.sin(np.outer(at, k)) @ (weight * k * lift) / np.pi
 
-    rising = slope([1.2, 1.4])
+    beyond = np.array([1.2, 1.4, 2.5])
+    rising = slope(beyond)
     assert (rising > 0).all()
     assert np.abs(slope([0.1, 0.3, 0.5, 0.7, 0.9])).max() < 2e-3 * rising.max()
+    x, step = np.c_[beyond * found.half_width, 0 * beyond], np.array([1e-5, 0.0])
+    opening = (found.gap(x + step) - found.gap(x - step)) / 2e-5
+    np.testing.assert_allclose(opening[:2], 1.3 * rising[:2], rtol=5e-4)  # E = 1.3 there, 1 here
+    np.testing.assert_allclose(opening[2], 1.3 * rising[2], rtol=2e-2)
+
+
+def test_the_gap_begins_at_the_end_of_the_contact_as_pressure_ends_there():
+    """p = C √(a − x), g = 4 C (x − a)^{3/2}/(3 E*), as at any end; two layers open twice as far."""
+    found, twice = layer(0.5), layer(0.5, bottom=SOFT)
+    a, near = found.half_width, np.array([[1e-4, 0.0], [4e-4, 0.0]])
+    end = np.array([[a, 0.0]])
+    factor = found.contact_pressure(end - near[:1])[0] / 1e-2
+    expected = 4 * factor * 0.91 / 3 * near[:, 0] ** 1.5
+    np.testing.assert_allclose(found.gap(end + near), expected, rtol=2e-3)
+    far = np.array([[-3.0, 0.0], [0.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
+    np.testing.assert_allclose(twice.gap(far), 2 * found.gap(far), rtol=1e-12)
+    gap = found.gap(far)
+    assert (gap[0], gap[1]) == (pytest.approx(gap[3], rel=1e-12), 0.0)
 
 
 def _lift(k: float, below: float, above: float, nu: float) -> float:

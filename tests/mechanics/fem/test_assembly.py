@@ -63,7 +63,7 @@ def test_cells_and_nodes_in_parts_of_any_size_by_any_threads(monkeypatch, size, 
     points, block = cube(5)
     whole = stiffness(points, [block])
     monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
-    monkeypatch.setattr(solver.mechanics.fem.elasticity, "_CHUNK_BYTES", size)
+    monkeypatch.setattr(solver.mechanics.fem.elasticity, "_MATRIX_BYTES", size)
     monkeypatch.setattr(solver.mechanics.fem.assembly, "_NODES_AT_ONCE", max(1, size // 1000))
     parts = stiffness(points, [block])
     assert (parts.indices == whole.indices).all()

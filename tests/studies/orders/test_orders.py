@@ -126,6 +126,7 @@ def test_the_mesh_of_a_file_is_refined_by_halving_alone(tmp_path):
 def test_an_expected_error_is_on_the_power_law_through_all_levels():
     """Of errors 8, 1, 1/2 at 1, 1/2, 1/4: slope log₂ 16 / 2 = 2 about the mean, 2^(2/3)."""
     assert at_first([1, 2, 4], [8.0, 1.0, 0.5]) == pytest.approx(2 ** (2 / 3) * 4)
+    assert at_first([1, 2, 4], [8.0, 0.01, 0.5]) == 8.0  # errors cancel: the law is 1.4 there
 
 
 def test_the_expected_errors_of_a_case_are_those_of_its_ladder(capsys):
