@@ -2,9 +2,9 @@
 
     python -IS solver/commands/warm.py BENCHMARK COMMAND …
 
-Python with all packages takes 0.7 s to start, a small case 0.1 s to solve. This client imports none
-of them; `solver.commands.server`, at the socket that the environment names, forks for each command.
-Exit status, output and files are those of the command. The file BENCHMARK gets its
+Python with all packages takes 0.4 to 0.8 s to start, a small case 0.1 s to solve. This client
+imports none of them; `solver.commands.server`, at the socket that the environment names, forks for
+each command. Exit status, output and files are those of the command. The file BENCHMARK gets its
 wall and processor time (s) and largest resident memory (MB).
 """
 

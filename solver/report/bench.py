@@ -186,7 +186,8 @@ class Bench:
             refused = sum(row.word == REFUSED for row in of)
             passes = f"{code} passes {sum(row.sound for row in of)} of {len(of) - refused}"
             words.append(passes + (f" and cannot express {refused}" if refused else ""))
-        return f"{'; '.join(words)}."
+        outcome = "; ".join(words)
+        return f"{outcome[:1].upper()}{outcome[1:]}."
 
     @property
     def records(self) -> list[dict[str, Any]]:

@@ -29,10 +29,10 @@ BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "
 CROSS = "M-1,-1L1,1M1,-1L-1,1"
 SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
 # Digits of a number in a page.
-DIGITS = 7
+DIGITS = 10
 # The values of a mark under the pointer: powers of ten as 1.2e-10.
 _FORMAT = ".4~g"
-# A logarithmic axis of less than so many times also has labels at 2 and 5 times the powers of ten.
+# A logarithmic axis of less than so many times also has labels at 2, 3 and 5 times powers of ten.
 _FEW = 300.0
 
 Spec = dict[str, Any]
@@ -295,7 +295,7 @@ def round_off(unknowns: int) -> tuple[float, float]:
 
 def slopes(records: Sequence[Record], x: str, y: str, orders: Sequence[float]) -> list[Spec]:
     """The directions of orders in a log–log chart, in its lower right corner."""
-    if not records:
+    if len({record[x] for record in records}) < 2:
         return []
     low, high = (f(r[x] for r in records) for f in (min, max))
     foot = min(r[y] for r in records)

@@ -18,6 +18,7 @@ from .charts import (
     Axis,
     Chart,
     Look,
+    Spec,
     floor_band,
     interaction,
     level,
@@ -39,6 +40,10 @@ _LOOKS = {
     "": Look(INK),
 }
 _BAD = "not passed"
+# The chart goes down to round-off where an error is below this one.
+_NEAR = 1e-9
+# Labels of lines are apart by this share of the chart's height, at least.
+_APART = 0.05
 # Smaller shares of a tolerance are drawn here: zero has no logarithm.
 _LEAST = 1e-9
 
@@ -49,9 +54,10 @@ def drawn(rows: Sequence[Row]) -> list[Row]:
     return [row for row in known if not row.verdict.code]
 
 
-def floor(rows: Sequence[Row]) -> tuple[float, float]:
-    """The round-off floor: the unit round-off ε, and ε√N for the largest N unknowns."""
-    return round_off(_unknowns(rows))
+def floor(rows: Sequence[Row]) -> tuple[float, float] | None:
+    """The round-off floor, ε and ε√N for the largest N unknowns; None where no solve is near it."""
+    near = any(row.accuracy and row.accuracy[0] < _NEAR for row in rows)
+    return round_off(_unknowns(rows)) if near else None
 
 
 def _unknowns(rows: Sequence[Row]) -> int:
@@ -66,8 +72,15 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
     looks[_BAD] = Look(RED, CROSS)
     found = {record["series"] for record in records}
     allowed = sorted({row.allowed for row in shown if row.allowed})
-    top = max(1e-2, *(3 * record["error"] for record in records), *(3 * a for a in allowed))
-    levels = [level(value, f"tolerance {formats.error(value)}", RED) for value in allowed]
+    shares = [*(record["error"] for record in records), *allowed]
+    low = EPSILON / 8 if floor(shown) else min(shares) / 10
+    top = max(1e-2, 3 * max(shares))
+    levels: list[Spec] = [floor_band(_unknowns(shown))] if floor(shown) else []
+    labelled = 0.0
+    for value in allowed:
+        apart = value > labelled * (top / low) ** _APART
+        labelled = value if apart else labelled
+        levels.append(level(value, f"tolerance {formats.error(value)}" if apart else "", RED))
     for code in reference_code:
         label = f"{code.name} {code.version}: {formats.error(code.error)}"
         levels.append(level(code.error, label, MUTED, (6, 4)))
@@ -76,11 +89,11 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
         "Worst error of every solve against its run time",
         records,
         Axis("seconds", "wall time of the solve, s", log=True),
-        Axis("error", "worst relative error", log=True, domain=(EPSILON / 8, top)),
+        Axis("error", "worst relative error", log=True, domain=(low, top)),
         {name: look for name, look in looks.items() if name in found},
         lines=False,
         tips={"case": "case", "check": "check", "verdict": "verdict", "stages": "stages"},
-        layers=[floor_band(_unknowns(shown)), *levels],
+        layers=levels,
         width=900,
         height=400,
     )

@@ -50,8 +50,12 @@ _LOOKS = {
 PRESSED = 0.6
 # Cosine of the turn of the normals, over what is pressed, from which on places are arc lengths.
 _STRAIGHT = np.cos(np.radians(10))
+# Room beside what is drawn, as a share of it: marks at the ends are whole.
+_MARGIN = 0.015
 # Points in each face at which p* and the reference are evaluated.
 _WITHIN = np.linspace(0.0, 1.0, 5)
+# Most points of a reference's line.
+_MOST = 200
 # Digits of a number in a chart.
 _DIGITS = 7
 
@@ -79,7 +83,8 @@ def draw_profile(
         records += _records(REFERENCE, s=place(zone.centre), p=means)
     low, high = _range(zone, records, means)
     records = [r for r in records if r.get("end", r["s"]) >= low and r["s"] <= high]
-    x = Axis("s", where, domain=(low, high))
+    margin = _MARGIN * (high - low)
+    x = Axis("s", where, domain=(low - margin, high + margin))
     pressure = Axis("p", with_unit("contact pressure", units.get("stress")), zero=True)
     looks = _looks(records, flat)
     views = [_view(records, x, pressure, looks, flat, 170, first=True)]
@@ -211,7 +216,7 @@ def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[di
         else:
             values = np.where(covered[on_faces.macro], evaluate(against, where), 0.0)
         at = place(where)
-        order = np.argsort(at, kind="stable")[:: max(1, len(at) // 400)]
+        order = np.argsort(at, kind="stable")[:: -(-len(at) // _MOST) or 1]
         found += _records(REFERENCE, s=at[order], p=values[order])
     return found
 

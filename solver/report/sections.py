@@ -138,8 +138,8 @@ class FamilySection:
         return draw_errors(self.rows, self.family.reference_code) if drawn(self.rows) else None
 
     @property
-    def floor(self) -> tuple[float, float]:
-        """The round-off floor of that figure."""
+    def floor(self) -> tuple[float, float] | None:
+        """The round-off floor of that figure, where it shows it."""
         return floor(drawn(self.rows))
 
     @property

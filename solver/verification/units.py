@@ -28,21 +28,25 @@ def label_fields(grid: h5py.Group, contact: h5py.Group, units: Mapping[str, str]
     `units` maps length and stress to their names. VTK shows no attributes, so the grid also lists
     the units of its fields as the field data `units`.
     """
-
-    def label(name: str, item: h5py.HLObject) -> None:
-        field = name.rpartition("/")[2]
-        if isinstance(item, h5py.Dataset) and _KINDS.get(field) in units:
-            item.attrs["unit"] = units[_KINDS[field]]
-            listed.add(f"{field}: {item.attrs['unit']}")
-
-    listed: set[str] = set()
-    contact.visititems(label)
-    listed.clear()
-    grid.visititems(label)
-    if listed:
+    _label(contact, units)
+    if listed := _label(grid, units):
         # VTK crashes on texts that are not declared as ASCII; their bytes may be UTF-8.
         texts = np.array([text.encode() for text in sorted(listed)], dtype=object)
         grid.create_dataset("FieldData/units", data=texts, dtype=h5py.string_dtype("ascii"))
+
+
+def _label(group: h5py.Group, units: Mapping[str, str]) -> set[str]:
+    """Label the fields in a group; each with its unit as one text."""
+    names: list[str] = []
+    group.visit(names.append)  # opens none of them, which takes most of the time in a small result
+    labelled = set()
+    for name in names:
+        field = name.rpartition("/")[2]
+        unit = units.get(_KINDS.get(field, ""))
+        if unit is not None and isinstance(group[name], h5py.Dataset):
+            group[name].attrs["unit"] = unit
+            labelled.add(f"{field}: {unit}")
+    return labelled
 
 
 def with_unit(text: str, unit: str | None) -> str:

@@ -331,7 +331,7 @@ def test_help_imports_nothing_heavy():
 
 
 def test_a_plane_solve_imports_little(small):
-    unused = {"gmsh", "meshio.xdmf", "numpy.f2py.crackfortran", "pyamg", "scipy.constants"}
+    unused = {"gmsh", "meshio.xdmf", "numba", "numpy.f2py.crackfortran", "pyamg", "scipy.constants"}
     unused |= {"scipy.linalg", "scipy.optimize", "scipy.sparse.linalg", "scipy.spatial.transform"}
     unused |= {"scipy.special", "skfem.assembly", "skfem.mesh", "skfem.utils"}
     assert main(["mesh", str(small / "c.yaml"), "-o", str(small / "m.vtkhdf")]) == 0

@@ -22,36 +22,6 @@ README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorial.md"
 LEFT_OUT = {".git", ".venv", ".snakemake", "cases", "results", "tests"}
 
 
-def write_part(case: dict, path: Path) -> None:
-    """Two unit cubes on each other as a MED file, with the groups that a case names."""
-    import gmsh
-
-    gmsh.initialize()
-    try:
-        gmsh.option.set_number("General.Terminal", 0)
-        z = {}
-        for name, bottom in zip(case["materials"], (0, 1), strict=True):
-            box = gmsh.model.occ.add_box(0, 0, bottom, 1, 1, 1)
-            gmsh.model.occ.synchronize()
-            gmsh.model.set_physical_name(3, gmsh.model.add_physical_group(3, [box]), name)
-            for _, face in gmsh.model.get_boundary([(3, box)], oriented=False):
-                z[name, round(gmsh.model.occ.get_center_of_mass(2, face)[2], 6)] = face
-        (lower, upper), [zone] = case["materials"], case["contact"]
-        faces = {
-            case["supports"][0]["group"]: z[lower, 0.0],
-            zone["slave"]: z[lower, 1.0],
-            zone["master"]: z[upper, 1.0],
-            case["loads"][0]["group"]: z[upper, 2.0],
-        }
-        for name, face in faces.items():
-            gmsh.model.set_physical_name(2, gmsh.model.add_physical_group(2, [face]), name)
-        gmsh.option.set_number("Mesh.MeshSizeMax", 0.5)
-        gmsh.model.mesh.generate(3)
-        gmsh.write(str(path))
-    finally:
-        gmsh.finalize()
-
-
 def write_study(folder: Path) -> None:
     """The project's study with a single point in its quick part."""
     shutil.copytree(ROOT / "cases" / "study", folder)
@@ -147,8 +117,6 @@ def test_every_command_works_in_its_order(project: Path):
 
 
 def test_the_tutorial_ends_with_a_verdict_in_the_batch(project: Path):
-    case = yaml.safe_load(next(text for language, text in blocks(TUTORIAL) if language == "yaml"))
-    write_part(case, project / "my-cases" / case["mesh"]["file"])
     run_all(TUTORIAL, project)
     verdict = json.loads((project / "results" / "my-cases" / "part" / "verdict.json").read_text())
     assert verdict["verdict"] == "passed"

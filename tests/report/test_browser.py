@@ -227,3 +227,45 @@ def test_without_javascript_there_is_the_picture(pages):
     assert all("hidden" in part[:120] for part in text.split("data-surfaces=")[1:])
     files = [path for path in pages.glob("pictures/*.js") if path.name in text]
     assert len(files) == 2
+
+
+THOUSAND = """((form) => {
+  const times = [];
+  const choices = ["text", "block-7", "family", "family_3", "text", "", "family", ""];
+  while (choices.length) {
+    const [name, value] = choices.splice(0, 2);
+    const start = performance.now();
+    form.elements[name].value = value;
+    form.dispatchEvent(new Event("input"));
+    document.body.getBoundingClientRect(); // what is shown is laid out
+    times.push(performance.now() - start);
+  }
+  return times;
+})(document.querySelector("form.filters"))"""
+
+
+@pytest.fixture(scope="module")
+def thousand(tmp_path_factory):
+    """The report of a thousand solves in twenty families."""
+    folder = tmp_path_factory.mktemp("thousand")
+    good = CHECK | {"error": 1e-5, "passed": True}
+    files = []
+    for number in range(1000):
+        family, name = f"family {number % 20}", f"block-{number}"
+        content = verdict(name, "passed", family=family, checks=[good] * 8, worst=good)
+        files.append(folder / family / name / "verdict.json")
+        put(files[-1], content)
+    write_report(files, folder / "report")
+    return folder / "report"
+
+
+def test_a_summary_of_a_thousand_solves_stays_small_and_quick(thousand, window):
+    window.open(thousand / "summary.html")
+    shown = "document.querySelectorAll('tr[data-verdict]:not([hidden])').length"
+    assert window.run(shown) == 1000
+    best = min(max(window.run(THOUSAND)) for _ in range(5))
+    assert best < 100, best
+    assert window.run(shown) == 1000
+    assert window.complaints() == []
+    for page in thousand.glob("*.html"):
+        assert page.stat().st_size < 1_500_000, page

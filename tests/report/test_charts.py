@@ -56,10 +56,10 @@ def test_a_chart_is_its_records():
 
 def test_a_page_holds_the_specification_and_says_what_it_needs():
     html = str(chart().__html__())
-    seven = json.loads(
-        json.dumps(chart().spec), parse_float=lambda digits: float(f"{float(digits):.7g}")
+    ten = json.loads(
+        json.dumps(chart().spec), parse_float=lambda digits: float(f"{float(digits):.10g}")
     )
-    assert specifications(html) == {"a": seven}
+    assert specifications(html) == {"a": ten}
     assert f"needs JavaScript and the file {SCRIPT} beside this page" in html
 
 

@@ -24,10 +24,14 @@ def memory(job, attempt, refine=1):
     return attempt * round(AROUND_MB + min(most, MOST_MEMORY) / 1e6)
 
 
+def seconds(job, refine=1):
+    """Estimated seconds of a case, the priority of its jobs: the longest cases start first."""
+    return min(size_of(job, refine).seconds, MOST_SECONDS)
+
+
 def minutes(job, attempt, refine=1):
     """Minutes that a job of this case asks for, more each time it has to be run again."""
-    seconds = min(size_of(job, refine).seconds, MOST_SECONDS)
-    return attempt * round(START_MINUTES + SLACK * seconds / 60)
+    return attempt * round(START_MINUTES + SLACK * seconds(job, refine) / 60)
 
 
 # What was said of each job that failed, by what it should have made.

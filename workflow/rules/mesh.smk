@@ -11,6 +11,7 @@ rule mesh:
         directory("results/meshes/{family}/{case}"),
     log:
         "results/meshes/{family}/{case}/log",
+    priority: lambda w: seconds(RECIPES[w.family, w.case])
     resources:
         mem_mb=lambda w, attempt: memory(RECIPES[w.family, w.case], attempt),
         runtime=lambda w, attempt: minutes(RECIPES[w.family, w.case], attempt),

@@ -12,6 +12,7 @@ use rule solve as solve_level with:
         directory("results/orders/{family}/{job}/{level}"),
     log:
         "results/orders/{family}/{job}/{level}/log",
+    priority: lambda w: seconds(level_of(w), int(w.level))
     resources:
         mem_mb=lambda w, attempt: memory(level_of(w), attempt, int(w.level)),
         runtime=lambda w, attempt: minutes(level_of(w), attempt, int(w.level)),

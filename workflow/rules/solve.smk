@@ -9,6 +9,7 @@ rule solve:
         directory("results/{family}/{job}"),
     log:
         "results/{family}/{job}/log",
+    priority: lambda w: seconds(BATCH[w.family, w.job])
     resources:
         mem_mb=lambda w, attempt: memory(BATCH[w.family, w.job], attempt),
         runtime=lambda w, attempt: minutes(BATCH[w.family, w.job], attempt),

@@ -46,7 +46,8 @@ class CellSum:
             n, k, _ = place.shape
             values = values.reshape(n, k, self._dim, k, self._dim).swapaxes(2, 3)
             entries = size * place[..., None].astype(np.intp) + np.arange(size)
-            return entries.ravel(), values.ravel()
+            # In the precision of the sum: NumPy adds mixed ones four times slower.
+            return entries.ravel(), values.astype(self._data.dtype, copy=False).ravel()
 
         for entries, values in ahead(placed, parts):
             np.add.at(self._data.reshape(-1), entries, values)

@@ -21,22 +21,17 @@ MULTIGRID = "multigrid"
 _SHIFTS = 0.0, 1e-15, 1e-14
 _SOFT = "displacements along the softest motions are not determined"
 _ASKED = "as asked for"
-# Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory.
-# Keys: whether PARDISO makes the factor; whether cells are quadratic (twice the iterations).
-_MULTIGRID_FROM = {
-    (True, False): 80_000,
-    (True, True): 200_000,
-    (False, False): 20_000,
-    (False, True): 100_000,
-}
+# Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory, by
+# whether PARDISO makes the factor. In graded meshes it takes less from about 100,000.
+_MULTIGRID_FROM = {True: 60_000, False: 20_000}
 # Condensing is slower than a saddle point if it adds more entries than this share of the matrix;
 # up to the second number of entries it costs nothing.
 _FILL, _LEAST_FILL = 1.0, 1_000_000
 
 
-def multigrid_from(quadratic: bool) -> int:
+def multigrid_from() -> int:
     """Unknowns in 3D from which multigrid is quicker, with the libraries installed here."""
-    return _MULTIGRID_FROM[BACKENDS["pardiso"].available(), quadratic]
+    return _MULTIGRID_FROM[BACKENDS["pardiso"].available()]
 
 
 class LinearSolver:
@@ -124,7 +119,7 @@ def prepare(
     against = gave_up or against_multigrid(size, unknowns)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
-        least = multigrid_from(unknowns.quadratic)
+        least = multigrid_from()
         why = f"{least} unknowns or more in 3D: faster and smaller than a factor"
         try:
             solver = Multigrid(matrix, unknowns, shared)
@@ -144,7 +139,7 @@ def against_multigrid(size: int, unknowns: Unknowns) -> str:
         return "" if wanted() == MULTIGRID else _ASKED
     if unknowns.dim == 2:
         return "a factor is small in 2D"
-    least = multigrid_from(unknowns.quadratic)
+    least = multigrid_from()
     return f"fewer than {least} unknowns: a factor is faster than multigrid" * (size < least)
 
 

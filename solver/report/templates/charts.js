@@ -17,7 +17,8 @@
     if (night.matches) for (const [light, dark] of Object.entries(THEME.dark)) text = text.replaceAll(light, dark);
     const spec = JSON.parse(text);
     const width = place.clientWidth - 38; // beside the menu
-    spec.config.legend.columns = Math.max(1, Math.floor(width / 170));
+    const longest = Math.max(...spec.data.values.map((record) => (record.series ?? "").length));
+    spec.config.legend.columns = Math.max(1, Math.floor(width / (40 + 6.3 * longest)));
     if (spec.width) { spec.width = width; spec.autosize = { type: "fit-x", contains: "padding" }; }
     for (const part of spec.vconcat ?? []) part.width = width - 70;
     return spec;

@@ -26,7 +26,7 @@ def outcome(found: Sequence[Convergence]) -> str:
     if bands:
         parts.append(f"{inside} of {bands} bands have the exact value")
     if known > bands:
-        parts.append(f"{known - bands} quantities with a known value have no band")
+        parts.append(f"{known - bands} of {known} known values have no band")
     if all_of_them:
         parts.append(f"{same} of {all_of_them} that do not depend on the mesh are exact")
     return "; ".join(parts or ["No exact value is known"]) + "."
