@@ -5,15 +5,18 @@ from pathlib import Path
 import pytest
 
 from solver.case.features import features, used
+from solver.case.reader import load_case
 from solver.case.yaml import read_mapping
 from solver.commands.jobs import case_files
 from solver.mesh.keys import RECIPES
 from solver.report.matrix import fits, matrix, matrix_page, reasons
 from solver.report.rows import read_rows
+from solver.verification.checks import CHECKS
 from tests.report.test_report import CHECK, verdict
 from tests.report.verdicts import put
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
+ROUND_OFF = 1e-10
 FOLDERS = sorted(file.parent for file in CASES.glob("*/family.yaml"))
 CASE = """\
 name: {name}
@@ -90,3 +93,25 @@ def test_a_line_counts_solves_by_dimension_and_names_the_strictest_check(tmp_pat
     page = matrix_page(rows, [family])
     assert "Not used: not yet" in page
     assert "<li>contact[].treatment: lac</li>" in page
+
+
+def test_no_case_of_the_batch_has_a_stated_tolerance():
+    """Each check is exact to round-off, or has the error that a ladder predicts."""
+    stated = [
+        (case.name, check.name)
+        for folder in FOLDERS
+        for case in map(load_case, case_files(folder))
+        for check in CHECKS
+        if _compared(check, case)
+        and check.tolerance_in(case.tolerance) > ROUND_OFF
+        and check.expected_in(case.expected) is None
+    ]
+    assert stated == []
+
+
+def _compared(check, case):
+    if check.norm == "error":
+        return check.name in case.tolerance
+    if check.name.startswith("observation") and not case.observe:
+        return False
+    return check.key is not None and check.key in case.reference
