@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from functools import cache, wraps
 from importlib.util import find_spec
+from threading import Lock
 from typing import Any
 
 _WORTH = 5_000_000  # numbers: 60,000 unknowns of HEXA8
@@ -44,8 +45,12 @@ def compiled(function: Callable[..., None]) -> Callable[..., None]:
         except RuntimeError:  # no folder for the cache
             return njit(**options)(function)
 
+    lock = Lock()
+
     @wraps(function)
     def call(*arguments: Any) -> None:
-        machine_code()(*arguments)
+        with lock:  # several threads compile it once
+            code = machine_code()
+        code(*arguments)
 
     return call

@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -44,6 +46,26 @@ def test_without_a_folder_for_the_cache_it_is_compiled_all_the_same(monkeypatch)
     out = np.zeros(1)
     compiled(add.__wrapped__)(np.ones(3), out)
     assert out == [3.0]
+
+
+@numba
+def test_several_threads_compile_once(monkeypatch):
+    import numba
+    import numpy as np
+
+    made = []
+
+    def slow(**options):
+        made.append(options)
+        time.sleep(0.05)
+        return lambda function: function
+
+    monkeypatch.setattr(numba, "njit", slow)
+    once, out = compiled(add.__wrapped__), [np.zeros(1) for _ in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(once, [np.ones(3)] * 4, out))
+    assert len(made) == 1
+    assert np.concatenate(out).tolist() == [3.0] * 4
 
 
 def test_numba_is_loaded_for_large_matrices_alone(monkeypatch):
