@@ -112,7 +112,7 @@ def test_the_peak_in_the_tip_of_a_wedge_is_infinite():
     # Four faces of the length 1/2 on both sides of the tip, each a macro-element.
     points = np.stack([np.linspace(-1, 1, 5), np.zeros(5)], axis=1)
     faces = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
-    zone = SimpleNamespace(faces=[("SEG2", faces, np.arange(4))])
+    zone = SimpleNamespace(name="interface", faces=[("SEG2", faces, np.arange(4))])
     solution = SimpleNamespace(case=case, mesh=SimpleNamespace(points=points))
     assert exact.contact_pressure(points).max() > 5 * exact.contact_pressure(points[1:2])
     assert known_peak(solution, zone) is None
