@@ -168,8 +168,8 @@ class Progress(logging.Filter):
             state.fail(of["jobid"])
         if line:
             print(line, file=self.out, flush=True)
-            if self.terminal:
-                self._show()
+        if self.terminal and (line or event == "job_info"):
+            self._show()
 
     def _tick(self) -> None:
         while not self._stop.wait(_ON_TERMINAL if self.terminal else _IN_FILE):

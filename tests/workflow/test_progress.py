@@ -117,12 +117,13 @@ def test_a_terminal_is_left_clean(tmp_path):
     events = [record("run_info", stats={"solve": 2}), info(1, "solve", [said])]
     out, status = hear(Terminal(), *events, record("job_finished", job_id=1))
     assert out == "a: passed, 0.25 s [1/2]\n"
-    assert status == "1 of 2 solves done\r\x1b[K"
+    wipe = "\r\x1b[K"
+    assert status == f"0 of 2 solves done, 1 running – solve 1{wipe}1 of 2 solves done{wipe}"
 
 
 def test_jobs_that_print_by_themselves_have_the_terminal_alone(tmp_path):
     said = str(log(tmp_path, "a: passed, 0.25 s"))
-    events = [record("run_info", stats={"solve": 2}), info(1, "solve", [said]), info(2, "report")]
+    events = [record("run_info", stats={"solve": 2}), info(2, "report"), info(1, "solve", [said])]
     _, status = hear(Terminal(), *events, record("job_finished", job_id=1))
     assert status == ""
 
