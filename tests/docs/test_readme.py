@@ -88,10 +88,10 @@ def blocks(page: Path) -> list[tuple[str, str]]:
     return FENCE.findall(page.read_text(encoding="utf-8"))
 
 
-def run_all(page: Path, project: Path) -> None:
+def run_all(page: Path, project: Path, **variables: str) -> None:
     """Run the blocks of a page; those in YAML are added to the case `part`."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST")}
-    environment["MAKEFLAGS"] = "INSTALL=:"
+    environment |= {"MAKEFLAGS": "INSTALL=:"} | variables
     for language, text in blocks(page):
         if language == "yaml":
             with (project / "my-cases" / "part.yaml").open("a") as case:
@@ -117,7 +117,8 @@ def test_every_command_works_in_its_order(project: Path):
 
 
 def test_the_tutorial_ends_with_a_verdict_in_the_batch(project: Path):
-    run_all(TUTORIAL, project)
+    # The program gmsh keeps preferences in the home folder.
+    run_all(TUTORIAL, project, HOME=str(project))
     verdict = json.loads((project / "results" / "my-cases" / "part" / "verdict.json").read_text())
     assert verdict["verdict"] == "passed"
     assert "force" in {check["name"] for check in verdict["checks"]}
