@@ -143,11 +143,11 @@ class Compared:
         """By check, what samples it; checks of what is not given are missing."""
         found: dict[str, samples.Sampler] = {}
         if "displacement" in self.placed:
-            found["displacement"] = self._displacement
+            found["displacement"] = self._components("displacement", "xyz"[: self.model.dim])
         if "stress" in self.placed:
             found |= {
                 "nodal_stress": self._nodal_stress,
-                "stress_components": self._stress_components,
+                "stress_components": self._components("stress", COMPONENTS),
                 "surface_stress_slave": self._surface_stress("slave"),
                 "surface_stress_master": self._surface_stress("master"),
             }
@@ -192,27 +192,21 @@ class Compared:
         by_place = np.array(exact.part_of(placed.places, None))
         return np.where(known, self.model.part[placed.body], by_place)
 
-    def _displacement(self, _: Solution, __: None, reference: Reference) -> Sample:
-        placed, axes = self._deformable("displacement"), "xyz"[: self.model.dim]
-        return samples.by_component(
-            placed.values,
-            placed.places,
-            axes,
-            reference,
-            lambda: reference.exact.displacement(placed.places, self._part(placed)),
-            _place(placed),
-        )
+    def _components(self, field: str, names: Sequence[str]) -> samples.Sampler:
+        """Samples a field that the exact solution has under the same name, all components."""
 
-    def _stress_components(self, _: Solution, __: None, reference: Reference) -> Sample:
-        placed = self._deformable("stress")
-        return samples.by_component(
-            placed.values,
-            placed.places,
-            COMPONENTS,
-            reference,
-            lambda: reference.exact.stress(placed.places, self._part(placed)),
-            _place(placed),
-        )
+        def sample(_: Solution, __: None, reference: Reference) -> Sample:
+            placed = self._deformable(field)
+            return samples.by_component(
+                placed.values,
+                placed.places,
+                names,
+                reference,
+                lambda: getattr(reference.exact, field)(placed.places, self._part(placed)),
+                _place(placed),
+            )
+
+        return sample
 
     def _along(self, placed: Placed, directions: np.ndarray, reference: Reference) -> Sample:
         """Stress along directions (dim,) or (k, dim) beside the reference's."""

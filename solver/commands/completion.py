@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..system.package import PROJECT
-from .options import add_command
+from .options import PASSED, add_command
 
 SHELLS = ("bash", "zsh", "tcsh")
 
@@ -22,7 +22,7 @@ def _completion(options: argparse.Namespace) -> int:
     from .cli import parser
 
     print(script(parser(), options.shell))
-    return 0
+    return PASSED
 
 
 def script(parser: argparse.ArgumentParser, shell: str) -> str:

@@ -120,16 +120,3 @@ def extents(zone: ZoneResult, position: np.ndarray) -> tuple[np.ndarray, np.ndar
         np.minimum.at(start, owner, position[nodes].min(axis=1))
         np.maximum.at(end, owner, position[nodes].max(axis=1))
     return start, end
-
-
-def lines_of(solution: Solution, number: int) -> list[str]:
-    """What a picture says of a body: its cells or rigid surface, and how that moves."""
-    body = solution.bodies[number]
-    rigid = solution.case.rigid.get(body.name)
-    if rigid is None:
-        return [", ".join(body.cells)]
-    given = [("moved", rigid.move), ("force", rigid.force)]
-    told = [f"{what} {k} {v:.4g}" for what, values in given for k, v in values.items()]
-    flat = solution.mesh.points.shape[1] == 2 and not solution.case.axisymmetric
-    shape = {"plane": "line", "sphere": "circle"}.get(rigid.surface) if flat else None
-    return [f"rigid {shape or rigid.surface}".strip(), *told]

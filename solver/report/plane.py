@@ -9,10 +9,10 @@ from ..mechanics.fem.faces import outer_faces
 from ..simulation.solution import Solution
 from .charts import BLUE, MUTED, PAPER
 from .geometry import plane_cells
-from .layout import Placement, apart, edge_color, fit, lines_of, pressed_box, tint, ways_apart
+from .layout import Placement, apart, edge_color, fit, pressed_box, tint, ways_apart
 from .obstacles import Obstacle, obstacles
 from .svg import Drawing, mixed
-from .symbols import View, draw_axes, draw_symbols
+from .symbols import View, draw_axes, draw_name, draw_symbols
 
 WIDTH, HEIGHT = 760, 360
 # Where the contact is more than this share of the model, it is not enlarged.
@@ -34,7 +34,7 @@ def draw_plane(solution: Solution, title: str) -> Markup:
     ways = _APART * solution.length * ways_apart(solution)
     shown = np.concatenate([points[meshed], *(r.points + ways[k] for k, r in rigid.items())])
     place = fit(shown, (48.0, 48.0, 190.0 if enlarged else 380.0, HEIGHT - 112.0))
-    _blocks(drawing, solution, place, points)
+    _blocks(drawing, solution, place, points, rigid)
     for number, surface in rigid.items():
         _rigid(drawing, place, surface, edge_color(solution.bodies[number]), ways[number])
     view = View(points, place, np.ones(len(points), dtype=bool))
@@ -59,18 +59,22 @@ def _enlarged(
     place = fit(np.stack(box), (WIDTH - 390.0, 10.0, 380.0, HEIGHT - 20.0))
     (x0, y1), (x1, y0) = place(np.stack(box))
     with drawing.clipped(x0, y0, x1 - x0, y1 - y0):
-        _blocks(drawing, solution, place, solution.mesh.points, box)
+        _blocks(drawing, solution, place, solution.mesh.points, rigid, box)
         for number, surface in rigid.items():
             _rigid(drawing, place, surface, edge_color(solution.bodies[number]))
     drawing.rectangle(x0, y0, x1 - x0, y1 - y0, stroke=MUTED, stroke_width=1)
 
 
 def _blocks(
-    drawing: Drawing, solution: Solution, place: Placement, points: np.ndarray, box: _Box = _ALL
+    drawing: Drawing,
+    solution: Solution,
+    place: Placement,
+    points: np.ndarray,
+    rigid: Mapping[int, Obstacle],
+    box: _Box = _ALL,
 ) -> None:
     """The cells of every body that reach into a box, the slave's surface in blue."""
     low, high = box
-    rigid = obstacles(solution)
     for polygons, node in plane_cells(points, solution.mesh):
         seen = ((polygons.max(axis=1) > low) & (polygons.min(axis=1) < high)).all(axis=1)
         for number, body in enumerate(solution.bodies):
@@ -122,9 +126,5 @@ def _names(
     ]
     middles, free = [float((y.min() + y.max()) / 2) for y in own], 0.0
     for number in np.argsort(middles):
-        body, y = solution.bodies[number], max(middles[number], free) - 4
-        drawing.text(right + 42, y, body.name, weight="600")
-        for line in lines_of(solution, int(number)):
-            drawing.text(right + 42, y := y + 14, line, color=MUTED)
-        drawing.text(right + 42, y := y + 14, body.role, color=edge_color(body))
-        free = y + 22
+        y = max(middles[number], free) - 4
+        free = draw_name(drawing, solution, int(number), right + 42, y) + 22

@@ -17,7 +17,6 @@ from .layout import (
     apart,
     edge_color,
     fit,
-    lines_of,
     mean_normal,
     plan_axes,
     pressed_box,
@@ -27,7 +26,7 @@ from .layout import (
 from .obstacles import obstacles
 from .profile import expected
 from .svg import Drawing, mixed
-from .symbols import View, draw_axes, draw_symbols
+from .symbols import View, draw_axes, draw_name, draw_symbols
 
 WIDTH, HEIGHT = 960, 400
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
@@ -104,10 +103,7 @@ def _blocks(drawing: Drawing, solution: Solution, frame: Frame) -> None:
             _macro_outlines(drawing, solution, points, lambda x: place(x @ screen.T))
         own = place(corners[number] @ screen.T)
         at, y = float(own[:, 0].max()) + 24, float(own[:, 1].mean()) - 8
-        drawing.text(at, y, body.name, weight="600")
-        for line in lines_of(solution, number):
-            drawing.text(at, y := y + 14, line, color=MUTED)
-        drawing.text(at, y + 14, body.role, color=edge_color(body))
+        draw_name(drawing, solution, number, at, y)
     seen = np.zeros(len(points), dtype=bool)
     for kind, nodes in outer:
         seen[nodes[normals(outlines(points, kind, nodes)) @ eye > 1e-6].ravel()] = True

@@ -12,7 +12,7 @@ from ..mechanics.fem.stress import traction
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution
 from .charts import GREEN, MUTED, RED
-from .layout import Placement
+from .layout import Placement, edge_color
 from .profile import mathematics
 from .svg import Drawing
 
@@ -88,6 +88,29 @@ def draw_axes(drawing: Drawing, screen: np.ndarray, size: np.ndarray, unit: str 
         drawing.text(tip[0] + 5 * np.sign(right) - 3, tip[1] + (-3 if up > 1 else 9), name, size=9)
     text = " × ".join(f"{length:.3g}" for length in size)
     drawing.text(6, drawing.height - 6, f"{text} {unit or ''}".strip(), color=MUTED, size=10)
+
+
+def draw_name(drawing: Drawing, solution: Solution, number: int, x: float, y: float) -> float:
+    """Name of a body, what it is made of and its role; returns the y of the last line."""
+    body = solution.bodies[number]
+    drawing.text(x, y, body.name, weight="600")
+    for line in _lines_of(solution, number):
+        drawing.text(x, y := y + 14, line, color=MUTED)
+    drawing.text(x, y := y + 14, body.role, color=edge_color(body))
+    return y
+
+
+def _lines_of(solution: Solution, number: int) -> list[str]:
+    """What a picture says of a body: its cells or rigid surface, and how that moves."""
+    body = solution.bodies[number]
+    rigid = solution.case.rigid.get(body.name)
+    if rigid is None:
+        return [", ".join(body.cells)]
+    given = [("moved", rigid.move), ("force", rigid.force)]
+    motion = [f"{what} {k} {v:.4g}" for what, values in given for k, v in values.items()]
+    flat = solution.mesh.points.shape[1] == 2 and not solution.case.axisymmetric
+    shape = {"plane": "line", "sphere": "circle"}.get(rigid.surface) if flat else None
+    return [f"rigid {shape or rigid.surface}".strip(), *motion]
 
 
 def _held(support: Support, normal: np.ndarray) -> Iterator[np.ndarray]:

@@ -24,7 +24,8 @@ import numpy as np
 from scipy import sparse
 
 from ..mechanics.fem import shape_functions
-from ..mechanics.fem.elasticity import Block, steepness
+from ..mechanics.fem.cell_sizes import steepness
+from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, area_vectors
 from ..mechanics.mortar.facets import FLAT
 from ..mechanics.mortar.status import Trial

@@ -6,10 +6,14 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ..mechanics.fem.elasticity import Sizes, internal_force, sizes, stiffness
+from ..mechanics.fem.cell_sizes import Sizes, sizes
+from ..mechanics.fem.elasticity import internal_force, stiffness
 from .constraints import ContactConstraints
 from .displacement import Displacement
 from .scene import Scene
+
+# What an iterate knows that neither the force nor the status changes.
+_OF_DISPLACEMENT = "defect", "internal", "springs", "sizes"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,12 +108,11 @@ class ContactIterate:
         What does not depend on the force is not computed anew, and the sizes of stresses stay those
         that they were, also after the iterates that follow: they scale round-off alone.
         """
-        return replace(self, force=force)._knowing(self, "defect", "internal", "springs", "sizes")
+        return replace(self, force=force)._knowing(self, *_OF_DISPLACEMENT)
 
     def with_closed(self, closed: np.ndarray) -> "ContactIterate":
         """The same displacement with other multipliers closed (k,)."""
-        known = "defect", "internal", "springs", "sizes"
-        return replace(self, closed=closed)._knowing(self, *known)
+        return replace(self, closed=closed)._knowing(self, *_OF_DISPLACEMENT)
 
     def _knowing(self, other: "ContactIterate", *names: str) -> "ContactIterate":
         known = vars(other)

@@ -14,6 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from .package import PROJECT, in_project, project_version
+from .threads import cores
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "gmsh")
 _THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -33,7 +34,7 @@ def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
         "case_sha256": _sha256(case),
         "mesh_sha256": _sha256(mesh),
         "cpu": _cpu(),
-        "cores": _cores(),
+        "cores": cores(),
         "threads": next((os.environ[name] for name in _THREADS if name in os.environ), ""),
         "platform": platform.platform(),
         "time_utc": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -86,10 +87,3 @@ def _cpu() -> str:
         return platform.processor()
     names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
     return next(names, platform.processor())
-
-
-def _cores() -> int:
-    """The cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

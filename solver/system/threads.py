@@ -10,13 +10,17 @@ Part = TypeVar("Part")
 Result = TypeVar("Result")
 
 
+def cores() -> int:
+    """The cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def workers() -> int:
     """The threads that this process may use: its cores, or fewer as OMP_NUM_THREADS says."""
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
     asked = os.environ.get("OMP_NUM_THREADS", "")
-    return min(cores, int(asked)) if asked.isdigit() and int(asked) else cores
+    return min(cores(), int(asked)) if asked.isdigit() and int(asked) else cores()
 
 
 def ahead(function: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:

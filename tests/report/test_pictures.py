@@ -70,7 +70,7 @@ def test_arrows_follow_the_load(tmp_path):
     svg = draw_plane(solution, "two blocks")
     lines = [p.get("d") for p in ET.fromstring(svg).iter(f"{SVG}path") if p.get("stroke") == RED]
     steps = sorted(tuple(map(float, line.split("l")[1].split())) for line in lines)
-    # At x = 0 there is none; the largest has 30 pixels.
+    # No arrow is at x = 0, where the load is zero; the longest has 30 pixels.
     assert np.array(steps) == pytest.approx(np.array([(100, 0), (200, 0), (300, 0)]), abs=1)
     assert "traction (x, 0)" in svg
     long = replace(load, value=(Expression("sin(x) * sin(x) + cos(x) * cos(x)"), 0.0))

@@ -5,9 +5,8 @@ from functools import partial
 import numpy as np
 
 from ...mesh.catalogue import CellType
-from ...system.threads import ahead
 from . import shape_functions
-from .elasticity import Block, chunks, in_precision, shapes_in, stress_in
+from .elasticity import Block, by_part, in_precision, shapes_in, stress_in
 
 
 def nodal_stress(
@@ -26,7 +25,7 @@ def nodal_stress(
     total, count = np.zeros(6 * n), np.zeros(n)
     for block in blocks:
         stress = partial(_at_nodes, points, block, displacement)
-        for part, nodal in zip(chunks(block, dim), ahead(stress, chunks(block, dim)), strict=True):
+        for part, nodal in by_part(block, dim, stress):
             places = 6 * block.cells[part][:, :, None] + np.arange(6)
             np.add.at(total, places.ravel(), nodal.ravel())
         count += np.bincount(block.cells.ravel(), minlength=n)

@@ -14,6 +14,7 @@ from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
 
 from .condensed_matrix import CondensedMatrix
 from .direct import factorise_roughly
+from .products import chosen_rows
 
 # A share of the diagonal: rows with less, those of pivots, are not smoothed.
 _NOTHING = 1e-4
@@ -34,7 +35,7 @@ class Correction:
 
     def coarser(self, prolongation: bsr_matrix) -> "Correction":
         """PᵀCP."""
-        way = _chosen_rows(prolongation, self.rows)
+        way = chosen_rows(prolongation, self.rows)
         columns, local = np.unique(way.indices, return_inverse=True)
         way = csr_matrix((way.data, local, way.indptr), shape=(len(self.rows), len(columns)))
         return Correction(columns, (way.T @ (self.matrix @ way)).tocsr())
@@ -44,7 +45,7 @@ class Correction:
         columns = self.rows[self.matrix.indices]
         shape = len(self.rows), matrix.shape[1]
         own = csr_matrix((self.matrix.data, columns, self.matrix.indptr), shape=shape)
-        return (_chosen_rows(matrix, self.rows) + own).tocsr()
+        return (chosen_rows(matrix, self.rows) + own).tocsr()
 
     def weights(self, matrix: bsr_matrix, corrected: csr_matrix) -> np.ndarray:
         """The weight (n,) of each row in the smoother: one where nothing changed, 0 at pivots.
@@ -52,7 +53,7 @@ class Correction:
         Elsewhere the inverse of the diagonal of the `corrected` rows (r, n) of K + C; less where
         the entries of a row add up to more than typical of K.
         """
-        before = np.asarray(abs(_chosen_rows(matrix, self.rows)).sum(axis=1)).ravel()
+        before = np.asarray(abs(chosen_rows(matrix, self.rows)).sum(axis=1)).ravel()
         diagonal = _own_diagonal(corrected, self.rows)
         there = diagonal > _NOTHING
         weight = np.ones(matrix.shape[0], dtype=np.float32)
@@ -106,18 +107,6 @@ def correction_of(condensed: CondensedMatrix, scale: np.ndarray, place: np.ndarr
     chosen, local = np.unique(place[np.concatenate([rows, columns])], return_inverse=True)
     entries = values.astype(np.float32), (local[: len(rows)], local[len(rows) :])
     return Correction(chosen, coo_matrix(entries, shape=(len(chosen),) * 2).tocsr())
-
-
-def _chosen_rows(matrix: bsr_matrix, rows: np.ndarray) -> csr_matrix:
-    """Some rows (r,) of a matrix in blocks."""
-    height, width = matrix.blocksize
-    blocks = np.unique(rows // height)
-    shape = matrix.shape[0] // height, matrix.shape[1] // width
-    number = np.arange(len(matrix.indices))
-    some = csr_matrix((number, matrix.indices, matrix.indptr), shape=shape)[blocks]
-    arrays = matrix.data[some.data], some.indices, some.indptr
-    found = bsr_matrix(arrays, shape=(height * len(blocks), matrix.shape[1])).tocsr()
-    return found[height * np.searchsorted(blocks, rows // height) + rows % height]
 
 
 def _own_diagonal(rows: csr_matrix, numbers: np.ndarray) -> np.ndarray:

@@ -12,17 +12,9 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.compiled import compiled, worthwhile
 from ...system.threads import ahead
-from .products import rows_of, share_rows
+from .products import pattern, rows_of, share_rows
 
 _PARTS = 8  # of a product that SciPy forms in parts
-
-
-def pattern(matrix: bsr_matrix) -> csr_matrix:
-    """Which blocks are stored, a row and column for each row and column of blocks."""
-    height, width = matrix.blocksize
-    shape = matrix.shape[0] // height, matrix.shape[1] // width
-    there = np.ones(len(matrix.indices), dtype=bool)
-    return csr_matrix((there, matrix.indices, matrix.indptr), shape=shape)
 
 
 def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_matrix:

@@ -22,10 +22,10 @@ from ...system.errors import SolveError
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .contact_levels import Correction, Interface, correction_of
-from .galerkin import coarse, pattern, smoothed
+from .galerkin import coarse, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
-from .products import in_pieces, multiply, multiply_transposed
+from .products import in_pieces, multiply, multiply_transposed, pattern, scale_blocks
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
@@ -147,7 +147,8 @@ class Hierarchy:
     ) -> tuple[bsr_matrix, LevelNodes]:
         """Add a level; return matrix and nodes of the next."""
         below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
-        _scale_blocks(prolongation, np.ones(prolongation.shape[0]), scale)
+        left = np.ones(prolongation.shape[0], dtype=np.float32)
+        scale_blocks(prolongation, left, scale.astype(np.float32))
         self.levels.append(Level(matrix, bound, prolongation))
         return below, replace(nodes, motions=motions)
 
@@ -338,23 +339,9 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     in_pieces(add_up, matrix)
     sums = scale * sums.ravel()
     scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
-    _scale_blocks(matrix, scale, scale)
+    single = scale.astype(np.float32)
+    scale_blocks(matrix, single, single)
     return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
-
-
-def _scale_blocks(matrix: bsr_matrix, left: np.ndarray, right: np.ndarray) -> None:
-    """Multiply rows and columns, in place."""
-    height, width = matrix.blocksize
-    rows = left.astype(np.float32).reshape(-1, height)
-    columns = right.astype(np.float32).reshape(-1, width)
-
-    def multiply_rows(first: int, last: int) -> None:
-        starts = matrix.indptr[first : last + 1]
-        some = slice(starts[0], starts[-1])
-        matrix.data[some] *= np.repeat(rows[first:last], np.diff(starts), axis=0)[:, :, None]
-        matrix.data[some] *= columns[matrix.indices[some]][:, None, :]
-
-    in_pieces(multiply_rows, matrix)
 
 
 def _largest_eigenvalue(

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ..fem.assembly import selected
-from .products import in_pieces, multiply
+from .products import chosen_rows, multiply, pattern, scale_blocks
 
 
 class NodalMatrix:
@@ -26,11 +26,9 @@ class NodalMatrix:
     @property
     def nnz(self) -> int:
         """How many entries of the blocks are between free degrees of freedom."""
-        dim = self.blocks.blocksize[0]
-        count = np.bincount(self.free // dim, minlength=self.blocks.shape[0] // dim)
-        ones = np.ones(len(self.blocks.indices), dtype=np.float32)
-        arrays = ones, self.blocks.indices, self.blocks.indptr
-        beside = csr_matrix(arrays, shape=(len(count),) * 2) @ count.astype(np.float32)
+        near = pattern(self.blocks)
+        count = np.bincount(self.free // self.blocks.blocksize[0], minlength=near.shape[0])
+        beside = near @ count.astype(np.float32)
         return int(count @ beside.astype(int))
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
@@ -48,29 +46,12 @@ class NodalMatrix:
 
     def __getitem__(self, rows: Any) -> csr_matrix:
         """Some of its rows, by mask, slice or numbers."""
-        dim, chosen = self.blocks.blocksize[0], self.free[rows]
-        nodes, local = np.unique(chosen // dim, return_inverse=True)
-        starts = self.blocks.indptr[nodes]
-        counts = self.blocks.indptr[nodes + 1] - starts
-        ends = np.concatenate([[0], np.cumsum(counts)])
-        entries = np.repeat(starts - ends[:-1], counts) + np.arange(ends[-1])
-        arrays = self.blocks.data[entries], self.blocks.indices[entries], ends
-        some = bsr_matrix(arrays, shape=(dim * len(nodes), self.blocks.shape[1]))
-        return some.tocsr()[dim * local + chosen % dim][:, self.free]
+        return chosen_rows(self.blocks, self.free[rows])[:, self.free]
 
     def scaled(self, scale: np.ndarray) -> bsr_matrix:
         """Its blocks in single precision, scaled on both sides by `scale` (n,), held rows zero."""
-        by_node = self._on_all(scale).reshape(-1, self.blocks.blocksize[0])
-        data = np.empty(self.blocks.data.shape, dtype=np.float32)
-
-        def fill(first: int, last: int) -> None:
-            some = slice(*self.blocks.indptr[[first, last]])
-            counts = np.diff(self.blocks.indptr[first : last + 1])
-            values = self.blocks.data[some] * by_node[self.blocks.indices[some], None, :]
-            values *= np.repeat(by_node[first:last], counts, axis=0)[:, :, None]
-            data[some] = values
-
-        in_pieces(fill, self.blocks)
+        whole, data = self._on_all(scale), np.empty(self.blocks.data.shape, dtype=np.float32)
+        scale_blocks(self.blocks, whole, whole, data)
         arrays = data, self.blocks.indices, self.blocks.indptr
         return bsr_matrix(arrays, shape=self.blocks.shape)
 

@@ -8,7 +8,7 @@ threads changes no digit.
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse import bsr_matrix
+from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.compiled import compiled, worthwhile
 from ...system.threads import ahead, workers
@@ -76,6 +76,45 @@ def rows_of(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
     chosen = slice(starts[0], starts[-1])
     arrays = matrix.data[chosen], matrix.indices[chosen], starts - starts[0]
     return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
+
+
+def chosen_rows(matrix: bsr_matrix, rows: np.ndarray) -> csr_matrix:
+    """Some rows (r,) of a matrix in blocks, one by one."""
+    height = matrix.blocksize[0]
+    nodes, local = np.unique(rows // height, return_inverse=True)
+    starts = matrix.indptr[nodes]
+    counts = matrix.indptr[nodes + 1] - starts
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    entries = np.repeat(starts - ends[:-1], counts) + np.arange(ends[-1])
+    arrays = matrix.data[entries], matrix.indices[entries], ends
+    some = bsr_matrix(arrays, shape=(height * len(nodes), matrix.shape[1]))
+    return some.tocsr()[height * local + rows % height]
+
+
+def pattern(matrix: bsr_matrix) -> csr_matrix:
+    """Which blocks are stored, a row and column for each row and column of blocks."""
+    height, width = matrix.blocksize
+    shape = matrix.shape[0] // height, matrix.shape[1] // width
+    there = np.ones(len(matrix.indices), dtype=bool)
+    return csr_matrix((there, matrix.indices, matrix.indptr), shape=shape)
+
+
+def scale_blocks(
+    matrix: bsr_matrix, left: np.ndarray, right: np.ndarray, out: np.ndarray | None = None
+) -> None:
+    """Multiply rows by `left` (m,), columns by `right` (n,); in place, or into the blocks `out`."""
+    height, width = matrix.blocksize
+    rows, columns = left.reshape(-1, height), right.reshape(-1, width)
+    into = matrix.data if out is None else out
+
+    def fill(first: int, last: int) -> None:
+        some = slice(*matrix.indptr[[first, last]])
+        counts = np.diff(matrix.indptr[first : last + 1])
+        values = matrix.data[some] * np.repeat(rows[first:last], counts, axis=0)[:, :, None]
+        values *= columns[matrix.indices[some]][:, None, :]
+        into[some] = values
+
+    in_pieces(fill, matrix)
 
 
 def ranges(starts: np.ndarray, weight: int, most: int) -> list[tuple[int, int]]:

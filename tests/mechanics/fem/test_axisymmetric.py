@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from solver.mechanics.fem.bodies import rigid_motions, unheld_motion
+from solver.mechanics.fem.cell_sizes import largest_strain, sizes
 from solver.mechanics.fem.elasticity import (
     Block,
     internal_force,
-    largest_strain,
-    sizes,
     stiffness,
 )
 from solver.mechanics.fem.faces import face_integrals, surface_points

@@ -9,14 +9,12 @@ from skfem.models.elasticity import linear_elasticity
 import solver.mechanics.fem.elasticity
 import solver.system.threads
 from solver.mechanics.fem import shape_functions, volume_rule
+from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepness
 from solver.mechanics.fem.elasticity import (
     Block,
     element_matrices,
     internal_force,
     lame_parameters,
-    largest_strain,
-    sizes,
-    steepness,
     stiffness,
 )
 from solver.mechanics.fem.nodal_stress import nodal_stress
