@@ -120,8 +120,8 @@ def _plain(part: DrawnSurface) -> dict[str, Any]:
     }
     packed = {name: _base64(array) for name, array in arrays.items()}
     fields = {title: _base64(values.astype("<f4")) for title, values in part.fields.items()}
-    told = {key: getattr(part, key) for key in ("name", "role", "body", "color", "fill")}
-    return told | packed | {"fields": fields, "apart": part.apart.tolist()}
+    named = {key: getattr(part, key) for key in ("name", "role", "body", "color", "fill")}
+    return named | packed | {"fields": fields, "apart": part.apart.tolist()}
 
 
 def _base64(array: np.ndarray) -> str:
