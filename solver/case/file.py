@@ -312,6 +312,8 @@ _TOLERANCE = (
 _OUT_OF_SCOPE = {
     "friction is out of scope: frictionless contact only": (
         "friction", "mu", "coulomb", "friction_coefficient", "stick"),
+    "Young's modulus is the key young": ("e", "modulus", "youngs_modulus", "young_modulus"),
+    "Poisson's ratio is the key poisson": ("nu", "poissons_ratio", "poisson_ratio"),
     "contact that holds in tension is out of scope: it may open": (
         "tied", "glue", "glued", "bonded", "adhesion", "cohesive"),
     "out of scope: small strain only": (

@@ -70,7 +70,7 @@ def test_one_failing_check_fails_the_solve_and_is_the_reason(tmp_path):
     solution.zones[0].gap[1] = 1.0
     verdict = verdict_of(solution)
     assert (verdict["verdict"], verdict["passed"]) == ("failed", False)
-    assert verdict["reason"].startswith("element_gap interface: 1 at macro-element 1")
+    assert verdict["reason"].startswith("element_gap interface: 1 (macro-element 1)")
     assert verdict["reason"].endswith("(and 1 more)")
     closest = {"name": "element_status", "zone": "interface", "error": 1.0}
     assert verdict["closest_to_tolerance"] == closest
