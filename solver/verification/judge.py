@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ..simulation.solution import Solution
 
 NOT_VERIFIED = "not verified: compared with no reference"
+NOT_JUDGED = "not verified: the tolerances belong to another recovery"
 # The arguments of `Case.as_solved`.
 SolvedAs = tuple[bool, str | None, str | None]
 # The checks of accuracy: their errors are relative to the reference.
@@ -97,7 +98,7 @@ def judge(
         verdict=word,
         passed=word == PASSED,
         judged=_judged(checks) if word == PASSED else "",
-        reason=_first_of(reasons) or (NOT_VERIFIED if word == SOLVED else ""),
+        reason=_first_of(reasons) or (_unverified(solution.case) if word == SOLVED else ""),
         result=result,
         result_sha256=sha256,
         **{name: getattr(solution, name) for name in _OF_SOLUTION},
@@ -119,6 +120,11 @@ def judge(
         attainable=accuracy.estimate,
         provenance=dict(provenance or {}),
     )
+
+
+def _unverified(case: Case) -> str:
+    """Why a sound solve is compared with nothing: see `Case.as_solved`."""
+    return NOT_JUDGED if case.reference_kind and not case.reference else NOT_VERIFIED
 
 
 def without_result(

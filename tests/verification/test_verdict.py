@@ -142,6 +142,14 @@ def test_a_verdict_that_cannot_be_written_leaves_the_old_one(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_with_another_recovery_a_solve_is_not_judged(tmp_path):
+    solution = plane(tmp_path)
+    solution.case = solution.case.as_solved(recovery="linear")
+    verdict = judge(solution, run_checks(solution))
+    assert (verdict.verdict, verdict.sound) == ("solved", True)
+    assert verdict.reason == "not verified: the tolerances belong to another recovery"
+
+
 def test_without_a_reference_a_solve_is_solved_and_not_verified(tmp_path):
     solution = plane(tmp_path, PLANE[: PLANE.index("reference")])
     verdict = judge(solution, run_checks(solution))
