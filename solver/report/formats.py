@@ -84,6 +84,6 @@ def formula(text: str) -> Markup:
 
 
 def symbols(text: str) -> Markup:
-    """Text whose single letters have what follows `_` or `^` set as in formulas: `c_n`, `a^(n+1)`."""
+    """Text in which `_` and `^` after a single letter are set as in formulas: `c_n`, `a^(n+1)`."""
     parts = re.split(r"(?<!\w)([^\W\d_](?:_\w+|\^\w+|\^\([^)]*\))+)(?!\w)", text)
     return Markup("").join(formula(part) if i % 2 else part for i, part in enumerate(parts))

@@ -143,11 +143,7 @@ def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
         lines=lines,
         speed_ups=speed_ups(lines),
         stages=colors,
-        bars=[
-            (line, _stage_chart(line, colors), line.solved[-1])
-            for line in lines
-            if line.solved
-        ],
+        bars=[(line, _stage_chart(line, colors), line.solved[-1]) for line in lines if line.solved],
         failures=lost,
         facts=facts(points),
         disturbed=disturbed(points),
