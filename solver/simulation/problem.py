@@ -298,6 +298,8 @@ class ContactProblem:
             _LOG.info("the stiffness is assembled again, in double precision")
             self.single = False
             self._systems.forget()
+            # Nothing holds the first stiffness while the second is made.
+            del system, self.matrix, self._systems
             self._assemble()
             system = self._constrained(start.closed)
             found = self._once(system, start, scale, status, correction, round_off)
