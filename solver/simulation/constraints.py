@@ -105,20 +105,26 @@ def unit_springs(scene: Scene) -> sparse.csr_matrix:
     return (sparse.diags_array(1 / np.where(largest > 0, largest, 1.0)) @ scene.springs).tocsr()
 
 
-def free_motion(
-    scene: Scene,
-    motions: sparse.csc_matrix,
-    constraints: ContactConstraints,
-    closed: np.ndarray,
-) -> str:
-    """The free motion with `closed` (k,) multipliers, in words; empty if nothing is free.
+@dataclass(frozen=True)
+class RigidMotions:
+    """The r rigid motions of all bodies, by what resists them.
 
-    `motions` (n_dofs, r): the rigid motions of all bodies.
+    `supports` (r, r) and `springs` (s, r): see `mechanics.fem.bodies`; `opened` (k, r): ∫ gap that
+    each motion opens. The motions themselves take as much memory as several displacements.
     """
-    held = (sparse.diags(1 / constraints.covered[closed]) @ constraints.gaps[closed]).tocsr()
-    if scene.springs.nnz:
-        held = sparse.vstack([held, unit_springs(scene)]).tocsr()
-    found = unheld_motion(motions, scene.free.basis, held, scene.n_bodies)
+
+    supports: np.ndarray
+    springs: sparse.csr_matrix
+    opened: sparse.csr_matrix
+
+
+def free_motion(
+    scene: Scene, motions: RigidMotions, constraints: ContactConstraints, closed: np.ndarray
+) -> str:
+    """The free motion with `closed` (k,) multipliers, in words; empty if nothing is free."""
+    held = sparse.diags(1 / constraints.covered[closed]) @ motions.opened[closed]
+    held = sparse.vstack([held, motions.springs]).tocsr()
+    found = unheld_motion(motions.supports, held, scene.n_bodies)
     if found is None:
         return ""
     return f"nothing keeps {body_names(scene)[found[0]]} from a free motion ({found[1]})"
