@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ..mechanics.fem.bodies import unheld_motion
+from ..mechanics.fem.bodies import support_resistance, unheld_motion
 from ..mechanics.linear.condensation import choose_pivots
 from ..system.errors import InputError
 from .naming import body_names
@@ -109,21 +109,30 @@ def unit_springs(scene: Scene) -> sparse.csr_matrix:
 class RigidMotions:
     """The r rigid motions of all bodies, by what resists them.
 
-    `supports` (r, r) and `springs` (s, r): see `mechanics.fem.bodies`; `opened` (k, r): ∫ gap that
-    each motion opens. The motions themselves take as much memory as several displacements.
+    `supports` (r, r): see `support_resistance`; `springs` (s, r) and `opened` (k, r): what each
+    motion changes in the rows of `unit_springs`, and the average gap that it opens. The motions
+    themselves take as much memory as several displacements.
     """
 
     supports: np.ndarray
     springs: sparse.csr_matrix
     opened: sparse.csr_matrix
 
+    @classmethod
+    def of(
+        cls, scene: Scene, constraints: ContactConstraints, motions: sparse.csc_matrix
+    ) -> "RigidMotions":
+        """What resists `motions` (n_dofs, r)."""
+        covered = constraints.covered
+        weight = np.divide(1.0, covered, out=np.zeros(len(covered)), where=covered > 0)
+        supports = support_resistance(motions, scene.free.basis)
+        opened = (sparse.diags(weight) @ constraints.gaps).tocsr() @ motions
+        return cls(supports, unit_springs(scene) @ motions, opened)
 
-def free_motion(
-    scene: Scene, motions: RigidMotions, constraints: ContactConstraints, closed: np.ndarray
-) -> str:
+
+def free_motion(scene: Scene, motions: RigidMotions, closed: np.ndarray) -> str:
     """The free motion with `closed` (k,) multipliers, in words; empty if nothing is free."""
-    held = sparse.diags(1 / constraints.covered[closed]) @ motions.opened[closed]
-    held = sparse.vstack([held, motions.springs]).tocsr()
+    held = sparse.vstack([motions.opened[closed], motions.springs]).tocsr()
     found = unheld_motion(motions.supports, held, scene.n_bodies)
     if found is None:
         return ""

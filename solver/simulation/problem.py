@@ -10,7 +10,6 @@ from scipy import sparse
 from ..case.model import Step
 from ..mechanics.fem.bodies import (
     rigid_motions,
-    support_resistance,
     unsupported,
 )
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
@@ -102,17 +101,15 @@ class ContactProblem:
         self.scene = scene
         self.constraints = contact_constraints(scene)
         motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
-        supports = support_resistance(motions, scene.free.basis)
-        springs, opened = unit_springs(scene), self.constraints.gaps @ motions
-        self._motions = RigidMotions(supports, springs @ motions, opened)
+        self._motions = RigidMotions.of(scene, self.constraints, motions)
         self._moves: dict[bytes, str] = {}
         refuse_unsolvable(scene, self._free_motion(self.constraints.eligible), self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
-        loose = unsupported(motions, supports)
+        loose = unsupported(motions, self._motions.supports)
         self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
         self.unsupported = loose
         if scene.springs.nnz:
-            self.unsupported = unsupported(motions, supports, springs)
+            self.unsupported = unsupported(motions, self._motions.supports, unit_springs(scene))
         refined = scene.options.safeguards.refinement
         self.single = refined and scene.n_dofs >= SINGLE_FROM
         del motions  # memory for the stiffness
@@ -238,7 +235,7 @@ class ContactProblem:
         """See `free_motion`; the last answer is kept, as a guess is asked about more than once."""
         key = closed.tobytes()
         if key not in self._moves:
-            self._moves = {key: free_motion(self.scene, self._motions, self.constraints, closed)}
+            self._moves = {key: free_motion(self.scene, self._motions, closed)}
         return self._moves[key]
 
     def _at_rest(
