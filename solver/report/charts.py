@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -115,9 +116,8 @@ class Chart:
 
     def __html__(self) -> Markup:
         """Its place in a page that has the script; without it, a line that says what is missing."""
-        spec = json.dumps(
-            _short(self.spec), ensure_ascii=False, separators=(",", ":"), default=float
-        )
+        brief = _short(self.spec | {"data": _tables(self.spec["data"]["values"])})
+        spec = json.dumps(brief, ensure_ascii=False, separators=(",", ":"), default=float)
         return Markup(
             '<div class=chart id="{}" role=img aria-label="{}" style="max-width:{}px">'
             '<script type="application/json">{}</script><div class=drawn></div><p class=none>This '
@@ -138,6 +138,21 @@ class Chart:
         import vl_convert
 
         return str(vl_convert.vegalite_to_svg(json.dumps(self.full, default=float)))
+
+
+def _tables(records: Sequence[Record]) -> list[Spec]:
+    """Records in tables of the same series and fields, which are named once in each.
+
+    The script makes them records again.
+    """
+
+    def kind(record: Record) -> tuple[Any, ...]:
+        return record.get("series"), *(field for field in record if field != "series")
+
+    return [
+        {"series": name, "fields": fields, "rows": [[r[f] for f in fields] for r in members]}
+        for (name, *fields), members in groupby(records, kind)
+    ]
 
 
 def _short(value: Any) -> Any:
@@ -306,10 +321,16 @@ def slopes(records: Sequence[Record], x: str, y: str, orders: Sequence[float]) -
         for at in (start, end)
     ]
     place = {axis: {"field": axis, "type": "quantitative"} for axis in "xy"}
-    place |= {"color": {"value": MUTED}}
     order = {"field": "order", "type": "nominal"}
-    line = {"mark": {"type": "line", "strokeWidth": 1}, "encoding": place | {"detail": order}}
     label = {"type": "text", "align": "left", "dx": 4, "fontSize": 10}
-    words: Spec = {"mark": label, "encoding": place | {"text": order}}
-    words["transform"] = [{"filter": f"datum.x > {1.0001 * start}"}]
-    return [{"data": {"values": rows}} | part for part in (line, words)]
+    at_end = {"filter": f"datum.x > {start * 1.0001:.7g}"}
+    return [
+        {
+            "data": {"values": rows},
+            "encoding": place | {"color": {"value": MUTED}, "detail": order},
+            "layer": [
+                {"mark": {"type": "line", "strokeWidth": 1}},
+                {"mark": label, "encoding": {"text": order}, "transform": [at_end]},
+            ],
+        }
+    ]

@@ -101,12 +101,18 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
 
 def draw_strip(rows: Sequence[Row]) -> Chart:
     """The worst error of every solve over its tolerance, a line for each family."""
-    shown = [row for row in drawn(rows) if row.allowed]
     records = [
-        _record(row)
-        | {"family": row.group, "share": max(row.accuracy[0] / row.allowed, _LEAST)}  # type: ignore[index, operator]
-        | {"url": f"{page_name(row.group)}#{quote(row.anchor)}", "series": row.word}
-        for row in shown
+        {
+            "case": row.name,
+            "series": row.word,
+            "family": row.group,
+            "share": max(row.accuracy[0] / row.allowed, _LEAST),  # type: ignore[index]
+            "error": row.accuracy[0],  # type: ignore[index]
+            "check": row.accuracy[1],  # type: ignore[index]
+            "url": f"{page_name(row.group)}#{quote(row.anchor)}",
+        }
+        for row in drawn(rows)
+        if row.allowed
     ]
     titles = {"case": "case", "share": "error / tolerance", "error": "error", "check": "check"}
     looks = {"passed": Look(GREEN), "failed": Look(RED, CROSS), "unreliable": Look(ORANGE, CROSS)}

@@ -34,7 +34,18 @@ def specifications(html):
     """The specifications of a page's charts, by their anchors."""
     found = re.findall(r'<div class=chart id="([^"]+)".*?json">(.*?)</script>', html, re.DOTALL)
     assert len(found) == len(dict(found))
-    return {name: json.loads(text) for name, text in found}
+    return {name: expanded(json.loads(text)) for name, text in found}
+
+
+def expanded(spec):
+    """A page's specification with its records as the script restores them."""
+    records = [
+        ({} if table["series"] is None else {"series": table["series"]})
+        | dict(zip(table["fields"], row, strict=True))
+        for table in spec["data"]
+        for row in table["rows"]
+    ]
+    return spec | {"data": {"values": records}}
 
 
 def chart():
@@ -60,6 +71,7 @@ def test_a_page_holds_the_specification_and_says_what_it_needs():
         json.dumps(chart().spec), parse_float=lambda digits: float(f"{float(digits):.10g}")
     )
     assert specifications(html) == {"a": ten}
+    assert html.count('"cells"') == 4, "once for each series; field and title under the pointer"
     assert f"needs JavaScript and the file {SCRIPT} beside this page" in html
 
 
