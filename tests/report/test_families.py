@@ -72,6 +72,8 @@ def test_paragraphs_that_are_indented_are_formulas(file):
         (False, "Without friction."),
     ]
     assert formats.formula("q^d < p_rr") == "q<sup>d</sup> &lt; p<sub>rr</sub>"
+    symbols = formats.symbols("c_n r^(n+1) < σ_θθ: surface_stress, 1e-3_x")
+    assert symbols == ("c<sub>n</sub> r<sup>n+1</sup> &lt; σ<sub>θθ</sub>: surface_stress, 1e-3_x")
     assert formats.formula("r^(1/3)") == "r<sup>1/3</sup>"
     assert formats.formula("ν_1²/E_1") == "ν<sub>1</sub>²/E<sub>1</sub>"
 
