@@ -189,7 +189,7 @@ class Solved:
         names = {"pressure": "multiplier"} | {n: n for n in ("gap", "closed", "area", "coverage")}
         for name, of in names.items():
             columns[name] = [getattr(zone, of) for zone in zones]
-        return {name: np.concatenate([np.empty(0), *parts]) for name, parts in columns.items()}
+        return {n: np.concatenate(parts) if parts else np.empty(0) for n, parts in columns.items()}
 
     def to_pyvista(self) -> Any:
         """The result as PyVista reads its file; raises ImportError where PyVista is missing."""

@@ -231,8 +231,8 @@ def _job(options: argparse.Namespace) -> "Job":
     from ..verification.run import Job
 
     given = vars(options)
-    told = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
-    return Job(swapped=options.swap, **told)
+    chosen = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
+    return Job(swapped=options.swap, **chosen)
 
 
 def _solve(options: argparse.Namespace) -> int:
@@ -342,7 +342,7 @@ def _new(options: argparse.Namespace) -> int:
     name = options.name or (options.output.stem if options.output else "new-case")
     path = options.output or Path(f"{name}.yaml")
     write_template(name, path)
-    print(f"{path}: written; next: {PROGRAM} solve {path} -o {name}.vtkhdf")
+    print(f"{path}: written; next: {PROGRAM} solve {path} -o {path.with_suffix('.vtkhdf')}")
     return PASSED
 
 

@@ -184,4 +184,11 @@ def _refuse_surfaces(scene: Scene, touching: np.ndarray) -> None:
             raise InputError(scene.case.path, key, master, allowed)
         if not touching[zone.numbers].any():
             allowed = f"does not lie over {slave} anywhere along the normals of {slave}"
+            if worst > 0:
+                allowed = (
+                    f"covers at most {worst:.1e} of a slave face of {slave}: do both bodies have "
+                    "the same unit of length?"
+                )
+            elif (body := scene.case.rigid.get(master)) and body.surface == "plane":
+                allowed += "; the normal of a rigid plane points out of the body"
             raise InputError(scene.case.path, key, master, allowed)
