@@ -136,7 +136,7 @@ def measure(job: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Part:
+class Moved:
     """A part of a measured solve; `share` of the bandwidth (bytes/s) that the machine has."""
 
     name: str
@@ -156,22 +156,22 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Table:
+class MovedBytes:
     """A measured solve: its parts, the stage first."""
 
     record: Record
-    parts: list[Part]
+    parts: list[Moved]
 
 
-def table(record: Record | None) -> Table | None:
+def table(record: Record | None) -> MovedBytes | None:
     """The parts of a record made by `measure`; None where there is none."""
     if not record or record["outcome"] != SOLVED:
         return None
     found = record["parts"]
     order = (STAGE, SET_UP, ITERATIONS, SMOOTHER, TRANSFER, DOUBLE)
     parts = [
-        Part(name, found[name]["seconds"], found[name]["bytes"], record["bandwidth"])
+        Moved(name, found[name]["seconds"], found[name]["bytes"], record["bandwidth"])
         for name in order
         if name in found
     ]
-    return Table(record, parts)
+    return MovedBytes(record, parts)

@@ -7,7 +7,7 @@ from pathlib import Path
 from ...report.html import render
 from ...system.files import write_text
 from ...verification.verdict import to_json
-from ..bandwidth import Table, table
+from ..bandwidth import MovedBytes, table
 from ..points import SOLVED, Record
 
 # A title and rows; a row has a name and numbers, or a reason in place of these.
@@ -50,7 +50,7 @@ def write_benchmark(record: Record, file: Path) -> Path:
     return page
 
 
-def _speed_ups(solves: Sequence[Table]) -> list[tuple[str, str, float]]:
+def _speed_ups(solves: Sequence[MovedBytes]) -> list[tuple[str, str, float]]:
     """Part, threads, and the time on the fewest over the time on the most; of bandwidth too."""
     if len(solves) < 2:
         return []
