@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .charts import INK, MUTED
-from .geometry import normals
+from .layout import normals
 from .svg import Drawing, Style, mixed
 
 Frame = tuple[float, ...]  # x, y, width, height in pixels
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
 FLAT = np.eye(2, 3)
 # Pixels between lines and between labels; the width of a character of text by its size.
-_LINE, _BETWEEN, _CHARACTER = 13.0, 5.0, 0.56
+_LINE, _BETWEEN, _CHARACTER = 13.0, 5.0, 0.53
 _LIGHT = np.array([0.25, -0.45, 0.85])
 
 
@@ -127,8 +127,8 @@ def _runs(
         yield float(place), int(level[members[0]]), light, polygons[members]
 
 
-def lit(color: str, light: float) -> str:
-    """A colour in light from 0 to 1."""
+def lit(color: str, _: int, light: float) -> str:
+    """A colour in light from 0 to 1, on any level."""
     return mixed(color, INK, 0.16 * (1 - light))
 
 

@@ -114,6 +114,8 @@ class Hierarchy:
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale *= scale[self.place]
+        if isinstance(matrix, NodalMatrix):
+            matrix.scaled_further(scale[self.place])
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
@@ -186,7 +188,7 @@ class Multigrid:
         condensed = matrix if isinstance(matrix, CondensedMatrix) else None
         kept = slice(None) if condensed is None else condensed.kept
         stiffness = condensed.stiffness if condensed else matrix
-        single = isinstance(stiffness, NodalMatrix) and stiffness.blocks.dtype == np.float32
+        single = isinstance(stiffness, NodalMatrix) and stiffness.single
         self._least = _LEAST_SINGLE if single else 0.0
         hierarchy = self._shared.hierarchy(stiffness, unknowns)
         self._size, self._place = hierarchy.size, hierarchy.place[kept]
@@ -327,6 +329,7 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
     single = scale.astype(np.float32)
     scale_blocks(matrix, single, single)
+    scale = single.astype(float)
     return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
 
 

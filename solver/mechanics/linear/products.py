@@ -114,9 +114,10 @@ def scale_blocks(
     def fill(first: int, last: int) -> None:
         some = slice(*matrix.indptr[[first, last]])
         counts = np.diff(matrix.indptr[first : last + 1])
-        values = matrix.data[some] * np.repeat(rows[first:last], counts, axis=0)[:, :, None]
-        values *= columns[matrix.indices[some]][:, None, :]
-        into[some] = values
+        # A product of both factors first: a symmetric matrix stays symmetric to the last digit.
+        factors = np.repeat(rows[first:last], counts, axis=0)[:, :, None]
+        factors = factors * columns[matrix.indices[some]][:, None, :]
+        into[some] = np.multiply(factors, matrix.data[some], out=factors)
 
     in_pieces(fill, matrix)
 
