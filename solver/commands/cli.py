@@ -164,6 +164,9 @@ def _add_batch(commands: Any) -> None:
         metavar="FAMILY.yaml",
         help="descriptions of families; default: those in cases/",
     )
+    command.add_argument(
+        "--processes", type=int, metavar="N", help="to draw pictures; default: one for each core"
+    )
 
     command = add_command(commands, "compare", _compare, "compare with another batch")
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
@@ -294,7 +297,7 @@ def _report(options: argparse.Namespace) -> int:
     families = options.families
     if families is None:
         families = sorted(Path("cases").glob("*/family.yaml"))
-    print(write_report(verdicts, options.output, families))
+    print(write_report(verdicts, options.output, families, options.processes))
     return PASSED
 
 

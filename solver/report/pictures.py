@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
 from urllib.parse import quote
@@ -123,8 +123,14 @@ def _name(row: Row) -> str:
 
 def _is_current(kept: Path, result: Path) -> bool:
     """Whether a picture is newer than its result and the sources of this folder."""
-    newest = max(path.stat().st_mtime for path in (result, *Path(__file__).parent.glob("*.py")))
+    newest = max(result.stat().st_mtime, _changed())
     return kept.is_file() and kept.stat().st_mtime > newest
+
+
+@cache
+def _changed() -> float:
+    """When the sources of this folder last changed."""
+    return max(path.stat().st_mtime for path in Path(__file__).parent.glob("*.py"))
 
 
 def _solution(row: Row) -> Solution:

@@ -48,6 +48,7 @@ rule report:
         "results/report/junit.xml",
         failures="results/report/failures.txt",
         benchmark="results/report/benchmark",
+    threads: workflow.cores or 1
     log:
         "results/report/log",
     params:
@@ -58,7 +59,7 @@ rule report:
     message:
         "report of all cases"
     shell:
-        "{SOLVER} {output.benchmark:q} report {params.verdicts:q} {params.others:q}"
+        "OMP_NUM_THREADS=1 {SOLVER} {output.benchmark:q} report --processes {threads} {params.verdicts:q} {params.others:q}"
         " -o results/report --families {params.families:q} 2>&1 | tee {log:q}"
 
 
