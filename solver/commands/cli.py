@@ -12,6 +12,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -35,7 +36,9 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from ..simulation.solution import Solution
     from ..verification.run import Job
+    from ..verification.verdict import Verdict
 
 _EXAMPLES = f"""examples:
   {PROGRAM} new my-block -o my-block.yaml
@@ -135,6 +138,9 @@ def _add_cases(commands: Any) -> None:
     command.add_argument("-o", "--output", type=Path, required=True, metavar="RESULT.vtkhdf")
     command.add_argument(
         "--verdict", type=Path, metavar="VERDICT.json", help="written for every outcome"
+    )
+    command.add_argument(
+        "--pictures", type=Path, metavar="DIR", help="draw the pictures of the report, kept there"
     )
     command.add_argument("--quiet", action="store_true", help="print nothing but errors")
     command.add_argument("--verbose", action="store_true", help="print each stage, with the time")
@@ -246,8 +252,18 @@ def _solve(options: argparse.Namespace) -> int:
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
     with telling(options.verbose, options.quiet), saying(log):
-        verdict = solve(job, options.output, options.verdict)
+        draw = partial(_draw, options.pictures, options.output.parent) if options.pictures else None
+        verdict = solve(job, options.output, options.verdict, draw)
     return PASSED if verdict.sound else FAILED
+
+
+def _draw(pictures: Path, folder: Path, solution: "Solution", verdict: "Verdict") -> None:
+    """Draw what the report shows of a solve; it draws what is missing, and says why it cannot."""
+    from ..report.pictures import draw_all
+    from ..report.rows import Row
+
+    with suppress(Exception):
+        draw_all(Row(verdict, folder), pictures, solution)
 
 
 def _silent(line: str) -> None:

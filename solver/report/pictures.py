@@ -28,22 +28,29 @@ MOST_CELLS = 100_000
 SIZES = {2: (plane.WIDTH, plane.HEIGHT), 3: (space.WIDTH, space.HEIGHT)}
 
 
-def picture(row: Row, folder: Path) -> Markup:
+def draw_all(row: Row, folder: Path, solution: Solution | None = None) -> None:
+    """Draw what pages show of a solve, unless `folder` has it; `solution` is that of its result."""
+    picture(row, folder, solution)
+    if row.dim == 2:
+        profile(row, folder, solution=solution)
+
+
+def picture(row: Row, folder: Path, solution: Solution | None = None) -> Markup:
     """The picture of one solve, a file in `folder`; else a line with the reason."""
-    kept = _kept(row, folder, ".svg", lambda row: draw(_solution(row), row.name))
+    kept = _kept(row, folder, ".svg", lambda solution: draw(solution, row.name), solution)
     if isinstance(kept, Markup):
         return kept
-    turned = _turned(row, folder)
+    turned = _turned(row, folder, solution)
     source, (width, height) = f"{folder.name}/{_name(row)}.svg", SIZES.get(row.dim, SIZES[3])
     size = f"width={width} height={height}"
     tag = f'<img class=mesh loading=lazy {size} src="{{}}" alt="{{}}: meshes and contact">'
     return Markup(tag).format(quote(source), row.name) + turned
 
 
-def _turned(row: Row, folder: Path) -> Markup:
+def _turned(row: Row, folder: Path, solution: Solution | None) -> Markup:
     """A button that turns the result, its surfaces in a file beside the picture; else nothing."""
     source = quote(f"{folder.name}/{_name(row)}.js")
-    kept = _kept(row, folder, ".js", lambda row: surfaces(_solution(row), source))
+    kept = _kept(row, folder, ".js", lambda solution: surfaces(solution, source), solution)
     button = "<button type=button data-surfaces='{}' hidden>Turn, zoom, maps of errors</button>"
     return Markup() if isinstance(kept, Markup) else Markup(button).format(source)
 
@@ -69,14 +76,16 @@ def _viewer() -> str:
     return (TEMPLATES / VIEWER).read_text(encoding="utf-8")
 
 
-def profile(row: Row, folder: Path, along: Expression | None = None) -> Chart | Markup:
+def profile(
+    row: Row, folder: Path, along: Expression | None = None, solution: Solution | None = None
+) -> Chart | Markup:
     """The pressure of one solve's first zone along the interface, kept in `folder` too."""
 
-    def draw_row(row: Row) -> str:
-        return json.dumps(vars(draw_pressure(_solution(row), row.name, along)))
+    def drawn(solution: Solution) -> str:
+        return json.dumps(vars(draw_pressure(solution, row.name, along)))
 
     over = f"-{sha256(along.text.encode()).hexdigest()[:8]}" if along else ""
-    kept = _kept(row, folder, f"-profile{over}.json", draw_row)
+    kept = _kept(row, folder, f"-profile{over}.json", drawn, solution)
     return kept if isinstance(kept, Markup) else Chart(**json.loads(kept))
 
 
@@ -103,13 +112,20 @@ def draw_pressure(
     return draw_profile(solution, shown, f"pressure-{name}", title, along)
 
 
-def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], str]) -> str:
+def _kept(
+    row: Row,
+    folder: Path,
+    ending: str,
+    draw: Callable[[Solution], str],
+    solution: Solution | None = None,
+) -> str:
+    """A drawing as kept in `folder`, or drawn and kept there; else a line with the reason."""
     if row.result_file is None:
         return Markup("<p class=none>No result, no picture.</p>")
     kept = folder / f"{_name(row)}{ending}"
     if not _is_current(kept, row.result_file):
         try:
-            drawing = draw(row)
+            drawing = draw(solution or _solution(row))
         except (InputError, OSError, LookupError, ValueError, ArithmeticError) as error:
             reason = f"{type(error).__name__}: {error}"
             return Markup("<p class=none>No picture: {}</p>").format(reason)

@@ -12,7 +12,7 @@ from .charts import Chart
 from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
 from .html import KINDS, NORMS
-from .pictures import picture, profile
+from .pictures import draw_all, picture, profile
 from .rows import Row, counted, families, ours
 from .tables import outcome
 
@@ -131,10 +131,10 @@ class FamilySection:
 
     def draw(self, row: Row) -> None:
         """Draw all that the page shows of a solve, and keep it for the page."""
-        picture(row, self.pictures)
-        along = [figure.expression for of, figure in self._figures if of is row]
-        for expression in dict.fromkeys([*along, *[None] * (row.dim == 2)]):
-            profile(row, self.pictures, expression)
+        draw_all(row, self.pictures)
+        for shown, figure in self._figures:
+            if shown is row:
+                profile(row, self.pictures, figure.expression)
 
     @cached_property
     def _figures(self) -> list[tuple[Row, Figure]]:
