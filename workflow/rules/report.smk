@@ -48,9 +48,9 @@ rule report:
         "results/report/junit.xml",
         failures="results/report/failures.txt",
         benchmark="results/report/benchmark",
-    threads: workflow.cores or 1
     log:
         "results/report/log",
+    threads: workflow.cores or 1
     params:
         verdicts=lambda w: [verdict_of(job) for job in RUN.values()],
         others=lambda w: verdicts_there(OTHERS) + CODES,
