@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from ..system.errors import InputError, SolveError, of_machine
 from ..system.imports import defer
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import codes, completion, history, jobs, look, results, studies
+from . import codes, completion, history, jobs, look, report, results, studies
 from .options import (
     BUG,
     FAILED,
@@ -111,6 +111,7 @@ def parser() -> argparse.ArgumentParser:
     look.add_commands(commands)
     results.add_commands(commands)
     codes.add_commands(commands)
+    report.add_commands(commands)
     _add_batch(commands)
     history.add_commands(commands)
     jobs.add_commands(commands)
@@ -159,26 +160,6 @@ def _add_cases(commands: Any) -> None:
 
 def _add_batch(commands: Any) -> None:
     """Add the commands that work on the results of many cases."""
-    command = add_command(commands, "report", _report, "write the report of many verdicts")
-    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
-    command.add_argument(
-        "--families",
-        type=Path,
-        nargs="*",
-        metavar="FAMILY.yaml",
-        help="descriptions of families; default: those in cases/",
-    )
-    command.add_argument(
-        "--processes", type=int, metavar="N", help="to draw pictures; default: one for each core"
-    )
-
-    command = add_command(commands, "compare", _compare, "compare with another batch")
-    command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
-    command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
-    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
-
     command = add_command(commands, "accept", _accept, "store results as the accepted values")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
 
@@ -292,38 +273,6 @@ def _check(options: argparse.Namespace) -> int:
         for verdict in verdicts:
             print_checks(verdict)
     return PASSED if all(verdict.sound for verdict in verdicts) else FAILED
-
-
-def _verdicts(options: argparse.Namespace) -> list[Path]:
-    """The verdicts named, and all in the folder of results, but those of ladders' levels."""
-    verdicts = list(options.verdicts)
-    if options.results:
-        found = sorted(options.results.glob("**/verdict.json"))
-        # The levels of ladders have a page of their own.
-        verdicts += [p for p in found if "orders" not in p.relative_to(options.results).parts]
-    if not verdicts:
-        where = options.results or options.run.__name__.strip("_")
-        raise InputError(where, "VERDICT.json", None, "no verdict is named or found")
-    return verdicts
-
-
-def _report(options: argparse.Namespace) -> int:
-    from ..report import write_report
-
-    verdicts = _verdicts(options)
-    families = options.families
-    if families is None:
-        families = sorted(Path("cases").glob("*/family.yaml"))
-    print(write_report(verdicts, options.output, families, options.processes))
-    return PASSED
-
-
-def _compare(options: argparse.Namespace) -> int:
-    from ..report.compare import compare
-
-    found, text = compare(options.base, options.this, options.output)
-    print(text)
-    return FAILED if found.groups["worse"] else PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:

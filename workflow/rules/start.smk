@@ -130,6 +130,7 @@ onstart:
         check_writable()
         HELD.append(take_lock())
         date_now()
+        list_verdicts()
         survive_termination()
         announce()
         if workflow.local_exec:
