@@ -7,11 +7,13 @@ Interactive Graphics, IEEE TVCG 23 (2017) 341–350.
 """
 
 import json
+import math
 import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +38,8 @@ SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
 DIGITS = 10
 # The values of a mark under the pointer: powers of ten as 1.2e-10.
 _FORMAT = ".4~g"
-# A logarithmic axis of less than so many times also has labels at 2, 3 and 5 times powers of ten.
-_FEW = 300.0
+# A logarithmic axis of at most so many times has labels at these multiples of powers of ten.
+_LABELS = {5.0: "units", 300.0: "halves", math.inf: "decades"}
 
 Spec = dict[str, Any]
 Record = Mapping[str, Any]
@@ -52,7 +54,7 @@ class Look:
     dashes: tuple[float, ...] = ()
 
 
-# Colour and mark by the shape of cells: either identifies them.
+# Colour and mark by the shape of cells.
 LOOKS = {
     "TRIA": Look(BLUE),
     "TETRA": Look(BLUE),
@@ -66,6 +68,15 @@ LOOKS = {
 def look_of(cells: str, looks: Mapping[str, Look] = LOOKS) -> Look:
     """The look of a cell type: the first of `looks` whose key its name begins with."""
     return next(look for shape, look in looks.items() if cells.startswith(shape))
+
+
+def distinct(looks: Mapping[str, Look]) -> dict[str, Look]:
+    """The looks, with another mark where one is taken."""
+    found: dict[str, Look] = {}
+    for name, look in looks.items():
+        others = (replace(look, shape=shape) for shape in (look.shape, *SHAPES))
+        found[name] = next((other for other in others if other not in found.values()), look)
+    return found
 
 
 @dataclass(frozen=True)
@@ -92,8 +103,8 @@ class Axis:
             scale = {"type": "log", "nice": False, "padding": 8}
         if self.domain:
             scale |= {"domain": list(self.domain), "padding": 0}
-        few = self.domain and self.domain[1] < _FEW * self.domain[0]
-        style = ("halves" if few else "decades") if self.log else "plain"
+        times = self.domain[1] / self.domain[0] if self.domain and self.log else math.inf
+        style = next(s for most, s in _LABELS.items() if times <= most) if self.log else "plain"
         return {
             "field": self.field,
             "type": "quantitative",
@@ -119,9 +130,8 @@ class Chart:
 
     def __html__(self) -> Markup:
         """Its place in a page that has the script; without it, a line that says what is missing."""
-        spec = json.dumps(
-            _short(self.spec), ensure_ascii=False, separators=(",", ":"), default=float
-        )
+        brief = _short(self.spec | {"data": _tables(self.spec["data"]["values"])})
+        spec = json.dumps(brief, ensure_ascii=False, separators=(",", ":"), default=float)
         return Markup(
             '<div class=chart id="{}" role=img aria-label="{}" style="max-width:{}px">'
             '<script type="application/json">{}</script><div class=drawn></div><p class=none>This '
@@ -142,6 +152,21 @@ class Chart:
         import vl_convert
 
         return str(vl_convert.vegalite_to_svg(json.dumps(self.full, default=float)))
+
+
+def _tables(records: Sequence[Record]) -> list[Spec]:
+    """Records in tables of the same series and fields, which are named once in each.
+
+    The script makes them records again.
+    """
+
+    def kind(record: Record) -> tuple[Any, ...]:
+        return record.get("series"), *(field for field in record if field != "series")
+
+    return [
+        {"series": name, "fields": fields, "rows": [[r[f] for f in fields] for r in members]}
+        for (name, *fields), members in groupby(records, kind)
+    ]
 
 
 def _short(value: Any) -> Any:
@@ -322,10 +347,16 @@ def slopes(records: Sequence[Record], x: str, y: str, orders: Sequence[float]) -
         for at in (start, end)
     ]
     place = {axis: {"field": axis, "type": "quantitative"} for axis in "xy"}
-    place |= {"color": {"value": MUTED}}
     order = {"field": "order", "type": "nominal"}
-    line = {"mark": {"type": "line", "strokeWidth": 1}, "encoding": place | {"detail": order}}
     label = {"type": "text", "align": "left", "dx": 4, "fontSize": 10}
-    words: Spec = {"mark": label, "encoding": place | {"text": order}}
-    words["transform"] = [{"filter": f"datum.x > {1.0001 * start}"}]
-    return [{"data": {"values": rows}} | part for part in (line, words)]
+    at_end = {"filter": f"datum.x > {start * 1.0001:.7g}"}
+    return [
+        {
+            "data": {"values": rows},
+            "encoding": place | {"color": {"value": MUTED}, "detail": order},
+            "layer": [
+                {"mark": {"type": "line", "strokeWidth": 1}},
+                {"mark": label, "encoding": {"text": order}, "transform": [at_end]},
+            ],
+        }
+    ]

@@ -30,19 +30,11 @@ from ..case.yaml import read_mapping
 from ..system.errors import InputError
 
 FILE_NAME = "family.yaml"
-# Pages of the report that are no family's: a family of that name has its page under another.
-_TAKEN = (
-    "index",
-    "summary",
-    "bench",
-    "compare",
-    "orders",
-    "workflow",
-    "study",
-    "stability",
-    "scaling",
-    "benchmark",
-)
+# Pages of the report that are no family's, also with a dash and more (`study-quick`): a family of
+# such a name has its page under another.
+_TAKEN = {"index", "summary", "matrix", "bench", "compare", "history", "workflow"} | {
+    *("orders", "study", "stability", "infsup", "scaling", "benchmark"),
+}
 
 
 class Figure(Section, frozen=True):
@@ -112,7 +104,7 @@ def read_family(file: Path) -> Family:
 def page_name(family: str) -> str:
     """The file name of a family's page."""
     plain = re.sub(r"[/\\\0]", "_", family)
-    return f"{'family-' if plain in _TAKEN else ''}{plain}.html"
+    return f"{'family-' if plain.split('-')[0] in _TAKEN else ''}{plain}.html"
 
 
 def paragraphs(text: str) -> list[tuple[bool, str]]:

@@ -1,8 +1,7 @@
 """The lines of a picture: outlines of cells and macro-elements, normals."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
-import meshio
 import numpy as np
 
 from ..mesh.catalogue import cell_type
@@ -17,13 +16,6 @@ def outlines(points: np.ndarray, kind: str, connectivity: np.ndarray) -> np.ndar
     corners = ring[:, ::2]
     bend = ring[:, 1::2] - (corners + np.roll(corners, -1, axis=1)) / 2
     return ring if np.abs(bend).max(initial=0.0) > 1e-6 * np.ptp(points) else corners
-
-
-def plane_cells(points: np.ndarray, mesh: meshio.Mesh) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Per cell type of a 2D mesh drawn at `points`: outlines (n, corners, 2), a node of each."""
-    for block in mesh.cells:
-        if block.dim == 2 and len(block.data):
-            yield outlines(points, block.type, block.data), block.data[:, 0]
 
 
 def macro_edges(faces: Iterable[tuple[str, np.ndarray, np.ndarray]]) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from . import formats
+from . import formats, stages
 from .charts import SCRIPT
 from .families import page_name, paragraphs
 
@@ -89,6 +89,7 @@ def environment(*folders: Path) -> Environment:
     }
     templates.globals |= {
         "formats": formats,
+        "bar": stages.bar,
         "kinds": KINDS,
         "main_page": PAGE,
         "page_name": page_name,

@@ -1,6 +1,6 @@
-"""Common to all pictures: colours of both sides, bodies drawn apart, coordinates to pixels."""
+"""Common to all pictures: colours of both sides, where bodies go apart, what is pressed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -8,10 +8,8 @@ from ..simulation.solution import BodyInfo, Solution, ZoneResult
 from .charts import BLUE, MUTED, ORANGE, PAPER
 from .svg import mixed
 
-Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
 # A picture of the contact shows this share of its extent around it.
 _AROUND = 0.15
-Placement = Callable[[np.ndarray], np.ndarray]  # coordinates (…, dim) to pixels (…, 2)
 
 
 def edge_color(body: BodyInfo) -> str:
@@ -52,25 +50,6 @@ def ways_apart(solution: Solution) -> np.ndarray:
             found[body] = found[slaves[0]] + _mean(zone.normal, np.eye(dim)[-1])
             moved.add(body)
     return found
-
-
-def apart(solution: Solution, share: float) -> np.ndarray:
-    """Points with bodies moved apart by `share` of the mesh's size, (n, dim)."""
-    return solution.mesh.points + share * solution.length * ways_apart(solution)[solution.body]
-
-
-def fit(points: np.ndarray, frame: Frame) -> Placement:
-    """A map of (…, 2) coordinates into the frame, y upward, shape kept, in its middle."""
-    x, y, width, height = frame
-    low, extent = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-300)
-    scale = min(width / extent[0], height / extent[1])
-    left, bottom = x + (width - scale * extent[0]) / 2, y + (height + scale * extent[1]) / 2
-
-    def place(values: np.ndarray) -> np.ndarray:
-        moved = (values - low) * scale
-        return np.stack([left + moved[..., 0], bottom - moved[..., 1]], axis=-1)
-
-    return place
 
 
 def pressed_box(points: np.ndarray, zones: Sequence[ZoneResult], within: np.ndarray) -> np.ndarray:

@@ -76,7 +76,7 @@ def family_page(section: FamilySection, folder: Path) -> str:
         good=not section.bad,
         section=section,
         choices=choices(section.rows),
-        orders=(folder / "orders.html").is_file(),
+        orders=(folder / f"orders-{section.name}.html").is_file(),
         norms=NORMS,
         stages=_stages(section.rows),
         picture=lambda row: picture(row, section.pictures),

@@ -139,7 +139,10 @@ def _view(
     size = {"type": "point", "strokeWidth": 1.3, "size": 22, "clip": True}
     shown = [name for name in marks if name not in (RECOVERED, REFERENCE) or not flat]
     point = {"mark": size, "encoding": {"shape": shape} | tips} | _only(shown)
-    layers.append(point | {"params": interaction()} if first else point)
+    if first:
+        layers.append(point | {"params": interaction()})
+    elif shown:
+        layers.append(point)
     return {"width": 400, "height": height, "encoding": shared, "layer": layers}
 
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
+from markupsafe import Markup
+
 # In the order of the work, in colours that colour-blind readers can distinguish.
 COLORS = {
     "read": "#999999",
@@ -27,3 +29,13 @@ def colors(found: Iterable[str]) -> dict[str, str]:
 def in_words(seconds: Mapping[str, float]) -> str:
     """The times of the stages in one line."""
     return ", ".join(f"{stage} {seconds[stage]:.3f} s" for stage in colors(seconds))
+
+
+def bar(seconds: Mapping[str, float], total: float) -> Markup:
+    """The shares of the stages in the total time as a bar, their times under the pointer."""
+    parts, end = [], 0.0
+    for stage, color in colors(seconds).items():
+        end += 100 * seconds[stage] / total
+        parts.append(f"{color} 0 {end:.0f}%")
+    tag = '<span class=bar title="{}" style="background:linear-gradient(90deg,{},#0000 0)"></span>'
+    return Markup(tag).format(in_words(seconds), ",".join(parts))

@@ -20,6 +20,7 @@ from solver.verification.run import Job, solve
 from solver.verification.verdict import write_verdict
 from tests.browser import MISSING, browser
 from tests.codes import results as handmade
+from tests.report.test_charts import specifications
 
 RECORDED = """
 kind: recorded
@@ -130,9 +131,7 @@ def test_the_page_of_the_bench(report):
     assert "cannot passes 0 of 0 and cannot express 1" in page
     assert "<strong>recorded</strong> 2020, not computed here; its manual, chapter 7" in page
     assert "penalty: 50 E" in page
-    start = page.index('<script type="application/json">') + len('<script type="application/json">')
-    spec = json.loads(page[start : page.index("</script>", start)])
-    records = spec["data"]["values"]
+    records = next(iter(specifications(page).values()))["data"]["values"]
     by_code = {
         r["series"]: [s["pressure"] for s in records if s["series"] == r["series"]] for r in records
     }

@@ -7,7 +7,7 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 import pytest
 
-from solver.report import write_report
+from solver.report import stages, write_report
 from solver.verification.results import write_result
 from tests import handmade
 from tests.browser import MISSING, browser
@@ -249,10 +249,12 @@ def thousand(tmp_path_factory):
     """The report of a thousand solves in twenty families."""
     folder = tmp_path_factory.mktemp("thousand")
     good = CHECK | {"error": 1e-5, "passed": True}
+    checks = [good | {"name": name} for name in ("multiplier", "nodal_stress", "coverage")] * 4
+    seconds = dict.fromkeys(stages.COLORS, 0.123) | {"total": 1.234}
     files = []
     for number in range(1000):
-        family, name = f"family {number % 20}", f"block-{number}"
-        content = verdict(name, "passed", family=family, checks=[good] * 8, worst=good)
+        family, name = f"family {number % 20}", f"long-name-of-a-block-{number}"
+        content = verdict(name, "passed", family=family, checks=checks, worst=good, seconds=seconds)
         files.append(folder / family / name / "verdict.json")
         put(files[-1], content)
     write_report(files, folder / "report")

@@ -15,6 +15,7 @@ from solver.report.charts import (
     SCRIPT,
     Axis,
     Look,
+    distinct,
     floor_band,
     level,
     series_chart,
@@ -35,7 +36,18 @@ def specifications(html):
     """The specifications of a page's charts, by their anchors."""
     found = re.findall(r'<div class=chart id="([^"]+)".*?json">(.*?)</script>', html, re.DOTALL)
     assert len(found) == len(dict(found))
-    return {name: json.loads(text) for name, text in found}
+    return {name: expanded(json.loads(text)) for name, text in found}
+
+
+def expanded(spec):
+    """A page's specification with its records as the script restores them."""
+    records = [
+        ({} if table["series"] is None else {"series": table["series"]})
+        | dict(zip(table["fields"], row, strict=True))
+        for table in spec["data"]
+        for row in table["rows"]
+    ]
+    return spec | {"data": {"values": records}}
 
 
 def chart():
@@ -61,6 +73,7 @@ def test_a_page_holds_the_specification_and_says_what_it_needs():
         json.dumps(chart().spec), parse_float=lambda digits: float(f"{float(digits):.10g}")
     )
     assert specifications(html) == {"a": ten}
+    assert html.count('"cells"') == 4, "once for each series; field and title under the pointer"
     assert f"needs JavaScript and the file {SCRIPT} beside this page" in html
 
 
@@ -73,6 +86,24 @@ def test_slopes_are_powers():
         ]
         (low, high) = rows
         assert high["y"] / low["y"] == pytest.approx((high["x"] / low["x"]) ** order)
+
+
+def test_a_logarithmic_axis_has_labels_wherever_it_begins():
+    """At powers of ten, at 2, 3 and 5 times these, or at every tick, by the length of the axis."""
+    styles = {
+        span: Axis("x", "x", log=True, domain=(7.0, 7.0 * span)).channel()["axis"]["style"]
+        for span in (3, 100, 1e4)
+    }
+    assert styles == {3: "units", 100: "halves", 1e4: "decades"}
+    assert Axis("x", "x", domain=(7.0, 21.0)).channel()["axis"]["style"] == "plain"
+
+
+def test_no_two_series_look_the_same():
+    same = dict.fromkeys("abc", Look(BLUE)) | {"d": Look(ORANGE)}
+    looks = distinct(same)
+    assert len(set(looks.values())) == 4
+    assert (looks["a"], looks["d"]) == (Look(BLUE), Look(ORANGE))
+    assert {look.color for look in looks.values()} == {BLUE, ORANGE}
 
 
 def test_the_floor_grows_with_the_root_of_the_unknowns():

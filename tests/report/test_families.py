@@ -72,6 +72,8 @@ def test_paragraphs_that_are_indented_are_formulas(file):
         (False, "Without friction."),
     ]
     assert formats.formula("q^d < p_rr") == "q<sup>d</sup> &lt; p<sub>rr</sub>"
+    symbols = formats.symbols("c_n r^(n+1) < σ_θθ: surface_stress, 1e-3_x")
+    assert symbols == ("c<sub>n</sub> r<sup>n+1</sup> &lt; σ<sub>θθ</sub>: surface_stress, 1e-3_x")
     assert formats.formula("r^(1/3)") == "r<sup>1/3</sup>"
     assert formats.formula("ν_1²/E_1") == "ν<sub>1</sub>²/E<sub>1</sub>"
 
@@ -132,6 +134,8 @@ def test_families_come_in_the_order_they_ask_for(tmp_path):
 def test_pages_of_the_report_are_no_family_s():
     assert page_name("lame") == "lame.html"
     assert page_name("summary") == "family-summary.html"
+    assert page_name("orders-waves") == "family-orders-waves.html"
+    assert page_name("matrix") == "family-matrix.html"
     assert "/" not in page_name("a/b")
 
 

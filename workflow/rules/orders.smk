@@ -37,6 +37,7 @@ rule orders_page:
         ],
     output:
         "results/report/orders.html",
+        [f"results/report/orders-{Path(f).parent.name}.html" for f in LADDER_FILES],
         "results/report/orders.csv",
         "results/report/orders-points.csv",
         "results/report/orders-recovery.csv",

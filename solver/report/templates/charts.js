@@ -10,12 +10,16 @@
     };
     return [names, ...records.map((r) => names.map((n) => r[n]))].map((r) => r.map(cell).join(",")).join("\n");
   };
+  const records = ({ series, fields, rows }) => rows.map((row) => ({
+    ...(series === null ? {} : { series }), ...Object.fromEntries(row.map((value, i) => [fields[i], value])),
+  }));
   const specification = (place) => {
     let text = place.querySelector("script").textContent;
     const theme = JSON.stringify(THEME.config);
     text = `{"config": ${theme}, ${text.trim().slice(1)}`;
     if (night.matches) for (const [light, dark] of Object.entries(THEME.dark)) text = text.replaceAll(light, dark);
     const spec = JSON.parse(text);
+    if (Array.isArray(spec.data)) spec.data = { values: spec.data.flatMap(records) }; // else of a former version
     const width = place.clientWidth - 38; // beside the menu
     const longest = Math.max(...spec.data.values.map((record) => (record.series ?? "").length));
     spec.config.legend.columns = Math.max(1, Math.floor(width / (40 + 6.3 * longest)));
@@ -35,6 +39,7 @@
       tooltip: { theme: night.matches ? "dark" : "light" },
     });
     drawn.set(place, result);
+    if (!spec.width && !spec.vconcat) shown.classList.add("whole"); // as wide as it is, beside its menu
     place.querySelector(".none")?.remove();
     const link = document.createElement("a");
     link.textContent = "CSV";

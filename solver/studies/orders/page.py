@@ -1,4 +1,4 @@
-"""The page of orders of convergence, its tables for machines, and what was not reached."""
+"""Orders of convergence: an overview, a page for each family, tables, and what was not reached."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,7 +27,7 @@ PAGE, SLOPES, POINTS, GAINS, FAILURES = (
 
 
 def write_orders(families: Sequence[LadderFamily], results: Path, folder: Path) -> str:
-    """Write the page, the tables and the failures of the ladders into `folder`.
+    """Write the pages, the tables and the failures of the ladders into `folder`.
 
     `results` holds a folder a family, a ladder, a level, each with its verdict. Returns a line for
     each level without a result and each slope that is not reached, and the outcome.
@@ -37,53 +37,96 @@ def write_orders(families: Sequence[LadderFamily], results: Path, folder: Path) 
     complaints = [line for curve in every for line in curve.complaints]
     found = [gain for members in curves.values() for gain in gains(members)]
     found.sort(key=lambda gain: (CELLS.index(gain.cells), gain.form))
-    page = render(
+    overview = render(
         Path(__file__).with_name("page.html.jinja"),
-        charts=True,
+        sortable=True,
         title="Orders of convergence",
-        sections=[_section(family, curves[family.name]) for family in families],
+        families=[_summary(family, curves[family.name]) for family in families],
         gains=found,
         outcome=outcome(every),
         good=bool(families) and not complaints,
         complaints=complaints,
-        names=ERRORS,
         last=LAST,
     )
+    pages = {page_of(f.name): _family_page(f, curves[f.name]) for f in families}
     failures = "".join(f"{line}\n" for line in complaints)
     tables = {SLOPES: _slope_rows(every), POINTS: _point_rows(every), GAINS: _gain_rows(found)}
-    contents = {PAGE: page, FAILURES: failures} | {k: as_csv(rows) for k, rows in tables.items()}
+    contents = {PAGE: overview, FAILURES: failures} | pages
+    contents |= {name: as_csv(rows) for name, rows in tables.items()}
     for name, content in contents.items():
         write_text(folder / name, content)
     write_script(folder)
     return f"{failures}{outcome(every)} Report: {folder / PAGE}"
 
 
+def page_of(family: str) -> str:
+    """The file name of a family's page."""
+    return f"orders-{family}.html"
+
+
 def outcome(curves: Sequence[Curve]) -> str:
     """How many slopes and errors at the finest levels were asked for and reached."""
-    slopes = [r for c in curves for e in ERRORS if (r := c.reached(e)) is not None]
-    finest = [r for c in curves for e in ERRORS if (r := c.kept(e)) is not None]
-    lost = sum(len(curve.rows) - len(curve.solved) for curve in curves)
-    reached = f"{sum(slopes)} of {len(slopes)} slopes asked for are reached"
-    text = f"{reached if slopes else 'No slope is asked for'}, on {len(curves)} ladders"
-    text += f"; {sum(finest)} of {len(finest)} errors at finest levels." if finest else "."
+    reached, asked, kept, bounds, lost = _counts(curves)
+    text = (
+        f"{reached} of {asked} slopes asked for are reached" if asked else "No slope is asked for"
+    )
+    text += f", on {len(curves)} ladders"
+    text += f"; {kept} of {bounds} errors at finest levels." if bounds else "."
     return text + (f" {lost} levels have no result." if lost else "")
 
 
-def _section(family: LadderFamily, curves: Sequence[Curve]) -> dict[str, Any]:
-    """One family: its words, and its panels and tables by group."""
-    described = read_family(family.folder / FILE_NAME)
+def _counts(curves: Sequence[Curve]) -> tuple[int, int, int, int, int]:
+    """Slopes reached and asked for, errors kept and bounded, levels without a result."""
+    slopes = [r for c in curves for e in ERRORS if (r := c.reached(e)) is not None]
+    finest = [r for c in curves for e in ERRORS if (r := c.kept(e)) is not None]
+    lost = sum(len(curve.rows) - len(curve.solved) for curve in curves)
+    return sum(slopes), len(slopes), sum(finest), len(finest), lost
+
+
+def _summary(family: LadderFamily, curves: Sequence[Curve]) -> dict[str, Any]:
+    """A family's line in the overview."""
+    return {
+        "title": _title(family),
+        "page": page_of(family.name),
+        "ladders": len(curves),
+        "levels": sum(len(curve.solved) for curve in curves),
+        "counts": _counts(curves),
+        "below": _below(curves),
+    }
+
+
+def _title(family: LadderFamily) -> str:
+    return family.title or read_family(family.folder / FILE_NAME).title
+
+
+def _below(curves: Sequence[Curve]) -> int:
+    """How many slopes are below theory."""
+    return sum(curve.below_theory(error) for curve in curves for error in ERRORS)
+
+
+def _family_page(family: LadderFamily, curves: Sequence[Curve]) -> str:
+    """The page of a family: its words, and its panels and tables by group."""
     parts: list[dict[str, Any]] = []
     for title, members in groups(curves).items():
         shown = shown_errors(members)
         panels = [draw_panel(f"{family.name}-{len(parts)}", error, members) for error in shown]
         parts.append({"title": title, "curves": members, "errors": shown, "panels": panels})
-    return {
-        "family": family,
-        "title": family.title or described.title,
-        "description": family.description or described.description,
-        "below": sum(curve.below_theory(error) for curve in curves for error in ERRORS),
-        "groups": parts,
-    }
+    complaints = [line for curve in curves for line in curve.complaints]
+    return render(
+        Path(__file__).with_name("family.html.jinja"),
+        charts=True,
+        title=f"Orders of convergence: {_title(family)}",
+        family=family,
+        description=family.description or read_family(family.folder / FILE_NAME).description,
+        groups=parts,
+        below=_below(curves),
+        outcome=outcome(curves),
+        good=not complaints,
+        complaints=complaints,
+        overview=PAGE,
+        names=ERRORS,
+        last=LAST,
+    )
 
 
 def _slope_rows(curves: Sequence[Curve]) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ import pytest
 from msgspec import structs
 
 from solver.commands.cli import main
+from solver.report.html import NORMS
 from solver.studies.orders import page as orders
 from solver.studies.orders.description import read_ladders
 from solver.studies.orders.page import write_orders
@@ -118,7 +119,7 @@ def test_where_no_slope_is_asked_for_none_is_counted(family, results):
 def test_a_ladder_never_solved_is_missed(family, tmp_path):
     write_orders([family], tmp_path / "nothing", tmp_path)
     failures = (tmp_path / orders.FAILURES).read_text()
-    assert "powers/tria3: level 1, 2, 4, 8: not solved\n" in failures
+    assert "powers/tria3: levels 1, 2, 4, 8: not solved\n" in failures
     assert failures.count("not solved") == 3
 
 
@@ -172,15 +173,22 @@ def test_problems_and_dimensions_are_drawn_apart(family, results):
     }
 
 
-def test_the_page_is_whole_and_escaped(page, tmp_path):
-    text = (tmp_path / orders.PAGE).read_text()
-    assert "Powers of &lt;h&gt;" in text
-    assert 'href="summary.html"' in text
+def test_the_pages_are_whole_and_escaped(page, tmp_path):
+    overview, text = (
+        (tmp_path / name).read_text() for name in (orders.PAGE, orders.page_of("powers"))
+    )
+    for html in (overview, text):
+        assert "Powers of &lt;h&gt;" in html
+        counter = Counter()
+        counter.feed(html)
+        assert counter.open == []
+    assert 'href="summary.html"' in overview
+    assert 'href="orders-powers.html"' in overview
+    assert "1 without a result" in overview
+    assert "2 of 4" in overview
+    assert 'href="orders.html"' in text
     assert "1.500 ± 0.000" in text
     assert "other_code 1.750" in text
-    counter = Counter()
-    counter.feed(text)
-    assert counter.open == []
     charts = specifications(text)
     assert list(charts) == [
         *("powers-0-displacement_l2", "powers-0-pressure_l2"),
@@ -189,6 +197,34 @@ def test_the_page_is_whole_and_escaped(page, tmp_path):
     rows = charts["powers-0-displacement_l2"]["data"]["values"]
     found = {r["h"]: r["error"] for r in rows if r["series"] == "TRIA3"}
     assert found == pytest.approx({1 / (4 * n): n**-1.5 for n in (1, 2, 4, 8)})
+
+
+def test_the_pages_of_large_families_are_small(tmp_path):
+    """Twice the charts of the largest family (waves: 180), thrice its ladders (49) and levels."""
+    problems, errors = range(17), list(NORMS)
+    path = tmp_path / "cases" / "large" / "orders.yaml"
+    path.parent.mkdir(parents=True)
+    cells = ("TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9", "PYRA5", "HEXA8", "HEXA20", "TETRA4")
+    ladders = []
+    for problem in problems:
+        for number, name in enumerate(cells):
+            case = f"{name.lower()}-{problem}"
+            (path.parent / f"{case}.yaml").touch()
+            ladders.append({"case": f"{case}.yaml", "problem": f"problem {problem}"})
+            for level in (1, 2, 4, 8, 16):
+                found = dict.fromkeys(errors, level ** (-(1 + number / 7)))
+                dim = 3 if number > 4 else 2
+                put(tmp_path / "results" / "large" / case, level, name, dim, **found)
+    path.write_text(json.dumps({"levels": [1, 2, 4, 8, 16], "ladders": ladders}))
+    write_orders([read_ladders(path)], tmp_path / "results", tmp_path)
+    text = (tmp_path / orders.page_of("large")).read_text()
+    charts = specifications(text)
+    assert len(charts) == 2 * len(problems) * len(errors)
+    assert sum(len(chart["data"]["values"]) for chart in charts.values()) == 5 * len(errors) * len(
+        ladders
+    )
+    sizes = [len(text.encode()), (tmp_path / orders.PAGE).stat().st_size]
+    assert max(sizes) < 1_500_000
 
 
 class Counter(HTMLParser):
@@ -219,13 +255,14 @@ def test_slopes_below_theory_are_told_with_the_reason_where_it_is_known(family, 
     ]
     assert below == [("tria3", "displacement_l2")]
     write_orders([family], results, tmp_path)
-    text = (tmp_path / orders.PAGE).read_text()
+    page = tmp_path / orders.page_of("powers")
+    text = page.read_text()
     assert "1 slopes (▽) are below theory by more than their spread." in text
     assert "The reason is not known." in text
     path = tmp_path / "cases" / "powers" / "orders.yaml"
     path.write_text(LADDERS + "shortfalls: Few <levels>.\n")
     write_orders([read_ladders(path)], results, tmp_path)
-    assert "Few &lt;levels&gt;.</p>" in (tmp_path / orders.PAGE).read_text()
+    assert "Few &lt;levels&gt;.</p>" in page.read_text()
 
 
 def test_a_label_tells_ladders_of_the_same_cells_apart(family, results):
