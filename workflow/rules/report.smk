@@ -60,7 +60,7 @@ rule report:
         benchmark="results/report/benchmark",
     log:
         "results/report/log",
-    threads: workflow.cores or 1
+    threads: workflow.resource_settings.cores or 1
     # What is listed is a parameter: the report is written again when it changes.
     params:
         verdicts=lambda w: [verdict_of(job) for job in RUN.values()],
