@@ -7,7 +7,7 @@ import numpy as np
 
 from ..case.expressions import Expression, evaluate
 from ..case.model import EXACT, Load, Support
-from ..mechanics.fem.faces import nodal_normals, outer_faces
+from ..mechanics.fem.faces import nodal_normals
 from ..mechanics.fem.stress import traction
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution
@@ -31,12 +31,16 @@ _DIAMOND = 2.5 * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
 
 @dataclass(frozen=True)
 class Symbols:
-    """Draws onto a view of a solution with its points as drawn (n, 3); some nodes (n,) are seen."""
+    """Draws onto a view of a solution with its points as drawn (n, 3); some nodes (n,) are seen.
+
+    `faces`: the outer ones, by type.
+    """
 
     solution: Solution
     view: View
     points: np.ndarray
     seen: np.ndarray
+    faces: list[tuple[str, np.ndarray]]
 
     def draw(self) -> list[Label]:
         """Draw all loads and supports; returns their labels, each text once."""
@@ -56,10 +60,10 @@ class Symbols:
 
     def _outward(self, nodes: np.ndarray) -> np.ndarray:
         """The normals (n, 3) of the faces of a group; where it has none, of all faces."""
-        points, faces = self.solution.mesh.points, list(outer_faces(self.solution.mesh))
+        points = self.solution.mesh.points
         inside = np.isin(np.arange(len(points)), nodes)
-        own = [(kind, f[inside[f].all(axis=1)]) for kind, f in faces]
-        return three(nodal_normals(points, own if any(len(f) for _, f in own) else faces))
+        own = [(kind, f[inside[f].all(axis=1)]) for kind, f in self.faces]
+        return three(nodal_normals(points, own if any(len(f) for _, f in own) else self.faces))
 
     def _some(self, nodes: np.ndarray) -> np.ndarray:
         """A few of the nodes that are seen, far from each other."""

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix, diags
 
-from .products import in_pieces
+from ...system.compiled import compiled, part_of_compiled, worthwhile
+from .products import in_pieces, share_rows
 from .unknowns import LevelNodes
 
 # The distances of a node's neighbours differ by more than this where cells are slender. There only
@@ -47,6 +48,58 @@ def _graph(matrix: bsr_matrix, nodes: LevelNodes) -> csr_matrix:
 
     Where cells are slender, near ones only: a smooth error is smooth along the short edges alone.
     """
+    count = len(nodes.body)
+    joined = (_joined_by_loops if worthwhile(matrix.data.size) else _joined)(matrix, nodes)
+    before = np.concatenate([[0], np.cumsum(joined, dtype=np.int32)], dtype=np.int32)
+    columns = matrix.indices[joined].astype(np.int32, copy=False)
+    ones = np.ones(len(columns), dtype=np.int8)
+    return csr_matrix((ones, columns, before[matrix.indptr]), shape=(count, count))
+
+
+def _joined_by_loops(matrix: bsr_matrix, nodes: LevelNodes) -> np.ndarray:
+    """What `_joined` returns, by compiled loops."""
+    joined, limit = np.empty(len(matrix.indices), dtype=bool), np.full(len(nodes.body), np.inf)
+    points = np.zeros((len(limit), 3)) if nodes.points is None else nodes.points
+    arrays = matrix.indptr, matrix.indices, nodes.body, np.ascontiguousarray(points), limit
+    if nodes.points is not None:
+        share_rows(lambda *some: _find_limits(*some, *arrays), matrix.indptr, 9)
+    share_rows(lambda *some: _join(*some, *arrays, joined), matrix.indptr, 9)
+    return joined
+
+
+@compiled
+def _find_limits(first, last, starts, columns, body, points, limit):  # type: ignore[no-untyped-def]
+    for i in range(first, last):
+        nearest, furthest = np.inf, 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            if j != i and body[j] == body[i] and body[i] >= 0:
+                distance = _between(points, i, j)
+                nearest, furthest = min(nearest, distance), max(furthest, distance)
+        if furthest > _SLENDER**2 * nearest:
+            limit[i] = _NEAR**2 * nearest
+
+
+@compiled
+def _join(first, last, starts, columns, body, points, limit, joined):  # type: ignore[no-untyped-def]
+    for i in range(first, last):
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            joined[k] = body[i] == body[j] and body[i] >= 0
+            within = max(limit[i], limit[j])
+            if joined[k] and within < np.inf:
+                joined[k] = _between(points, i, j) <= within
+
+
+@part_of_compiled
+def _between(points, i, j):  # type: ignore[no-untyped-def]
+    """The squared distance of two points."""
+    x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+    return x * x + y * y + z * z
+
+
+def _joined(matrix: bsr_matrix, nodes: LevelNodes) -> np.ndarray:
+    """Which pairs of neighbours (nnz,) may share an aggregate."""
     body, count = nodes.body, len(nodes.body)
     joined = np.empty(len(matrix.indices), dtype=bool)
     nearest, furthest = np.full(count, np.inf), np.zeros(count)
@@ -71,10 +124,7 @@ def _graph(matrix: bsr_matrix, nodes: LevelNodes) -> csr_matrix:
             joined[some] &= _distance(nodes.points, rows, columns) <= within
 
         in_pieces(part, matrix)
-    before = np.concatenate([[0], np.cumsum(joined, dtype=np.int32)], dtype=np.int32)
-    columns = matrix.indices[joined].astype(np.int32, copy=False)
-    ones = np.ones(len(columns), dtype=np.int8)
-    return csr_matrix((ones, columns, before[matrix.indptr]), shape=(count, count))
+    return joined
 
 
 def _pairs(matrix: bsr_matrix, first: int, last: int) -> tuple[slice, np.ndarray, np.ndarray]:
