@@ -199,7 +199,8 @@ def _compact(
     for block in blocks:
         present[block.nodes] = True
     used = np.flatnonzero(present)
-    new = np.full(len(points), -1)
+    # Node numbers take most of the memory of a mesh: from here on they have 32 bits.
+    new = np.full(len(points), -1, dtype=np.int32)
     new[used] = np.arange(len(used))
     sets = {
         name: [np.flatnonzero(block.groups.get(name, ())) for block in blocks] for name in names

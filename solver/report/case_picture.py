@@ -9,17 +9,26 @@ from functools import partial
 import numpy as np
 from markupsafe import Markup
 
+from ..mechanics.fem.faces import outer_faces
 from ..mesh.catalogue import cell_type
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import MUTED, PAPER
-from .geometry import macro_edges, normals, outlines
-from .layout import mean_normal, plan_axes, pressed_box
-from .parts import DrawnPart, parts, three
-from .profile import expected
+from .layout import (
+    PRESSURE,
+    color_map,
+    macro_edges,
+    mean_normal,
+    normals,
+    outlines,
+    plan_axes,
+    pressed_box,
+    shade,
+)
+from .parts import DrawnPart, parts, three, zone_fields
 from .svg import Drawing, mixed
 from .symbols import Symbols, body_label, draw_axes
-from .view import FLAT, View, axonometry, draw_labels, lit
+from .view import FLAT, Frame, View, axonometry, draw_labels, lit
 
 # Width and height by the dimension of the bodies; bodies drawn apart by a share of the model.
 SIZES = {2: (760, 360), 3: (1040, 400)}
@@ -29,17 +38,11 @@ _ALONE, _BESIDE, _CONTACT = (48, 48, 380, 248), (48, 48, 190, 248), (410, 10, 34
 _SPACE, _PLANS = (28, 40, 210, 300), ((460, 40, 200, 280), (745, 40, 200, 280))
 # Where the contact is more than this share of the model, it is not enlarged.
 _LARGE = 0.5
-# From no pressure to the largest, light to dark: distinguished by lightness alone.
-PRESSURE = ("#f3f6fa", "#cfe1ee", "#9cc3dc", "#5f9dc6", "#2f75a8", "#174f7c")
-# From too little to too much.
-DEVIATION = ("#b35806", "#f1a340", "#fee0b6", "#f7f7f7", "#d8daeb", "#998ec3", "#542788")
 MASTER = "#ffa45c"  # readable on every pressure
 LEVELS = 32
 MOST_FACES = 100_000
-# Deviations of this size or less are round-off, and stay pale.
-_ROUND_OFF = 1e-12
-# Hatches of rigid lines, and their distance, in pixels; on one line there are this many at most.
-_HATCH, _PITCH, _HATCHES = 6.0, 8.0, 200
+# The length of hatches behind rigid lines, in pixels.
+_HATCH = 6.0
 
 
 def draw_case(solution: Solution, title: str) -> Markup:
@@ -54,7 +57,7 @@ def draw_case(solution: Solution, title: str) -> Markup:
         if solution.zones:
             _draw_plans(drawing, solution, solution.zones[0])
         return drawing.svg()
-    used = np.concatenate([p.points[p.used, :2] for p in drawn if p.out is None])
+    used = np.concatenate([p.points[p.used, :2] for p in drawn if p.meshed])
     box = pressed_box(solution.mesh.points, solution.zones, used)
     if np.ptp(box, axis=0).max() >= _LARGE * solution.length:
         _whole(drawing, solution, drawn, _ALONE, drawing.width)
@@ -72,7 +75,7 @@ def _whole(
     drawing: Drawing,
     solution: Solution,
     drawn: Sequence[DrawnPart],
-    frame: tuple[float, ...],
+    frame: Frame,
     end: float,
 ) -> View:
     """All bodies apart, with loads, supports, axes, and labels from the bodies to x = `end`."""
@@ -88,7 +91,10 @@ def _whole(
     ways = {part.body: part.way for part in drawn}
     points = three(solution.mesh.points)
     points += share * np.stack([ways[number] for number in range(len(ways))])[solution.body]
-    labels = Symbols(solution, view, points, _seen(drawn, points, view.eye)).draw()
+    faces = [face[:2] for part in drawn if part.meshed for face in part.faces]
+    seen = _seen(faces, points, view) if dim == 3 else np.ones(len(points), dtype=bool)
+    faces = faces if dim == 3 else list(outer_faces(solution.mesh))
+    labels = Symbols(solution, view, points, seen, faces).draw()
     for part, places in zip(drawn, flat, strict=True):
         if part.zone is None:
             middle = view.at((places.min(axis=0) + places.max(axis=0)) / 2)
@@ -96,7 +102,7 @@ def _whole(
             at = view(np.concatenate(centres) + share * part.way)
             nearest = np.linalg.norm(at - middle, axis=1).argmin()
             labels.append(body_label(solution, part.body, at[nearest]))
-    left = float(view.at(np.concatenate(flat))[:, 0].max()) + 44
+    left = float(view.at(np.concatenate(flat))[:, 0].max()) + 40
     draw_labels(drawing, labels, (left, 12, end - left - 8, drawing.height - 24))
     draw_axes(view, np.ptp(solution.mesh.points[solution.deformable], axis=0), length)
     return view
@@ -111,13 +117,11 @@ def _axis(solution: Solution) -> np.ndarray:
     return np.array([[0, low[1] - 0.05 * size[1], 0], [0, low[1] + 1.05 * size[1], 0]])
 
 
-def _seen(drawn: Sequence[DrawnPart], points: np.ndarray, eye: np.ndarray) -> np.ndarray:
+def _seen(faces: Sequence[tuple[str, np.ndarray]], points: np.ndarray, view: View) -> np.ndarray:
     """Which points (n,) as drawn are on faces that are turned to the eye."""
     seen = np.zeros(len(points), dtype=bool)
-    for part in drawn:
-        for kind, nodes, _ in part.faces if part.out is None and not part.zone else ():
-            towards = np.abs if eye[2] == 1 else np.positive
-            seen[nodes[towards(normals(outlines(points, kind, nodes)) @ eye) > 1e-6].ravel()] = True
+    for kind, nodes in faces:
+        seen[nodes[normals(outlines(points, kind, nodes)) @ view.eye > 1e-6].ravel()] = True
     return seen
 
 
@@ -129,106 +133,88 @@ def _draw_parts(
     for part in sorted(drawn, key=lambda part: (near[part.body], part.zone is not None)):
         points = part.points + share * part.way
         if part.zone:
-            turned = three(part.zone.normal) @ view.eye > -1e-6
-            faces = [(kind, nodes, owner) for kind, nodes, owner in part.faces]
-            faces = [(kind, f[turned[owner]], owner[turned[owner]]) for kind, f, owner in faces]
+            to = three(part.zone.normal) @ view.eye > -1e-6
+            faces = [(kind, nodes[to[own]], own[to[own]]) for kind, nodes, own in part.faces]
             edges = macro_edges(faces) if view.solid else np.concatenate([f for _, f, _ in faces])
             view.lines(points[edges[:, :2]], part.color, 1.3 if view.solid else 1.6)
         elif part.out is not None and not view.solid:
-            _draw_hatched(view, part, points, box)
+            _draw_hatched(view, part, part.out, points, box)
         else:
             rings = [outlines(points, kind, nodes) for kind, nodes, _ in part.faces]
             rings = [ring[view.inside(ring, box)] for ring in rings]
             edge = mixed(part.color, PAPER, 0.25) if part.out is None else part.fill
             groups = [(ring, np.zeros(len(ring), dtype=int)) for ring in rings]
             both = part.out is not None or not view.solid
-            view.faces(groups, partial(_lit, part.fill), edge, both)
+            view.faces(groups, partial(lit, part.fill), edge, both)
 
 
-def _lit(color: str, _: int, light: float) -> str:
-    return lit(color, light)
-
-
-def _draw_hatched(view: View, part: DrawnPart, points: np.ndarray, box: np.ndarray | None) -> None:
-    """A rigid line, hatched on the side of the body."""
-    assert part.out is not None
+def _draw_hatched(
+    view: View, part: DrawnPart, out: np.ndarray, points: np.ndarray, box: np.ndarray | None
+) -> None:
+    """A rigid line, and a wide dashed one behind it: hatches across."""
     nodes = np.concatenate([nodes[:, :2] for _, nodes, _ in part.faces])
     nodes = nodes[view.inside(points[nodes], box)]
+    behind = points - _HATCH / 2 / view.scale * out
     view.lines(points[nodes], part.color, 2)
-    first, last = (view(points[end])[:, None] for end in nodes.T)
-    length = np.linalg.norm(last - first, axis=2).max(initial=0.0)
-    shares = np.linspace(0, 1, int(np.clip(length / _PITCH, 1, _HATCHES)), endpoint=False)
-    along = first + shares[:, None] * (last - first)
-    out = part.out[nodes].mean(axis=1)
-    into = _HATCH * np.stack([-out[:, 0] - out[:, 1], out[:, 1] - out[:, 0]], axis=1)
-    hatches = np.stack([along, along + into[:, None]], axis=2).reshape(-1, 2, 2)
-    view.drawing.polygons(hatches, closed=False, stroke=part.color, stroke_width=0.8)
+    view.lines(behind[nodes], part.color, _HATCH, stroke_dasharray=(0.8, 5.0))
 
 
 def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
     """A zone seen along its normal: its pressure, and its deviation from the reference."""
-    largest, unit = max(float(zone.multiplier.max()), 1e-300), solution.case.units.get("stress")
-    label = with_unit(f"p on {zone.name}", unit)
-    _draw_plan(solution, zone, drawing, 0, label, zone.multiplier, (0.0, largest), PRESSURE)
-    means = expected(solution, zone)
-    if means is not None:
-        off = (zone.multiplier - means) / (np.abs(means).max() or 1.0)
-        most = max(float(np.abs(off).max()), _ROUND_OFF)
-        _draw_plan(solution, zone, drawing, 1, "Δp / max p", off, (-most, most), DEVIATION)
+    points, (screen, names) = solution.mesh.points, plan_axes(zone)
+    used, flat = np.unique(np.concatenate([f.ravel() for _, f, _ in zone.faces])), points @ screen.T
+    box = pressed_box(flat, [zone], flat[used])
+    names = (with_unit(names[0], solution.case.units.get("length")), names[1])
+    fields = [
+        field for field in zone_fields(solution, zone).items() if not field[0].startswith("gap")
+    ]
+    for frame, (title, values) in zip(_PLANS, fields, strict=False):
+        view, (limits, colors) = View.of(drawing, screen, box, frame), color_map(title, values)
+        x, y, width, height = view.rectangle(box)
+        with drawing.clipped(x, y, width, height):
+            share = np.clip((values - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
+            _draw_sub_faces(view, points, zone, np.rint(share * LEVELS).astype(int), colors, box)
+        drawing.text(x, y - 10, title)
+        _draw_ends(drawing, (x, y, width, height), box, names if frame is _PLANS[0] else names[:1])
+        for k in range(LEVELS):
+            fill, step = shade((LEVELS - k - 0.5) / LEVELS, colors), height / LEVELS
+            drawing.rectangle(x + width + 10, y + k * step, 10, step + 0.3, fill=fill)
+        drawing.text(x + width + 24, y + 9, f"{limits[1]:.3g}")
+        drawing.text(x + width + 24, y + height, f"{limits[0]:.3g}")
     sub_faces = sum(len(nodes) for _, nodes, _ in zone.faces)
     kinds = ", ".join(sorted({cell_type(kind).name for kind, _, _ in zone.faces}))
-    words = f"{len(zone.centre)} macro-elements (white) in {sub_faces} sub-faces ({kinds}), "
+    words = f"{zone.name}: {len(zone.centre)} macro-elements in {sub_faces} sub-faces ({kinds}), "
     words += f"{sum(len(f) for _, f in zone.master_faces)} master faces (orange)"
     drawing.text(_PLANS[0][0], drawing.height - 24, words)
 
 
-def _draw_plan(
-    solution: Solution,
+def _draw_sub_faces(
+    view: View,
+    points: np.ndarray,
     zone: ZoneResult,
-    drawing: Drawing,
-    number: int,
-    label: str,
-    values: np.ndarray,
-    limits: tuple[float, float],
+    level: np.ndarray,
     colors: Sequence[str],
+    box: np.ndarray,
 ) -> None:
-    """Sub-faces coloured by a value (m,), macro-elements and master in outline."""
-    points, (screen, names) = solution.mesh.points, plan_axes(zone)
-    used = np.concatenate([nodes.ravel() for _, nodes, _ in zone.faces])
-    flat = points @ screen.T
-    box = pressed_box(flat, [zone], flat[used])
-    view = View.of(drawing, screen, box, _PLANS[number])
-    share = np.clip((values - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
-    level = np.rint(share * LEVELS).astype(int)
+    """Sub-faces coloured by the level (m,) of their macro-element; this and master in outline."""
     groups = [(outlines(points, kind, nodes), level[owner]) for kind, nodes, owner in zone.faces]
     groups = [(r[seen], n[seen]) for r, n in groups for seen in [view.inside(r, box)]]
-    x, y, width, height = view.rectangle(box)
-    with drawing.clipped(x, y, width, height):
-        view.faces(groups, lambda n, _: shade(n / LEVELS, colors), PAPER, both=True)
-        view.lines(points[macro_edges(zone.faces)[:, :2]], PAPER, 1.6)
-        for kind, nodes in zone.master_faces:
-            ring = outlines(points, kind, nodes)
-            drawing.polygons(view(ring[view.inside(ring, box)]), stroke=MASTER, stroke_width=0.8)
-    drawing.text(x, y - 10, label)
-    length, below, text = solution.case.units.get("length"), y + height + 15, drawing.text
+    view.faces(groups, lambda n, _: shade(n / LEVELS, colors), PAPER, both=True)
+    outline = PAPER if colors is PRESSURE else MUTED
+    view.lines(points[macro_edges(zone.faces)[:, :2]], outline, 1.6)
+    for kind, nodes in zone.master_faces:
+        ring = outlines(points, kind, nodes)
+        ring = view(ring[view.inside(ring, box)])
+        view.drawing.polygons(ring, stroke=MASTER, stroke_width=0.8)
+
+
+def _draw_ends(drawing: Drawing, frame: Frame, box: np.ndarray, names: Sequence[str]) -> None:
+    """The coordinates at the ends of a plan, to the right and, with a second name, upward."""
+    x, y, width, height = frame
     box = np.where(np.abs(box) < 1e-9 * np.ptp(box, axis=0), 0.0, box)
-    text(x, below, f"{box[0, 0]:.4g}", color=MUTED)
-    text(x + width / 2, below, with_unit(names[0], length), "middle", color=MUTED)
-    text(x + width, below, f"{box[1, 0]:.4g}", "end", color=MUTED)
-    if number == 0:  # the other has the same axes
-        text(x - 7, y + height, f"{box[0, 1]:.4g}", "end", color=MUTED)
-        text(x - 7, y + height / 2, names[1], "end", color=MUTED)
-        text(x - 7, y + 9, f"{box[1, 1]:.4g}", "end", color=MUTED)
-    step = height / LEVELS
-    for k in range(LEVELS):
-        fill = shade((LEVELS - k - 0.5) / LEVELS, colors)
-        drawing.rectangle(x + width + 10, y + k * step, 10, step + 0.3, fill=fill)
-    text(x + width + 24, y + 9, f"{limits[1]:.3g}")
-    text(x + width + 24, y + height, f"{limits[0]:.3g}")
-
-
-def shade(share: float, colors: Sequence[str] = PRESSURE) -> str:
-    """The colour between the first and the last, `share` of the way."""
-    position = share * (len(colors) - 1)
-    k = min(int(position), len(colors) - 2)
-    return mixed(colors[k], colors[k + 1], position - k)
+    words = [f"{box[0, 0]:.4g}", names[0], f"{box[1, 0]:.4g}"]
+    for k, anchor in enumerate(("start", "middle", "end")):
+        drawing.text(x + k * width / 2, y + height + 15, words[k], anchor, color=MUTED)
+        if len(names) > 1:
+            upward = [f"{box[0, 1]:.4g}", names[1], f"{box[1, 1]:.4g}"][k]
+            drawing.text(x - 7, y + height - k * (height - 9) / 2, upward, "end", color=MUTED)

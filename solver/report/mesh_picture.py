@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from ..mesh.catalogue import BY_MESHIO
 from .charts import MUTED, PAPER
-from .geometry import outlines
+from .layout import outlines
 from .parts import outside, three
 from .svg import Drawing, mixed
 from .view import FLAT, View, axonometry, lit
@@ -31,7 +31,7 @@ def draw_mesh(mesh: meshio.Mesh, title: str) -> Markup:
         (outlines(points, k, f), n) for n, own in enumerate(groups.values(), 1) for k, f in own
     ]
     solid = [(ring, np.full(len(ring), n)) for ring, n in [*rings, *faces] if ring.shape[1] > 2]
-    view.faces(solid, lambda level, light: lit(shades[level], light), MUTED, not view.solid)
+    view.faces(solid, lambda level, light: lit(shades[level], level, light), MUTED, not view.solid)
     for ring, n in faces:
         if ring.shape[1] == 2:
             view.lines(ring, list(colors.values())[n - 1], 2.5)

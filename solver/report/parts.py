@@ -13,8 +13,10 @@ import numpy as np
 from ..mechanics.fem.faces import outer_faces, volume_cells
 from ..simulation.rigid import quadric_of
 from ..simulation.solution import Solution, ZoneResult
+from ..verification.units import with_unit
 from .charts import BLUE, PAPER
-from .layout import edge_color, tint, ways_apart
+from .layout import RELATIVE, edge_color, tint, ways_apart
+from .profile import expected
 from .svg import mixed
 
 # A rigid surface is drawn this much larger than the slave opposite to it.
@@ -44,6 +46,11 @@ class DrawnPart:
     way: np.ndarray
     zone: ZoneResult | None = None
     out: np.ndarray | None = None
+
+    @property
+    def meshed(self) -> bool:
+        """Whether it is a body with cells."""
+        return self.zone is None and self.out is None
 
     @property
     def used(self) -> np.ndarray:
@@ -102,6 +109,19 @@ def rigid_surface(
     moved = np.c_[places, np.ones(len(places))] @ linear
     local = [(k, np.searchsorted(used, f), np.full(len(f), number)) for k, f, _ in faces]
     return three(places), three(moved), local, three(_unit(surface.gradient(places)))
+
+
+def zone_fields(solution: Solution, zone: ZoneResult) -> dict[str, np.ndarray]:
+    """Fields (m,) of a zone by title: pressure, gap, deviation from a reference if there is one."""
+    units = solution.case.units
+    found = {
+        with_unit("contact pressure p", units.get("stress")): zone.multiplier,
+        with_unit("gap", units.get("length")): zone.gap,
+    }
+    means = expected(solution, zone)
+    if means is not None:
+        found[RELATIVE] = (zone.multiplier - means) / (np.abs(means).max() or 1.0)
+    return found
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

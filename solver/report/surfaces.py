@@ -11,20 +11,14 @@ from typing import Any
 import numpy as np
 
 from ..mesh.catalogue import cell_type
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.solution import Solution
 from ..verification import samples
 from ..verification.units import with_unit
-from .case_picture import DEVIATION, PRESSURE
-from .layout import mean_normal
-from .parts import DrawnPart, parts, three
-from .profile import expected, reference
+from .layout import color_map, mean_normal
+from .parts import DrawnPart, parts, three, zone_fields
+from .profile import reference
 from .view import AZIMUTH, ELEVATION
 
-_DEVIATION = "Δp / max p"
-# Values of the other sign below this share of the largest are round-off.
-_NO_SIGN = 1e-9
-# Errors without a sign, from none to the largest.
-ERROR = ("#fff7ec", "#fdd49e", "#fc8d59", "#d7301f", "#7f0000")
 # A file of more points is too large for a page.
 MOST_POINTS = 200_000
 # Maps of errors at nodes: key of the reference, title, sampler of the check.
@@ -46,7 +40,9 @@ def surfaces(solution: Solution, file: str) -> str:
     if number > MOST_POINTS:
         raise ValueError(f"{number} points on surfaces; {MOST_POINTS} at most are allowed")
     nodal = _nodal_fields(solution)
-    found = [_content(part, _zone_fields(solution, part.zone, nodal)) for part in drawn]
+    found = [
+        _content(part, zone_fields(solution, part.zone) if part.zone else nodal) for part in drawn
+    ]
     whole = np.concatenate([part.points[part.used] for part in drawn])
     fields: dict[str, list[np.ndarray]] = {}
     for _, own in reversed(found):
@@ -59,7 +55,11 @@ def surfaces(solution: Solution, file: str) -> str:
         "factor": magnification(solution.displacement, solution.length),
         "whole": [whole.min(axis=0).tolist(), whole.max(axis=0).tolist()],
         "contact": _contact(solution),
-        "maps": [_map(title, np.concatenate(values)) for title, values in fields.items()],
+        "maps": [
+            {"title": title, "limits": limits, "colors": colors}
+            for title, values in fields.items()
+            for limits, colors in [color_map(title, np.concatenate(values))]
+        ],
         "parts": [plain | {"fields": _packed(own)} for plain, own in found],
     }
     text = json.dumps([file, content], ensure_ascii=False, separators=(",", ":"))
@@ -73,18 +73,6 @@ def _contact(solution: Solution) -> list[list[float]] | None:
     pressed = [points[f[zone.multiplier[owner] > 0]].reshape(-1, 3) for zone, f, owner in faces]
     found = np.concatenate([np.empty((0, 3)), *pressed])
     return [found.min(axis=0).tolist(), found.max(axis=0).tolist()] if len(found) else None
-
-
-def _map(title: str, values: np.ndarray) -> dict[str, Any]:
-    """The colours of a map: the same on both sides of zero where values have two signs."""
-    low, high = float(values.min()), float(values.max())
-    most = max(abs(low), abs(high)) or 1.0
-    both = min(-low, high) > _NO_SIGN * most or title == _DEVIATION
-    colors = DEVIATION if both else ERROR if "Δ" in title else PRESSURE
-    limits = [-most, most] if both else [0.0, most] if high > 0 else [-most, 0.0]
-    if limits[0]:  # compression alone: dark is the largest
-        colors = colors if both else colors[::-1]
-    return {"title": title, "limits": limits, "colors": colors}
 
 
 def _content(part: DrawnPart, fields: Fields) -> tuple[dict[str, Any], Fields]:
@@ -121,21 +109,6 @@ def _packed(arrays: Fields) -> dict[str, str]:
         name: base64.b64encode(array.astype(kinds[name]).tobytes()).decode()
         for name, array in arrays.items()
     }
-
-
-def _zone_fields(solution: Solution, zone: ZoneResult | None, nodal: Fields) -> Fields:
-    """Fields of a zone (m,) by macro-element; without a zone, those at all nodes (n,)."""
-    if zone is None:
-        return nodal
-    units = solution.case.units
-    found = {
-        with_unit("contact pressure p", units.get("stress")): zone.multiplier,
-        with_unit("gap", units.get("length")): zone.gap,
-    }
-    means = expected(solution, zone)
-    if means is not None:
-        found[_DEVIATION] = (zone.multiplier - means) / (np.abs(means).max() or 1.0)
-    return found
 
 
 def _nodal_fields(solution: Solution) -> Fields:
@@ -185,12 +158,7 @@ def split(faces: list[tuple[str, np.ndarray]], outline: bool = False) -> Fields:
 
 
 def magnification(displacement: np.ndarray, size: float) -> float:
-    """The factor by which a displacement (n, dim) is enlarged on a model of that size.
-
-    The largest becomes at most a sixteenth of the size; the factor is 1, 2 or 5 times a power of
-    ten.
-    """
+    """The power of ten by which a displacement (n, dim) becomes at most a tenth of a size."""
     largest = float(np.linalg.norm(displacement, axis=1).max(initial=0.0))
-    wanted = size / (16 * largest) if largest else 1.0
-    decade = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(m * decade for m in (1, 2, 5) if m * decade <= wanted * (1 + 1e-9)))
+    wanted = size / (10 * largest) if largest else 1.0
+    return float(10.0 ** np.floor(np.log10(wanted) + 1e-9))

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .charts import INK, MUTED
-from .geometry import normals
+from .layout import normals
 from .svg import Drawing, Style, mixed
 
 Frame = tuple[float, ...]  # x, y, width, height in pixels
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)
 FLAT = np.eye(2, 3)
 # Pixels between lines and between labels; the width of a character of text by its size.
-_LINE, _BETWEEN, _CHARACTER = 13.0, 5.0, 0.56
+_LINE, _BETWEEN, _CHARACTER = 13.0, 5.0, 0.53
 _LIGHT = np.array([0.25, -0.45, 0.85])
 
 
@@ -79,9 +79,9 @@ class View:
         flat = polygons @ self.screen.T
         return np.asarray(((flat.max(axis=1) > box[0]) & (flat.min(axis=1) < box[1])).all(axis=1))
 
-    def pixels(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (…, 3) in pixels (…, 2), y downward."""
-        return self.scale * (vectors @ self.screen.T) * [1.0, -1.0]
+    def along(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors (…, 3) on the drawing (…, 2), y downward; shorter where they point at the eye."""
+        return vectors @ self.screen.T * [1.0, -1.0]
 
     def faces(
         self,
@@ -127,8 +127,8 @@ def _runs(
         yield float(place), int(level[members[0]]), light, polygons[members]
 
 
-def lit(color: str, light: float) -> str:
-    """A colour in light from 0 to 1."""
+def lit(color: str, _: int, light: float) -> str:
+    """A colour in light from 0 to 1, on any level."""
     return mixed(color, INK, 0.16 * (1 - light))
 
 
@@ -144,7 +144,7 @@ class Label:
 def draw_labels(drawing: Drawing, labels: Sequence[Label], frame: Frame) -> None:
     """Labels one below the other in a frame, each as near as can be to what it names."""
     x, top, width, height = frame
-    ordered = sorted(labels, key=lambda label: top if label.at is None else float(label.at[1]))
+    ordered = sorted(labels, key=lambda label: _order(label, top))
     if sum(_height(label) for label in ordered) > height:  # crowded: a line each
         for label in ordered:
             text = ", ".join(text for text, _ in label.lines)
@@ -174,6 +174,12 @@ def draw_labels(drawing: Drawing, labels: Sequence[Label], frame: Frame) -> None
             shown = int(width / (size * _CHARACTER))
             short = text if len(text) <= shown else f"{text[: shown - 1]}…"
             drawing.text(x, y + 11 + k * _LINE, short, size=size, color=color, weight=weight)
+
+
+def _order(label: Label, top: float) -> tuple[float, ...]:
+    """From above, and from the left where two are nearly at one height."""
+    x, y = (0.0, top) if label.at is None else label.at
+    return round(y / _LINE), x, y
 
 
 def _height(label: Label) -> float:

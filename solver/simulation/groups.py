@@ -86,7 +86,7 @@ def with_cells(mesh: meshio.Mesh, wanted: Sequence[np.ndarray]) -> meshio.Mesh:
         place = np.cumsum(kept) - 1
         for name, parts in mesh.cell_sets.items():
             sets[name].append(place[np.asarray(parts[i], dtype=int)])
-        cells.append((block.type, block.data[kept]))
+        cells.append((block.type, block.data if kept.all() else block.data[kept]))
     return meshio.Mesh(mesh.points, cells, cell_sets=sets, point_sets=mesh.point_sets)
 
 

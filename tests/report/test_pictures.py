@@ -10,10 +10,9 @@ import pytest
 
 from solver.case.expressions import Expression
 from solver.mechanics.fem.faces import outer_faces
-from solver.report.case_picture import DEVIATION, draw_case, shade
+from solver.report.case_picture import draw_case
 from solver.report.charts import BLUE, GREEN, ORANGE, RED
-from solver.report.geometry import macro_edges, normals, outlines
-from solver.report.layout import pressed_box
+from solver.report.layout import DEVIATION, macro_edges, normals, outlines, pressed_box, shade
 from solver.report.pictures import picture
 from solver.report.rows import Row
 from solver.report.svg import Drawing, mixed

@@ -124,7 +124,7 @@ def test_pictures_have_units(tmp_path):
     assert channels["y"]["title"] == "contact pressure [N/mm²]"
     assert channels["x"]["title"] == "x [mm]"
     plan = draw_case(solid, "")
-    assert ">p on interface [N/mm²]<" in plan
+    assert ">contact pressure p [N/mm²]<" in plan
     assert ">x [mm]<" in plan
 
 

@@ -143,11 +143,7 @@ def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
         lines=lines,
         speed_ups=speed_ups(lines),
         stages=colors,
-        bars=[
-            (line, _stage_chart(line, colors), _shares(line, colors))
-            for line in lines
-            if line.solved
-        ],
+        bars=[(line, _stage_chart(line, colors), line.solved[-1]) for line in lines if line.solved],
         failures=lost,
         facts=facts(points),
         disturbed=disturbed(points),
@@ -208,10 +204,3 @@ def _stage_chart(line: SeriesSolves, colors: dict[str, str]) -> Chart:
     looks = {stage: Look(color) for stage, color in colors.items()}
     fan = slopes(records, "size", "cost", _LINEAR)
     return series_chart(title, title, records, x, y, looks, layers=fan, width=380, height=200)
-
-
-def _shares(line: SeriesSolves, colors: dict[str, str]) -> list[tuple[str, str, float]]:
-    """Stage, colour and share in per cent of the largest solve."""
-    costs = {stage: line.solved[-1].cost(stage) for stage in colors}
-    whole = sum(costs.values()) or 1.0
-    return [(stage, colors[stage], 100 * cost / whole) for stage, cost in costs.items()]
