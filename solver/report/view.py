@@ -79,9 +79,9 @@ class View:
         flat = polygons @ self.screen.T
         return np.asarray(((flat.max(axis=1) > box[0]) & (flat.min(axis=1) < box[1])).all(axis=1))
 
-    def pixels(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (…, 3) in pixels (…, 2), y downward."""
-        return self.scale * (vectors @ self.screen.T) * [1.0, -1.0]
+    def along(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors (…, 3) on the drawing (…, 2), y downward; shorter where they point at the eye."""
+        return vectors @ self.screen.T * [1.0, -1.0]
 
     def faces(
         self,
