@@ -185,6 +185,19 @@ def test_pyvista_reads_what_was_solved():
     assert pressure[~np.isnan(pressure)].max() == pytest.approx(PRESSURE)
 
 
+def test_pyvista_shows_the_pressure_on_slave_faces_alone(monkeypatch):
+    pyvista = pytest.importorskip("pyvista", reason="PyVista is not installed")
+    monkeypatch.setattr(pyvista.UnstructuredGrid, "plot", lambda grid, **options: (grid, options))
+    solved = patch()
+    grid, options = solved.plot(show_edges=True)
+    assert not np.isnan(grid.cell_data["pressure"]).any()
+    assert options["clim"] == (0.0, pytest.approx(PRESSURE))
+    assert (options["scalars"], options["show_edges"]) == ("pressure", True)
+    grid, options = solved.plot("displacement", clim=(0, 1))
+    assert grid.n_points == len(solved.points)
+    assert options["clim"] == (0, 1)
+
+
 def test_figures_are_svg_and_a_notebook_shows_one():
     solved = patch()
     for figure in (solved.picture(), solved.profile(), solved.profile("x", zone="interface")):

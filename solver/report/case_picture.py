@@ -41,8 +41,8 @@ _LARGE = 0.5
 MASTER = "#ffa45c"  # readable on every pressure
 LEVELS = 32
 MOST_FACES = 100_000
-# Hatches of rigid lines, and their distance, in pixels; on one line there are this many at most.
-_HATCH, _PITCH, _HATCHES = 6.0, 8.0, 200
+# The length of hatches behind rigid lines, in pixels.
+_HATCH = 6.0
 
 
 def draw_case(solution: Solution, title: str) -> Markup:
@@ -138,7 +138,7 @@ def _draw_parts(
             edges = macro_edges(faces) if view.solid else np.concatenate([f for _, f, _ in faces])
             view.lines(points[edges[:, :2]], part.color, 1.3 if view.solid else 1.6)
         elif part.out is not None and not view.solid:
-            _draw_hatched(view, part, points, box)
+            _draw_hatched(view, part, part.out, points, box)
         else:
             rings = [outlines(points, kind, nodes) for kind, nodes, _ in part.faces]
             rings = [ring[view.inside(ring, box)] for ring in rings]
@@ -148,20 +148,15 @@ def _draw_parts(
             view.faces(groups, partial(lit, part.fill), edge, both)
 
 
-def _draw_hatched(view: View, part: DrawnPart, points: np.ndarray, box: np.ndarray | None) -> None:
-    """A rigid line, hatched on the side of the body."""
-    assert part.out is not None
+def _draw_hatched(
+    view: View, part: DrawnPart, out: np.ndarray, points: np.ndarray, box: np.ndarray | None
+) -> None:
+    """A rigid line, and a wide dashed one behind it: hatches across."""
     nodes = np.concatenate([nodes[:, :2] for _, nodes, _ in part.faces])
     nodes = nodes[view.inside(points[nodes], box)]
+    behind = points - _HATCH / 2 / view.scale * out
     view.lines(points[nodes], part.color, 2)
-    first, last = (view(points[end])[:, None] for end in nodes.T)
-    length = np.linalg.norm(last - first, axis=2).max(initial=0.0)
-    shares = np.linspace(0, 1, int(np.clip(length / _PITCH, 1, _HATCHES)), endpoint=False)
-    along = first + shares[:, None] * (last - first)
-    out = part.out[nodes].mean(axis=1)
-    into = _HATCH * np.stack([-out[:, 0] - out[:, 1], out[:, 1] - out[:, 0]], axis=1)
-    hatches = np.stack([along, along + into[:, None]], axis=2).reshape(-1, 2, 2)
-    view.drawing.polygons(hatches, closed=False, stroke=part.color, stroke_width=0.8)
+    view.lines(behind[nodes], part.color, _HATCH, stroke_dasharray=(0.8, 5.0))
 
 
 def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
@@ -188,8 +183,8 @@ def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
         drawing.text(x + width + 24, y + height, f"{limits[0]:.3g}")
     sub_faces = sum(len(nodes) for _, nodes, _ in zone.faces)
     kinds = ", ".join(sorted({cell_type(kind).name for kind, _, _ in zone.faces}))
-    words = f"{zone.name}: {len(zone.centre)} macro-elements in {sub_faces} sub-faces ({kinds}), "
-    words += f"{sum(len(f) for _, f in zone.master_faces)} master faces (orange)"
+    words = f"{zone.name}: macro-elements {len(zone.centre)}, sub-faces {sub_faces} ({kinds}), "
+    words += f"master faces {sum(len(f) for _, f in zone.master_faces)} (orange)"
     drawing.text(_PLANS[0][0], drawing.height - 24, words)
 
 

@@ -88,18 +88,14 @@ class Symbols:
             marks = self.view(self.points[both])[:, None] + _DIAMOND
             self.view.drawing.polygons(marks, fill=GREEN)
         if support.together:  # spokes to a hub beside the nodes
-            hub = at.mean(axis=0) + 14 * self._along(outward[chosen].mean(axis=0))
+            hub = at.mean(axis=0) + 14 * self.view.along(outward[chosen].mean(axis=0))
             self._draw_lines(np.stack([at, np.broadcast_to(hub, at.shape)], axis=1))
             self.view.drawing.polygons((hub + _DIAMOND)[None], fill=GREEN)
         shape = _SPRING if support.spring else _TRIANGLE
         for place, normal in zip(at, outward[chosen], strict=True):
             for direction in _held(support, normal):
-                self._fixed(place, self._along(direction), shape)
+                self._fixed(place, self.view.along(direction), shape)
         return np.asarray(at[at[:, 0].argmax()])
-
-    def _along(self, direction: np.ndarray) -> np.ndarray:
-        """A direction (3,) on the screen, shorter where it points at the eye."""
-        return self.view.pixels(direction) / self.view.scale
 
     def _draw_lines(self, ends: np.ndarray) -> None:
         self.view.drawing.polygons(ends, closed=False, stroke=GREEN, stroke_width=1.1)
@@ -125,16 +121,12 @@ class Symbols:
         outward = self._outward(nodes)[chosen]
         vectors = three(_vectors(self.solution, load, chosen, outward))
         size = np.linalg.norm(vectors, axis=1)
+        arrows = _ARROW * self.view.along(vectors / max(size.max(), 1e-300))
         large = size > 0.05 * size.max()
-        ways = [self._along(v / s) for v, s in zip(vectors[large], size[large], strict=True)]
-        ends = self.view(self.points[chosen[large]])
-        tails = []
-        for end, way, vector, normal, length in zip(
-            ends, ways, vectors[large], outward[large], size[large], strict=True
-        ):
-            arrow = _ARROW * length / size.max() * way
-            tails.append(end if vector @ normal > 0 else end - arrow)
-            draw_arrow(self.view.drawing, tails[-1], tails[-1] + arrow, RED, _HEAD)
+        ends, pulls = self.view(self.points[chosen]), (vectors * outward).sum(axis=1) > 0
+        tails = np.where(pulls[:, None], ends, ends - arrows)[large]
+        for tail, arrow in zip(tails, arrows[large], strict=True):
+            draw_arrow(self.view.drawing, tail, tail + arrow, RED, _HEAD)
         return max(tails, key=lambda tail: float(tail[0]), default=None)
 
     def _words(self, entry: Load | Support) -> str:
@@ -165,8 +157,8 @@ def draw_axes(view: View, size: np.ndarray, unit: str | None) -> None:
     """The axes of the picture in its lower left corner, and the extents (dim,) of the mesh."""
     drawing = view.drawing
     corner = np.array([22.0, drawing.height - 34.0])
-    for name, step in zip("xyz"[: len(size)], view.pixels(np.eye(3)), strict=False):
-        way = 18 * step / view.scale
+    for name, step in zip("xyz"[: len(size)], view.along(np.eye(3)), strict=False):
+        way = 18 * step
         if np.hypot(*way) > 3:
             draw_arrow(drawing, corner, corner + way, MUTED, 4.0)
         x, y = corner + way

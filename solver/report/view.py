@@ -79,9 +79,9 @@ class View:
         flat = polygons @ self.screen.T
         return np.asarray(((flat.max(axis=1) > box[0]) & (flat.min(axis=1) < box[1])).all(axis=1))
 
-    def pixels(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (…, 3) in pixels (…, 2), y downward."""
-        return self.scale * (vectors @ self.screen.T) * [1.0, -1.0]
+    def along(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors (…, 3) on the drawing (…, 2), y downward; shorter where they point at the eye."""
+        return vectors @ self.screen.T * [1.0, -1.0]
 
     def faces(
         self,
@@ -144,7 +144,7 @@ class Label:
 def draw_labels(drawing: Drawing, labels: Sequence[Label], frame: Frame) -> None:
     """Labels one below the other in a frame, each as near as can be to what it names."""
     x, top, width, height = frame
-    ordered = sorted(labels, key=lambda label: top if label.at is None else float(label.at[1]))
+    ordered = sorted(labels, key=lambda label: _order(label, top))
     if sum(_height(label) for label in ordered) > height:  # crowded: a line each
         for label in ordered:
             text = ", ".join(text for text, _ in label.lines)
@@ -174,6 +174,12 @@ def draw_labels(drawing: Drawing, labels: Sequence[Label], frame: Frame) -> None
             shown = int(width / (size * _CHARACTER))
             short = text if len(text) <= shown else f"{text[: shown - 1]}…"
             drawing.text(x, y + 11 + k * _LINE, short, size=size, color=color, weight=weight)
+
+
+def _order(label: Label, top: float) -> tuple[float, ...]:
+    """From above, and from the left where two are nearly at one height."""
+    x, y = (0.0, top) if label.at is None else label.at
+    return round(y / _LINE), x, y
 
 
 def _height(label: Label) -> float:

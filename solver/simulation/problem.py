@@ -244,7 +244,8 @@ class ContactProblem:
         """The start of a solve with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
-            raise SolveError(f"{moves} once {int((~closed).sum())} macro-elements are open")
+            opened = f"{moves} once {int((~closed).sum())} macro-elements are open"
+            raise SolveError(f"{opened}: the loads part the bodies, or a support is missing")
         acting, offset = scene.acting(step)
         return ContactIterate(
             scene=scene,

@@ -104,6 +104,15 @@ def test_list(capsys):
     assert "did you mean loads?" in capsys.readouterr().err
 
 
+def test_an_unknown_command_names_the_nearest_and_no_internal_one(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["slove", "case.yaml"])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert "no such command: slove; did you mean solve? (allowed: accept, check, " in said
+    assert not {"serve", "crashed", "jobs", "orders"} & set(re.findall(r"\w+", said))
+
+
 def test_help_lists_what_people_use_in_the_order_of_use(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])

@@ -150,6 +150,7 @@ def _describe(motion: np.ndarray) -> str:
 
 def _direction(vector: np.ndarray) -> str:
     unit = vector / vector[np.abs(vector).argmax()]
+    unit[np.abs(unit) < 1e-6] = 0.0
     if np.abs(unit).sum() < 1 + 1e-6:
         return "xyz"[int(np.abs(unit).argmax())]
     return "(" + ", ".join(f"{x:.3g}" for x in unit) + ")"

@@ -23,6 +23,7 @@ from ...report.charts import (
 from ...report.html import render
 from ...report.tables import as_csv
 from ...system.files import write_text
+from ..bandwidth import table
 from ..points import disturbed, facts, outcome, page_name
 from .description import Scaling
 from .records import (
@@ -142,6 +143,7 @@ def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
         pairing=_pairing(lines),
         lines=lines,
         speed_ups=speed_ups(lines),
+        products=[(m.point.series.title, table(m.record.get("products"))) for m in points],
         stages=colors,
         bars=[(line, _stage_chart(line, colors), line.solved[-1]) for line in lines if line.solved],
         failures=lost,
