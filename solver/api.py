@@ -189,7 +189,7 @@ class Solved:
         names = {"pressure": "multiplier"} | {n: n for n in ("gap", "closed", "area", "coverage")}
         for name, of in names.items():
             columns[name] = [getattr(zone, of) for zone in zones]
-        return {name: np.concatenate([np.empty(0), *parts]) for name, parts in columns.items()}
+        return {n: np.concatenate(parts) if parts else np.empty(0) for n, parts in columns.items()}
 
     def to_pyvista(self) -> Any:
         """The result as PyVista reads its file; raises ImportError where PyVista is missing."""
@@ -201,8 +201,18 @@ class Solved:
             return pyvista.read(file)
 
     def plot(self, scalars: str = "pressure", **options: Any) -> Any:
-        """Show a field in PyVista's window; `options` go to its `plot`."""
-        return self.to_pyvista().plot(scalars=scalars, **options)
+        """Show a field in PyVista's window; `options` go to its `plot`.
+
+        Fields of slave faces, such as the pressure, are shown without the bodies, which hide them;
+        the colours of the pressure begin at zero.
+        """
+        grid = self.to_pyvista()
+        defaults: dict[str, Any] = {"line_width": 6}
+        if scalars in grid.cell_data:
+            grid = grid.threshold(0, scalars="zone")
+        if scalars == "pressure":
+            defaults["clim"] = (0.0, float(self.pressure.max(initial=0.0)) or 1.0)
+        return grid.plot(scalars=scalars, **defaults | options)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the result file, as `solve -o` does: whole or not at all, named `.vtkhdf`."""

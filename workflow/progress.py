@@ -40,6 +40,7 @@ _CHATTER = (
 # themselves.
 _GATES = ("gate", "orders", "stability", "infsup")
 _GATE_MARK = "# gate"
+_GOOD = ("passed", "solved")
 _BAD = ("failed", "unreliable", "refused", "crashed")
 _EVENTS = ("job_info", "job_started", "job_finished", "progress", "run_info", "resources_info")
 _ON_TERMINAL, _IN_FILE = 1.0, 60.0
@@ -94,7 +95,13 @@ class State:
             return None
         self.done += 1
         said = last_line(job.log)
-        self.bad += said.partition(": ")[2].startswith(_BAD)
+        if said and job.rule == "solve_level":  # its log has the name of the case alone
+            said = f"{job.message.removeprefix('solve ')}: {said.partition(': ')[2]}"
+        what = said.partition(": ")[2]
+        if job.rule in ("solve", "solve_level"):  # refused or without a solution: the reason alone
+            self.bad += bool(said) and not what.startswith(_GOOD)
+        else:
+            self.bad += what.startswith(_BAD)
         return f"{said} [{self.done}/{self.total}]" if said else None
 
     @property

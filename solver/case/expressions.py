@@ -7,6 +7,7 @@ never compiled or run. All numbers are floats, so that no power can grow without
 import ast
 import math
 import operator
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -95,6 +96,8 @@ class Expression:
     def _parse(self) -> ast.expr:
         if len(self.text) > MAX_LENGTH:
             raise self._error(f"longer than {MAX_LENGTH} characters")
+        if re.fullmatch(r"[-+]?\d+,\d+", self.text.strip()):
+            raise self._error(f"write numbers with a point: {self.text.replace(',', '.')}")
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")

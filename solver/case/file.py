@@ -307,11 +307,10 @@ _TOLERANCE = (
     "a positive number of at most 1, or a mapping of checks (`all`: the relative ones) to such "
     "numbers"
 )
-
-
 _OUT_OF_SCOPE = {
     "friction is out of scope: frictionless contact only": (
         "friction", "mu", "coulomb", "friction_coefficient", "stick"),
+    "the keys of a material are young and poisson": ("e", "youngs_modulus", "nu", "poissons_ratio"),
     "contact that holds in tension is out of scope: it may open": (
         "tied", "glue", "glued", "bonded", "adhesion", "cohesive"),
     "out of scope: small strain only": (

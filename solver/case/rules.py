@@ -232,7 +232,7 @@ def _check_strains(case: Case, dim: int) -> None:
 
 def check_dimension(case: Case, dim: int) -> None:
     """Raise `InputError` for a vector, direction or expression that does not fit the dimension."""
-    allowed = f"must have {dim} components, as the mesh has"
+    allowed = f"must have {dim} components: the case is {'plane' if dim == 2 else 'in 3D'}"
     for key, vector in _vectors(case):
         if len(vector) != dim:
             shown = [v.text if isinstance(v, Expression) else v for v in vector]

@@ -10,7 +10,7 @@ from .reader import parse_case
 TEMPLATE = """\
 # A case file: change it to your problem, then
 #   {program} validate --mesh FILE    checks that it is valid
-#   {program} solve FILE -o {name}.vtkhdf    solves and checks it
+#   {program} solve FILE -o RESULT.vtkhdf    solves and checks it
 # Paths are relative to this file. Use consistent units of length, force and stress.
 
 name: {name}

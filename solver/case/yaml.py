@@ -80,7 +80,25 @@ def _place(error: yaml.YAMLError, text: str) -> tuple[str, None, str]:
     line = (text.splitlines() or [""])[min(mark.line, len(text.splitlines()) - 1)]
     if "\t" in line[: len(line) - len(line.lstrip())]:
         return f"line {mark.line + 1}", None, "a tab indents this line: indent with spaces"
+    context = getattr(error, "context", None) or ""
+    begun = getattr(error, "context_mark", None) or mark
+    if "simple key" in context:  # the parser goes on to the next line
+        return f"line {begun.line + 1}", None, "must be YAML (a key without a colon and a space)"
+    if "mapping values" in reason:
+        reason += ": indent the line like its neighbours; quote a text with a colon"
+    if "flow" in context or "quoted" in context:
+        reason += f", from line {begun.line + 1} on"
+    elif "block" in context:
+        reason += ": is this line, or one before, indented unlike the others?"
     return f"line {mark.line + 1}", None, f"must be YAML ({reason})"
+
+
+def _not_text(key: object, text: str, items: dict) -> str:
+    """Why a key is refused that is not text, given its text and the items before it."""
+    before = [None, *items.values()][-1]
+    if isinstance(key, int) and type(before) is int:
+        return f"{before},{text} is no number: write {before}.{text}"
+    return f"the key {key!r} is not text: put it in quotes"
 
 
 class _Builder:
@@ -128,13 +146,12 @@ class _Builder:
                 raise self.error(keys, event, "a list or mapping cannot be a key")
             key = self.value(event, keys)
             if not isinstance(key, str):
-                cause = f"the key {key!r} is not text: put it in quotes"
-                if isinstance(key, int) and items:
-                    cause += ", or write numbers with a point, as in 2.5"
-                raise self.error(keys, event, cause)
+                raise self.error(keys, event, _not_text(key, getattr(event, "value", ""), items))
             if key in items:
                 raise self.error((*keys, key), event, "the key is given twice")
             items[key] = self.value(next(self.events), (*keys, key))
+            if items[key] is None and ":" in key and getattr(event, "implicit", [False])[0]:
+                raise self.error((*keys, key), event, "write a space after the colon")
         return items
 
     def scalar(self, event: yaml.ScalarEvent, keys: Keys) -> object:

@@ -17,7 +17,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..system.errors import InputError, SolveError, of_machine
+from ..system.errors import InputError, SolveError, hint, of_machine
 from ..system.imports import defer
 from ..system.package import PROGRAM, PROJECT, project_version
 from . import codes, completion, history, jobs, look, results, studies
@@ -94,7 +94,7 @@ def _unexpected(error: Exception) -> int:
 @cache
 def parser() -> argparse.ArgumentParser:
     """The command line: all commands with their arguments."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog=PROGRAM,
         description="Verified contact solves.",
         epilog=_EXAMPLES,
@@ -192,6 +192,16 @@ def _add_batch(commands: Any) -> None:
     command.add_argument("socket", type=int, metavar="FD", help="an open, listening socket")
 
 
+class _Parser(argparse.ArgumentParser):
+    """Answers an unknown command with those that help lists, the nearest one first."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
+            listed = [choice.dest for choice in action._choices_actions]
+            self.error(f"no such command: {value}; {hint(value, listed)}")
+        super()._check_value(action, value)
+
+
 class _Version(argparse.Action):
     """Prints the version, which is looked up only then."""
 
@@ -231,8 +241,8 @@ def _job(options: argparse.Namespace) -> "Job":
     from ..verification.run import Job
 
     given = vars(options)
-    told = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
-    return Job(swapped=options.swap, **told)
+    chosen = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
+    return Job(swapped=options.swap, **chosen)
 
 
 def _solve(options: argparse.Namespace) -> int:
@@ -342,7 +352,7 @@ def _new(options: argparse.Namespace) -> int:
     name = options.name or (options.output.stem if options.output else "new-case")
     path = options.output or Path(f"{name}.yaml")
     write_template(name, path)
-    print(f"{path}: written; next: {PROGRAM} solve {path} -o {name}.vtkhdf")
+    print(f"{path}: written; next: {PROGRAM} solve {path} -o {path.with_suffix('.vtkhdf')}")
     return PASSED
 
 

@@ -24,7 +24,7 @@ def add_commands(commands: Any) -> None:
     command.add_argument(
         "--gap", nargs=2, metavar=("SLAVE", "MASTER"), help="the gap between two groups of faces"
     )
-    command.add_argument("-o", "--output", type=Path, metavar="PICTURE.svg")
+    command.add_argument("-o", "--output", type=Path, metavar="PICTURE", help="SVG or PNG")
 
     command = add_command(commands, "plot", _plot, "draw a result: meshes, contact pressure")
     command.add_argument("result", type=Path, metavar="RESULT.vtkhdf")
@@ -46,7 +46,8 @@ def _list(options: argparse.Namespace) -> int:
         if case_files(folder) and folder.name not in ("study", "scaling")
     }
     if not folders:
-        raise InputError(options.cases, "cases", None, "no folders with case files")
+        allowed = "no folders with case files; name another folder with --cases"
+        raise InputError(options.cases, "cases", None, allowed)
     if options.family is None:
         for name, folder in folders.items():
             file = folder / "family.yaml"
@@ -77,10 +78,8 @@ def _inspect(options: argparse.Namespace) -> int:
         )
     if options.output:
         from ..report.mesh_picture import draw_mesh
-        from ..system.files import write_text
 
-        write_text(options.output, draw_mesh(mesh, options.mesh.name))
-        print(f"Picture: {options.output}")
+        _write_picture(draw_mesh(mesh, options.mesh.name), options.output)
     return 0
 
 
@@ -97,7 +96,6 @@ def _row(group: "Group") -> str:
 
 def _plot(options: argparse.Namespace) -> int:
     from ..report.pictures import draw, draw_pressure, page
-    from ..system.files import replacing, write_text
     from ..verification.results import read_result
 
     solution = read_result(options.result).solution
@@ -111,16 +109,22 @@ def _plot(options: argparse.Namespace) -> int:
             picture = str(draw(solution, solution.job))
     except ValueError as error:
         raise InputError(options.result, "picture", None, str(error)) from None
+    _write_picture(picture, output, *[".html"] * (not options.profile))
+    return 0
+
+
+def _write_picture(picture: str, output: Path, *others: str) -> None:
+    """Write an SVG, as a PNG if the file is called so; `others`: further names that are allowed."""
+    from ..system.files import replacing, write_text
+
+    allowed = ".svg", ".png", *others
+    if output.suffix not in allowed:
+        raise InputError(output, "output", output.suffix, f"allowed: {', '.join(allowed)}")
     if output.suffix == ".png":
         import vl_convert
 
         with replacing(output) as file:
             file.write_bytes(vl_convert.svg_to_png(picture, scale=2))
-    elif output.suffix == ".svg" or (output.suffix == ".html" and not options.profile):
-        write_text(output, picture)
     else:
-        raise InputError(
-            output, "output", output.suffix, "allowed: .svg, .png, .html (without --profile)"
-        )
+        write_text(output, picture)
     print(f"Picture: {output}")
-    return 0

@@ -15,8 +15,8 @@ def write_report(
     Every verdict is in every file: the main page and the page of its family, summary.json,
     .csv, .md, junit.xml, and failures.txt (empty when all passed); `bench.html` where other codes
     have results; `matrix.html` with families. `families` are files `family.yaml`, each in the
-    folder of its family. Returned are a line for each solve that did not pass, the outcome, and the
-    processor time by family.
+    folder of its family. Returned are the processor time by family, a line for each solve that did
+    not pass, and the outcome.
     """
     from ..system.files import write_text
     from . import tables
@@ -52,8 +52,8 @@ def write_report(
     write_script(folder)
     write_viewer(folder)
     complaints = "".join(f"{c}\n" for part in parts if (c := part.family.complaint))
-    said = f"{tables.outcome(rows)} Report: {folder / PAGE}\n{_costs(parts)}"
-    return f"{complaints}{contents['failures.txt']}{said}"
+    outcome = f"{tables.outcome(rows)} Report: {folder / PAGE}"
+    return f"{complaints}{_costs(parts)}\n{contents['failures.txt']}{outcome}"
 
 
 def _costs(sections: Sequence[Any]) -> str:

@@ -7,6 +7,7 @@ Interactive Graphics, IEEE TVCG 23 (2017) 341–350.
 """
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,8 +34,8 @@ SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
 DIGITS = 10
 # The values of a mark under the pointer: powers of ten as 1.2e-10.
 _FORMAT = ".4~g"
-# A logarithmic axis of less than so many times also has labels at 2, 3 and 5 times powers of ten.
-_FEW = 300.0
+# A logarithmic axis of at most so many times has labels at these multiples of powers of ten.
+_LABELS = {5.0: "units", 300.0: "halves", math.inf: "decades"}
 
 Spec = dict[str, Any]
 Record = Mapping[str, Any]
@@ -49,7 +50,7 @@ class Look:
     dashes: tuple[float, ...] = ()
 
 
-# Colour and mark by the shape of cells: either identifies them.
+# Colour and mark by the shape of cells.
 LOOKS = {
     "TRIA": Look(BLUE),
     "TETRA": Look(BLUE),
@@ -63,6 +64,15 @@ LOOKS = {
 def look_of(cells: str, looks: Mapping[str, Look] = LOOKS) -> Look:
     """The look of a cell type: the first of `looks` whose key its name begins with."""
     return next(look for shape, look in looks.items() if cells.startswith(shape))
+
+
+def distinct(looks: Mapping[str, Look]) -> dict[str, Look]:
+    """The looks, with another mark where one is taken."""
+    found: dict[str, Look] = {}
+    for name, look in looks.items():
+        others = (replace(look, shape=shape) for shape in (look.shape, *SHAPES))
+        found[name] = next((other for other in others if other not in found.values()), look)
+    return found
 
 
 @dataclass(frozen=True)
@@ -89,8 +99,8 @@ class Axis:
             scale = {"type": "log", "nice": False, "padding": 8}
         if self.domain:
             scale |= {"domain": list(self.domain), "padding": 0}
-        few = self.domain and self.domain[1] < _FEW * self.domain[0]
-        style = ("halves" if few else "decades") if self.log else "plain"
+        times = self.domain[1] / self.domain[0] if self.domain and self.log else math.inf
+        style = next(s for most, s in _LABELS.items() if times <= most) if self.log else "plain"
         return {
             "field": self.field,
             "type": "quantitative",

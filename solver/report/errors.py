@@ -42,7 +42,7 @@ _LOOKS = {
 _BAD = "not passed"
 # The chart goes down to round-off where an error is below this one.
 _NEAR = 1e-9
-# Labels of lines are apart by this share of the chart's height, at least.
+# A line has a label where the next one is this share of the chart's height above it, at least.
 _APART = 0.05
 # Smaller shares of a tolerance are drawn here: zero has no logarithm.
 _LEAST = 1e-9
@@ -73,13 +73,11 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
     found = {record["series"] for record in records}
     allowed = sorted({row.allowed for row in shown if row.allowed})
     shares = [*(record["error"] for record in records), *allowed]
-    low = EPSILON / 8 if floor(shown) else min(shares) / 10
+    low = EPSILON / 8 if floor(shown) else min(shares) / 3
     top = max(1e-2, 3 * max(shares))
     levels: list[Spec] = [floor_band(_unknowns(shown))] if floor(shown) else []
-    labelled = 0.0
-    for value in allowed:
-        apart = value > labelled * (top / low) ** _APART
-        labelled = value if apart else labelled
+    for value, above in zip(allowed, [*allowed[1:], float("inf")], strict=bool(allowed)):
+        apart = above > value * (top / low) ** _APART
         levels.append(level(value, f"tolerance {formats.error(value)}" if apart else "", RED))
     for code in reference_code:
         label = f"{code.name} {code.version}: {formats.error(code.error)}"

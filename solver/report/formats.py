@@ -81,3 +81,9 @@ def formula(text: str) -> Markup:
     """Text with what follows `_` set lower and what follows `^` higher: `σ_xx`, `r^(1/3)`."""
     lowered = re.sub(r"_([^\W⁰¹²³⁴-⁹]+)", r"<sub>\1</sub>", str(escape(text)))
     return Markup(re.sub(r"\^(?:\(([^)]*)\)|(\w+))", r"<sup>\1\2</sup>", lowered))
+
+
+def symbols(text: str) -> Markup:
+    """Text in which `_` and `^` after a single letter are set as in formulas: `c_n`, `a^(n+1)`."""
+    parts = re.split(r"(?<!\w)([^\W\d_](?:_\w+|\^\w+|\^\([^)]*\))+)(?!\w)", text)
+    return Markup("").join(formula(part) if i % 2 else part for i, part in enumerate(parts))

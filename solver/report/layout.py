@@ -1,17 +1,26 @@
-"""Common to all pictures: colours of both sides, bodies drawn apart, coordinates to pixels."""
+"""Common to all pictures: colours, where bodies go apart, what is pressed, outlines, normals."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from ..mesh.catalogue import cell_type
 from ..simulation.solution import BodyInfo, Solution, ZoneResult
 from .charts import BLUE, MUTED, ORANGE, PAPER
 from .svg import mixed
 
-Frame = tuple[float, float, float, float]  # x, y, width, height in pixels
+# From no pressure to the largest, light to dark: distinguished by lightness alone.
+PRESSURE = ("#f3f6fa", "#cfe1ee", "#9cc3dc", "#5f9dc6", "#2f75a8", "#174f7c")
+# From too little to too much.
+DEVIATION = ("#b35806", "#f1a340", "#fee0b6", "#f7f7f7", "#d8daeb", "#998ec3", "#542788")
+# Errors without a sign, from none to the largest.
+ERROR = ("#fff7ec", "#fdd49e", "#fc8d59", "#d7301f", "#7f0000")
+RELATIVE = "Δp / max p"
+# Errors of this size or less are round-off, and stay pale; values of the other sign below this
+# share of the largest are.
+_ROUND_OFF, _NO_SIGN = 1e-12, 1e-9
 # A picture of the contact shows this share of its extent around it.
 _AROUND = 0.15
-Placement = Callable[[np.ndarray], np.ndarray]  # coordinates (…, dim) to pixels (…, 2)
 
 
 def edge_color(body: BodyInfo) -> str:
@@ -22,6 +31,24 @@ def edge_color(body: BodyInfo) -> str:
 def tint(body: BodyInfo) -> str:
     """The light colour a body is filled with."""
     return mixed(edge_color(body), PAPER, 0.8)
+
+
+def color_map(title: str, values: np.ndarray) -> tuple[tuple[float, float], Sequence[str]]:
+    """Limits and colours of a map: the same on both sides of zero where values have two signs."""
+    low, high = float(values.min()), float(values.max())
+    most = max(abs(low), abs(high), _ROUND_OFF if "Δ" in title else 0.0) or 1.0
+    if min(-low, high) > _NO_SIGN * most or title == RELATIVE:
+        return (-most, most), DEVIATION
+    colors = ERROR if "Δ" in title else PRESSURE
+    # Of compression alone, dark is the largest.
+    return ((-most, 0.0), colors[::-1]) if high <= 0 and low < 0 else ((0.0, most), colors)
+
+
+def shade(share: float, colors: Sequence[str] = PRESSURE) -> str:
+    """The colour between the first and the last, `share` of the way."""
+    position = share * (len(colors) - 1)
+    k = min(int(position), len(colors) - 2)
+    return mixed(colors[k], colors[k + 1], position - k)
 
 
 def mean_normal(solution: Solution) -> np.ndarray:
@@ -52,25 +79,6 @@ def ways_apart(solution: Solution) -> np.ndarray:
             found[body] = found[slaves[0]] + _mean(zone.normal, np.eye(dim)[-1])
             moved.add(body)
     return found
-
-
-def apart(solution: Solution, share: float) -> np.ndarray:
-    """Points with bodies moved apart by `share` of the mesh's size, (n, dim)."""
-    return solution.mesh.points + share * solution.length * ways_apart(solution)[solution.body]
-
-
-def fit(points: np.ndarray, frame: Frame) -> Placement:
-    """A map of (…, 2) coordinates into the frame, y upward, shape kept, in its middle."""
-    x, y, width, height = frame
-    low, extent = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-300)
-    scale = min(width / extent[0], height / extent[1])
-    left, bottom = x + (width - scale * extent[0]) / 2, y + (height + scale * extent[1]) / 2
-
-    def place(values: np.ndarray) -> np.ndarray:
-        moved = (values - low) * scale
-        return np.stack([left + moved[..., 0], bottom - moved[..., 1]], axis=-1)
-
-    return place
 
 
 def pressed_box(points: np.ndarray, zones: Sequence[ZoneResult], within: np.ndarray) -> np.ndarray:
@@ -120,3 +128,37 @@ def extents(zone: ZoneResult, position: np.ndarray) -> tuple[np.ndarray, np.ndar
         np.minimum.at(start, owner, position[nodes].min(axis=1))
         np.maximum.at(end, owner, position[nodes].max(axis=1))
     return start, end
+
+
+def outlines(points: np.ndarray, kind: str, connectivity: np.ndarray) -> np.ndarray:
+    """Polygons (n, corners, dim) around faces of one type; mid-nodes only where an edge bends."""
+    face = cell_type(kind)
+    ring = points[connectivity[:, face.boundary]]
+    if face.order == 1 or face.dim == 1:
+        return ring
+    corners = ring[:, ::2]
+    bend = ring[:, 1::2] - (corners + np.roll(corners, -1, axis=1)) / 2
+    return ring if np.abs(bend).max(initial=0.0) > 1e-6 * np.ptp(points) else corners
+
+
+def macro_edges(faces: Iterable[tuple[str, np.ndarray, np.ndarray]]) -> np.ndarray:
+    """The edges around macro-elements, given their sub-faces (type, nodes, number).
+
+    Returns (n, 3): both ends, and the node between them, or an end again where there is none.
+    """
+    edges = []
+    for kind, nodes, owner in faces:
+        n, order = cell_type(kind).n_vertices, cell_type(kind).order
+        corners = nodes[:, :n]
+        pairs = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
+        pairs.sort()
+        middle = nodes[:, n : 2 * n].ravel() if order == 2 else pairs[:, 0]
+        edges.append(np.column_stack([pairs, middle, np.repeat(owner, n)]))
+    unique, counts = np.unique(np.concatenate(edges), axis=0, return_counts=True)
+    return np.unique(unique[counts == 1, :3], axis=0)
+
+
+def normals(polygons: np.ndarray) -> np.ndarray:
+    """Unit normals (n, 3) of nearly plane polygons (n, corners, 3)."""
+    turned = np.cross(polygons, np.roll(polygons, -1, axis=1)).sum(axis=1)
+    return turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-300)

@@ -14,7 +14,7 @@ from ..simulation.solution import Solution
 from ..system.errors import InputError
 from ..system.files import write_text
 from ..verification.results import read_result
-from . import plane, space
+from .case_picture import SIZES, draw_case
 from .charts import Chart
 from .html import TEMPLATES, render
 from .profile import draw_profile
@@ -23,29 +23,26 @@ from .surfaces import surfaces
 
 VIEWER = "viewer.js"
 
-MOST_CELLS = 100_000
-# Width and height by the dimension of the bodies.
-SIZES = {2: (plane.WIDTH, plane.HEIGHT), 3: (space.WIDTH, space.HEIGHT)}
-
 
 def picture(row: Row, folder: Path) -> Markup:
-    """The picture of one solve, a file in `folder`; else a line with the reason."""
-    kept = _kept(row, folder, ".svg", lambda row: draw(_solution(row), row.name))
-    if isinstance(kept, Markup):
-        return kept
-    turned = _turned(row, folder)
-    source, (width, height) = f"{folder.name}/{_name(row)}.svg", SIZES.get(row.dim, SIZES[3])
-    size = f"width={width} height={height}"
-    tag = f'<img class=mesh loading=lazy {size} src="{{}}" alt="{{}}: meshes and contact">'
-    return Markup(tag).format(quote(source), row.name) + turned
+    """The picture of one solve, a file in `folder`, and a button that turns its surfaces.
 
-
-def _turned(row: Row, folder: Path) -> Markup:
-    """A button that turns the result, its surfaces in a file beside the picture; else nothing."""
-    source = quote(f"{folder.name}/{_name(row)}.js")
-    kept = _kept(row, folder, ".js", lambda row: surfaces(_solution(row), source))
-    button = "<button type=button data-surfaces='{}' hidden>Turn, zoom, maps of errors</button>"
-    return Markup() if isinstance(kept, Markup) else Markup(button).format(source)
+    A line with the reason where there is no picture, or nothing to turn.
+    """
+    if row.result_file is None:
+        return Markup("<p class=none>No result, no picture.</p>")
+    name, (width, height) = f"{folder.name}/{_name(row)}", SIZES.get(row.dim, SIZES[3])
+    shown = _kept(row, folder, "picture", ".svg", lambda row: draw(_solution(row), row.name))
+    if not isinstance(shown, Markup):
+        size = f"width={width} height={height}"
+        tag = f'<img class=mesh loading=lazy {size} src="{{}}.svg" alt="{{}}: meshes and contact">'
+        shown = Markup(tag).format(quote(name), row.name)
+    file = f"{quote(name)}.js"
+    turned = _kept(row, folder, "view to turn", ".js", lambda row: surfaces(_solution(row), file))
+    if not isinstance(turned, Markup):
+        button = "<button type=button data-surfaces='{}' hidden>Turn, zoom, maps of errors</button>"
+        turned = Markup(button).format(file)
+    return shown + turned
 
 
 def write_viewer(folder: Path) -> None:
@@ -76,17 +73,13 @@ def profile(row: Row, folder: Path, along: Expression | None = None) -> Chart | 
         return json.dumps(vars(draw_pressure(_solution(row), row.name, along)))
 
     over = f"-{sha256(along.text.encode()).hexdigest()[:8]}" if along else ""
-    kept = _kept(row, folder, f"-profile{over}.json", draw_row)
+    kept = _kept(row, folder, "chart", f"-profile{over}.json", draw_row)
     return kept if isinstance(kept, Markup) else Chart(**json.loads(kept))
 
 
 def draw(solution: Solution, name: str) -> Markup:
-    """Meshes and contact pressure; raises ValueError where there are too many cells to draw."""
-    cells = sum(len(block.data) for block in solution.mesh.cells)
-    if cells > MOST_CELLS:
-        raise ValueError(f"{cells} cells are too many to draw")
-    drawn = plane.draw_plane if solution.mesh.points.shape[1] == 2 else space.draw_space
-    return drawn(solution, f"{name}: meshes and contact pressure")
+    """Meshes and contact pressure; raises ValueError where there are too many faces to draw."""
+    return draw_case(solution, f"{name}: meshes and contact pressure")
 
 
 def draw_pressure(
@@ -103,17 +96,17 @@ def draw_pressure(
     return draw_profile(solution, shown, f"pressure-{name}", title, along)
 
 
-def _kept(row: Row, folder: Path, ending: str, draw: Callable[[Row], str]) -> str:
+def _kept(row: Row, folder: Path, what: str, ending: str, draw: Callable[[Row], str]) -> str:
     if row.result_file is None:
-        return Markup("<p class=none>No result, no picture.</p>")
+        return Markup("<p class=none>No result, no {}.</p>").format(what)
     kept = folder / f"{_name(row)}{ending}"
     if not _is_current(kept, row.result_file):
         try:
             drawing = draw(row)
         except (InputError, OSError, LookupError, ValueError, ArithmeticError) as error:
             reason = f"{type(error).__name__}: {error}"
-            return Markup("<p class=none>No picture: {}</p>").format(reason)
-        write_text(kept, drawing)
+            return Markup("<p class=none>No {}: {}</p>").format(what, reason)
+        write_text(kept, str(drawing))
     return kept.read_text(encoding="utf-8")
 
 

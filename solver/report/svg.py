@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 from markupsafe import Markup, escape
 
-from .charts import INK
+from .charts import INK, PAPER
 
 Style = str | float | tuple[float, ...]
 
@@ -23,24 +23,18 @@ class Drawing:
 
     def polygons(self, points: np.ndarray, closed: bool = True, **style: Style) -> None:
         """Add polygons or lines of equally many points, (n, points, 2), as one path."""
-        if len(points):
-            self.path(self._data(points, closed), **style)
-
-    @staticmethod
-    def _data(points: np.ndarray, closed: bool = True) -> str:
+        if not len(points):
+            return
         pattern = "M%d %dl" + " ".join(["%d %d"] * (points.shape[1] - 1)) + ("Z" if closed else "")
         whole = np.rint(points * 10).astype(int)
         whole[:, 1:] -= whole[:, :-1].copy()  # steps have fewer digits than places
-        return pattern * len(points) % tuple(whole.ravel().tolist())
-
-    def path(self, data: str, **style: Style) -> None:
-        """Add a path whose data are in tenths of a pixel."""
+        data = pattern * len(points) % tuple(whole.ravel().tolist())
         self._parts.append(f'<path d="{data}"{_attributes(style)}/>')
 
     def rectangle(self, x: float, y: float, width: float, height: float, **style: Style) -> None:
         """Add an upright rectangle, (x, y) its upper left corner."""
         corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
-        self.path(self._data(np.array([corners])), **style)
+        self.polygons(np.array([corners]), True, **style)
 
     @contextmanager
     def clipped(self, x: float, y: float, width: float, height: float) -> Iterator[None]:
@@ -74,7 +68,8 @@ class Drawing:
         head = (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {w * 10:g} {h * 10:g}" '
             f'width="{w:g}" height="{h:g}" role="img" font-family="system-ui, sans-serif" '
-            f'stroke-linejoin="round"><title>{escape(self.title)}</title>'
+            f'stroke-linejoin="round" style="background:{PAPER}">'
+            f"<title>{escape(self.title)}</title>"
         )
         return Markup(head + "".join(self._parts) + "</svg>")
 

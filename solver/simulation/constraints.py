@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ..mechanics.fem.bodies import unheld_motion
+from ..mechanics.fem.bodies import support_resistance, unheld_motion
 from ..mechanics.linear.condensation import choose_pivots
 from ..system.errors import InputError
 from .naming import body_names
@@ -105,20 +105,35 @@ def unit_springs(scene: Scene) -> sparse.csr_matrix:
     return (sparse.diags_array(1 / np.where(largest > 0, largest, 1.0)) @ scene.springs).tocsr()
 
 
-def free_motion(
-    scene: Scene,
-    motions: sparse.csc_matrix,
-    constraints: ContactConstraints,
-    closed: np.ndarray,
-) -> str:
-    """The free motion with `closed` (k,) multipliers, in words; empty if nothing is free.
+@dataclass(frozen=True)
+class RigidMotions:
+    """The r rigid motions of all bodies, by what resists them.
 
-    `motions` (n_dofs, r): the rigid motions of all bodies.
+    `supports` (r, r): see `support_resistance`; `springs` (s, r) and `opened` (k, r): what each
+    motion changes in the rows of `unit_springs`, and the average gap that it opens. The motions
+    themselves take as much memory as several displacements.
     """
-    held = (sparse.diags(1 / constraints.covered[closed]) @ constraints.gaps[closed]).tocsr()
-    if scene.springs.nnz:
-        held = sparse.vstack([held, unit_springs(scene)]).tocsr()
-    found = unheld_motion(motions, scene.free.basis, held, scene.n_bodies)
+
+    supports: np.ndarray
+    springs: sparse.csr_matrix
+    opened: sparse.csr_matrix
+
+    @classmethod
+    def of(
+        cls, scene: Scene, constraints: ContactConstraints, motions: sparse.csc_matrix
+    ) -> "RigidMotions":
+        """What resists `motions` (n_dofs, r)."""
+        covered = constraints.covered
+        weight = np.divide(1.0, covered, out=np.zeros(len(covered)), where=covered > 0)
+        supports = support_resistance(motions, scene.free.basis)
+        opened = (sparse.diags(weight) @ constraints.gaps).tocsr() @ motions
+        return cls(supports, unit_springs(scene) @ motions, opened)
+
+
+def free_motion(scene: Scene, motions: RigidMotions, closed: np.ndarray) -> str:
+    """The free motion with `closed` (k,) multipliers, in words; empty if nothing is free."""
+    held = sparse.vstack([motions.opened[closed], motions.springs]).tocsr()
+    found = unheld_motion(motions.supports, held, scene.n_bodies)
     if found is None:
         return ""
     return f"nothing keeps {body_names(scene)[found[0]]} from a free motion ({found[1]})"
@@ -169,4 +184,11 @@ def _refuse_surfaces(scene: Scene, touching: np.ndarray) -> None:
             raise InputError(scene.case.path, key, master, allowed)
         if not touching[zone.numbers].any():
             allowed = f"does not lie over {slave} anywhere along the normals of {slave}"
+            if worst > 0:
+                allowed = (
+                    f"covers at most {worst:.1e} of a slave face of {slave}: do both bodies have "
+                    "the same unit of length?"
+                )
+            elif (body := scene.case.rigid.get(master)) and body.surface == "plane":
+                allowed += "; the normal of a rigid plane points out of the body"
             raise InputError(scene.case.path, key, master, allowed)

@@ -1,9 +1,8 @@
 """The stiffness of a scene's free unknowns, and what these unknowns are."""
 
 import numpy as np
-from scipy import sparse
 
-from ..mechanics.fem.bodies import nodes_of_unknowns, rigid_motions, whole_motions
+from ..mechanics.fem.bodies import nodes_of_unknowns, whole_motions
 from ..mechanics.fem.elasticity import stiffness
 from ..mechanics.fem.vertices import from_vertices, linear_unknowns
 from ..mechanics.linear.choice import against_multigrid
@@ -43,15 +42,16 @@ def free_stiffness(scene: Scene, unknowns: Unknowns, single: bool) -> tuple[Stif
     return StiffenedMatrix(soft, divergence, weight, schur, mean.stable), diagonal
 
 
-def free_unknowns(scene: Scene, motions: sparse.csc_matrix) -> Unknowns:
-    """The meaning of a scene's free unknowns, given the rigid motions of its bodies."""
+def free_unknowns(scene: Scene) -> Unknowns:
+    """The meaning of a scene's free unknowns."""
     basis, dim = scene.free.basis, scene.points.shape[1]
     node = nodes_of_unknowns(basis, dim)
-    if scene.case.axisymmetric:
-        # Those of the sections in their plane: they hardly strain rings far from the axis.
-        motions = rigid_motions(scene.points, scene.body)
-    together = basis.T @ whole_motions(motions, scene.n_bodies)
-    about = dim, node, together, scene.body[node], scene.points
+
+    def motions() -> np.ndarray:
+        # Those of axisymmetric sections in their plane hardly strain rings far from the axis.
+        return np.asarray(basis.T @ whole_motions(scene.points, scene.body))
+
+    about = dim, node, motions, scene.body[node], scene.points
     if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
         return Unknowns(*about)
     return Unknowns(

@@ -19,6 +19,7 @@ from ..system.errors import SolveError
 from ..system.memory import release
 from .accuracy import Accuracy, Roughness, estimate, judged, roughness
 from .constraints import (
+    RigidMotions,
     contact_constraints,
     free_motion,
     refuse_unsolvable,
@@ -99,23 +100,25 @@ class ContactProblem:
         """Assemble; raises InputError where nothing can hold a body or a macro-element's node."""
         self.scene = scene
         self.constraints = contact_constraints(scene)
-        self.motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
+        motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
+        self._motions = RigidMotions.of(scene, self.constraints, motions)
         self._moves: dict[bytes, str] = {}
         refuse_unsolvable(scene, self._free_motion(self.constraints.eligible), self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
-        loose = unsupported(self.motions, scene.free.basis)
+        loose = unsupported(motions, self._motions.supports)
         self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
         self.unsupported = loose
         if scene.springs.nnz:
-            self.unsupported = unsupported(self.motions, scene.free.basis, unit_springs(scene))
+            self.unsupported = unsupported(motions, self._motions.supports, unit_springs(scene))
         refined = scene.options.safeguards.refinement
         self.single = refined and scene.n_dofs >= SINGLE_FROM
+        del motions  # memory for the stiffness
         self._assemble()
 
     def _assemble(self) -> None:
         scene, on_free = self.scene, self.constraints.on_free
         own = None if len(self.constraints.dependent) else self.constraints.own
-        unknowns = free_unknowns(scene, self.motions)
+        unknowns = free_unknowns(scene)
         if scene.n_dofs > _LARGE:
             release()
         self.matrix, self.diagonal = free_stiffness(scene, unknowns, self.single)
@@ -232,7 +235,7 @@ class ContactProblem:
         """See `free_motion`; the last answer is kept, as a guess is asked about more than once."""
         key = closed.tobytes()
         if key not in self._moves:
-            self._moves = {key: free_motion(self.scene, self.motions, self.constraints, closed)}
+            self._moves = {key: free_motion(self.scene, self._motions, closed)}
         return self._moves[key]
 
     def _at_rest(
@@ -241,7 +244,8 @@ class ContactProblem:
         """The start of a solve with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
-            raise SolveError(f"{moves} once {int((~closed).sum())} macro-elements are open")
+            opened = f"{moves} once {int((~closed).sum())} macro-elements are open"
+            raise SolveError(f"{opened}: the loads part the bodies, or a support is missing")
         acting, offset = scene.acting(step)
         return ContactIterate(
             scene=scene,
@@ -298,6 +302,8 @@ class ContactProblem:
             _LOG.info("the stiffness is assembled again, in double precision")
             self.single = False
             self._systems.forget()
+            # Nothing holds the first stiffness while the second is made.
+            del system, self.matrix, self._systems
             self._assemble()
             system = self._constrained(start.closed)
             found = self._once(system, start, scale, status, correction, round_off)

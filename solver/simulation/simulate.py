@@ -3,6 +3,8 @@
 import logging
 import resource
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import meshio
 import numpy as np
@@ -45,6 +47,8 @@ from .unloaded import without_unloaded
 from .validity import remarks, validity
 
 _LOG = logging.getLogger(__name__)
+# Forces below this fraction of the largest one are shown as zero.
+_NOISE = 1e-10
 # Half, up to round-off.
 _HALF = 0.5 - 1e-9
 
@@ -69,6 +73,7 @@ def simulate(
             scene = without_unloaded(scene)
     macro_elements = sum(zone.count for zone in scene.zones)
     _LOG.log(OUTCOME, "%d unknowns, %d macro-elements", scene.n_dofs, macro_elements)
+    _log_gaps(scene)
     with stage(clock, "assembly"):
         problem = ContactProblem(scene)
     solution = solve_problem(problem, clock)
@@ -87,7 +92,7 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     plan += noted(problem, states)
     with stage(clock, "recovery"):
         solution = _recover(problem, states, fields, plan)
-    _tell_forces(solution)
+    _log_forces(solution)
     solution.plan += [*estimated(solution), *remarks(solution.validity), *yielding(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
@@ -95,16 +100,32 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     return solution
 
 
-def _tell_forces(solution: Solution) -> None:
+def _log_gaps(scene: Scene) -> None:
+    """Log the initial gaps of zones whose surfaces do not touch everywhere."""
+    for zone in scene.zones:
+        met = zone.operator.covered > 0
+        gaps = zone.operator.initial[met] / zone.operator.covered[met]
+        if gaps.any():
+            text = "zone %s: initial gap %.4g to %.4g" + ", an overlap" * bool(gaps.min() < 0)
+            _LOG.log(OUTCOME, text, zone.zone.name, gaps.min(), gaps.max())
+
+
+def _log_forces(solution: Solution) -> None:
     """Log the forces of each step, and the largest displacement and strain of the last."""
+    shown = partial(_without_noise, float(np.ptp(solution.mesh.points, axis=0).max()))
     for step, given in zip(solution.steps, solution.case.steps, strict=True):
         of_step = f"{_called(given, step.factor)}, " if len(solution.steps) > 1 else ""
-        for name, forces in step.resultants.items():
-            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, forces)
+        forces = [one.force for one in step.resultants.values()]
+        forces += [one.force for one in step.reactions] + [one.force for one in step.rigid]
+        most = max((float(np.abs(force).max()) for force in forces), default=0.0)
+        for name, contact in step.resultants.items():
+            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, shown(most, contact))
         for reaction in step.reactions:
-            _LOG.log(OUTCOME, "%sreaction of %s: %s", of_step, reaction.group, reaction)
+            text = "%sreaction of %s: %s"
+            _LOG.log(OUTCOME, text, of_step, reaction.group, shown(most, reaction))
         for body in step.rigid:
-            _LOG.log(OUTCOME, "%scontact on rigid body %s: %s", of_step, body.body, body)
+            text = "%scontact on rigid body %s: %s"
+            _LOG.log(OUTCOME, text, of_step, body.body, shown(most, body))
     for name, probe in solution.probes.items():
         for line in probe.lines():
             _LOG.log(OUTCOME, "probe %s %s", name, line)
@@ -113,6 +134,16 @@ def _tell_forces(solution: Solution) -> None:
     values = largest, at, solution.validity.strain, solution.strain_energy
     text = "largest displacement %.6g at (%s), largest strain %.3g, strain energy %.6g"
     _LOG.log(OUTCOME, text, *values)
+
+
+def _without_noise(length: float, most: float, found: Any) -> Any:
+    """A resultant without the round-off beside `most`, the largest force, and its moments."""
+    force, moment = found.force, found.moment
+    return replace(
+        found,
+        force=np.where(np.abs(force) < _NOISE * most, 0.0, force),
+        moment=np.where(np.abs(moment) < _NOISE * most * length, 0.0, moment),
+    )
 
 
 def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:

@@ -150,9 +150,10 @@ class Resultants:
     pressure: np.ndarray | None = None
 
     def __str__(self) -> str:
-        area, low, high = (f"{value:.5g}" for value in self.area)
+        area, *bounds = (f"{value:.5g}" for value in self.area)
+        within = "" if {*bounds} == {area} else f" (between {' and '.join(bounds)})"
         force, moment = (", ".join(f"{x:.6g}" for x in v) for v in (self.force, self.moment))
-        text = f"contact area {area} ({low} to {high}), force ({force}) on the slave, "
+        text = f"contact area {area}{within}, force ({force}) on the slave, "
         text += f"moment ({moment})"
         if self.pressure is not None:
             low, high = (f"{value:.6g}" for value in self.pressure)

@@ -16,6 +16,7 @@ from ..mechanics.fem.bodies import (
     joined_bodies,
     nodes_of_unknowns,
     rigid_motions,
+    support_resistance,
     unheld_motion,
 )
 from ..mechanics.fem.supports import FreeMotion
@@ -85,8 +86,9 @@ def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:
     there = covered > 0
     per_area = sparse.diags(1 / covered[there]) @ gaps[there]
     motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
-    held = sparse.vstack([per_area, unit_springs(scene)]).tocsr()
-    return unheld_motion(motions, scene.free.basis, held, scene.n_bodies) is not None
+    opened = sparse.vstack([per_area, unit_springs(scene)]).tocsr() @ motions
+    supports = support_resistance(motions, scene.free.basis)
+    return unheld_motion(supports, opened, scene.n_bodies) is not None
 
 
 def _gaps(scene: Scene) -> sparse.csr_matrix:

@@ -13,6 +13,7 @@ from threading import Lock
 from typing import Any
 
 _WORTH = 5_000_000  # numbers: 60,000 unknowns of HEXA8
+_PARTS: list[Callable[..., Any]] = []  # that Numba does not know yet
 
 
 @cache
@@ -29,6 +30,12 @@ def worthwhile(numbers: int) -> bool:
     return available() and (numbers >= _WORTH or "numba" in sys.modules)
 
 
+def part_of_compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same function, which compiled functions of its file may call."""
+    _PARTS.append(function)
+    return function
+
+
 def compiled(function: Callable[..., None]) -> Callable[..., None]:
     """The function compiled at its first call; ImportError there where Numba is missing.
 
@@ -38,7 +45,10 @@ def compiled(function: Callable[..., None]) -> Callable[..., None]:
     @cache
     def machine_code() -> Any:
         from numba import njit
+        from numba.extending import register_jitable
 
+        while _PARTS:
+            register_jitable(_PARTS.pop())
         options: dict[str, Any] = {"nogil": True, "fastmath": {"contract"}}
         try:
             return njit(cache=True, **options)(function)

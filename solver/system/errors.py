@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-# Names that a message lists.
-_MOST = 60
+# Names that a message lists: all of up to so many, else the nearest ones.
+_ALL, _NEAREST = 24, 12
 
 
 class InputError(Exception):
@@ -54,12 +54,17 @@ def printable(name: object) -> str:
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """`did you mean …?` when one of the known names is near, and the first of them."""
+    """`did you mean …?` if one of the known names is near, and the names, the nearest of many."""
     known = sorted(known)
+    if not known:
+        return "there is none"
+    listed = known
+    if len(known) > _ALL:
+        listed = get_close_matches(str(name), known, n=_NEAREST, cutoff=0.0)
+    more = f" and {len(known) - len(listed)} more" if len(known) > len(listed) else ""
+    allowed = f"allowed: {', '.join(listed)}{more}"
     near = get_close_matches(str(name), known, n=1)
-    more = f" and {len(known) - _MOST} more" if len(known) > _MOST else ""
-    listed = f"allowed: {', '.join(known[:_MOST])}{more}" if known else "there is none"
-    return f"did you mean {near[0]}? ({listed})" if near else listed
+    return f"did you mean {near[0]}? ({allowed})" if near else allowed
 
 
 def key_path(keys: Iterable[str | int]) -> str:

@@ -3,11 +3,14 @@
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from functools import cache
+from threading import current_thread
 from typing import TypeVar
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
+_NAME = "ahead"
 
 
 def cores() -> int:
@@ -27,25 +30,37 @@ def ahead(function: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator
     """`function` of each part, in the order of the parts; threads compute the next few ahead.
 
     A sum of the results thus has the same digits for any number of threads. An exception comes in
-    its place. A single part, or a single thread, is computed here.
+    its place. A single part, or a single thread, is computed here, and so is everything in one of
+    these threads.
 
     >>> list(ahead(lambda x: x * x, range(5)))
     [0, 1, 4, 9, 16]
     """
     parts = list(parts)
     count = min(workers(), len(parts))
-    if count < 2:
+    if count < 2 or current_thread().name.startswith(_NAME):
         yield from map(function, parts)
         return
     waiting: deque[Future[Result]] = deque()
-    with ThreadPoolExecutor(count) as pool:
-        try:
-            for part in parts:
-                waiting.append(pool.submit(function, part))
-                if len(waiting) > count:
-                    yield waiting.popleft().result()
-            while waiting:
+    pool = _pool(count)
+    try:
+        for part in parts:
+            waiting.append(pool.submit(function, part))
+            if len(waiting) > count:
                 yield waiting.popleft().result()
-        finally:
-            for future in waiting:
-                future.cancel()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        for future in waiting:
+            future.cancel()
+        wait(waiting)
+
+
+@cache
+def _pool(count: int) -> ThreadPoolExecutor:
+    """So many threads, which wait for work from one call to the next."""
+    return ThreadPoolExecutor(count, _NAME)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)

@@ -36,8 +36,9 @@ if TYPE_CHECKING:
     from ..simulation.solution import Solution
 
 NOT_VERIFIED = "not verified: compared with no reference"
+NOT_JUDGED = "not verified: the tolerances belong to another recovery"
 # The arguments of `Case.as_solved`.
-Told = tuple[bool, str | None, str | None]
+SolvedAs = tuple[bool, str | None, str | None]
 # The checks of accuracy: their errors are relative to the reference.
 ACCURACY = (
     "multiplier",
@@ -97,7 +98,7 @@ def judge(
         verdict=word,
         passed=word == PASSED,
         judged=_judged(checks) if word == PASSED else "",
-        reason=_first_of(reasons) or (NOT_VERIFIED if word == SOLVED else ""),
+        reason=_first_of(reasons) or (_unverified(solution.case) if word == SOLVED else ""),
         result=result,
         result_sha256=sha256,
         **{name: getattr(solution, name) for name in _OF_SOLUTION},
@@ -121,24 +122,29 @@ def judge(
     )
 
 
+def _unverified(case: Case) -> str:
+    """Why a sound solve is compared with nothing: see `Case.as_solved`."""
+    return NOT_JUDGED if case.reference_kind and not case.reference else NOT_VERIFIED
+
+
 def without_result(
     word: str,
     reason: str,
     case: Case | Path,
-    told: Told = (False, None, None),
+    solved_as: SolvedAs = (False, None, None),
     transient: bool = False,
 ) -> Verdict:
     """The verdict of a solve that was refused, failed or crashed, for the reason given.
 
-    `case` is the path of the case file where the file itself could not be read; `told` are the
+    `case` is the path of the case file where the file itself could not be read; `solved_as` are the
     arguments of `Case.as_solved`.
     """
-    return Verdict(**_identity(case, told), verdict=word, reason=reason, transient=transient)
+    return Verdict(**_identity(case, solved_as), verdict=word, reason=reason, transient=transient)
 
 
-def _identity(case: Case | Path, told: Told) -> dict[str, Any]:
+def _identity(case: Case | Path, solved_as: SolvedAs) -> dict[str, Any]:
     """The identity of a solve, and the origin of its reference."""
-    swapped, hexahedra, recovery = told
+    swapped, hexahedra, recovery = solved_as
     found: dict[str, Any] = {
         "swapped": swapped,
         "direction": "swapped" if swapped else "first",
@@ -158,7 +164,7 @@ def _identity(case: Case | Path, told: Told) -> dict[str, Any]:
             "reference_remark": case.reference_remark,
             "reference_solution": case.solution.name if case.solution else None,
         }
-    return found | {"case": name, "family": family, "job": job_name(name, *told)}
+    return found | {"case": name, "family": family, "job": job_name(name, *solved_as)}
 
 
 def _judged(checks: Iterable[CheckResult]) -> str:

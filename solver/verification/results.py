@@ -306,9 +306,9 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
 
 def _read_case(group: h5py.Group) -> Case:
     case = parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
-    told = group.attrs
+    kept = group.attrs
     return case.as_solved(
-        bool(told["swapped"]), told["hexahedra"] or None, told["recovery"] or None
+        bool(kept["swapped"]), kept["hexahedra"] or None, kept["recovery"] or None
     )
 
 

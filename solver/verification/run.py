@@ -65,13 +65,13 @@ class Job:
     everything: bool = False
 
     @property
-    def told(self) -> tuple[bool, str | None, str | None]:
+    def solved_as(self) -> tuple[bool, str | None, str | None]:
         """The arguments of `Case.as_solved`."""
         return self.swapped, self.hexahedra, self.recovery
 
     def of(self, case: Case) -> Case:
         """The case as this job solves it."""
-        return case.as_solved(*self.told)
+        return case.as_solved(*self.solved_as)
 
 
 def refined(case: Case, factor: int) -> Case:
@@ -122,7 +122,7 @@ def solve(job: Job, output: Path, verdict_file: Path | None) -> Verdict:
     except Exception as error:
         if verdict_file:
             word, reason, transient = _ending(error)
-            ended = without_result(word, reason, case or job.case, job.told, transient)
+            ended = without_result(word, reason, case or job.case, job.solved_as, transient)
             write_verdict(verdict_file, ended)
         raise
     if verdict_file:
@@ -174,7 +174,7 @@ def record_crash(
         reason = _death(status) + (f"; last words: {said}" if said else "")
     else:
         reason = said or "the process died without a word"
-    verdict = without_result(CRASHED, reason, case, job.told, transient=True)
+    verdict = without_result(CRASHED, reason, case, job.solved_as, transient=True)
     write_verdict(verdict_file, verdict)
     return verdict
 

@@ -3,8 +3,8 @@
 A smooth pressure differs from the trend of its neighbours by little, and neighbours differ by the
 same sign. Where it oscillates, they differ by opposite signs. The trend at a macro-element is the
 linear least squares fit to others within half a master face, because the facets of a master that
-is coarser than the slave are the cause of most oscillations (docs/oscillation.md). A contact area
-that the facets break into spots smaller than themselves is the same fault in an extreme form.
+is coarser than the slave are the cause of most oscillations (docs/slave-and-master.md). A contact
+area that the facets break into spots smaller than themselves is the same fault in an extreme form.
 """
 
 from collections.abc import Iterable

@@ -89,7 +89,7 @@ class CheckResult:
         """Why the check failed, in one line; empty where it holds."""
         if not self.error <= self.tolerance:
             return (
-                f"{self.title}: {self.value:.9g} at {self.where}, reference {self.reference:.9g}: "
+                f"{self.title}: {self.value:.9g} ({self.where}), reference {self.reference:.9g}: "
                 f"error {self.error:.2e}, tolerance {self.tolerance:.1e}"
             )
         if self.regression and not self.regression.passed:

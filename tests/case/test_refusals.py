@@ -26,6 +26,9 @@ REFUSED = [
     # unknown keys, with the nearest allowed one
     ('"a\\nb": 1', "'a\\nb' = 1: unknown key; allowed: "),
     ("suports: []", "suports = []: unknown key; did you mean supports?"),
+    ("bodies: {die: {E: 1}}", "bodies.die.E = 1: the keys of a material are young and poisson"),
+    ("bodies: {die: {nu: 0}}", "bodies.die.nu = 0: the keys of a material are young and poisson"),
+    ("loads: [{group: g, pressure: '8,03'}]", "'8,03': write numbers with a point: 8.03"),
     ("plane: stressed", "plane = 'stressed': must be strain, stress or axisymmetric"),
     ("transform: {rotation: 1}", "transform.rotation = 1: unknown key; did you mean rotate?"),
     ("transform: {scale: 0}", "transform.scale = 0: must be a positive number"),

@@ -111,7 +111,7 @@ FAULTS = {
     "one wrong node": (
         lambda a: a.changed(stress=a.stress + 0.1 * np.eye(len(a.stress), 6, -7)),
         1,
-        "failed: nodal_stress: -24.9 at node 8",
+        "failed: nodal_stress: -24.9 (node 8)",
     ),
     "mesh in m": (lambda a: a.changed(points=1e-3 * a.points), 2, "lengths are 10⁻³ times"),
     "mirrored": (lambda a: a.changed(points=a.points * [-1, 1]), 2, "the mesh is mirrored in x"),

@@ -68,6 +68,31 @@ def test_passed_is_0(small, capsys):
     assert capsys.readouterr().out.splitlines()[-1].startswith("small: passed, worst error ")
 
 
+def test_solve_prints_forces_without_round_off_and_the_initial_gap(small, capsys):
+    """25 on a width of 50 in plane strain, ε_y = −25 · 0.91 / 2000, ε_x = 25 · 0.39 / 2000."""
+    assert solve(small)[0] == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1:5] == [
+        "load factor 1: 1 iteration, 3 closed, residual " + lines[1].rpartition(" ")[2],
+        (
+            "zone interface: pressure 25 to 25, contact area 50, force (0, -1250) on the slave, "
+            "moment (0, 0, -31250)"
+        ),
+        "reaction of symx: force (0, 0), moment (0, 0, 0)",
+        "reaction of base: force (0, 1250), moment (0, 0, 31250)",
+    ]
+    height, width = 100 * 25 * 0.91 / 2000, 50 * 25 * 0.39 / 2000
+    strain = f"largest strain {height / 100:.3g}, strain energy {1250 * height / 2:.6g}"
+    assert (
+        lines[5]
+        == f"largest displacement {(height**2 + width**2) ** 0.5:.6g} at (50, 50), {strain}"
+    )
+    change(small, "master: top_contact", "master: top_contact, interference: 0.25")
+    solve(small)
+    gap = "zone interface: initial gap -0.25 to -0.25, an overlap"
+    assert gap in capsys.readouterr().out.splitlines()
+
+
 def test_without_a_reference_a_solve_is_solved_with_0_and_not_passed(small, capsys):
     (small / "c.yaml").write_text(PLANE[: PLANE.index("reference:")])
     status, verdict = solve(small)

@@ -65,6 +65,10 @@ def test_inspect(tmp_path, capsys):
     assert "3 QUAD4; 10 nodes; [0, 1.25] × [0, 2.5]; edges 0.5 … 1" in lines[0]
     assert lines[-2].startswith("gap of foot to top of lower: 0.5 … 0.5, mean 0.5; 75 % of the")
     assert ">top of lower</text>" in picture.read_text()
+    assert main(["inspect", str(file), "-o", str(tmp_path / "m.png")]) == 0
+    assert (tmp_path / "m.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["inspect", str(file), "-o", str(tmp_path / "m.html")]) == 2
+    assert capsys.readouterr().err.endswith("output = '.html': allowed: .svg, .png\n")
 
 
 def test_a_mesh_in_space_is_drawn_with_what_the_eye_sees(tmp_path):
@@ -88,9 +92,7 @@ def test_plot(tmp_path, capsys):
     assert "src=" not in page, "it stands alone"
     assert main(["plot", str(file), "--profile", "-o", str(tmp_path / "q.html")]) == 2
     assert main(["plot", str(file), "-o", str(tmp_path / "p.gif")]) == 2
-    assert capsys.readouterr().err.endswith(
-        "output = '.gif': allowed: .svg, .png, .html (without --profile)\n"
-    )
+    assert capsys.readouterr().err.endswith("output = '.gif': allowed: .svg, .png, .html\n")
 
 
 def test_list(capsys):
@@ -100,6 +102,15 @@ def test_list(capsys):
     assert "cases/loads/" in capsys.readouterr().out
     assert main(["list", "load"]) == 2
     assert "did you mean loads?" in capsys.readouterr().err
+
+
+def test_an_unknown_command_names_the_nearest_and_no_internal_one(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["slove", "case.yaml"])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert "no such command: slove; did you mean solve? (allowed: accept, check, " in said
+    assert not {"serve", "crashed", "jobs", "orders"} & set(re.findall(r"\w+", said))
 
 
 def test_help_lists_what_people_use_in_the_order_of_use(capsys):

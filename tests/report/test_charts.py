@@ -14,6 +14,7 @@ from solver.report.charts import (
     SCRIPT,
     Axis,
     Look,
+    distinct,
     floor_band,
     level,
     series_chart,
@@ -84,6 +85,24 @@ def test_slopes_are_powers():
         ]
         (low, high) = rows
         assert high["y"] / low["y"] == pytest.approx((high["x"] / low["x"]) ** order)
+
+
+def test_a_logarithmic_axis_has_labels_wherever_it_begins():
+    """At powers of ten, at 2, 3 and 5 times these, or at every tick, by the length of the axis."""
+    styles = {
+        span: Axis("x", "x", log=True, domain=(7.0, 7.0 * span)).channel()["axis"]["style"]
+        for span in (3, 100, 1e4)
+    }
+    assert styles == {3: "units", 100: "halves", 1e4: "decades"}
+    assert Axis("x", "x", domain=(7.0, 21.0)).channel()["axis"]["style"] == "plain"
+
+
+def test_no_two_series_look_the_same():
+    same = dict.fromkeys("abc", Look(BLUE)) | {"d": Look(ORANGE)}
+    looks = distinct(same)
+    assert len(set(looks.values())) == 4
+    assert (looks["a"], looks["d"]) == (Look(BLUE), Look(ORANGE))
+    assert {look.color for look in looks.values()} == {BLUE, ORANGE}
 
 
 def test_the_floor_grows_with_the_root_of_the_unknowns():

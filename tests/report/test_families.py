@@ -72,6 +72,8 @@ def test_paragraphs_that_are_indented_are_formulas(file):
         (False, "Without friction."),
     ]
     assert formats.formula("q^d < p_rr") == "q<sup>d</sup> &lt; p<sub>rr</sub>"
+    symbols = formats.symbols("c_n r^(n+1) < σ_θθ: surface_stress, 1e-3_x")
+    assert symbols == ("c<sub>n</sub> r<sup>n+1</sup> &lt; σ<sub>θθ</sub>: surface_stress, 1e-3_x")
     assert formats.formula("r^(1/3)") == "r<sup>1/3</sup>"
     assert formats.formula("ν_1²/E_1") == "ν<sub>1</sub>²/E<sub>1</sub>"
 
@@ -217,10 +219,12 @@ def test_a_solve_that_is_held_against_norms_alone_shows_the_largest(tmp_path):
     assert "Not drawn" not in Page(tmp_path / "fam.html").text
 
 
-def test_the_cost_of_each_family_is_told(tmp_path):
+def test_the_cost_of_each_family_is_printed_before_the_outcome(tmp_path):
     verdicts = [verdict("a", "passed"), verdict("b", "passed", family="other", cpu_seconds=2.0)]
     logged = report(tmp_path, verdicts)
-    assert "Processor time by family (solves): fam 0.7 s (1), other 2.0 s (1)." in logged
+    first, *_, last = logged.splitlines()
+    assert first == "Processor time by family (solves): fam 0.7 s (1), other 2.0 s (1)."
+    assert last.startswith("All 2 solves passed. Report: ")
     assert "2.00 s of processor time" in Page(tmp_path / "summary.html").text
 
 

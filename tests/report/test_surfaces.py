@@ -9,8 +9,9 @@ import pytest
 from solver.case.reader import load_case
 from solver.mesh.catalogue import cell_type
 from solver.report.layout import ways_apart
-from solver.report.obstacles import obstacle
-from solver.report.surfaces import _split, magnification, surfaces
+from solver.report.parts import rigid_surface
+from solver.report.surfaces import magnification, split, surfaces
+from solver.simulation.solution import BodyInfo
 from tests import handmade
 
 
@@ -90,7 +91,7 @@ def test_pressure_and_deviation_jump_between_macro_elements(tmp_path):
 )
 def test_triangles_fill_a_face_and_use_its_mid_nodes(kind, number):
     face = cell_type(kind)
-    found = _split([(kind, np.arange(face.n_nodes)[None])])
+    found = split([(kind, np.arange(face.n_nodes)[None])])
     corners = face.nodes[found["triangles"]]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     areas = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
@@ -107,6 +108,7 @@ def with_rigid(folder, body, make=handmade.plane):
     solution = make(folder)
     (folder / "case.yaml").write_text(f"{text}bodies: {{die: {body}}}\n")
     solution.case = load_case(folder / "case.yaml")
+    solution.bodies[1] = BodyInfo("die", {}, 0, "master")
     return solution
 
 
@@ -114,13 +116,16 @@ SPHERE = "{sphere: {centre: [25, 80], radius: 80}}"
 
 
 def test_a_rigid_circle_is_drawn_opposite_to_the_slave(tmp_path):
-    found = obstacle(with_rigid(tmp_path, SPHERE), "die")
-    away = found.points - [25, 80]
+    solution = with_rigid(tmp_path, SPHERE)
+    solution.displacement[14:] = [0.5, -0.25]
+    points, moved, _, out = rigid_surface(solution, 1)
+    away = points - [25, 80, 0]
     assert np.linalg.norm(away, axis=1) == pytest.approx(80)
-    assert found.out == pytest.approx(away / 80)
-    assert found.points[:, 0].min() < 0 < 50 < found.points[:, 0].max()
-    assert found.points[:, 1].min() == pytest.approx(0, abs=0.1)  # between two points
-    assert obstacle(handmade.plane(tmp_path), "top") is None
+    assert out == pytest.approx(away / 80)
+    assert moved == pytest.approx(np.tile([0.5, -0.25, 0], (len(points), 1)))
+    assert points[:, 0].min() < 0 < 50 < points[:, 0].max()
+    assert points[:, 1].min() == pytest.approx(0, abs=0.1)  # between two points
+    assert rigid_surface(handmade.plane(tmp_path), 1) is None
 
 
 @pytest.mark.parametrize(
@@ -138,20 +143,20 @@ def test_a_rigid_circle_is_drawn_opposite_to_the_slave(tmp_path):
     ],
 )  # fmt: skip
 def test_rigid_surfaces_in_space(tmp_path, body, implicit):
-    found = obstacle(with_rigid(tmp_path, body, handmade.solid), "die")
-    assert implicit(*found.points.T) == pytest.approx(0, abs=1e-9)
-    low, high = found.points.min(axis=0), found.points.max(axis=0)
+    points, _, _, out = rigid_surface(with_rigid(tmp_path, body, handmade.solid), 1)
+    assert implicit(*points.T) == pytest.approx(0, abs=1e-9)
+    low, high = points.min(axis=0), points.max(axis=0)
     assert (low[:2] < 0).all(), "beyond the slave"
     assert (high[:2] > 10).all()
     assert ((low + high) / 2)[:2] == pytest.approx([5, 5], abs=0.5), "opposite to the slave"
-    assert np.abs(found.points[:, 2]).min() < 1.8
-    assert found.out[:, 2].min() < -0.7, "out of the body, towards the slave below"
+    assert np.abs(points[:, 2]).min() < 1.8
+    assert out[:, 2].min() < -0.7, "out of the body, towards the slave below"
 
 
 @pytest.mark.parametrize(
-    ("largest", "expected"), [(1.0, 5.0), (0.003, 2000.0), (70.0, 0.05), (0.0, 1.0)]
+    ("largest", "expected"), [(1.0, 10.0), (0.003, 1000.0), (70.0, 0.1), (0.0, 1.0)]
 )
-def test_the_displacement_is_magnified_by_a_round_number(largest, expected):
+def test_the_displacement_is_magnified_by_a_power_of_ten(largest, expected):
     assert magnification(np.array([[0.0, largest]]), 100.0) == expected
 
 

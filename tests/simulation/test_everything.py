@@ -128,7 +128,7 @@ def test_a_plane_solve_imports_nothing_of_three_dimensions(tmp_path):
     of_space = {
         "solver.mechanics.fem.extra_elements",
         "solver.mesh.recipes.hybrid",
-        "solver.report.space",
+        "solver.report.case_picture",
     }
     assert not loaded & of_space
     assert not any(name.startswith("solver.report") for name in loaded)

@@ -123,7 +123,16 @@ def cell_upon_cell(mesh):
     return rebuilt(mesh, np.vstack([mesh.points, mesh.points[quad[2:]]]), quads), []
 
 
+def a_thousandth(mesh):
+    """The upper unit block in metres, the lower one in millimetres."""
+    points, top = mesh.points.copy(), nodes_of(mesh, "top")
+    middle = points[top].min(axis=0)
+    points[top] = middle + 1e-3 * (points[top] - middle)
+    return rebuilt(mesh, points), []
+
+
 REFUSED = [
+    (a_thousandth, "covers at most 3.0e-03 of a slave face of bottom_contact: do both bodies"),
     (folded, "mesh: QUAD4 5: flat or folded: the Jacobian must not vanish or change its sign"),
     (flat, "flat or folded"),
     (
@@ -138,7 +147,13 @@ REFUSED = [
     (shared_slave_faces, "contact[1].slave = 'bottom_contact': 3 of its faces are slave faces of"),
     (a_part_apart, "supports: nothing keeps body 3 from a free motion (move along x), even with"),
     (nothing_holds, "supports: nothing keeps bottom from a free motion (move along y), even with"),
-    (glued, "contact[0].master = 'top_contact': 2 of its faces are slave faces too; a slave"),
+    (
+        glued,
+        (
+            "contact[0].master = 'top_contact': 2 of its faces are slave faces too; a slave "
+            "cannot be its own master: bodies in contact share no nodes"
+        ),
+    ),
     (cell_upon_cell, "of its faces have a cell on both sides (the first near ("),
 ]
 

@@ -174,7 +174,7 @@ def tetrahedron():
         ("plane: strain", "plane = 'strain': only for plane meshes; this one has three dimensions"),
         (
             "loads: [{group: base, traction: [0, 1]}]",
-            "[0.0, 1.0]: must have 3 components, as the mesh has",
+            "[0.0, 1.0]: must have 3 components: the case is in 3D",
         ),
     ],
 )

@@ -8,8 +8,8 @@ from vtk.util.numpy_support import vtk_to_numpy
 
 from solver.case.reader import parse_case
 from solver.mesh.catalogue import BY_NAME, cell_type
+from solver.report.case_picture import draw_case
 from solver.report.profile import draw_profile
-from solver.report.space import draw_space
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.results import write_result
@@ -114,7 +114,7 @@ def test_units_stand_beside_the_fields(tmp_path):
 def test_without_units_there_are_none(tmp_path):
     write_result(tmp_path / "result.vtkhdf", handmade.plane(tmp_path), [], {})
     assert opened_by_vtk(tmp_path / "result.vtkhdf")[-1] == []
-    assert "[" not in draw_space(handmade.solid(tmp_path), "")
+    assert "[" not in draw_case(handmade.solid(tmp_path), "")
 
 
 def test_pictures_have_units(tmp_path):
@@ -123,8 +123,8 @@ def test_pictures_have_units(tmp_path):
     channels = view["encoding"]
     assert channels["y"]["title"] == "contact pressure [N/mm²]"
     assert channels["x"]["title"] == "x [mm]"
-    plan = draw_space(solid, "")
-    assert ">p on interface [N/mm²]<" in plan
+    plan = draw_case(solid, "")
+    assert ">contact pressure p [N/mm²]<" in plan
     assert ">x [mm]<" in plan
 
 

@@ -226,7 +226,7 @@ def test_a_shaft_with_oversize_opens_a_tube_as_lame_has_it():
                     "die: {plane: {point: [3, 1], normal: [0, 1]}",
                 )
             ],
-            "contact[1].master = 'die': does not lie over press anywhere",
+            "along the normals of press; the normal of a rigid plane points out of the body",
         ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

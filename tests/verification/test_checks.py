@@ -170,7 +170,7 @@ def test_a_failure_says_where_and_by_how_much(solution):
     assert check.error == pytest.approx(0.04)
     assert check.where == "macro-element 1"
     assert check.reason == (
-        "multiplier interface: 26 at macro-element 1, reference 25: "
+        "multiplier interface: 26 (macro-element 1), reference 25: "
         "error 4.00e-02, tolerance 1.0e-03"
     )
 

@@ -70,7 +70,7 @@ def test_one_failing_check_fails_the_solve_and_is_the_reason(tmp_path):
     solution.zones[0].gap[1] = 1.0
     verdict = verdict_of(solution)
     assert (verdict["verdict"], verdict["passed"]) == ("failed", False)
-    assert verdict["reason"].startswith("element_gap interface: 1 at macro-element 1")
+    assert verdict["reason"].startswith("element_gap interface: 1 (macro-element 1)")
     assert verdict["reason"].endswith("(and 1 more)")
     closest = {"name": "element_status", "zone": "interface", "error": 1.0}
     assert verdict["closest_to_tolerance"] == closest
@@ -140,6 +140,14 @@ def test_a_verdict_that_cannot_be_written_leaves_the_old_one(tmp_path):
         write_verdict(path, Verdict(family="f", job="j", verdict="passed", reason=object()))
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_with_another_recovery_a_solve_is_not_judged(tmp_path):
+    solution = plane(tmp_path)
+    solution.case = solution.case.as_solved(recovery="linear")
+    verdict = judge(solution, run_checks(solution))
+    assert (verdict.verdict, verdict.sound) == ("solved", True)
+    assert verdict.reason == "not verified: the tolerances belong to another recovery"
 
 
 def test_without_a_reference_a_solve_is_solved_and_not_verified(tmp_path):

@@ -62,6 +62,23 @@ def test_what_did_not_pass_is_counted(state, tmp_path, word):
     assert state.not_passed == 1
 
 
+def test_a_refused_solve_prints_its_reason_and_has_not_passed(state, tmp_path):
+    line = "my/a.yaml: supports: this key is needed"
+    state.start(1, "solve", "solve a", log(tmp_path, line))
+    assert state.end(1) == f"{line} [1/10]"
+    assert state.not_passed == 1
+    state.start(2, "solve", "solve b", log(tmp_path, "b: solved: not verified"))
+    state.end(2)
+    assert state.not_passed == 1
+
+
+def test_a_ladder_names_the_level(state, tmp_path):
+    file = log(tmp_path, "two-blocks-none: failed: element_gap: 1")
+    state.start(1, "solve_level", "solve two-blocks-none refined 3 times", file)
+    assert state.end(1) == "two-blocks-none refined 3 times: failed: element_gap: 1 [1/10]"
+    assert state.not_passed == 1
+
+
 def test_a_job_that_breaks_off_may_begin_once_more(state, tmp_path):
     state.start(1, "solve", "solve a", log(tmp_path, "a: passed, 0.25 s"))
     state.fail(1)
@@ -197,6 +214,7 @@ def test_a_quiet_run_tells_its_outcome_alone(project):
     assert run.returncode == 0, run.stdout
     lines = run.stdout.splitlines()
     assert [line for line in lines if "specific profile" not in line] == [
+        "Processor time by family (solves): tiny "
+        + re.search(r"tiny (\d+\.\d s \(1\)\.)$", run.stdout, re.MULTILINE)[1],
         "The one solve passed. Report: results/report/summary.html",
-        lines[-1],
     ]

@@ -327,13 +327,16 @@ def test_a_mesh_that_includes_a_changed_file_is_solved_again(project):
 
 def test_a_family_alone_leaves_the_others_in_the_report(project):
     write_case(project / "cases" / "other", "wrong", pressure=26.0)
-    assert snakemake(project).returncode == 1
+    last = "4 solves: 1 failed, 3 passed. Report: results/report/summary.html"
+    wrong = snakemake(project)
+    assert wrong.returncode == 1
+    assert wrong.stdout.splitlines()[-1] == last
+    assert wrong.stdout.count(last) == 1
     done = snakemake(project, "--config", "family=tiny", "--forcerun", "report")
     assert done.returncode == 0, done.stdout  # what failed was not asked for
     assert summary(project).keys() == {"tiny-a", "tiny-a-swapped", "tiny-b", "wrong"}
     again = snakemake(project)
     assert again.returncode == 1
-    last = "4 solves: 1 failed, 3 passed. Report: results/report/summary.html"
     assert again.stdout.splitlines()[-1] == last
     assert "Error" not in again.stdout
 

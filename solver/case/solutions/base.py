@@ -159,17 +159,14 @@ class ElasticSolution(ExactSolution):
         """Stress (n, 6) of displacement gradients (n, d, d) in the materials of the parts."""
         dim = gradient.shape[-1]
         lame, shear = (values[part] for values in np.array([lame_of(m) for m in self.materials]).T)
-        strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
         stress = np.zeros((len(gradient), 6))
         stress[:, :3] = (lame * np.einsum("nii->n", gradient))[:, None]
         for i in range(dim):
-            stress[:, i] += 2 * shear * strain[:, i, i]
+            stress[:, i] += 2 * shear * gradient[:, i, i]
         if self.materials[0].thin:
             stress[:, 2] = 0.0
-        stress[:, 3] = 2 * shear * strain[:, 0, 1]
-        if dim == 3:
-            stress[:, 4] = 2 * shear * strain[:, 1, 2]
-            stress[:, 5] = 2 * shear * strain[:, 0, 2]
+        for place, i, j in ((3, 0, 1), (4, 1, 2), (5, 0, 2))[: 3 if dim == 3 else 1]:
+            stress[:, place] = shear * (gradient[:, i, j] + gradient[:, j, i])
         return stress
 
 

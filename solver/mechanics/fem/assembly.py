@@ -62,11 +62,16 @@ class CellSum:
         return np.asarray(found).reshape(n, k, k)
 
     @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where its rows start (n_nodes + 1,), the columns (nnz,), the blocks (nnz, dim, dim)."""
+        return self._near.indptr, self._near.indices, self._data
+
+    @property
     def matrix(self) -> sparse.bsr_matrix:
         """The sum (dim · n_nodes, dim · n_nodes) in blocks, both halves stored, rows sorted."""
-        arrays = self._data, self._near.indices, self._near.indptr
+        starts, columns, blocks = self.arrays
         size = self._dim * self._near.shape[0]
-        return sparse.bsr_matrix(arrays, shape=(size, size))
+        return sparse.bsr_matrix((blocks, columns, starts), shape=(size, size))
 
 
 def selected(matrix: sparse.spmatrix, kept: np.ndarray) -> sparse.csr_matrix:

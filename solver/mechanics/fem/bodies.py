@@ -1,5 +1,7 @@
 """Bodies: connected parts of a mesh, their rigid motions and their supports."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
@@ -27,45 +29,58 @@ def rigid_motions(
     larger angle than about others.
     """
     n, dim = points.shape
-    count = np.bincount(body)
-    centre = np.stack([np.bincount(body, points[:, d]) / count for d in range(dim)], axis=1)
-    arm = points - centre[body]
-    fields = [np.tile(np.eye(dim)[d], (n, 1)) for d in range(dim)]
-    turns = [np.stack([-arm[:, 1], arm[:, 0]], axis=1)]
-    for turn in turns if dim == 2 else [np.cross(np.eye(3)[d], arm) for d in range(3)]:
-        size = np.zeros(len(count))
-        np.maximum.at(size, body, np.linalg.norm(turn, axis=1))
-        fields.append(turn / np.where(size > 0, size, 1.0)[body][:, None])
+    fields = list(_fields(points, body))
     fields = fields[1:2] if axisymmetric else fields
     per_body = len(fields)
     rows = [np.flatnonzero(field).astype(np.int32) for field in fields]
     columns = [body[some // dim] * per_body + k for k, some in enumerate(rows)]
     values = [field.ravel()[some] for field, some in zip(fields, rows, strict=True)]
     entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return sparse.csc_matrix(entries, shape=(n * dim, len(count) * per_body))
+    return sparse.csc_matrix(entries, shape=(n * dim, (int(body.max()) + 1) * per_body))
 
 
-def whole_motions(motions: sparse.csc_matrix, n_bodies: int) -> np.ndarray:
+def whole_motions(points: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Rigid motions (n_dofs, 3 or 6) of all bodies at once, each about its own centre."""
-    each = motions.shape[1] // n_bodies
-    return np.asarray(motions @ np.tile(np.eye(each), (n_bodies, 1)))
+    return np.stack([field.ravel() for field in _fields(points, body)], axis=1)
+
+
+def _fields(points: np.ndarray, body: np.ndarray) -> Iterator[np.ndarray]:
+    """The displacement (n, dim) of each rigid motion, in all bodies at once."""
+    n, dim = points.shape
+    count = np.bincount(body)
+    centre = np.stack([np.bincount(body, points[:, d]) / count for d in range(dim)], axis=1)
+    arm = points - centre[body]
+    for d in range(dim):
+        yield np.tile(np.eye(dim)[d], (n, 1))
+    turns = [np.stack([-arm[:, 1], arm[:, 0]], axis=1)]
+    for turn in turns if dim == 2 else (np.cross(np.eye(3)[d], arm) for d in range(3)):
+        size = np.zeros(len(count))
+        np.maximum.at(size, body, np.linalg.norm(turn, axis=1))
+        yield turn / np.where(size > 0, size, 1.0)[body][:, None]
+
+
+def support_resistance(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> np.ndarray:
+    """How supports resist rigid motions (n_dofs, r), (r, r): the products of what they hold.
+
+    `basis` (n_dofs, n_free) spans the displacements that the supports leave free.
+    """
+    held = motions - basis @ (basis.T @ motions)
+    return np.asarray((held.T @ held).toarray())
 
 
 def unsupported(
     motions: sparse.csc_matrix,
-    basis: sparse.csr_matrix,
+    resistance: np.ndarray,
     springs: sparse.csr_matrix | None = None,
 ) -> sparse.csr_matrix:
     """The rigid motions (n_dofs, k) of each body that the supports leave free.
 
-    `basis` (n_dofs, n_free) spans the displacements that the supports leave free; `springs`
-    (n_dofs, n_dofs), rows of a stiffness, resist motions too.
+    `resistance` (r, r) of the supports; `springs` (n_dofs, n_dofs), rows of a stiffness, resist
+    motions too.
     """
-    held = motions - basis @ (basis.T @ motions)
-    resistance = (held.T @ held).toarray()
     if springs is not None:
         stretched = springs @ motions
-        resistance += (stretched.T @ stretched).toarray()
+        resistance = resistance + (stretched.T @ stretched).toarray()
     values, vectors = np.linalg.eigh(resistance)
     free = values <= _FREE * max(float(values[-1]), np.finfo(float).tiny)
     # Round-off entries would mix the bodies and fill the motions up.
@@ -104,19 +119,14 @@ def joined_bodies(gaps: sparse.csr_matrix, bodies: np.ndarray, n_bodies: int) ->
 
 
 def unheld_motion(
-    motions: sparse.csc_matrix,
-    basis: sparse.csr_matrix,
-    constraints: sparse.csr_matrix,
-    n_bodies: int,
+    supports: np.ndarray, contact: sparse.csr_matrix, n_bodies: int
 ) -> tuple[int, str] | None:
-    """A rigid motion that neither supports nor `constraints` resist: (body, description), or None.
+    """A rigid motion that neither supports nor contact resist: (body, description), or None.
 
-    `basis` spans the displacements that the supports leave free; `constraints` (m, n_dofs) are the
-    rows of closed contact per unit of area.
+    `supports` (r, r): see `support_resistance`; `contact` (m, r): the average gap that each motion
+    opens at each closed multiplier.
     """
-    held = motions - basis @ (basis.T @ motions)
-    contact = constraints @ motions
-    resistance = (held.T @ held + contact.T @ contact).toarray()
+    resistance = supports + (contact.T @ contact).toarray()
     weight = 1 / np.sqrt(np.maximum(np.diag(resistance), np.finfo(float).tiny))
     dead = np.diag(resistance) <= _FREE * max(np.diag(resistance).max(initial=0.0), 1e-300)
     weight[dead] = 1.0
@@ -140,6 +150,7 @@ def _describe(motion: np.ndarray) -> str:
 
 def _direction(vector: np.ndarray) -> str:
     unit = vector / vector[np.abs(vector).argmax()]
+    unit[np.abs(unit) < 1e-6] = 0.0
     if np.abs(unit).sum() < 1 + 1e-6:
         return "xyz"[int(np.abs(unit).argmax())]
     return "(" + ", ".join(f"{x:.3g}" for x in unit) + ")"

@@ -17,7 +17,7 @@ from scipy import sparse
 from ...mesh.catalogue import CellType
 from ...system.errors import SolveError
 from ...system.threads import ahead
-from . import shape_functions, volume_rule
+from . import cell_loops, shape_functions, volume_rule
 from .assembly import CellSum
 from .faces import circumference
 from .small_matrices import invert
@@ -227,6 +227,9 @@ def stiffness(points: np.ndarray, blocks: list[Block], single: bool = False) -> 
     n, dim = points.shape
     total = CellSum([block.cells for block in blocks], n, dim, single)
     for block in blocks:
+        if cell_loops.serve(n, blocks):
+            cell_loops.add_stiffness(points, block, *total.arrays)
+            continue
         matrices, size = partial(element_matrices, points, block), dim * block.type.n_nodes
         total.add(block.cells, matrices, _parts(block, 8 * size**2, _MATRIX_BYTES))
     return total.matrix
@@ -248,6 +251,11 @@ def internal_force(
     force = np.zeros((dim, n), dtype=points.dtype)
     if not displacement.any():
         return force.T.copy()
+    if cell_loops.serve(n, blocks) and not extended:
+        force = force.reshape(n, dim)
+        for block in blocks:
+            cell_loops.add_forces(points, block, displacement.reshape(-1, n, dim), force)
+        return force
     for block in blocks:
         forces = partial(_cell_forces, points, block, displacement)
         for part, nodal in by_part(block, dim, forces):

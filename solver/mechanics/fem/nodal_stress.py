@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from ...mesh.catalogue import CellType
-from . import shape_functions
+from . import cell_loops, shape_functions
 from .elasticity import Block, by_part, in_precision, shapes_in, stress_in
 
 
@@ -22,14 +22,17 @@ def nodal_stress(
     """
     n, dim = points.shape
     points, displacement = in_precision(points, displacement, extended)
-    total, count = np.zeros(6 * n), np.zeros(n)
+    total, count = np.zeros((n, 6)), np.zeros(n)
     for block in blocks:
+        count += np.bincount(block.cells.ravel(), minlength=n)
+        if cell_loops.serve(n, blocks) and not extended:
+            fit, parts = extrapolation(block.type, block.rule[0]), displacement.reshape(-1, n, dim)
+            cell_loops.add_nodal_stress(points, block, parts, fit, total)
+            continue
         stress = partial(_at_nodes, points, block, displacement)
         for part, nodal in by_part(block, dim, stress):
             places = 6 * block.cells[part][:, :, None] + np.arange(6)
-            np.add.at(total, places.ravel(), nodal.ravel())
-        count += np.bincount(block.cells.ravel(), minlength=n)
-    total.shape = n, 6
+            np.add.at(total.reshape(-1), places.ravel(), nodal.ravel())
     total /= np.maximum(count, 1)[:, None]
     return total
 

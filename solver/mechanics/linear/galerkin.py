@@ -33,7 +33,7 @@ def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_ma
 
 
 def coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
-    """Pᵀ A P for `matrix` A (n, n) and `prolongation` P (n, c) in single precision."""
+    """Pᵀ A P for a symmetric `matrix` A (n, n) and `prolongation` P (n, c) in single precision."""
     width = prolongation.blocksize[1]
     if not worthwhile(matrix.data.size):
         count = matrix.shape[0] // matrix.blocksize[0]
@@ -51,6 +51,8 @@ def coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
     kernel, most = _coarse_rows(*prolongation.blocksize), np.diff(total.indptr).max(initial=0)
     arrays = [a for m in (matrix, prolongation, total) for a in (m.indptr, m.indices, m.data)]
     share_rows(lambda *some: kernel(*some, *arrays, most), total.indptr, 1000)
+    half = total.indptr, total.indices, total.data
+    share_rows(lambda *some: _mirror(*some, *half), total.indptr, width**2)
     return total
 
 
@@ -99,20 +101,23 @@ def _coarse_rows(height: int, width: int) -> Callable[..., None]:  # noqa: C901 
         first, last, starts, columns, blocks, p_starts, p_columns, ways,
         into, places, out, most,
     ):  # fmt: skip
-        """Rows of Pᵀ A P; a row of A P at a time, for all rows that it adds to."""
+        """The upper half of rows of Pᵀ A P; a row of A P at a time, for all that it adds to."""
         slot = np.full(len(into) - 1, -1, dtype=np.int32)
         found = np.empty(most, dtype=np.int32)
         product = np.empty((most, height, width), dtype=out.dtype)
         for i in range(len(starts) - 1):
-            mine = False
+            least = last
             for q in range(p_starts[i], p_starts[i + 1]):
-                mine = mine or first <= p_columns[q] < last
-            if not mine:
+                if first <= p_columns[q]:
+                    least = min(least, p_columns[q])
+            if least == last:
                 continue
             count = 0
             for k in range(starts[i], starts[i + 1]):
                 j = columns[k]
                 for q in range(p_starts[j], p_starts[j + 1]):
+                    if p_columns[q] < least:
+                        continue
                     s = slot[p_columns[q]]
                     if s < 0:
                         s = count
@@ -130,6 +135,8 @@ def _coarse_rows(height: int, width: int) -> Callable[..., None]:  # noqa: C901 
                 if first <= row < last:
                     low, high = into[row], into[row + 1]
                     for s in range(count):
+                        if found[s] < row:
+                            continue
                         place = low + np.searchsorted(places[low:high], found[s])
                         for c in range(height):
                             for r in range(width):
@@ -140,3 +147,16 @@ def _coarse_rows(height: int, width: int) -> Callable[..., None]:  # noqa: C901 
                 slot[found[s]] = -1
 
     return kernel
+
+
+@compiled
+def _mirror(first, last, starts, columns, blocks):  # type: ignore[no-untyped-def]
+    """Rows of the lower half from the upper one."""
+    for i in range(first, last):
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            if j < i:
+                place = starts[j] + np.searchsorted(columns[starts[j] : starts[j + 1]], i)
+                for r in range(blocks.shape[1]):
+                    for m in range(blocks.shape[2]):
+                        blocks[k, r, m] = blocks[place, m, r]

@@ -2,12 +2,15 @@
 
 import logging
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ...system.errors import SolveError
+from ...system.threads import ahead
 
 _LOG = logging.getLogger(__name__)
+_ROWS = 1 << 16  # of vectors at once
 _TOLD = 10  # iterations from one line of the log to the next
 _KEPT = 10  # directions of conjugate residuals; 40 save a tenth of the iterations, all no more
 
@@ -29,25 +32,20 @@ def conjugate_gradients(
     1305): the preconditioner is rounded, so it is linear only to single precision.
     """
     solution, residual = np.zeros_like(right), right.copy()
-    start = np.linalg.norm(right, axis=0)
+    start = np.sqrt(_total(lambda some: _dot(right[some], right[some]), len(right)))
     improved = precondition(residual)
-    direction = improved
-    energy = np.sum(residual * improved, axis=0)
+    direction = improved.copy()
+    energy = _total(lambda some: _dot(residual[some], improved[some]), len(right))
     iteration, reached = 0, float(start.any())
     while reached > accuracy:
         _give_up("conjugate gradients", iteration, reached, accuracy, most)
-        image = multiply(direction)
-        step = _ratio(energy, np.sum(direction * image, axis=0))
-        solution += step * direction
-        residual -= step * image
+        left = _advance(solution, residual, direction, multiply(direction), energy)
         iteration += 1
-        reached = float(_ratio(np.linalg.norm(residual, axis=0), start).max())
+        reached = float(_ratio(left, start).max())
         _tell("conjugate gradients", iteration, reached)
         if reached > accuracy:
             previous, improved = improved, precondition(residual)
-            change = np.sum(residual * (improved - previous), axis=0)
-            direction = improved + _ratio(change, energy) * direction
-            energy = np.sum(residual * improved, axis=0)
+            energy = _turn(direction, residual, improved, previous, energy)
     return solution, iteration
 
 
@@ -94,6 +92,63 @@ def conjugate_residuals(
     return solution, iteration
 
 
+def _advance(
+    solution: np.ndarray,
+    residual: np.ndarray,
+    direction: np.ndarray,
+    image: np.ndarray,
+    energy: np.ndarray,
+) -> np.ndarray:
+    """One step along a direction, in place; the norms (k,) of the residual."""
+    step = _ratio(energy, _total(lambda some: _dot(direction[some], image[some]), len(image)))
+
+    def part(some: slice) -> np.ndarray:
+        solution[some] += step * direction[some]
+        residual[some] -= step * image[some]
+        return _dot(residual[some], residual[some])
+
+    return np.sqrt(_total(part, len(image)))
+
+
+def _turn(
+    direction: np.ndarray,
+    residual: np.ndarray,
+    improved: np.ndarray,
+    previous: np.ndarray,
+    energy: np.ndarray,
+) -> np.ndarray:
+    """The next direction, in place, and its energy (k,)."""
+
+    def part(some: slice) -> np.ndarray:
+        change = improved[some] - previous[some]
+        return np.stack([_dot(residual[some], change), _dot(residual[some], improved[some])])
+
+    change, following = _total(part, len(residual))
+    share = _ratio(change, energy)
+
+    def turned(some: slice) -> float:
+        direction[some] *= share
+        direction[some] += improved[some]
+        return 0.0
+
+    _total(turned, len(direction))
+    return following
+
+
+def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The products (k,) of the columns of both."""
+    return np.asarray(np.sum(one * other, axis=0))
+
+
+def _total(found: Callable[[slice], Any], size: int) -> np.ndarray:
+    """The sum of what is `found` for some rows at a time, few enough for the processor's cache.
+
+    Threads find it; the sum is in the order of the rows.
+    """
+    parts = (slice(first, first + _ROWS) for first in range(0, size, _ROWS))
+    return np.asarray(sum(ahead(found, parts), 0.0))
+
+
 def in_single(solve: Operator) -> Operator:
     """A linear `solve` of float32 columns as one of float64 columns, each scaled to order one.
 
@@ -101,7 +156,7 @@ def in_single(solve: Operator) -> Operator:
     """
 
     def lifted(right: np.ndarray) -> np.ndarray:
-        size = np.abs(right).max(axis=0)
+        size = np.maximum(right.max(axis=0), -right.min(axis=0))
         size[size == 0] = 1.0
         return solve((right / size).astype(np.float32)) * size
 

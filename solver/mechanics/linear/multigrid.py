@@ -25,7 +25,8 @@ from .contact_levels import Correction, Interface, correction_of
 from .galerkin import coarse, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
-from .products import in_pieces, multiply, multiply_transposed, pattern, scale_blocks
+from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
+from .slender import smoothed_along
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
@@ -114,16 +115,22 @@ class Hierarchy:
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale *= scale[self.place]
+        if isinstance(matrix, NodalMatrix):
+            matrix.scaled_further(scale[self.place])
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
             blocks, nodes = self._add_linear(blocks, unknowns)
         while blocks.shape[0] > COARSEST:
             bound = _bound_of(blocks)
-            tentative, coarse_nodes = aggregate(blocks, nodes)
+            tentative, coarse_nodes, near = aggregate(blocks, nodes)
             if tentative.nnz == 0 or 2 * tentative.shape[1] > blocks.shape[0]:
                 break
-            way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            if near is None:
+                way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            else:
+                about = nodes.motions, _SMOOTHED, float(bound)
+                way = smoothed_along(blocks, tentative, near, *about)
             _refuse_fill(way)
             blocks, nodes = self._add(blocks, bound, way, coarse_nodes)
         if blocks.shape[0] > LARGEST_DENSE:
@@ -186,7 +193,7 @@ class Multigrid:
         condensed = matrix if isinstance(matrix, CondensedMatrix) else None
         kept = slice(None) if condensed is None else condensed.kept
         stiffness = condensed.stiffness if condensed else matrix
-        single = isinstance(stiffness, NodalMatrix) and stiffness.blocks.dtype == np.float32
+        single = isinstance(stiffness, NodalMatrix) and stiffness.single
         self._least = _LEAST_SINGLE if single else 0.0
         hierarchy = self._shared.hierarchy(stiffness, unknowns)
         self._size, self._place = hierarchy.size, hierarchy.place[kept]
@@ -329,27 +336,14 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     few at a contact surface would set the eigenvalue bound for all. Zero rows, which have no
     unknown, stay zero.
     """
-    size = matrix.blocksize[0]
     diagonal = matrix.diagonal().astype(float)
     there = diagonal > 0
     scale = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
-    weights = scale.astype(np.float32).reshape(-1, size)
-    sums = np.zeros(weights.shape)
-
-    def add_up(first: int, last: int) -> None:
-        starts = matrix.indptr[first : last + 1]
-        some, filled = slice(starts[0], starts[-1]), np.diff(starts) > 0
-        if filled.any():
-            columns = weights[matrix.indices[some], :, None]
-            inner = np.matmul(np.abs(matrix.data[some]), columns)[:, :, 0]
-            starts = starts[:-1][filled] - starts[0]
-            sums[first:last][filled] = np.add.reduceat(inner, starts, axis=0)
-
-    in_pieces(add_up, matrix)
-    sums = scale * sums.ravel()
+    sums = scale * sums_of_sizes(matrix, scale.astype(np.float32))
     scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
     single = scale.astype(np.float32)
     scale_blocks(matrix, single, single)
+    scale = single.astype(float)
     return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
 
 

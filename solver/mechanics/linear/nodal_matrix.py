@@ -17,11 +17,19 @@ class NodalMatrix:
     """The rows and columns `free` (n,), ascending, of `blocks` (n_dofs, n_dofs), symmetric.
 
     `blocks` have an edge of dim, their columns are sorted; those of held degrees of freedom stay.
+    Where the blocks have been scaled in place by `scaled`, `scale` (n,) says how, and every
+    operation divides by it: the matrix is still the one given, up to single precision.
     """
 
     def __init__(self, blocks: bsr_matrix, free: np.ndarray):
         self.blocks, self.free = blocks, free
         self.shape = len(free), len(free)
+        self.scale: np.ndarray | None = None
+
+    @property
+    def single(self) -> bool:
+        """Whether the blocks are stored in single precision."""
+        return bool(self.blocks.dtype == np.float32)
 
     @property
     def nnz(self) -> int:
@@ -35,8 +43,10 @@ class NodalMatrix:
         """The product with x (n,) or its columns (n, k)."""
         if x.ndim > 1:
             return np.stack([self @ column for column in x.T], axis=1)
+        x = x if self.scale is None else x / self.scale
         # In double precision, whatever that of the blocks.
-        return multiply(self.blocks, self._on_all(x), np.zeros(self.blocks.shape[0]))[self.free]
+        found = multiply(self.blocks, self._on_all(x), np.zeros(self.blocks.shape[0]))[self.free]
+        return found if self.scale is None else found / self.scale
 
     def _on_all(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) on all degrees of freedom, zero on held ones."""
@@ -46,19 +56,43 @@ class NodalMatrix:
 
     def __getitem__(self, rows: Any) -> csr_matrix:
         """Some of its rows, by mask, slice or numbers."""
-        return chosen_rows(self.blocks, self.free[rows])[:, self.free]
+        chosen = chosen_rows(self.blocks, self.free[rows])[:, self.free]
+        return chosen if self.scale is None else _unscaled(chosen, self.scale[rows], self.scale)
 
     def scaled(self, scale: np.ndarray) -> bsr_matrix:
-        """Its blocks in single precision, scaled on both sides by `scale` (n,), held rows zero."""
-        whole, data = self._on_all(scale), np.empty(self.blocks.data.shape, dtype=np.float32)
+        """Its blocks in single precision, scaled on both sides by `scale` (n,), held rows zero.
+
+        Blocks in single precision are scaled in place: no second copy of them is made. What the
+        caller scales in them further goes to `scaled_further`.
+        """
+        factor = scale if self.scale is None else scale / self.scale
+        data = self.blocks.data
+        if self.single:
+            self.scale = scale.copy()
+        else:
+            data = np.empty(data.shape, dtype=np.float32)
+        whole = self._on_all(factor)
         scale_blocks(self.blocks, whole, whole, data)
         arrays = data, self.blocks.indices, self.blocks.indptr
         return bsr_matrix(arrays, shape=self.blocks.shape)
 
+    def scaled_further(self, factor: np.ndarray) -> None:
+        """Take note that the blocks which `scaled` returned are now scaled by `factor` (n,) too."""
+        if self.scale is not None:
+            self.scale *= factor
+
     def diagonal(self) -> np.ndarray:
         """Its diagonal (n,)."""
-        return np.asarray(self.blocks.diagonal()[self.free], dtype=float)
+        found = np.asarray(self.blocks.diagonal()[self.free], dtype=float)
+        return found if self.scale is None else found / self.scale**2
 
     def tocsr(self) -> csr_matrix:
         """All of it, entry by entry."""
-        return selected(self.blocks, self.free)
+        found = selected(self.blocks, self.free)
+        return found if self.scale is None else _unscaled(found, self.scale, self.scale)
+
+
+def _unscaled(matrix: csr_matrix, rows: np.ndarray, columns: np.ndarray) -> csr_matrix:
+    """The matrix (r, n) with its rows divided by `rows` (r,), its columns by `columns` (n,)."""
+    factors = np.repeat(1 / rows, np.diff(matrix.indptr)) / columns[matrix.indices]
+    return csr_matrix((matrix.data * factors, matrix.indices, matrix.indptr), shape=matrix.shape)

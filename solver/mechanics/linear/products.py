@@ -106,15 +106,46 @@ def scale_blocks(
     height, width = matrix.blocksize
     rows, columns = left.reshape(-1, height), right.reshape(-1, width)
     into = matrix.data if out is None else out
+    if worthwhile(matrix.data.size):
+        arrays = matrix.indptr, matrix.indices, matrix.data, rows, columns, into
+        share_rows(lambda *some: _scale(*some, *arrays), matrix.indptr, height * width)
+        return
 
     def fill(first: int, last: int) -> None:
         some = slice(*matrix.indptr[[first, last]])
         counts = np.diff(matrix.indptr[first : last + 1])
-        values = matrix.data[some] * np.repeat(rows[first:last], counts, axis=0)[:, :, None]
-        values *= columns[matrix.indices[some]][:, None, :]
-        into[some] = values
+        # A product of both factors first: a symmetric matrix stays symmetric to the last digit.
+        factors = np.repeat(rows[first:last], counts, axis=0)[:, :, None]
+        factors = factors * columns[matrix.indices[some]][:, None, :]
+        into[some] = np.multiply(factors, matrix.data[some], out=factors)
 
     in_pieces(fill, matrix)
+
+
+def sums_of_sizes(matrix: bsr_matrix, weights: np.ndarray) -> np.ndarray:
+    """The sums (m,) over the rows of a matrix (m, n) of |entry| · `weights` (n,) of its column.
+
+    >>> sums_of_sizes(bsr_matrix([[1.0, -2.0], [0.0, 3.0]], blocksize=(2, 2)), np.ones(2))
+    array([3., 3.])
+    """
+    height, width = matrix.blocksize
+    sums, columns = np.zeros((matrix.shape[0] // height, height)), weights.reshape(-1, width)
+    if worthwhile(matrix.data.size):
+        arrays = matrix.indptr, matrix.indices, matrix.data, columns, sums
+        share_rows(lambda *some: _add_sizes(*some, *arrays), matrix.indptr, height * width)
+        return sums.ravel()
+
+    def add_up(first: int, last: int) -> None:
+        starts = matrix.indptr[first : last + 1]
+        some, filled = slice(starts[0], starts[-1]), np.diff(starts) > 0
+        if filled.any():
+            found = columns[matrix.indices[some], :, None]
+            inner = np.matmul(np.abs(matrix.data[some]), found)[:, :, 0]
+            starts = starts[:-1][filled] - starts[0]
+            sums[first:last][filled] = np.add.reduceat(inner, starts, axis=0)
+
+    in_pieces(add_up, matrix)
+    return sums.ravel()
 
 
 def ranges(starts: np.ndarray, weight: int, most: int) -> list[tuple[int, int]]:
@@ -140,21 +171,48 @@ def in_pieces(work: Callable[[int, int], None], matrix: bsr_matrix) -> None:
         pass
 
 
+@compiled
+def _scale(first, last, starts, columns, blocks, left, right, into):  # type: ignore[no-untyped-def]
+    for i in range(first, last):
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            for r in range(blocks.shape[1]):
+                for m in range(blocks.shape[2]):
+                    into[k, r, m] = left[i, r] * right[j, m] * blocks[k, r, m]
+
+
+@compiled
+def _add_sizes(first, last, starts, columns, blocks, weights, sums):  # type: ignore[no-untyped-def]
+    for i in range(first, last):
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            for r in range(blocks.shape[1]):
+                for m in range(blocks.shape[2]):
+                    sums[i, r] += abs(blocks[k, r, m]) * weights[j, m]
+
+
 def _product_of_three(width: int) -> Callable[..., None]:
+    # Nine sums rather than three: none of them waits for the one before.
     @compiled
     def kernel(first, last, starts, columns, blocks, x, factor, out):  # type: ignore[no-untyped-def]
         for i in range(first, last):
-            a = b = c = factor - factor
+            a = b = c = d = e = f = g = h = p = factor - factor
             for k in range(starts[i], starts[i + 1]):
                 j = width * columns[k]
-                for m in range(width):
-                    value = x[j + m]
-                    a += blocks[k, 0, m] * value
-                    b += blocks[k, 1, m] * value
-                    c += blocks[k, 2, m] * value
-            out[3 * i] += factor * a
-            out[3 * i + 1] += factor * b
-            out[3 * i + 2] += factor * c
+                for m in range(0, width, 3):
+                    u, v, w = x[j + m], x[j + m + 1], x[j + m + 2]
+                    a += blocks[k, 0, m] * u
+                    b += blocks[k, 0, m + 1] * v
+                    c += blocks[k, 0, m + 2] * w
+                    d += blocks[k, 1, m] * u
+                    e += blocks[k, 1, m + 1] * v
+                    f += blocks[k, 1, m + 2] * w
+                    g += blocks[k, 2, m] * u
+                    h += blocks[k, 2, m + 1] * v
+                    p += blocks[k, 2, m + 2] * w
+            out[3 * i] += factor * (a + b + c)
+            out[3 * i + 1] += factor * (d + e + f)
+            out[3 * i + 2] += factor * (g + h + p)
 
     return kernel
 

@@ -1,5 +1,6 @@
 """The meaning of the unknowns of a system: what multigrid asks for beside the matrix."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,15 +11,16 @@ from scipy.sparse import csr_matrix
 class Unknowns:
     """The meaning of the unknowns of a system, in `dim` dimensions.
 
-    `node` (n,): the node of each unknown, at most `dim` per node; `motions` (n, 3 or 6): the rigid
-    motions in these unknowns; `body` (n,): the number of the body. Bodies that slide on each other
-    share no aggregate. `points` (n_nodes, 3): coordinates of the nodes. Where cells are
-    quadratic, `linear` (n, m) interpolates from the unknowns `vertices` (m,) of linear cells.
+    `node` (n,): the node of each unknown, at most `dim` per node; `motions` returns the rigid
+    motions (n, 3 or 6) in these unknowns, which nobody keeps; `body` (n,): the number of the body.
+    Bodies that slide on each other share no aggregate. `points` (n_nodes, 3): coordinates of the
+    nodes. Where cells are quadratic, `linear` (n, m) interpolates from the unknowns `vertices` (m,)
+    of linear cells.
     """
 
     dim: int
     node: np.ndarray
-    motions: np.ndarray
+    motions: Callable[[], np.ndarray]
     body: np.ndarray
     points: np.ndarray | None = None
     vertices: np.ndarray | None = None
@@ -31,7 +33,11 @@ class Unknowns:
 
     def of(self, chosen: np.ndarray) -> "Unknowns":
         """The same for some of them, in ascending order, where no interpolation joins others."""
-        arrays = self.node[chosen], self.motions[chosen], self.body[chosen], self.points
+
+        def motions() -> np.ndarray:
+            return self.motions()[chosen]
+
+        arrays = self.node[chosen], motions, self.body[chosen], self.points
         if self.linear is None or self.vertices is None:
             return Unknowns(self.dim, *arrays)
         mine = np.flatnonzero(np.isin(self.vertices, chosen))
@@ -64,8 +70,9 @@ def places(unknowns: Unknowns) -> tuple[np.ndarray, int]:
 
 def nodes_at(unknowns: Unknowns, place: np.ndarray, size: int) -> LevelNodes:
     """The nodes of `size` rows; those without unknowns belong to no body, −1."""
-    motions, body = np.zeros((size, unknowns.motions.shape[1])), np.full(size // 3, -1)
-    motions[place], body[place // 3] = unknowns.motions, unknowns.body
+    given = unknowns.motions()
+    motions, body = np.zeros((size, given.shape[1])), np.full(size // 3, -1)
+    motions[place], body[place // 3] = given, unknowns.body
     if unknowns.points is None:
         return LevelNodes(motions, body, None)
     points = np.zeros((size // 3, unknowns.points.shape[1]))

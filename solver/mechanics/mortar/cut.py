@@ -155,7 +155,7 @@ class _Pieces:
         numbers = self.n_points + np.arange(len(owner) * count).reshape(len(owner), count)
         self.points.append(new.reshape(-1, new.shape[2]))
         self.n_points += numbers.size
-        nodes = np.concatenate([parents, numbers], axis=1)
+        nodes = np.concatenate([parents, numbers], axis=1, dtype=parents.dtype)
         self.kept[name][owner] = False
         for piece, local in template.pieces:
             self.new.setdefault(piece, []).append((nodes[:, local], name, owner))
@@ -169,12 +169,13 @@ class _Pieces:
         for name in [*self.cells, *(n for n in self.new if n not in self.cells)]:
             data, parents = [], []
             if name in self.cells:
-                data.append(self.cells[name][self.kept[name]])
+                kept = self.kept[name]
+                data.append(self.cells[name] if kept.all() else self.cells[name][kept])
                 parents.append((name, np.flatnonzero(self.kept[name])))
             for piece, parent, owner in self.new.get(name, []):
                 data.append(piece)
                 parents.append((parent, owner))
-            joined = np.concatenate(data)
+            joined = data[0] if len(data) == 1 else np.concatenate(data)
             if len(joined):
                 cells[name], origin[name] = joined, parents
         return CutMesh(np.concatenate(self.points), cells, origin, _joined(whole + self.sub_faces))

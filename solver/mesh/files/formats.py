@@ -41,5 +41,6 @@ def read(path: Path) -> meshio.Mesh:
     read_by = read_here if suffix == ".vtkhdf" else read_apart
     mesh = read_by(lambda file: tidy(reader.read(file), file), path)
     if not mesh.cell_sets:
-        raise InputError(path, "groups", None, "the mesh must have named groups of cells or faces")
+        allowed = "the mesh must have named groups of cells or faces (docs/formats.md)"
+        raise InputError(path, "groups", None, allowed)
     return mesh

@@ -39,6 +39,7 @@
       tooltip: { theme: night.matches ? "dark" : "light" },
     });
     drawn.set(place, result);
+    if (!spec.width && !spec.vconcat) shown.classList.add("whole"); // as wide as it is, beside its menu
     place.querySelector(".none")?.remove();
     const link = document.createElement("a");
     link.textContent = "CSV";

@@ -72,7 +72,7 @@
         const shown = element(label, "span", {}, name === "deformation" ? " × 0" : "");
         input.oninput = () => { set(+input.value, shown); this.draw(); };
       };
-      slider("deformation", 2 * data.factor, 0, (value, shown) => {
+      slider("deformation", 10 * data.factor, 0, (value, shown) => {
         this.factor = value;
         shown.textContent = ` × ${+value.toPrecision(3)}`;
       });

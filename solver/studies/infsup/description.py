@@ -63,16 +63,15 @@ class InfSupLadder:
     @property
     def name(self) -> str:
         """In words."""
-        face = f" on {self.contact}" if self.contact else ""
-        cut = f", {self.hexahedra}" if self.hexahedra and self.cut else ""
-        cut = cut if self.cut else ", uncut"
         held = "clamped" if self.clamped else "floating"
-        return f"{self.cells}{face}{cut}, {held}, master {self.coarser} times as coarse"
+        return f"{self.kind}, {held}, master {self.coarser} times as coarse"
 
     @property
-    def kind(self) -> tuple[str, bool]:
-        """Its cells, and whether this is the method (with the cut, where they need one)."""
-        return self.cells, self.cut
+    def kind(self) -> str:
+        """Its cells, their faces in contact and their cut, in words."""
+        face = f" on {self.contact}" if self.contact else ""
+        cut = f", {self.hexahedra}" if self.hexahedra and self.cut else ""
+        return f"{self.cells}{face}{cut if self.cut else ', uncut'}"
 
     @property
     def way(self) -> str:

@@ -1,8 +1,9 @@
 """Charts of the inf-sup constants level by level, and of the half-loaded block's pressure."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from ...report.charts import INK, ORANGE, Axis, Chart, Look, look_of, series_chart
+from ...report.charts import INK, ORANGE, Axis, Chart, Look, distinct, look_of, series_chart
 from .description import InfSupLadder
 from .half_loaded import CELLS, PressureProfile
 
@@ -14,29 +15,23 @@ def draw_constants(title: str, ladders: Sequence[InfSupLadder]) -> Chart:
     """β_h against the slave divisions, log–log; without the cut dashed."""
     ladders = sorted(ladders, key=lambda one: not one.cut)
     records = [
-        {"series": _name(each.kind), "faces": level, "constant": max(constant, _RANGE[0])}
+        {"series": each.kind, "faces": level, "constant": max(constant, _RANGE[0])}
         for each in ladders
         for level, constant in zip(each.levels, each.constants, strict=False)
     ]
-    looks = {}
-    for each in ladders:
-        cells, cut = each.kind
-        look = look_of(cells)
-        looks[_name(each.kind)] = Look(look.color, look.shape, () if cut else (5.0, 3.0))
+    looks = {
+        each.kind: replace(look_of(each.cells), dashes=() if each.cut else (5.0, 3.0))
+        for each in ladders
+    }
     return series_chart(
         f"infsup-{title}",
         f"Inf-sup constant by level: {title}",
         records,
         Axis("faces", "slave faces along an edge of the interface", log=True),
-        Axis("constant", f"β_h, {title}", log=True, domain=_RANGE),
-        looks,
+        Axis("constant", f"βₕ, {title}", log=True, domain=_RANGE),
+        distinct(looks),
         width=460,
     )
-
-
-def _name(kind: tuple[str, bool]) -> str:
-    cells, cut = kind
-    return cells if cut else f"{cells}, uncut"
 
 
 def draw_profiles(profiles: Sequence[PressureProfile]) -> list[Chart]:

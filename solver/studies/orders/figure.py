@@ -1,6 +1,7 @@
 """Error against size of the macro-elements, log–log: a panel for each error, a line per ladder."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ...report.charts import (
     CROSS,
@@ -10,6 +11,7 @@ from ...report.charts import (
     Axis,
     Chart,
     Look,
+    distinct,
     look_of,
     series_chart,
     slopes,
@@ -36,15 +38,13 @@ def draw_panel(name: str, error: str, curves: Sequence[Curve]) -> Chart:
         records,
         Axis("h", "macro-element / interface", log=True),
         Axis("error", f"relative error: {ERRORS[error]}", log=True),
-        {curve.label: _look(curve) for curve in curves if curve.label in found},
+        distinct({curve.label: _look(curve) for curve in curves if curve.label in found}),
         layers=slopes(records, "h", "error", sorted(orders) or [1.0, 2.0]),
         width=460,
     )
 
 
 def _look(curve: Curve) -> Look:
-    """Linear cells dashed, quadratic ones solid; a variant is dotted."""
+    """Linear cells dashed, quadratic ones solid."""
     look = look_of(curve.slave_cells[0].name, _LOOKS)
-    variant = curve.ladder.hexahedra or curve.ladder.recovery or curve.ladder.label
-    dashes = (1.5, 3.0) if variant else (6.0, 3.0) if curve.degree == "linear" else ()
-    return Look(look.color, look.shape, dashes)
+    return replace(look, dashes=(6.0, 3.0) if curve.degree == "linear" else ())

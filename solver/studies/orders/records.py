@@ -47,7 +47,10 @@ class Curve:
         for row in self.rows:
             if row not in self.solved:
                 levels.setdefault(_reason(row), []).append(row.folder.name)
-        return [f"level {', '.join(names)}: {reason}" for reason, names in levels.items()]
+        return [
+            f"level{'s' * (len(names) > 1)} {', '.join(names)}: {reason}"
+            for reason, names in levels.items()
+        ]
 
     @cached_property
     def slave_cells(self) -> list[CellType]:
@@ -63,7 +66,8 @@ class Curve:
             return self.ladder.label
         names = " + ".join(dict.fromkeys(cell.name for cell in self.slave_cells))
         cut = f" cut into {self.ladder.hexahedra}" if self.ladder.hexahedra else ""
-        with_ = f", {self.ladder.recovery}" if self.ladder.recovery else ""
+        recovery = self.ladder.recovery or "none"
+        with_ = f", {recovery}" if recovery != "none" else ""
         return (names or self.name) + cut + with_
 
     @cached_property

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
-from solver.mechanics.fem.bodies import rigid_motions, unheld_motion
+from solver.mechanics.fem.bodies import rigid_motions, support_resistance, unheld_motion
 from solver.mechanics.fem.cell_sizes import largest_strain, sizes
 from solver.mechanics.fem.elasticity import (
     Block,
@@ -126,7 +127,20 @@ def test_the_one_rigid_motion_of_a_ring():
     motions = rigid_motions(RING, np.zeros(4, dtype=int), axisymmetric=True)
     assert motions.toarray().reshape(4, 2).tolist() == [[0, 1]] * 4
     free = free_motion(4, 2, []).basis
-    assert unheld_motion(motions, free, motions.T[:0], 1) == (0, "move along y")
+    assert unheld_motion(support_resistance(motions, free), motions[:0], 1) == (0, "move along y")
+
+
+def test_a_free_motion_is_named_without_round_off():
+    """Rows that resist all motions of four nodes but the one along (1, 1e-18, -0.5)."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    motions = rigid_motions(points, np.zeros(4, dtype=int))
+    along = np.array([1.0, 1e-18, -0.5])
+    others = np.stack([np.cross(along, [0, 1, 0]), [0, 1, 0]])
+    # About the centre of the points the turns are orthogonal to the translations.
+    moves, turns = motions[:, :3], motions[:, 3:]
+    held = sparse.vstack([(moves @ others.T).T, turns.T]).tocsr()
+    found = unheld_motion(motions, sparse.eye_array(12).tocsr(), held, 1)
+    assert found == (0, "move along (1, 0, -0.5)")
 
 
 def rings_under_a_disc():

@@ -31,7 +31,7 @@ def chain_over_floor(count):
 
 def stands_for(matrix, dim=3):
     n = matrix.shape[0]
-    return Unknowns(dim, np.arange(n), np.ones((n, 6)), np.zeros(n, dtype=int))
+    return Unknowns(dim, np.arange(n), lambda: np.ones((n, 6)), np.zeros(n, dtype=int))
 
 
 @needs_pardiso

@@ -42,7 +42,7 @@ def pressed(slave: int, master: int):
     kept = np.flatnonzero(free.ravel())
     own = np.isin(kept, 3 * top + 2)
     body = np.repeat([0, 1], [len(low), len(high)])
-    unknowns = Unknowns(3, kept // 3, motions(points)[kept], body[kept // 3], points)
+    unknowns = Unknowns(3, kept // 3, lambda: motions(points)[kept], body[kept // 3], points)
     return csr_matrix(matrix[kept][:, kept]), csr_matrix(gaps[:, kept]), own, unknowns
 
 
@@ -140,7 +140,7 @@ def test_slender_cells_are_gathered_along_short_edges():
     """Cells fifty times wider than high: neighbours by the mesh alone do not converge."""
     points, matrix = block(12, stretch=1 / 50)
     kept = np.flatnonzero(np.repeat(points[:, 2] > 0, 3))
-    about = 3, kept // 3, motions(points)[kept], np.zeros(len(kept), dtype=int)
+    about = 3, kept // 3, lambda: motions(points)[kept], np.zeros(len(kept), dtype=int)
     free = csr_matrix(matrix[kept][:, kept])
     exact = np.random.default_rng(4).standard_normal(len(kept))
     iterations = []

@@ -41,7 +41,7 @@ def motions(points: np.ndarray) -> np.ndarray:
 def held(points: np.ndarray, matrix: csr_matrix, free: np.ndarray, body: np.ndarray):
     """The system of the free unknowns, and what they stand for."""
     kept = np.flatnonzero(free.ravel())
-    unknowns = Unknowns(3, kept // 3, motions(points)[kept], body[kept // 3])
+    unknowns = Unknowns(3, kept // 3, lambda: motions(points)[kept], body[kept // 3])
     return csr_matrix(matrix[kept][:, kept]), unknowns
 
 
@@ -110,7 +110,7 @@ def test_order_and_units_of_the_unknowns_do_not_matter():
     matrix, unknowns = on_rollers(8)
     exact = np.random.default_rng(1).standard_normal(matrix.shape[0])
     order = np.random.default_rng(2).permutation(matrix.shape[0])
-    shuffled = Unknowns(3, unknowns.node[order], unknowns.motions[order], unknowns.body[order])
+    shuffled = unknowns.of(order)
     solver = Multigrid(1e-12 * matrix[order][:, order], shuffled)
     solution = solver.solve(1e-12 * (matrix @ exact)[order])
     np.testing.assert_allclose(solution, exact[order], rtol=0, atol=1e-11)
@@ -141,7 +141,7 @@ def test_rough_solution_is_as_rough_as_promised():
 def test_nodes_without_neighbours_do_not_coarsen():
     count = 4500
     node = np.arange(count) // 3
-    unknowns = Unknowns(3, node, np.ones((count, 6)), np.zeros(count, dtype=int))
+    unknowns = Unknowns(3, node, lambda: np.ones((count, 6)), np.zeros(count, dtype=int))
     with pytest.raises(SolveError, match="its levels end at 4500 unknowns: nothing coarsens"):
         Multigrid(csr_matrix(eye(count)), unknowns)
 
@@ -175,7 +175,7 @@ def tied_to_one_node(count: int):
     tied = block_array([[matrix + eye(n), -link], [-link.T, n * eye(3)]]).tocsr()
     node = np.append(unknowns.node, [unknowns.node.max() + 1] * 3)
     body, shifts = np.repeat([0, 1], [n, 3]), np.hstack([np.eye(3), np.zeros((3, 3))])
-    return tied, Unknowns(3, node, np.vstack([unknowns.motions, shifts]), body)
+    return tied, Unknowns(3, node, lambda: np.vstack([unknowns.motions(), shifts]), body)
 
 
 def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):

@@ -8,6 +8,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.nodal_matrix import NodalMatrix
+from solver.mechanics.linear.products import scale_blocks
 
 
 def example(seed, dim, share):
@@ -53,3 +54,35 @@ def test_a_condensed_matrix_of_blocks_is_that_of_entries(dim):
     np.testing.assert_allclose(condensed[2:5].toarray(), expected[2:5], atol=1e-12)
     np.testing.assert_allclose(condensed.diagonal(), np.diag(expected), atol=1e-12)
     np.testing.assert_allclose(condensed.tocsr().toarray(), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_blocks_scaled_in_place_are_still_the_matrix(dim):
+    """Also once the caller has scaled them further, and when they are scaled for a second time."""
+    matrix, dense, _ = example(3, dim, 0.8)
+    single = NodalMatrix(matrix.blocks.astype(np.float32), matrix.free)
+    n, rng = len(dense), np.random.default_rng(1)
+    nnz, close = single.nnz, {"rtol": 1e-6, "atol": 1e-6 * np.abs(dense).max()}
+    for _ in range(2):
+        scale, further = rng.uniform(0.1, 2, n), np.zeros(matrix.blocks.shape[0])
+        further[matrix.free] = rng.uniform(0.1, 2, n)
+        blocks = single.scaled(scale)
+        assert np.shares_memory(blocks.data, single.blocks.data)
+        scale_blocks(blocks, further, further)
+        single.scaled_further(further[matrix.free])
+        total = scale * further[matrix.free]
+        scaled = blocks.toarray()
+        expected = np.zeros_like(scaled, dtype=float)
+        expected[np.ix_(matrix.free, matrix.free)] = dense * np.outer(total, total)
+        np.testing.assert_allclose(scaled, expected, rtol=1e-6, atol=1e-5)
+        np.testing.assert_allclose(single @ np.eye(n), dense, **close)
+        np.testing.assert_allclose(single.diagonal(), np.diag(dense), **close)
+        np.testing.assert_allclose(single.tocsr().toarray(), dense, **close)
+        np.testing.assert_allclose(single[[2, 0]].toarray(), dense[[2, 0]], **close)
+        assert single.nnz == nnz
+
+
+def test_blocks_in_double_precision_stay_as_they_are():
+    matrix, dense, _ = example(3, 3, 0.8)
+    assert not np.shares_memory(matrix.scaled(np.full(len(dense), 2.0)).data, matrix.blocks.data)
+    np.testing.assert_array_equal(matrix.tocsr().toarray(), dense)

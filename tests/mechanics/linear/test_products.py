@@ -110,3 +110,19 @@ def test_galerkin_products_are_the_dense_ones(height, monkeypatch):
 def test_pattern_has_an_entry_for_each_block():
     matrix = bsr_matrix(kron(np.eye(4), np.ones((3, 6))), blocksize=(3, 6))
     np.testing.assert_array_equal(galerkin.pattern(matrix).toarray(), np.eye(4, dtype=bool))
+
+
+@pytest.mark.parametrize("size", [(3, 3), (3, 6), (6, 6)])
+def test_scaled_blocks_and_sums_are_the_dense_ones(size, monkeypatch):
+    monkeypatch.setattr(products, "_LEAST", 1)
+    matrix, rng = blocks(23, 17, size, 0.1), np.random.default_rng(1)
+    left, right = (rng.uniform(1, 2, n).astype(np.float32) for n in matrix.shape)
+    dense = matrix.toarray()
+    found = products.sums_of_sizes(matrix, right)
+    np.testing.assert_allclose(found, np.abs(dense) @ right, rtol=1e-6)
+    scaled = np.empty_like(matrix.data)
+    products.scale_blocks(matrix, left, right, scaled)
+    np.testing.assert_array_equal(matrix.toarray(), dense)
+    products.scale_blocks(matrix, left, right)
+    np.testing.assert_array_equal(matrix.data, scaled)
+    np.testing.assert_allclose(matrix.toarray(), left[:, None] * dense * right, rtol=1e-6)

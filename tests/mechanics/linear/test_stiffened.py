@@ -138,7 +138,8 @@ def test_conjugate_residuals_give_up_where_they_gain_little():
 
 def test_small_systems_and_linear_cells_are_factored(monkeypatch):
     matrix, whole = a_matrix()
-    unknowns = Unknowns(3, np.repeat(np.arange(10), 3), np.ones((30, 1)), np.zeros(30, dtype=int))
+    node, body = np.repeat(np.arange(10), 3), np.zeros(30, dtype=int)
+    unknowns = Unknowns(3, node, lambda: np.ones((30, 1)), body)
     monkeypatch.setattr(choice, "multigrid_from", lambda: 10)
     few = choice.prepare(matrix, unknowns)
     assert few.why.startswith("fewer than 100000 unknowns, some of nearly incompressible cells")

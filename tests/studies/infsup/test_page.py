@@ -1,5 +1,7 @@
 """The inf-sup test from its file to its page: ladders, record, what does not hold."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 
 from solver.commands.cli import main
 from solver.studies.infsup.description import InfSupLadder, read_ladders
+from solver.studies.infsup.figure import draw_constants
 from solver.studies.infsup.half_loaded import PressureProfile
 from solver.studies.infsup.page import sections, write_page
 from solver.studies.infsup.point import run
@@ -42,7 +45,7 @@ def profile(pressure, cut=True):
 
 def test_the_file_asks_for_every_cell_type_that_is_cut():
     asked = read_ladders(FILE)
-    assert {each.kind for each in asked} >= {
+    assert {(each.cells, each.cut) for each in asked} >= {
         (cells, cut)
         for cells in ("TRIA3", "QUAD4", "TETRA4", "TETRA10", "HEXA8", "HEXA20")
         for cut in (True, False)
@@ -55,6 +58,21 @@ def test_the_file_asks_for_every_cell_type_that_is_cut():
     assert {(each.clamped, each.coarser) for each in asked if each.cells == "TRIA3"} == {
         (clamped, coarser) for clamped in (True, False) for coarser in (1, 4)
     }
+
+
+def test_each_ladder_of_a_chart_has_its_own_line_and_look():
+    """PENTA6 has ladders on either kind of face, HEXA8 two cuts: each is a line of its own."""
+    asked = [each for each in read_ladders(FILE) if each.dim == 3 and each.clamped]
+    asked = [replace(each, constants=[0.1] * len(each.levels)) for each in asked]
+    asked = [each for each in asked if each.coarser == asked[0].coarser]
+    spec = draw_constants("3D", asked).spec
+    records = spec["data"]["values"]
+    assert len({(r["series"], r["faces"]) for r in records}) == len(records)
+    marks = spec["layer"][-1]["layer"]
+    channels = spec["layer"][-1]["encoding"]["color"], marks[1]["encoding"]["shape"]
+    dashes = marks[0]["encoding"]["strokeDash"]
+    looks = list(zip(*(c["scale"]["range"] for c in (*channels, dashes)), strict=True))
+    assert len({json.dumps(look) for look in looks}) == len(looks) == len(asked)
 
 
 def test_what_the_file_may_not_say(tmp_path):
@@ -77,9 +95,9 @@ def test_a_small_run_from_file_to_page(tmp_path):
     path.write_text(SMALL)
     ladders = [run(each) for each in read_ladders(path) if each.dim == 2]
     kinds = {each.kind: each for each in ladders if each.clamped}
-    assert kinds["QUAD4", True].levels_off
-    assert kinds["QUAD9", True].levels_off
-    assert kinds["QUAD4", False].order == pytest.approx(1.0, abs=0.05)
+    assert kinds["QUAD4"].levels_off
+    assert kinds["QUAD9"].levels_off
+    assert kinds["QUAD4, uncut"].order == pytest.approx(1.0, abs=0.05)
     write_record(record, ladders, [profile([1.0, 0.9, 0.8]), profile([1.0, 0.0, 1.0], cut=False)])
     assert read_record(record)[0] == ladders
     assert failures(read_record(record)) == []

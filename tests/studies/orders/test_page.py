@@ -119,7 +119,7 @@ def test_where_no_slope_is_asked_for_none_is_counted(family, results):
 def test_a_ladder_never_solved_is_missed(family, tmp_path):
     write_orders([family], tmp_path / "nothing", tmp_path)
     failures = (tmp_path / orders.FAILURES).read_text()
-    assert "powers/tria3: level 1, 2, 4, 8: not solved\n" in failures
+    assert "powers/tria3: levels 1, 2, 4, 8: not solved\n" in failures
     assert failures.count("not solved") == 3
 
 

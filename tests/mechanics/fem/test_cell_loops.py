@@ -1,0 +1,96 @@
+"""Compiled loops over cells: against NumPy's, a cube known by hand, and on any threads."""
+
+import numpy as np
+import pytest
+
+from solver.mechanics.fem import cell_loops
+from solver.mechanics.fem.elasticity import Block, internal_force, stiffness
+from solver.mechanics.fem.nodal_stress import nodal_stress
+from solver.mesh.catalogue import BY_MESHIO, BY_NAME
+from solver.system.compiled import available
+from solver.system.errors import SolveError
+from tests.scenes import block_mesh, grid
+
+pytestmark = pytest.mark.skipif(not available(), reason="Numba is not installed")
+
+SOLID = [name for name, kind in BY_NAME.items() if kind.dim == 3]
+
+
+def choose(loops, monkeypatch, threads=1):
+    """With the compiled loops or without, on so many threads."""
+    monkeypatch.setattr(cell_loops, "_LEAST", 1 if loops else 1 << 40)
+    monkeypatch.setattr(cell_loops, "workers", lambda: threads)
+    monkeypatch.setattr("solver.system.threads.workers", lambda: threads)
+
+
+def scattered(name):
+    """Two blocks of cells with bent edges and any materials, nodes numbered at random."""
+    mesh, rng = block_mesh(name, name), np.random.default_rng(0)
+    number, points = rng.permutation(len(mesh.points)), np.empty_like(mesh.points)
+    points[number] = mesh.points + 0.01 * rng.uniform(-1, 1, mesh.points.shape)
+    blocks = []
+    for group in mesh.cells:
+        lame, shear = rng.uniform(1, 2, (2, len(group.data)))
+        kind = BY_MESHIO[group.type]
+        if kind.dim == 3:
+            blocks.append(Block(kind, number[group.data], lame, shear, straight=False))
+    return points, blocks, rng.standard_normal((2, *points.shape))
+
+
+def found(points, blocks, field):
+    matrix = stiffness(points, blocks)
+    force, stress = internal_force(points, blocks, field), nodal_stress(points, blocks, field)
+    return matrix.data, stiffness(points, blocks, single=True).data, force, stress
+
+
+@pytest.mark.parametrize("name", SOLID)
+def test_loops_are_numpys_sums_whatever_the_threads(name, monkeypatch):
+    about = scattered(name)
+    choose(False, monkeypatch)
+    expected = found(*about)
+    choose(True, monkeypatch)
+    alone = found(*about)
+    for ours, numpys in zip(alone, expected, strict=True):
+        close = 100 * np.finfo(numpys.dtype).eps * np.abs(numpys).max()
+        np.testing.assert_allclose(ours, numpys, rtol=0, atol=close)
+    for threads in (2, 3, 8):
+        choose(True, monkeypatch, threads)
+        for ours, one in zip(found(*about), alone, strict=True):
+            np.testing.assert_array_equal(ours, one)
+
+
+def test_a_stretched_cube_by_hand(monkeypatch):
+    """u = x: σ = (λ + 2μ, λ, λ); a corner of a cell carries a quarter of each face's force."""
+    choose(True, monkeypatch)
+    points, cells = grid(2)
+    lame, shear = 3.0, 0.5
+    block = Block(BY_NAME["HEXA8"], cells, np.full(8, lame), np.full(8, shear))
+    field = np.zeros((2, *points.shape))
+    field[0, :, 0] = points[:, 0]
+    normal = np.array([lame + 2 * shear, lame, lame])
+    stress = nodal_stress(points, [block], field)
+    np.testing.assert_allclose(stress, [[*normal, 0, 0, 0]] * len(points), atol=1e-14)
+    side = 2 * points - 1
+    share = np.where(np.abs(side) == 1, 1, 2) / 4
+    area = np.stack([share[:, [1, 2]], share[:, [0, 2]], share[:, [0, 1]]]).prod(axis=2).T
+    force = internal_force(points, [block], field)
+    np.testing.assert_allclose(force, normal * side * area, atol=1e-15)
+    product = stiffness(points, [block]) @ field[0].ravel()
+    np.testing.assert_allclose(product, force.ravel(), atol=1e-14)
+
+
+def test_an_inverted_cell_is_refused(monkeypatch):
+    choose(True, monkeypatch, 2)
+    points, cells = grid(2)
+    cells[5] = cells[5, [4, 5, 6, 7, 0, 1, 2, 3]]
+    about = points, [Block(BY_NAME["HEXA8"], cells, np.ones(8), np.ones(8))]
+    for compute, *field in ((stiffness,), (internal_force, points), (nodal_stress, points)):
+        with pytest.raises(SolveError, match="HEXA8 cells are inverted"):
+            compute(*about, *field)
+
+
+def test_small_and_plane_meshes_are_left_to_numpy():
+    solid, plane = ([Block(BY_NAME[name], *[np.empty(0)] * 3)] for name in ("TETRA4", "QUAD4"))
+    assert cell_loops.serve(20_000, solid)
+    assert not cell_loops.serve(19_999, solid)
+    assert not cell_loops.serve(1_000_000, plane)
