@@ -237,7 +237,7 @@ class Case:
 
     @property
     def acting(self) -> dict[str, str]:
-        """The groups of supports, and of loads that are not on cells, by key of the case file."""
+        """The groups of supports and of the sides they copy, and of loads on surfaces, by key."""
         held = {f"supports[{i}].group": s.group for i, s in enumerate(self.supports)}
         supports, loads = enumerate(self.supports), enumerate(self.loads)
         held |= {f"supports[{i}].cyclic.of": s.cyclic.of for i, s in supports if s.cyclic}

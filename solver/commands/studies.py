@@ -210,16 +210,14 @@ def _add_benchmark(commands: Any) -> None:
 
 def _benchmark(options: argparse.Namespace) -> int:
     from ..studies.benchmark.description import read_benchmark
-    from ..studies.benchmark.page import as_text
+    from ..studies.benchmark.page import as_text, write_benchmark
     from ..studies.benchmark.run import run_benchmark
-    from ..system.files import write_text
-    from ..verification.verdict import to_json
 
     benchmark = read_benchmark(options.benchmark, QUICK if options.quick else FULL)
     with saying(partial(print, file=sys.stderr, flush=True)):
         record = run_benchmark(options.benchmark, benchmark)
-    write_text(options.output, to_json(record) + "\n")
-    print(as_text(record))
+    page = write_benchmark(record, options.output)
+    print(f"{as_text(record)}\n\nPage: {page}")
     return 0
 
 

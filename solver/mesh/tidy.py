@@ -162,7 +162,10 @@ def _flattened(points: np.ndarray, dim: int, where: object) -> np.ndarray:
         raise InputError(where, "node coordinates", None, allowed)
     if dim == 2 and points.shape[1] == 3:
         if np.ptp(points[:, 2]) > _PLANE * np.ptp(points, axis=0).max():
-            raise InputError(where, "node coordinates", None, "a mesh of 2D cells must have z = 0")
+            allowed = (
+                "a mesh of 2D cells must have z = 0; for bodies in 3D cells of volume are missing"
+            )
+            raise InputError(where, "node coordinates", None, f"{allowed} (docs/formats.md)")
         points = points[:, :2]
     return np.ascontiguousarray(points)
 

@@ -183,8 +183,8 @@ def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
         drawing.text(x + width + 24, y + height, f"{limits[0]:.3g}")
     sub_faces = sum(len(nodes) for _, nodes, _ in zone.faces)
     kinds = ", ".join(sorted({cell_type(kind).name for kind, _, _ in zone.faces}))
-    words = f"{zone.name}: {len(zone.centre)} macro-elements in {sub_faces} sub-faces ({kinds}), "
-    words += f"{sum(len(f) for _, f in zone.master_faces)} master faces (orange)"
+    words = f"{zone.name}: macro-elements {len(zone.centre)}, sub-faces {sub_faces} ({kinds}), "
+    words += f"master faces {sum(len(f) for _, f in zone.master_faces)} (orange)"
     drawing.text(_PLANS[0][0], drawing.height - 24, words)
 
 

@@ -270,7 +270,10 @@ class _Groups:
         parts = {s: self.cells(key, getattr(zone, s), self.dim - 1) for s, key in keys.items()}
         common = self.shared(parts["slave"], parts["master"])
         if common:
-            allowed = f"{common} of its faces are slave faces too; a slave cannot be its own master"
+            allowed = (
+                f"{common} of its faces are slave faces too; a slave cannot be its own master: "
+                "bodies in contact share no nodes"
+            )
             raise self.error(keys["master"], zone.master, allowed)
         for side in ("slave", "master") if self.case.directions == "both" else ("slave",):
             self.check_deformable(keys[side], getattr(zone, side), parts[side])

@@ -91,7 +91,12 @@ def test_a_plane_mesh_has_two_columns():
 @pytest.mark.parametrize(
     ("points", "cells", "sets", "message"),
     [
-        ([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [("triangle", [[0, 1, 2]])], {}, "must have z = 0"),
+        (
+            [[0, 0, 0], [1, 0, 0], [0, 1, 1]],
+            [("triangle", [[0, 1, 2]])],
+            {},
+            "must have z = 0; for bodies in 3D",
+        ),
         ([[0, 0, 0], [1, 0, 0], [0, 1, 1e-6]], [("triangle", [[0, 1, 2]])], {}, "must have z = 0"),
         (SQUARE, [("triangle", [[0, 1.5, 2]])], {}, "cells triangle: node numbers must be whole"),
         (SQUARE, [("triangle", [[0, 1, 2]])], {"": [[0]]}, "group = '': must have a name of prin"),

@@ -257,7 +257,7 @@ def test_a_batch_that_passed_leaves_no_failures(tmp_path):
     path = put(tmp_path / "fam-a" / "verdict.json", verdict("fam-a", "passed"))
     logged = write_report([path], tmp_path / "report")
     assert (tmp_path / "report" / "failures.txt").read_text() == ""
-    assert logged.startswith("The one solve passed.")
+    assert logged.splitlines()[-1].startswith("The one solve passed. Report: ")
 
 
 def test_a_badge_says_how_strictly_a_solve_was_judged(tmp_path):
@@ -276,7 +276,7 @@ def test_a_solve_without_a_reference_has_its_own_word_and_is_no_failure(tmp_path
     out = tmp_path / "report"
     logged = write_report(paths, out)
     assert (out / "failures.txt").read_text() == ""
-    assert logged.startswith("2 solves: 1 solved, 1 passed.")
+    assert logged.splitlines()[-1].startswith("2 solves: 1 solved, 1 passed. Report: ")
     assert '<span class="badge solved">solved</span>' in (out / "fam.html").read_text()
     told = {each["job"]: each for each in json.loads((out / "summary.json").read_text())}
     assert (told["fam-free"]["verdict"], told["fam-free"]["passed"]) == ("solved", False)

@@ -147,7 +147,13 @@ REFUSED = [
     (shared_slave_faces, "contact[1].slave = 'bottom_contact': 3 of its faces are slave faces of"),
     (a_part_apart, "supports: nothing keeps body 3 from a free motion (move along x), even with"),
     (nothing_holds, "supports: nothing keeps bottom from a free motion (move along y), even with"),
-    (glued, "contact[0].master = 'top_contact': 2 of its faces are slave faces too; a slave"),
+    (
+        glued,
+        (
+            "contact[0].master = 'top_contact': 2 of its faces are slave faces too; a slave "
+            "cannot be its own master: bodies in contact share no nodes"
+        ),
+    ),
     (cell_upon_cell, "of its faces have a cell on both sides (the first near ("),
 ]
 

@@ -146,7 +146,7 @@ def _refuse_odd_owners(mesh: meshio.Mesh, corners: np.ndarray, owners: np.ndarra
             at = ", ".join(f"{x:.6g}" for x in place)
             raise FaceError(
                 f"{int(count.sum())} of its faces have {what} (the first near ({at})); "
-                "faces on the outside of a body are allowed"
+                "allowed are faces on the outside of a body; bodies in contact share no nodes"
             )
 
 

@@ -26,6 +26,7 @@ from .galerkin import coarse, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
+from .slender import smoothed_along
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
@@ -122,10 +123,14 @@ class Hierarchy:
             blocks, nodes = self._add_linear(blocks, unknowns)
         while blocks.shape[0] > COARSEST:
             bound = _bound_of(blocks)
-            tentative, coarse_nodes = aggregate(blocks, nodes)
+            tentative, coarse_nodes, near = aggregate(blocks, nodes)
             if tentative.nnz == 0 or 2 * tentative.shape[1] > blocks.shape[0]:
                 break
-            way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            if near is None:
+                way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            else:
+                about = nodes.motions, _SMOOTHED, float(bound)
+                way = smoothed_along(blocks, tentative, near, *about)
             _refuse_fill(way)
             blocks, nodes = self._add(blocks, bound, way, coarse_nodes)
         if blocks.shape[0] > LARGEST_DENSE:

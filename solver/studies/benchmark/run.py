@@ -19,6 +19,7 @@ from ...system.errors import SolveError
 from ...system.package import COMMAND
 from ...system.process import cores_for, run_apart, used_since
 from ...system.progress import OUTCOME
+from ..bandwidth import measure
 from ..points import FAILED, MISSING, SOLVED, ended, measure_apart, surroundings
 from ..scaling.description import ScalingPoint, read_scaling
 from .description import Benchmark, WayComparison
@@ -43,9 +44,11 @@ def run_benchmark(path: Path, benchmark: Benchmark) -> Record:
         "comparisons": [],
     }
     series = {one.name: one for one in read_scaling(benchmark.scaling).series}
+    space = None
     for comparison in benchmark.comparisons:
         _LOG.log(OUTCOME, "measuring: %s", comparison.title)
         point = ScalingPoint(series[comparison.series], int(comparison.size))
+        space = space or (point if point.series.dim == 3 else None)
         with TemporaryDirectory(prefix="benchmark-") as folder:
             ways = _compare(point, comparison, Path(folder), cores, benchmark.limit)
         record["comparisons"].append(
@@ -58,7 +61,30 @@ def run_benchmark(path: Path, benchmark: Benchmark) -> Record:
                 "ways": ways,
             }
         )
+    with TemporaryDirectory(prefix="benchmark-") as folder:
+        record["products"] = _products(space, Path(folder), cores, benchmark.limit) if space else []
     return record | {"whole": now() - started}
+
+
+def _products(
+    point: ScalingPoint, folder: Path, cores: Sequence[int], limit: float
+) -> list[Record]:
+    """Bytes and times of the products of a solve, on one core and on all."""
+    _LOG.log(OUTCOME, "measuring: bandwidth")
+    job, found = _files(point, folder, cores, limit), folder / "products.json"
+    return [
+        {"title": point.series.title} | measure_apart(measure, job, found, cores[:count], limit)
+        for count in sorted({1, len(cores)})
+    ]
+
+
+def _files(point: ScalingPoint, folder: Path, cores: Sequence[int], limit: float) -> dict[str, str]:
+    """The case and mesh files of a point."""
+    case, mesh = folder / "case.yaml", folder / "mesh.vtkhdf"
+    case.write_text(point.source(), encoding="utf-8")
+    if run_apart([*COMMAND, "mesh", str(case), "-o", str(mesh)], cores, limit).status != 0:
+        raise SolveError(f"{case}: no mesh")
+    return {"case": str(case), "mesh": str(mesh)}
 
 
 def _compare(
@@ -69,16 +95,12 @@ def _compare(
     limit: float,
 ) -> list[Record]:
     """All ways to solve one mesh."""
-    case, mesh = folder / "case.yaml", folder / "mesh.vtkhdf"
-    case.write_text(point.source(), encoding="utf-8")
-    if run_apart([*COMMAND, "mesh", str(case), "-o", str(mesh)], cores, limit).status != 0:
-        raise SolveError(f"{case}: no mesh")
-    found = []
+    files, found = _files(point, folder, cores, limit), []
     for way in comparison.ways:
-        job = {"case": str(case), "mesh": str(mesh), "repetitions": comparison.repetitions}
-        job |= structs.asdict(way)
+        job = files | {"repetitions": comparison.repetitions} | structs.asdict(way)
         if way.program:
-            solved = _other(point.parsed(case), mesh, folder, cores, limit)
+            case = point.parsed(Path(files["case"]))
+            solved = _other(case, Path(files["mesh"]), folder, cores, limit)
         else:
             solved = measure_apart(solve_way, job, folder / "found.json", cores, limit)
         found.append({"way": way.title} | solved)

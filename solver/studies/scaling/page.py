@@ -1,6 +1,7 @@
 """The page of growth with size, and its tables for machines."""
 
 from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from ...report.charts import (
 from ...report.html import render
 from ...report.tables import as_csv
 from ...system.files import write_text
+from ..bandwidth import table
 from ..points import disturbed, facts, outcome, page_name
 from .description import Scaling
 from .records import (
@@ -142,6 +144,7 @@ def _to_html(scaling: Scaling, lines: Sequence[SeriesSolves], name: str) -> str:
         pairing=_pairing(lines),
         lines=lines,
         speed_ups=speed_ups(lines),
+        products=[(m.point.series.title, table(m.record.get("products"))) for m in points],
         stages=colors,
         bars=[(line, _stage_chart(line, colors), line.solved[-1]) for line in lines if line.solved],
         failures=lost,
@@ -201,6 +204,8 @@ def _stage_chart(line: SeriesSolves, colors: dict[str, str]) -> Chart:
     ]
     title = f"{line.series.title}: stages"
     x, y = Axis("size", "unknowns", log=True), Axis("cost", "processor time, s", log=True)
-    looks = {stage: Look(color) for stage, color in colors.items()}
+    # On dark paper some colours are close: marks differ too.
+    marks = zip(colors.items(), cycle(SHAPES), strict=False)
+    looks = {stage: Look(color, shape) for (stage, color), shape in marks}
     fan = slopes(records, "size", "cost", _LINEAR)
     return series_chart(title, title, records, x, y, looks, layers=fan, width=380, height=200)

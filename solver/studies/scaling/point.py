@@ -12,6 +12,7 @@ operating system reports processor time and peak memory of the whole process. Be
     process meshing                        {wall, cpu, peak_memory_mb} of the processes that solve
                                            and that make the mesh file
     errors verdict plan                    as in the verdict
+    products                               of the largest 3D solve of a series: `studies.bandwidth`
     memory_free_gb                         when it began
 """
 
@@ -26,7 +27,8 @@ from ...system.memory import available
 from ...system.package import COMMAND
 from ...system.process import cores_for, run_apart
 from ...verification.verdict import read_verdict
-from ..points import CRASHED, FAILED, REFUSED, SOLVED, Record, ended, surroundings
+from ..bandwidth import measure
+from ..points import CRASHED, FAILED, REFUSED, SOLVED, Record, ended, measure_apart, surroundings
 from .description import Scaling, ScalingPoint
 
 # The share of the machine's free memory that a point may take: the rest is for other programs.
@@ -91,4 +93,7 @@ def _solve(
         reason = content.reason.removeprefix(f"{case}: ")
         return found | ended(word if word in (REFUSED, CRASHED) else FAILED, reason)
     found["faces"] = sum(body.faces for body in content.bodies)
+    if point.series.dim == 3 and point.size == max(point.series.sizes):
+        job = {"case": str(case), "mesh": str(mesh)}
+        found["products"] = measure_apart(measure, job, folder / "products.json", cores, limit)
     return found | ended(SOLVED, content.reason)
