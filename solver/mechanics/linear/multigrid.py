@@ -114,9 +114,9 @@ class Hierarchy:
         nodes = nodes_at(unknowns, self.place, self.size)
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
-        self.scale *= scale[self.place]
+        self.scale = self.scale * scale[self.place]
         if isinstance(matrix, NodalMatrix):
-            matrix.scaled_further(scale[self.place])
+            matrix.now_scaled(self.scale)
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
