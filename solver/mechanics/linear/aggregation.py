@@ -5,6 +5,7 @@ from scipy.sparse import bsr_matrix, csr_matrix, diags
 
 from ...system.compiled import compiled, part_of_compiled, worthwhile
 from .products import in_pieces, share_rows
+from .slender import Near
 from .unknowns import LevelNodes
 
 # The distances of a node's neighbours differ by more than this where cells are slender. There only
@@ -14,10 +15,10 @@ _SLENDER, _NEAR = 3.5, 2.5
 _LINE = 6
 
 
-def aggregate(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[bsr_matrix, LevelNodes]:
+def aggregate(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[bsr_matrix, LevelNodes, Near | None]:
     """Tentative prolongation, whose columns are the orthonormal motions of each aggregate.
 
-    And the aggregates, as the nodes of the next level.
+    The aggregates, as the nodes of the next level. What is near where cells are slender.
     """
     from pyamg.aggregation import (
         fit_candidates,
@@ -25,7 +26,8 @@ def aggregate(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[bsr_matrix, LevelN
     )
 
     body = nodes.body
-    aggregates, _ = standard_aggregation(_along_lines(_graph(matrix, nodes)))
+    graph, near = _graph(matrix, nodes)
+    aggregates, _ = standard_aggregation(_along_lines(graph))
     tentative, motions = fit_candidates(aggregates, nodes.motions)
     members, points = aggregates.tocoo(), None
     coarse_body = np.zeros(aggregates.shape[1], dtype=body.dtype)
@@ -33,7 +35,7 @@ def aggregate(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[bsr_matrix, LevelN
     if nodes.points is not None:
         points = (aggregates.T @ nodes.points) / aggregates.sum(axis=0).reshape(-1, 1)
         points = np.asarray(points)
-    return bsr_matrix(tentative, dtype=np.float32), LevelNodes(motions, coarse_body, points)
+    return bsr_matrix(tentative, dtype=np.float32), LevelNodes(motions, coarse_body, points), near
 
 
 def _along_lines(graph: csr_matrix) -> csr_matrix:
@@ -43,20 +45,42 @@ def _along_lines(graph: csr_matrix) -> csr_matrix:
     return (graph + lines @ lines).tocsr() if lines.nnz else graph
 
 
-def _graph(matrix: bsr_matrix, nodes: LevelNodes) -> csr_matrix:
+def _graph(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[csr_matrix, Near | None]:
     """Which neighbours may share an aggregate: those of one body, no held node.
 
     Where cells are slender, near ones only: a smooth error is smooth along the short edges alone.
+    A node that has none joins its nearest neighbour.
     """
-    count = len(nodes.body)
-    joined = (_joined_by_loops if worthwhile(matrix.data.size) else _joined)(matrix, nodes)
+    joined, slender = (_joined_by_loops if worthwhile(matrix.data.size) else _joined)(matrix, nodes)
+    near = None
+    if slender:
+        rows = np.repeat(np.arange(len(nodes.body)), np.diff(matrix.indptr))
+        alone = np.bincount(rows[joined], minlength=len(nodes.body)) == 1
+        nearest = _nearest(matrix, nodes, rows, alone)
+        near = Near(joined | (rows == matrix.indices), rows[nearest])
+        joined[nearest] = True
     before = np.concatenate([[0], np.cumsum(joined, dtype=np.int32)], dtype=np.int32)
     columns = matrix.indices[joined].astype(np.int32, copy=False)
     ones = np.ones(len(columns), dtype=np.int8)
-    return csr_matrix((ones, columns, before[matrix.indptr]), shape=(count, count))
+    shape = len(nodes.body), len(nodes.body)
+    return csr_matrix((ones, columns, before[matrix.indptr]), shape=shape), near
 
 
-def _joined_by_loops(matrix: bsr_matrix, nodes: LevelNodes) -> np.ndarray:
+def _nearest(
+    matrix: bsr_matrix, nodes: LevelNodes, rows: np.ndarray, alone: np.ndarray
+) -> np.ndarray:
+    """Of each node that is `alone` (n,) the entry of its nearest neighbour, if it has any.
+
+    `rows` (nnz,) of the entries.
+    """
+    entries = np.flatnonzero(alone[rows] & (rows != matrix.indices))
+    entries = entries[nodes.body[matrix.indices[entries]] == nodes.body[rows[entries]]]
+    distance = _distance(nodes.points, rows[entries], matrix.indices[entries])
+    entries = entries[np.lexsort((distance, rows[entries]))]
+    return np.asarray(entries[np.diff(rows[entries], prepend=-1) > 0])
+
+
+def _joined_by_loops(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[np.ndarray, bool]:
     """What `_joined` returns, by compiled loops."""
     joined, limit = np.empty(len(matrix.indices), dtype=bool), np.full(len(nodes.body), np.inf)
     points = np.zeros((len(limit), 3)) if nodes.points is None else nodes.points
@@ -64,7 +88,7 @@ def _joined_by_loops(matrix: bsr_matrix, nodes: LevelNodes) -> np.ndarray:
     if nodes.points is not None:
         share_rows(lambda *some: _find_limits(*some, *arrays), matrix.indptr, 9)
     share_rows(lambda *some: _join(*some, *arrays, joined), matrix.indptr, 9)
-    return joined
+    return joined, bool((limit < np.inf).any())
 
 
 @compiled
@@ -86,7 +110,7 @@ def _join(first, last, starts, columns, body, points, limit, joined):  # type: i
         for k in range(starts[i], starts[i + 1]):
             j = columns[k]
             joined[k] = body[i] == body[j] and body[i] >= 0
-            within = max(limit[i], limit[j])
+            within = min(limit[i], limit[j])
             if joined[k] and within < np.inf:
                 joined[k] = _between(points, i, j) <= within
 
@@ -98,8 +122,8 @@ def _between(points, i, j):  # type: ignore[no-untyped-def]
     return x * x + y * y + z * z
 
 
-def _joined(matrix: bsr_matrix, nodes: LevelNodes) -> np.ndarray:
-    """Which pairs of neighbours (nnz,) may share an aggregate."""
+def _joined(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[np.ndarray, bool]:
+    """Which pairs of neighbours (nnz,) may share an aggregate, and whether cells are slender."""
     body, count = nodes.body, len(nodes.body)
     joined = np.empty(len(matrix.indices), dtype=bool)
     nearest, furthest = np.full(count, np.inf), np.zeros(count)
@@ -120,11 +144,11 @@ def _joined(matrix: bsr_matrix, nodes: LevelNodes) -> np.ndarray:
 
         def part(first: int, last: int) -> None:
             some, rows, columns = _pairs(matrix, first, last)
-            within = np.maximum(limit[rows], limit[columns])
+            within = np.minimum(limit[rows], limit[columns])
             joined[some] &= _distance(nodes.points, rows, columns) <= within
 
         in_pieces(part, matrix)
-    return joined
+    return joined, bool(slender.any())
 
 
 def _pairs(matrix: bsr_matrix, first: int, last: int) -> tuple[slice, np.ndarray, np.ndarray]:

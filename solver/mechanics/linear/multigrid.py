@@ -26,6 +26,7 @@ from .galerkin import coarse, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
+from .slender import smoothed_along
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
@@ -113,19 +114,23 @@ class Hierarchy:
         nodes = nodes_at(unknowns, self.place, self.size)
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
-        self.scale *= scale[self.place]
+        self.scale = self.scale * scale[self.place]
         if isinstance(matrix, NodalMatrix):
-            matrix.scaled_further(scale[self.place])
+            matrix.now_scaled(self.scale)
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
             blocks, nodes = self._add_linear(blocks, unknowns)
         while blocks.shape[0] > COARSEST:
             bound = _bound_of(blocks)
-            tentative, coarse_nodes = aggregate(blocks, nodes)
+            tentative, coarse_nodes, near = aggregate(blocks, nodes)
             if tentative.nnz == 0 or 2 * tentative.shape[1] > blocks.shape[0]:
                 break
-            way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            if near is None:
+                way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            else:
+                about = nodes.motions, _SMOOTHED, float(bound)
+                way = smoothed_along(blocks, tentative, near, *about)
             _refuse_fill(way)
             blocks, nodes = self._add(blocks, bound, way, coarse_nodes)
         if blocks.shape[0] > LARGEST_DENSE:
@@ -216,7 +221,7 @@ class Multigrid:
         accuracy = max(accuracy, self._least)
         solution, iterations = conjugate_gradients(
             lambda x: self._scale * (self._matrix @ (self._scale * x)),
-            in_single(partial(np.apply_along_axis, self._cycle, 0)),
+            self.cycle,
             self._scale * columns,
             accuracy,
             MAX_ITERATIONS,
@@ -230,6 +235,15 @@ class Multigrid:
         """Release the hierarchy; it solves no more."""
         self._levels = []
         self._shared.close()
+
+    @property
+    def scale(self) -> np.ndarray:
+        """The scale (n,) of the unknowns."""
+        return np.asarray(self._scale[:, 0])
+
+    def cycle(self, residual: np.ndarray) -> np.ndarray:
+        """The correction for a residual (n, k), one V-cycle; both scaled."""
+        return in_single(partial(np.apply_along_axis, self._cycle, 0))(residual)
 
     def _cycle(self, residual: np.ndarray) -> np.ndarray:
         padded = np.zeros(self._size, dtype=np.float32)

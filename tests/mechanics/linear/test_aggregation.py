@@ -20,7 +20,7 @@ def with_loops(yes, monkeypatch):
 def graph(near, points, body):
     """Of nodes with blocks of three where `near` (n, n) is not zero."""
     matrix = kron(near, np.ones((3, 3))).tobsr((3, 3)).astype(np.float32)
-    return _graph(matrix, LevelNodes(np.zeros((3 * len(body), 6)), body, points))
+    return _graph(matrix, LevelNodes(np.zeros((3 * len(body), 6)), body, points))[0]
 
 
 @pytest.mark.parametrize("loops", [NUMBA, False])
