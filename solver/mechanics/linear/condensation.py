@@ -20,7 +20,7 @@ from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise_indefinite
 from .krylov import EPSILON, ROUGH
 from .multigrid import Shared
-from .nodal_matrix import NodalMatrix
+from .stiffened import StiffenedMatrix, Stiffness
 from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)
@@ -220,7 +220,7 @@ def inverse_of(pivots: sparse.csr_matrix) -> sparse.csr_matrix:
 
 
 def condense(
-    matrix: sparse.csr_matrix | NodalMatrix,
+    matrix: Stiffness,
     constraints: sparse.csr_matrix,
     own: np.ndarray,
     unknowns: Unknowns | None = None,
@@ -245,13 +245,22 @@ def condense(
     kept_columns, coupling = np.flatnonzero(kept), matrix[pivot]
     inverse = inverse_of(constraints[:, pivot])
     follow = -(inverse @ constraints[:, kept_columns])
-    condensed: Symmetric = matrix
-    if len(pivot):
-        pulled = (coupling[:, kept_columns].T @ follow).tocsr()
-        added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
-        condensed = CondensedMatrix(matrix, kept_columns, added.tocsr())
+    condensed = _condensed(matrix, kept_columns, pivot, follow) if len(pivot) else matrix
     factor = prepare(condensed, unknowns, gave_up, shared)
     return CondensedSystem(kept_columns, follow.tocsr(), pivot, inverse, factor, coupling)
+
+
+def _condensed(
+    matrix: Stiffness, kept: np.ndarray, pivot: np.ndarray, follow: sparse.csr_matrix
+) -> Symmetric:
+    """ZᵀKZ for the unknowns `kept` (k,), which the others `follow` (m, k)."""
+    if isinstance(matrix, StiffenedMatrix):
+        opened = matrix.divergence[:, kept] + matrix.divergence[:, pivot] @ follow
+        return matrix.changed(_condensed(matrix.soft, kept, pivot, follow), opened.tocsr())
+    coupling = matrix[pivot]
+    pulled = (coupling[:, kept].T @ follow).tocsr()
+    added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
+    return CondensedMatrix(matrix, kept, added.tocsr())
 
 
 class Iterate(Protocol):
