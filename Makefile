@@ -99,7 +99,7 @@ stability: environment ## numerical stability: vary quantities until the answer 
 	@$(SNAKEMAKE) stability
 
 scaling: override CONFIG += $(if $(LEVEL),scaling=$(LEVEL))
-scaling: environment ## cost up to a million unknowns; small sizes in a minute: LEVEL=quick
+scaling: environment ## cost up to a million unknowns; a minute: LEVEL=quick; ten million: LEVEL=large
 	@$(SNAKEMAKE) scaling
 
 BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json

@@ -12,6 +12,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from ..system.errors import InputError, SolveError, hint, of_machine
 from ..system.imports import defer
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import codes, completion, history, jobs, look, results, studies
+from . import codes, completion, history, jobs, look, report, results, studies
 from .options import (
     BUG,
     FAILED,
@@ -35,7 +36,9 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from ..simulation.solution import Solution
     from ..verification.run import Job
+    from ..verification.verdict import Verdict
 
 _EXAMPLES = f"""examples:
   {PROGRAM} new my-block -o my-block.yaml
@@ -108,6 +111,7 @@ def parser() -> argparse.ArgumentParser:
     look.add_commands(commands)
     results.add_commands(commands)
     codes.add_commands(commands)
+    report.add_commands(commands)
     _add_batch(commands)
     history.add_commands(commands)
     jobs.add_commands(commands)
@@ -136,6 +140,9 @@ def _add_cases(commands: Any) -> None:
     command.add_argument(
         "--verdict", type=Path, metavar="VERDICT.json", help="written for every outcome"
     )
+    command.add_argument(
+        "--pictures", type=Path, metavar="DIR", help="draw the pictures of the report, kept there"
+    )
     command.add_argument("--quiet", action="store_true", help="print nothing but errors")
     command.add_argument("--verbose", action="store_true", help="print each stage, with the time")
     add_threads(command)
@@ -153,23 +160,6 @@ def _add_cases(commands: Any) -> None:
 
 def _add_batch(commands: Any) -> None:
     """Add the commands that work on the results of many cases."""
-    command = add_command(commands, "report", _report, "write the report of many verdicts")
-    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
-    command.add_argument(
-        "--families",
-        type=Path,
-        nargs="*",
-        metavar="FAMILY.yaml",
-        help="descriptions of families; default: those in cases/",
-    )
-
-    command = add_command(commands, "compare", _compare, "compare with another batch")
-    command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
-    command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
-    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
-
     command = add_command(commands, "accept", _accept, "store results as the accepted values")
     command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
 
@@ -190,6 +180,7 @@ def _add_batch(commands: Any) -> None:
         listed=False,
     )
     command.add_argument("socket", type=int, metavar="FD", help="an open, listening socket")
+    jobs.add_folders(command, "*")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -253,8 +244,18 @@ def _solve(options: argparse.Namespace) -> int:
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
     with telling(options.verbose, options.quiet), saying(log):
-        verdict = solve(job, options.output, options.verdict)
+        draw = partial(_draw, options.pictures, options.output.parent) if options.pictures else None
+        verdict = solve(job, options.output, options.verdict, draw)
     return PASSED if verdict.sound else FAILED
+
+
+def _draw(pictures: Path, folder: Path, solution: "Solution", verdict: "Verdict") -> None:
+    """Draw what the report shows of a solve; it draws what is missing, and says why it cannot."""
+    from ..report.pictures import draw_all
+    from ..report.rows import Row
+
+    with suppress(Exception):
+        draw_all(Row(verdict, folder), pictures, solution)
 
 
 def _silent(line: str) -> None:
@@ -282,38 +283,6 @@ def _check(options: argparse.Namespace) -> int:
         for verdict in verdicts:
             print_checks(verdict)
     return PASSED if all(verdict.sound for verdict in verdicts) else FAILED
-
-
-def _verdicts(options: argparse.Namespace) -> list[Path]:
-    """The verdicts named, and all in the folder of results, but those of ladders' levels."""
-    verdicts = list(options.verdicts)
-    if options.results:
-        found = sorted(options.results.glob("**/verdict.json"))
-        # The levels of ladders have a page of their own.
-        verdicts += [p for p in found if "orders" not in p.relative_to(options.results).parts]
-    if not verdicts:
-        where = options.results or options.run.__name__.strip("_")
-        raise InputError(where, "VERDICT.json", None, "no verdict is named or found")
-    return verdicts
-
-
-def _report(options: argparse.Namespace) -> int:
-    from ..report import write_report
-
-    verdicts = _verdicts(options)
-    families = options.families
-    if families is None:
-        families = sorted(Path("cases").glob("*/family.yaml"))
-    print(write_report(verdicts, options.output, families))
-    return PASSED
-
-
-def _compare(options: argparse.Namespace) -> int:
-    from ..report.compare import compare
-
-    found, text = compare(options.base, options.this, options.output)
-    print(text)
-    return FAILED if found.groups["worse"] else PASSED
 
 
 def _validate(options: argparse.Namespace) -> int:
@@ -380,6 +349,11 @@ def _serve(options: argparse.Namespace) -> int:
 
     from .server import serve
 
+    if options.folders:
+        try:
+            jobs.print_jobs(options)
+        except InputError:
+            print()  # who asked finds out why from the command `jobs`
     with socket.socket(fileno=options.socket) as listener:
         serve(listener)
     return PASSED

@@ -157,12 +157,18 @@ def _printable(text: str, strict: bool = False) -> str:
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add the command `jobs`."""
     purpose = "list the jobs of folders of cases, as JSON"
-    command = add_command(commands, "jobs", _jobs, purpose, listed=False)
-    command.add_argument("folders", type=Path, nargs="+", metavar="DIR")
+    command = add_command(commands, "jobs", print_jobs, purpose, listed=False)
+    add_folders(command, "+")
+
+
+def add_folders(command: argparse.ArgumentParser, count: str) -> None:
+    """Let a command take the folders whose jobs `print_jobs` prints."""
+    command.add_argument("folders", type=Path, nargs=count, metavar="DIR", help="with case files")
     command.add_argument("--variants", action="store_true", help="with the other cut of hexahedra")
 
 
-def _jobs(options: argparse.Namespace) -> int:
+def print_jobs(options: argparse.Namespace) -> int:
+    """Print the jobs of the folders as a line of JSON; InputError for a folder without cases."""
     for folder in options.folders:
         if not folder.is_dir():
             raise InputError(folder, "cases", None, "no such folder")

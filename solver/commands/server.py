@@ -7,7 +7,6 @@ It runs the command as `python -m solver` does, on the standard output and error
 
 import gc
 import importlib
-import json
 import os
 import pkgutil
 import runpy
@@ -24,7 +23,7 @@ from typing import NoReturn
 from ..system.package import PACKAGE
 from ..system.provenance import gather
 from .cli import parser
-from .warm import GREETING, LIMIT, THREADS, outcome
+from .warm import GREETING, LIMIT, THREADS, answer, words
 
 # Modules that the solver imports late. The command itself reports a missing one.
 _LATE = (
@@ -46,22 +45,79 @@ def serve(listener: socket.socket) -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     load()
-    while _INPUT not in select.select([listener.fileno(), _INPUT], [], [])[0]:
-        client, _ = listener.accept()
-        if os.fork() == 0:
-            listener.close()
-            _end(partial(_answer, client))
-        client.close()
-        _reap(os.WNOHANG)
+    ended = _watch_forks()
+    asking: set[socket.socket] = set()
+    running: dict[int, socket.socket] = {}
+    while True:
+        waiting: list[int | socket.socket] = [_INPUT, ended, listener, *asking]
+        ready = select.select(waiting, [], [])[0]
+        if ended in ready:
+            os.read(ended, LIMIT)
+            _report_ends(running, os.WNOHANG)
+        if _INPUT in ready:
+            break
+        for client in asking.intersection(ready):
+            asking.remove(client)
+            if process := _start(client, [listener, *asking, *running.values()]):
+                running[process] = client
+            else:
+                client.close()
+        if listener in ready:
+            asking.add(_greet(listener))
     listener.close()
-    _reap()
+    for client in asking:
+        client.close()
+    _report_ends(running)
 
 
-def _reap(options: int = 0) -> None:
-    """Collect the forks that have ended, or wait for all."""
-    with suppress(ChildProcessError):
-        while os.waitpid(-1, options)[0]:
-            pass
+def _watch_forks() -> int:
+    """The end of a pipe that can be read whenever a fork has ended."""
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    inward, outward = os.pipe()
+    os.set_blocking(outward, False)
+    signal.set_wakeup_fd(outward, warn_on_full_buffer=False)
+    return inward
+
+
+def _greet(listener: socket.socket) -> socket.socket:
+    client, _ = listener.accept()
+    with suppress(OSError):
+        client.send(GREETING)
+    return client
+
+
+def _start(client: socket.socket, others: Sequence[socket.socket]) -> int:
+    """Start the client's command in a fork: its process, or 0 where it is not started.
+
+    Libraries read the number of threads when they are loaded: no answer for another number. The
+    fork keeps the client's connection, so that a client whose server is killed waits for the end of
+    its command; it closes all `others`.
+    """
+    message, streams = b"", list[int]()
+    with suppress(OSError):
+        message, streams, *_ = socket.recv_fds(client, LIMIT, 2)
+    command, process = words(message, os.environ.get(THREADS, "")), 0
+    if command and len(streams) == 2:
+        process = os.fork()
+        if process == 0:
+            for other in others:
+                other.close()
+            _end(partial(_run, command, streams))
+    for stream in streams:
+        os.close(stream)
+    return process
+
+
+def _report_ends(running: dict[int, socket.socket], options: int = 0) -> None:
+    """Report to its client how each fork ended that has ended, or wait for all."""
+    while running:
+        process, status, used = os.wait4(-1, options)
+        if not process:
+            return
+        client = running.pop(process)
+        with suppress(OSError):
+            client.send(answer(status, used))
+        client.close()
 
 
 def load() -> None:
@@ -83,23 +139,10 @@ def load() -> None:
     gc.freeze()
 
 
-def _answer(client: socket.socket) -> int:
-    """Run the client's command in a separate process and report how it ended."""
-    client.send(GREETING)
-    message, streams, *_ = socket.recv_fds(client, LIMIT, 2)
-    request = json.loads(message or "{}")
-    # Libraries read the number of threads when they are loaded: no answer for another number.
-    if request.get("threads") == os.environ.get(THREADS):
-        process = os.fork()
-        if process == 0:
-            client.close()
-            _end(partial(_run, request["command"], streams))
-        client.send(json.dumps(outcome(process)).encode())
-    return 0
-
-
 def _run(command: Sequence[str], streams: Sequence[int]) -> int:
     """Run a command as `python -m solver` does; its exit status."""
+    signal.set_wakeup_fd(-1)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     nothing = os.open(os.devnull, os.O_RDONLY)
     for number, stream in enumerate((nothing, *streams)):

@@ -5,11 +5,12 @@ The workflow runs them, so the help of the program does not list them.
 
 import argparse
 import sys
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..studies import FULL, QUICK, SIZES
+from ..studies import FULL, LARGE, QUICK, SIZES
 from ..system.errors import InputError
 from ..system.progress import saying
 from .options import add_command, add_threads
@@ -36,12 +37,18 @@ def _output(command: argparse.ArgumentParser, metavar: str) -> None:
 
 
 def _sized(
-    commands: Any, name: str, run: Any, purpose: str, file: str, output: str
+    commands: Any,
+    name: str,
+    run: Any,
+    purpose: str,
+    file: str,
+    output: str,
+    sizes: Sequence[str] = SIZES,
 ) -> argparse.ArgumentParser:
-    """A command on the file that describes a study, or on its quick part."""
+    """A command on the file that describes a study, or on a part of it."""
     command = add_command(commands, name, run, purpose)
     command.add_argument("study", type=Path, metavar=file)
-    command.add_argument("--size", choices=SIZES, default=FULL)
+    command.add_argument("--size", choices=sizes, default=FULL)
     _output(command, output)
     return command
 
@@ -173,11 +180,12 @@ def _study_page(options: argparse.Namespace) -> int:
 
 
 def _add_scaling(commands: Any) -> None:
-    file = "SCALING.yaml"
+    file, sizes = "SCALING.yaml", (*SIZES, LARGE)
     purpose = "solve one point, in a process of its own"
-    point = _sized(commands, "point", _scaling_point, purpose, file, RECORD)
+    point = _sized(commands, "point", _scaling_point, purpose, file, RECORD, sizes)
     point.add_argument("point", metavar="POINT", help="SERIES/SIZE")
-    page = _sized(commands, "page", _scaling_page, "write the page of all points", file, FOLDER)
+    purpose = "write the page of all points"
+    page = _sized(commands, "page", _scaling_page, purpose, file, FOLDER, sizes)
     page.add_argument("--results", type=Path, required=True, metavar=FOLDER, help="the records")
 
 

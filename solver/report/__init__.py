@@ -9,16 +9,22 @@ def write_report(
     verdicts: Sequence[Path],
     folder: Path,
     families: Sequence[Path] = (),
+    processes: int | None = None,
 ) -> str:
     """Write the report of the verdict files into `folder`; returns what it found.
 
     Every verdict is in every file: the main page and the page of its family, summary.json,
     .csv, .md, junit.xml, and failures.txt (empty when all passed); `bench.html` where other codes
     have results; `matrix.html` with families. `families` are files `family.yaml`, each in the
-    folder of its family. Returned are the processor time by family, a line for each solve that did
-    not pass, and the outcome.
+    folder of its family. Pictures are drawn by so many `processes`, one for each core where None is
+    given. Returned are the processor time by family, a line for each solve that did not pass, and
+    the outcome.
     """
+    from functools import partial
+
     from ..system.files import write_text
+    from ..system.forks import in_forks
+    from ..system.threads import workers
     from . import tables
     from .bench import write_bench
     from .charts import write_script
@@ -35,18 +41,20 @@ def write_report(
     parts = sections(read_rows(verdicts), files, folder / "pictures")
     rows = [row for part in parts for row in part.rows]
     folders = [file.resolve().parent for file in families]
-    write_bench(rows, folder, folders)
-    if folders:  # the main page links it
-        write_text(folder / "matrix.html", matrix_page(rows, folders))
-    contents = {
-        PAGE: main_page(parts, folder),
-        "summary.json": tables.to_json(rows),
-        "summary.csv": tables.to_csv(rows),
-        "summary.md": tables.to_markdown(rows),
-        "junit.xml": to_junit(rows),
-        "failures.txt": tables.to_failures(rows),
-        **{part.page: family_page(part, folder) for part in parts},
-    }
+    drawings = [partial(part.draw, row) for part in parts for row in part.drawn]
+    with in_forks([partial(write_script, folder), *drawings], processes or workers()):
+        write_bench(rows, folder, folders)
+        if folders:  # the main page links it
+            write_text(folder / "matrix.html", matrix_page(rows, folders))
+        contents = {
+            PAGE: main_page(parts, folder),
+            "summary.json": tables.to_json(rows),
+            "summary.csv": tables.to_csv(rows),
+            "summary.md": tables.to_markdown(rows),
+            "junit.xml": to_junit(rows),
+            "failures.txt": tables.to_failures(rows),
+        }
+    contents |= {part.page: family_page(part, folder) for part in parts}
     for name, content in contents.items():
         write_text(folder / name, content)
     write_script(folder)

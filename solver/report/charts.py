@@ -9,6 +9,7 @@ Interactive Graphics, IEEE TVCG 23 (2017) 341–350.
 import json
 import math
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -20,8 +21,11 @@ import numpy as np
 from markupsafe import Markup
 
 from ..system.files import write_text
+from ..system.package import PROJECT
 
 SCRIPT = "charts.js"
+# Beside the packages that its content comes from.
+KEPT = Path(sys.prefix, "share", PROJECT, "vega.js")
 _SCHEMA = "https://vega.github.io/schema/vega-lite/v6.json"
 _TEMPLATES = Path(__file__).with_name("templates")
 EPSILON = float(np.finfo(float).eps)
@@ -176,11 +180,8 @@ def _short(value: Any) -> Any:
 
 def write_script(folder: Path) -> None:
     """Write the script that draws charts into `folder`, unless it is there already."""
-    import vl_convert
-
     own = (_TEMPLATES / SCRIPT).read_text(encoding="utf-8")
-    versions = vl_convert.get_vega_version(), vl_convert.get_vega_embed_version()
-    head = "// Vega {} and Vega-Embed {} (BSD-3-Clause)\n".format(*versions)
+    head = _head()
     tail = f"\nconst THEME = {json.dumps(theme())};\n{own}"
     file = folder / SCRIPT
     there = file.read_text(encoding="utf-8") if file.is_file() else ""
@@ -188,12 +189,27 @@ def write_script(folder: Path) -> None:
         write_text(file, head + _libraries() + tail)
 
 
-@cache
-def _libraries() -> str:
-    """Vega, Vega-Lite and Vega-Embed as one script; it takes more than a second."""
+def _head() -> str:
     import vl_convert
 
+    versions = vl_convert.get_vega_version(), vl_convert.get_vega_embed_version()
+    return "// Vega {} and Vega-Embed {} (BSD-3-Clause)\n".format(*versions)
+
+
+@cache
+def _libraries() -> str:
+    """Vega, Vega-Lite and Vega-Embed as one script: as kept, or made in more than a second."""
+    import vl_convert
+
+    kept = KEPT.read_text(encoding="utf-8") if KEPT.is_file() else ""
+    if kept.startswith(_head()):
+        return kept.removeprefix(_head())
     return vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
+
+
+def keep_libraries() -> None:
+    """Keep that script in the environment; its installation calls this."""
+    write_text(KEPT, _head() + _libraries())
 
 
 @cache

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
 from urllib.parse import quote
@@ -24,7 +24,14 @@ from .surfaces import surfaces
 VIEWER = "viewer.js"
 
 
-def picture(row: Row, folder: Path) -> Markup:
+def draw_all(row: Row, folder: Path, solution: Solution | None = None) -> None:
+    """Draw what pages show of a solve, unless `folder` has it; `solution` is that of its result."""
+    picture(row, folder, solution)
+    if row.dim == 2:
+        profile(row, folder, solution=solution)
+
+
+def picture(row: Row, folder: Path, solution: Solution | None = None) -> Markup:
     """The picture of one solve, a file in `folder`, and a button that turns its surfaces.
 
     A line with the reason where there is no picture, or nothing to turn.
@@ -32,13 +39,13 @@ def picture(row: Row, folder: Path) -> Markup:
     if row.result_file is None:
         return Markup("<p class=none>No result, no picture.</p>")
     name, (width, height) = f"{folder.name}/{_name(row)}", SIZES.get(row.dim, SIZES[3])
-    shown = _kept(row, folder, "picture", ".svg", lambda row: draw(_solution(row), row.name))
+    shown = _kept(row, folder, "picture", ".svg", lambda of: draw(of, row.name), solution)
     if not isinstance(shown, Markup):
         size = f"width={width} height={height}"
         tag = f'<img class=mesh loading=lazy {size} src="{{}}.svg" alt="{{}}: meshes and contact">'
         shown = Markup(tag).format(quote(name), row.name)
     file = f"{quote(name)}.js"
-    turned = _kept(row, folder, "view to turn", ".js", lambda row: surfaces(_solution(row), file))
+    turned = _kept(row, folder, "view to turn", ".js", lambda of: surfaces(of, file), solution)
     if not isinstance(turned, Markup):
         button = "<button type=button data-surfaces='{}' hidden>Turn, zoom, maps of errors</button>"
         turned = Markup(button).format(file)
@@ -66,14 +73,16 @@ def _viewer() -> str:
     return (TEMPLATES / VIEWER).read_text(encoding="utf-8")
 
 
-def profile(row: Row, folder: Path, along: Expression | None = None) -> Chart | Markup:
+def profile(
+    row: Row, folder: Path, along: Expression | None = None, solution: Solution | None = None
+) -> Chart | Markup:
     """The pressure of one solve's first zone along the interface, kept in `folder` too."""
 
-    def draw_row(row: Row) -> str:
-        return json.dumps(vars(draw_pressure(_solution(row), row.name, along)))
+    def drawn(solution: Solution) -> str:
+        return json.dumps(vars(draw_pressure(solution, row.name, along)))
 
     over = f"-{sha256(along.text.encode()).hexdigest()[:8]}" if along else ""
-    kept = _kept(row, folder, "chart", f"-profile{over}.json", draw_row)
+    kept = _kept(row, folder, "chart", f"-profile{over}.json", drawn, solution)
     return kept if isinstance(kept, Markup) else Chart(**json.loads(kept))
 
 
@@ -96,13 +105,21 @@ def draw_pressure(
     return draw_profile(solution, shown, f"pressure-{name}", title, along)
 
 
-def _kept(row: Row, folder: Path, what: str, ending: str, draw: Callable[[Row], str]) -> str:
+def _kept(
+    row: Row,
+    folder: Path,
+    what: str,
+    ending: str,
+    draw: Callable[[Solution], str],
+    solution: Solution | None,
+) -> str:
+    """A drawing as kept in `folder`, or drawn and kept there; else a line with the reason."""
     if row.result_file is None:
         return Markup("<p class=none>No result, no {}.</p>").format(what)
     kept = folder / f"{_name(row)}{ending}"
     if not _is_current(kept, row.result_file):
         try:
-            drawing = draw(row)
+            drawing = draw(solution or _solution(row))
         except (InputError, OSError, LookupError, ValueError, ArithmeticError) as error:
             reason = f"{type(error).__name__}: {error}"
             return Markup("<p class=none>No {}: {}</p>").format(what, reason)
@@ -116,8 +133,14 @@ def _name(row: Row) -> str:
 
 def _is_current(kept: Path, result: Path) -> bool:
     """Whether a picture is newer than its result and the sources of this folder."""
-    newest = max(path.stat().st_mtime for path in (result, *Path(__file__).parent.glob("*.py")))
+    newest = max(result.stat().st_mtime, _changed())
     return kept.is_file() and kept.stat().st_mtime > newest
+
+
+@cache
+def _changed() -> float:
+    """When the sources of this folder last changed."""
+    return max(path.stat().st_mtime for path in Path(__file__).parent.glob("*.py"))
 
 
 def _solution(row: Row) -> Solution:

@@ -12,7 +12,7 @@ from .charts import Chart
 from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
 from .html import KINDS, NORMS
-from .pictures import picture, profile
+from .pictures import draw_all, picture, profile
 from .rows import Row, counted, families, ours
 from .tables import outcome
 
@@ -111,7 +111,7 @@ class FamilySection:
     def profiles(self) -> list[Profile]:
         """The pressure along the interface of the solves that the family names, or of some."""
         found = []
-        for row, figure in self._figures():
+        for row, figure in self._figures:
             picture(row, self.pictures)  # both of one reading of the result
             drawing = profile(row, self.pictures, figure.expression)
             found.append(Profile(row, drawing, figure.caption))
@@ -121,8 +121,22 @@ class FamilySection:
     def model(self) -> Row | None:
         """The solve whose picture shows the problem: the first of the profiles, or any."""
         with_result = [row for row in self.rows if row.result_file]
-        return next((row for row, _ in self._figures()), next(iter(with_result), None))
+        return next((row for row, _ in self._figures), next(iter(with_result), None))
 
+    @property
+    def drawn(self) -> list[Row]:
+        """The solves with a picture, the largest first."""
+        found = [row for row in self.rows if row.result_file]
+        return sorted(found, key=lambda row: -(row.verdict.dofs or 0))
+
+    def draw(self, row: Row) -> None:
+        """Draw all that the page shows of a solve, and keep it for the page."""
+        draw_all(row, self.pictures)
+        for shown, figure in self._figures:
+            if shown is row:
+                profile(row, self.pictures, figure.expression)
+
+    @cached_property
     def _figures(self) -> list[tuple[Row, Figure]]:
         by_name = {row.name: row for row in self.rows if row.result_file}
         if self.family.figures:

@@ -1,38 +1,45 @@
 """The stiffness of a scene's free unknowns, and what these unknowns are."""
 
 import numpy as np
-from scipy import sparse
 
 from ..mechanics.fem.bodies import nodes_of_unknowns, whole_motions
 from ..mechanics.fem.elasticity import stiffness
 from ..mechanics.fem.vertices import from_vertices, linear_unknowns
 from ..mechanics.linear.choice import against_multigrid
 from ..mechanics.linear.nodal_matrix import NodalMatrix
+from ..mechanics.linear.stiffened import StiffenedMatrix, Stiffness
 from ..mechanics.linear.unknowns import Unknowns
 from .scene import Scene
 
 
-def free_stiffness(
-    scene: Scene, unknowns: Unknowns, single: bool
-) -> tuple[sparse.csr_matrix | NodalMatrix, np.ndarray]:
+def free_stiffness(scene: Scene, unknowns: Unknowns, single: bool) -> tuple[Stiffness, np.ndarray]:
     """The stiffness of the free unknowns, and the diagonal (n_dofs,) for all degrees of freedom.
 
     `single`: in single precision where multigrid solves.
     """
     free, mean = scene.free, scene.mean
-    plain = free.selection is not None and not mean.size and not scene.springs.nnz
-    in_blocks = plain and not against_multigrid(len(unknowns.node), unknowns)
+    iterative = not against_multigrid(len(unknowns.node), unknowns)
+    plain = free.selection is not None and not scene.springs.nnz
+    in_blocks = plain and iterative and not mean.size
     blocks = stiffness(scene.points, scene.blocks, single and in_blocks)
     diagonal = blocks.diagonal().astype(float)
     if in_blocks and free.selection is not None:
         return NodalMatrix(blocks, free.selection), diagonal
     matrix = free.reduced(blocks)
-    if mean.size:
-        matrix = matrix + free.reduced(mean.stiffness())
     if scene.springs.nnz:
         matrix = matrix + free.reduced(scene.springs)
         diagonal = diagonal + scene.springs.diagonal()
-    return matrix, diagonal
+    if not mean.size:
+        return matrix, diagonal
+    beyond, near = mean.parted()
+    if not (iterative and beyond.any()):
+        return matrix + free.reduced(mean.stiffness()), diagonal
+    soft = matrix + free.reduced(mean.stiffness(1 / mean.compliance - beyond))
+    stiff = beyond > 0
+    divergence = (mean.divergence[stiff] @ free.basis).tocsr()
+    weight = beyond[stiff]
+    schur = 1 / weight + near[stiff]
+    return StiffenedMatrix(soft, divergence, weight, schur, mean.stable), diagonal
 
 
 def free_unknowns(scene: Scene) -> Unknowns:

@@ -104,11 +104,16 @@ def _squares_in(
     points, kind, (reference, weights) = solution.mesh.points, cell_type(block.type), rule
     values = shape_functions(kind.name).values(reference)
     cells = block.data[chosen]
-    gradient, determinant = physical_gradients(points, cells, kind, reference)
+    # In a linear simplex gradients are constant.
+    affine = kind.n_nodes == kind.dim + 1
+    somewhere = reference[:1] if affine else reference
+    gradient, determinant = physical_gradients(points, cells, kind, somewhere)
     nodal = solution.displacement[cells]
     place, found = values @ points[cells], values @ nodal
     apart = np.swapaxes(nodal - nodal[:, :1], 1, 2)
     slope = apart[:, None] @ gradient
+    if affine:
+        slope, determinant = (np.repeat(a, len(weights), axis=1) for a in (slope, determinant))
     if solution.case.axisymmetric:
         hoop, around = hoop_values(points, cells, kind, reference)
         slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])

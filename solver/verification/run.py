@@ -3,6 +3,7 @@
 import logging
 import os
 import signal
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -109,8 +110,15 @@ def mesh_of(case: Case, memory_check: bool = True, limited: bool = False) -> mes
     return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
 
 
-def solve(job: Job, output: Path, verdict_file: Path | None) -> Verdict:
+def solve(
+    job: Job,
+    output: Path,
+    verdict_file: Path | None,
+    then: Callable[[Solution, Verdict], None] | None = None,
+) -> Verdict:
     """Solve, check, write the result; the verdict, also written to `verdict_file` if given.
+
+    `then` is called at the end with a solution that has a result.
 
     Without a result the verdict gives the reason, and the exception goes on: InputError,
     SolveError, or any other one for an error of the program.
@@ -118,7 +126,7 @@ def solve(job: Job, output: Path, verdict_file: Path | None) -> Verdict:
     case: Case | None = None
     try:
         case = job.of(refined(load_case(job.case), job.refine))
-        verdict = _solve(job, case, output, verdict_file or output)
+        solution, verdict = _solve(job, case, output, verdict_file or output)
     except Exception as error:
         if verdict_file:
             word, reason, transient = _ending(error)
@@ -128,6 +136,8 @@ def solve(job: Job, output: Path, verdict_file: Path | None) -> Verdict:
     if verdict_file:
         write_verdict(verdict_file, verdict)
     _LOG.log(OUTCOME, "%s", verdict.summary)
+    if then:
+        then(solution, verdict)
     return verdict
 
 
@@ -202,8 +212,8 @@ def _death(status: int) -> str:
     return f"{died}, ended by {names[status]}{hint}"
 
 
-def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
-    """The verdict of a solve that comes to its end; `beside` is the path of the verdict."""
+def _solve(job: Job, case: Case, output: Path, beside: Path) -> tuple[Solution, Verdict]:
+    """A solve that comes to its end, and its verdict; `beside` is the path of the verdict."""
     started, clock = processor_time(), Clock()
     # Refuse before the solve, not after it.
     check_name(output)
@@ -221,7 +231,7 @@ def _solve(job: Job, case: Case, output: Path, beside: Path) -> Verdict:
     with stage(clock, "write"):
         sha256 = write_result(output, solution, checks, provenance)
     name = os.path.relpath(output, beside.parent)
-    return judge(solution, checks, name, provenance, sha256)
+    return solution, judge(solution, checks, name, provenance, sha256)
 
 
 def _ending(error: Exception) -> tuple[str, str, bool]:

@@ -10,13 +10,19 @@ from pathlib import Path
 
 import pytest
 
+from solver.commands.warm import request, words
+
 ROOT = Path(__file__).parents[2]
 # In each process that runs a command: what it found, and how some of them end.
 FAULTS = """\
-import os, sys
+import os, sys, time
 print("warm" if "skfem" in sys.modules else "cold", flush=True)
 if "killed.yaml" in sys.argv:
     os.kill(os.getpid(), 9)
+if "waits.yaml" in sys.argv and "skfem" in sys.modules:
+    while not os.path.exists("go"):
+        time.sleep(0.01)
+    print("first ended", flush=True)
 """
 PACKAGES = {"solver", "numpy", "scipy", "skfem", "meshio", "h5py", "gmsh", "jsonschema", "jinja2"}
 CLIENT = [sys.executable, "-IS", "solver/commands/warm.py", "benchmark"]
@@ -35,16 +41,16 @@ def folder(tmp_path_factory):
     return folder
 
 
-def start(folder, place):
-    """A server's process; it listens at `place` in the folder."""
+def start(folder, place, *listed):
+    """A server's process; it listens at `place` in the folder, and first lists jobs."""
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(str(folder / place))
         listener.listen()
         return subprocess.Popen(
-            [sys.executable, "-m", "solver", "serve", str(listener.fileno())],
+            [sys.executable, "-m", "solver", "serve", str(listener.fileno()), *listed],
             cwd=folder,
             stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE if listed else subprocess.DEVNULL,
             pass_fds=[listener.fileno()],
             env=ONE_THREAD,
         )
@@ -135,6 +141,21 @@ print(*(set(sys.modules) - before))
     assert {name for name in late if name.partition(".")[0] in PACKAGES} == set()
 
 
+def test_a_server_first_lists_jobs_as_the_command_does(folder):
+    cases = folder / "cases"
+    cases.mkdir()
+    shutil.copy(folder / "good.yaml", cases / "hexa.yaml")
+    for listed, known in (((str(cases), "--variants"), True), ((str(cases / "none"),), False)):
+        alone = client(folder, "jobs", *listed, place="nowhere")
+        assert (alone.returncode == 0) == known
+        server = start(folder, f"lists-{known}", *listed)
+        lines = [server.stdout.readline().decode().strip() for _ in range(2)]
+        assert lines == ["cold", alone.stdout.splitlines()[1] if known else ""]
+        done = client(folder, "validate", "good.yaml", place=f"lists-{known}")
+        assert done.stdout.startswith("warm")
+        server.communicate(timeout=60)
+
+
 def test_a_server_that_hangs_is_given_up_by_all(folder):
     source = folder / "solver" / "commands" / "warm.py"
     text = source.read_text()
@@ -168,3 +189,39 @@ def test_the_server_ends_with_whoever_began_it_and_its_forks_come_to_their_end(f
     assert running.wait(60) == 0
     assert (folder / "last.vtkhdf").is_file()
     assert client(folder, "validate", "good.yaml", place="last").stdout.startswith("cold")
+
+
+def test_a_client_whose_server_is_killed_waits_for_its_command_and_runs_it_again(folder):
+    server = start(folder, "struck")
+    waits = [*CLIENT, "validate", "waits.yaml"]
+    running = subprocess.Popen(
+        waits,
+        cwd=folder,
+        env={**ONE_THREAD, "WARM_SOLVER": "struck"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert running.stdout.readline() == "warm\n"
+    server.kill()
+    server.communicate()
+    # Another client finds nobody, at once: no fork listens in place of its server.
+    assert client(folder, "validate", "good.yaml", place="struck").stdout.startswith("cold")
+    assert running.poll() is None
+    (folder / "go").touch()
+    assert running.communicate(timeout=60)[0].splitlines()[0] == "first ended"
+    assert running.returncode == 2
+
+
+def test_a_command_too_long_for_a_message_runs_in_a_process_of_its_own(folder, server):
+    many = ["./" * 500 + "good.yaml"] * 80
+    done = client(folder, "validate", *many)
+    assert done.returncode == 0
+    assert done.stdout.splitlines() == ["cold", *["good.yaml: valid"] * 80]
+
+
+def test_a_message_that_was_cut_off_is_no_command():
+    message = request("1", ["report", "a b", ""])
+    assert words(message, "1") == ["report", "a b", ""]
+    assert words(message, "2") == []
+    assert [words(message[:end], "1") for end in range(len(message))] == [[]] * len(message)

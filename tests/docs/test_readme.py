@@ -42,7 +42,8 @@ def write_scaling(folder: Path) -> None:
     scaling = yaml.safe_load((folder / "scaling.yaml").read_text())
     [plane] = [series for series in scaling["series"] if series["name"] == "quad4"]
     scaling["series"], scaling["goals"] = [plane | {"sizes": [1000]}], []
-    scaling["quick"]["series"] = ["quad4"]
+    for part in ("quick", "large"):
+        scaling[part]["series"] = ["quad4"]
     (folder / "scaling.yaml").write_text(yaml.safe_dump(scaling))
     benchmark = yaml.safe_load((folder / "benchmark.yaml").read_text())
     comparison = benchmark["comparisons"][0] | {"series": "quad4"}

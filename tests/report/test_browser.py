@@ -126,6 +126,17 @@ def test_print_keeps_checks_and_provenance(pages, window):
     assert window.run("[...document.querySelectorAll('article > details')].every((d) => d.open)")
 
 
+def test_charts_are_light_on_paper_also_where_the_screen_is_dark(pages, window):
+    window.open(pages / "fam.html", dark=True)
+    window.run("document.querySelector('.chart').scrollIntoView()")
+    paper = "document.querySelector('.chart svg.marks')?.style.backgroundColor"
+    window.wait(f"{paper} === 'rgb(20, 25, 31)'")
+    window.run("dispatchEvent(new Event('beforeprint'))")
+    window.wait(f"{paper} === 'rgb(255, 255, 255)'")
+    window.run("dispatchEvent(new Event('afterprint'))")
+    window.wait(f"{paper} === 'rgb(20, 25, 31)'")
+
+
 CANVAS, CHOICE = (f"document.querySelector('.turned {tag}')" for tag in ("canvas", "select"))
 BOX = f"{CANVAS}.getBoundingClientRect()"
 # How many colours the result has, a sum over its pixels, and how many colours are frequent.

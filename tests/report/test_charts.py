@@ -7,6 +7,7 @@ from urllib.parse import unquote
 
 import pytest
 
+from solver.report import charts
 from solver.report.charts import (
     BLUE,
     EPSILON,
@@ -127,6 +128,25 @@ def test_the_script_is_written_where_it_is_missing_or_another(tmp_path, monkeypa
     write_script(tmp_path)
     assert len(written) == 2
     assert (tmp_path / SCRIPT).read_text(encoding="utf-8") == text
+
+
+def test_the_libraries_are_kept_with_the_packages_that_they_come_from(tmp_path, monkeypatch):
+    made = []
+    bundle = "vl_convert.javascript_bundle"
+    monkeypatch.setattr(bundle, lambda snippet: made.append(snippet) or "vega;")
+    monkeypatch.setattr("solver.report.charts.KEPT", tmp_path / "share" / "vega.js")
+    charts._libraries.cache_clear()
+    for folder, file in (("first", None), ("again", None), ("other", "// Vega 0\nold;")):
+        if file:
+            charts.KEPT.write_text(file)
+        charts._libraries.cache_clear()
+        write_script(tmp_path / folder)
+        charts.keep_libraries()
+    texts = {(tmp_path / folder / SCRIPT).read_text() for folder in ("first", "again", "other")}
+    charts._libraries.cache_clear()
+    assert len(made) == 2  # not again, but for a file of other versions
+    assert len(texts) == 1
+    assert "\nvega;\n" in texts.pop()
 
 
 @pytest.mark.skipif(bool(MISSING), reason=MISSING)

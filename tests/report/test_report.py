@@ -10,6 +10,7 @@ from urllib.parse import unquote
 
 import pytest
 
+from solver.commands.cli import main
 from solver.report import write_report
 from solver.report.page import LEFT_OUT, left_out
 from solver.report.rows import Row
@@ -327,3 +328,15 @@ def test_what_the_solves_of_a_family_left_out():
 def test_a_batch_of_nothing_is_no_success(tmp_path):
     assert "none at all" in write_report([], tmp_path / "report")
     assert 'class="outcome bad"' in (tmp_path / "report" / "summary.html").read_text()
+
+
+def test_verdicts_come_from_a_list_as_from_the_command_line(tmp_path, capsys):
+    files = [put(tmp_path / "fam" / job / "verdict.json", {"job": job}) for job in ("b c", "aé")]
+    (tmp_path / "list").write_text("".join(f"{file}\n" for file in files), encoding="utf-8")
+    named, listed = tmp_path / "named", tmp_path / "listed"
+    assert main(["report", *map(str, files), "-o", str(named), "--families"]) == 0
+    assert main(["report", "--list", str(tmp_path / "list"), "-o", str(listed), "--families"]) == 0
+    assert (listed / "summary.json").read_text() == (named / "summary.json").read_text()
+    assert len(json.loads((listed / "summary.json").read_text())) == 2
+    assert main(["report", "--list", str(tmp_path / "none"), "-o", str(listed)]) == 2
+    assert "none" in capsys.readouterr().err

@@ -44,10 +44,11 @@ class Target:
 
 SOLVER = [*PYTHON, "solver"]
 SOLVE = ["--mesh", MESH, "--verbose", "-o", f"{FOLDER}/result.vtkhdf"]
+PICTURES = ["--pictures", "results/report/pictures"]
 TARGETS = {
     "mesh": Target([*SOLVER, "mesh", CASE, "-o", MESH], ("meshes/tiny/tiny-a/mesh.vtkhdf",)),
     "solve": Target(
-        [*SOLVER, "solve", CASE, *SOLVE, "--verdict", f"{FOLDER}/verdict.json"],
+        [*SOLVER, "solve", CASE, *SOLVE, "--verdict", f"{FOLDER}/verdict.json", *PICTURES],
         ("tiny/tiny-a/result.vtkhdf", "tiny/tiny-a/verdict.json"),
     ),
     "report": Target([*SOLVER, "report", *VERDICTS, "-o", "results/report"], ("report/summary.*",)),

@@ -187,6 +187,7 @@ def test_an_environment_out_of_a_cache_is_completed_on_this_system(monkeypatch, 
     monkeypatch.setattr(environment, "current", lambda groups: True)
     monkeypatch.setattr(environment, "complete", lambda: True)
     monkeypatch.setattr(environment, "stamp", lambda groups, complete: done.append("stamp"))
+    monkeypatch.setattr(environment, "keep_scripts", lambda: None)
     monkeypatch.setattr(libraries, "missing", lambda venv: missing)
     monkeypatch.setattr(libraries, "provide", lambda venv: done.append("provide"))
     runpy.run_path(str(ROOT / "workflow" / "install"), run_name="__main__")
@@ -235,3 +236,18 @@ def test_the_environment_knows_the_project_from_any_folder(tmp_path, monkeypatch
     command = [sys.executable, "-I", "-S", "-c", code]
     run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert run.stdout.strip() == str(ROOT / "solver" / "__init__.py"), run.stderr
+
+
+def test_the_script_of_charts_is_made_once_for_an_environment(tmp_path, monkeypatch):
+    python = tmp_path / "python"
+    python.write_text(
+        '#!/bin/sh\ncd "$(dirname "$0")"\nmkdir -p share/mortarcheck\n'
+        'echo "$3" >> share/mortarcheck/vega.js\n'
+    )
+    python.chmod(0o755)
+    monkeypatch.setattr(environment, "VENV", tmp_path)
+    monkeypatch.setattr(environment, "PYTHON", python)
+    environment.keep_scripts()
+    environment.keep_scripts()
+    made = (tmp_path / "share" / "mortarcheck" / "vega.js").read_text().splitlines()
+    assert made == ["from solver.report.charts import keep_libraries; keep_libraries()"]

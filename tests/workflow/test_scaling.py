@@ -18,7 +18,9 @@ def test_points_are_measured_once(tmp_path):
     content = yaml.safe_load(file.read_text())
     plane = next(series for series in content["series"] if series["name"] == "quad4")
     content |= {"series": [plane | {"sizes": [400, 800]}], "goals": []}
-    file.write_text(yaml.safe_dump(content | {"quick": {"largest": 500, "series": ["quad4"]}}))
+    content["quick"] = {"largest": 500, "series": ["quad4"]}
+    content["large"] |= {"sizes": [900], "series": ["quad4"]}
+    file.write_text(yaml.safe_dump(content))
     # What describes the family is no case of the batch.
     assert not any("scaling" in job or "benchmark" in job for job in jobs(project))
 
@@ -35,3 +37,5 @@ def test_points_are_measured_once(tmp_path):
     assert jobs(project, "scaling") == {"measure quad4/400", "growth with size"}
     quick = jobs(project, "scaling", "--config", "scaling=quick")
     assert quick == {"measure quad4/400", "growth with size"}
+    large = jobs(project, "scaling", "--config", "scaling=large")
+    assert large == {"measure quad4/900", "growth with size"}

@@ -38,6 +38,7 @@ def main() -> None:
             environment.install(groups)
             environment.stamp(groups)
         environment.share()
+        environment.keep_scripts()
         # An environment out of a cache may have been completed on another system.
         if not environment.complete() or libraries.missing(environment.VENV):
             libraries.provide(environment.VENV)

@@ -121,6 +121,13 @@ def compile_bytecode() -> None:
     subprocess.run([PYTHON, "-m", "compileall", "-q", "-q", "-j", "0", VENV / "lib"])
 
 
+def keep_scripts() -> None:
+    """Keep the script of all charts in the environment: otherwise each first report makes it."""
+    if not (VENV / "share" / "mortarcheck" / "vega.js").is_file():
+        code = "from solver.report.charts import keep_libraries; keep_libraries()"
+        subprocess.run([PYTHON, "-Es", "-c", code], cwd=ROOT)
+
+
 def stamp(groups: dict[str, str], complete: bool = False) -> None:
     """Write down what has been installed, when it has been."""
     mkl = "yes" if "mkl" in groups else "no"

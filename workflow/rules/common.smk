@@ -132,6 +132,15 @@ def folder_of(family):
     return f"{plain}_" if plain in RESERVED else plain
 
 
+def listed_cold(folders):
+    """The list of jobs in the folders from a process of its own."""
+    command = [sys.executable, "-Es", "-m", "solver", "jobs", *folders]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        refuse((done.stderr.strip() or "cases: they cannot be listed").splitlines()[-1])
+    return done.stdout.splitlines()[-1]
+
+
 def find_jobs():
     """All jobs by folder and name: ours, a folder a family, and those of the configured folders."""
     # Folders of studies contain descriptions and templates, no cases of the batch.
@@ -140,15 +149,10 @@ def find_jobs():
     folders = [*ours, *(Path(f).expanduser() for f in listed(config["cases"]))]
     if not folders:
         refuse("cases: no folder with case files (*.yaml) in it")
-    command = [sys.executable, "-Es", "-m", "solver", "jobs", *map(str, folders)]
-    done = subprocess.run(
-        command + ["--variants"] * VARIANTS, capture_output=True, text=True
-    )
-    if done.returncode:
-        refuse((done.stderr.strip() or "cases: they cannot be listed").splitlines()[-1])
+    what = [*map(str, folders), *["--variants"] * VARIANTS]
     jobs = [
         Job(**of, folder=folder_of(of["family"]))
-        for of in json.loads(done.stdout.splitlines()[-1])
+        for of in json.loads(listed_warm(what) or listed_cold(what))
     ]
     return {(job.folder, job.name): job for job in jobs}
 

@@ -32,6 +32,16 @@ RECORDED = sorted(
 )
 
 
+# The system takes 128 kB for a job's shell command: 2,800 verdicts.
+LISTED = ".snakemake/verdicts"
+
+
+def list_verdicts():
+    """Write the list of verdicts that the report reads: of this run, and of all others there."""
+    listed = [*map(verdict_of, RUN.values()), *verdicts_there(OTHERS), *CODES]
+    Path(LISTED).write_bytes(b"".join(os.fsencode(f"{file}\n") for file in listed))
+
+
 # The pages of families are no outputs here: one that is missing, of a family not asked for before,
 # would hide from Snakemake that the batch is another one.
 rule report:
@@ -50,6 +60,8 @@ rule report:
         benchmark="results/report/benchmark",
     log:
         "results/report/log",
+    threads: workflow.resource_settings.cores or 1
+    # What is listed is a parameter: the report is written again when it changes.
     params:
         verdicts=lambda w: [verdict_of(job) for job in RUN.values()],
         others=lambda w: verdicts_there(OTHERS) + CODES,
@@ -58,7 +70,7 @@ rule report:
     message:
         "report of all cases"
     shell:
-        "{SOLVER} {output.benchmark:q} report {params.verdicts:q} {params.others:q}"
+        "OMP_NUM_THREADS=1 {SOLVER} {output.benchmark:q} report --list {LISTED} --processes {threads}"
         " -o results/report --families {params.families:q} 2>&1 | tee {log:q}"
 
 

@@ -26,7 +26,8 @@ rule solve:
         ' if test -e {params.mesh}; then set -- "$@" --mesh {params.mesh}; fi;'
         " if test -z {params.refusal}; then"
         ' {SOLVER} {output:q}/benchmark solve "$@" {MEMORY_CHECK} --verbose'
-        " -o {output:q}/result.vtkhdf --verdict {output:q}/verdict.json > {log:q} 2>&1 || died=$?; fi;"
+        " -o {output:q}/result.vtkhdf --verdict {output:q}/verdict.json"
+        " --pictures results/report/pictures > {log:q} 2>&1 || died=$?; fi;"
         " test -s {output:q}/verdict.json"
         ' || {PYTHON} -m solver crashed "$@" --status $died --refusal {params.refusal}'
         " --log {log:q} --verdict {output:q}/verdict.json >> {log:q}"

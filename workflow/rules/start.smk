@@ -1,11 +1,9 @@
-"""Before jobs run: lock the folder, report progress, start the warm process."""
+"""Before jobs run: lock the folder, report progress, keep the warm process."""
 
 import atexit
 import fcntl
 import logging
 import signal
-import socket
-import tempfile
 from threading import Thread
 
 from snakemake.settings.enums import Quietness
@@ -126,61 +124,20 @@ def announce():
             logger.info(told(due))
 
 
-def is_warm(job):
-    """Whether a job uses the warm process; none is started beside timed jobs."""
-    return "{SOLVER}" in (job.rule.shellcmd or "")
-
-
-def keep_warm():
-    """Start the process that forks for each job of this run, and ends with it.
-
-    Jobs wait until it has loaded its packages; without it each loads them itself.
-    """
-    from solver.system.process import THREADS
-
-    folder = tempfile.TemporaryDirectory()
-    with socket.socket(socket.AF_UNIX) as listener:
-        try:
-            listener.bind(f"{folder.name}/warm")
-        except OSError:
-            return  # a file system without sockets, or too long a name
-        listener.listen()
-        server = subprocess.Popen(
-            [sys.executable, "-Es", "-m", "solver", "serve", str(listener.fileno())],
-            stdin=subprocess.PIPE,  # closed when this run ends
-            pass_fds=[listener.fileno()],
-            env={**os.environ, **dict.fromkeys(THREADS, "1")},
-        )
-    os.environ["WARM_SOLVER"] = f"{folder.name}/warm"
-    atexit.register(folder.cleanup)
-    atexit.register(end_warm, server)
-
-
-def end_warm(server):
-    """Let the warm process end; one that hangs is killed."""
-    try:
-        server.communicate(timeout=10)
-    except subprocess.TimeoutExpired:
-        server.kill()
-
-
 # Not in a dry run, which changes nothing.
 onstart:
     if workflow.is_main_process:
         check_writable()
         HELD.append(take_lock())
         date_now()
+        list_verdicts()
         survive_termination()
         announce()
         if workflow.local_exec:
             # Each search for jobs to start sets a timer for another one, so their number grows.
             # Without them the batch takes 3.4 s of Snakemake's own processor time, else 9.5 s.
             workflow.scheduler.job_rate_limiter = None
-            # On other systems libraries start threads, and forks may hang.
-            if sys.platform == "linux" and any(
-                map(is_warm, workflow.dag.needrun_jobs())
-            ):
-                keep_warm()
+        keep_warm()
 
 
 def forget_marker():

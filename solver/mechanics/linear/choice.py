@@ -12,6 +12,7 @@ from .direct import Factor, factorise, wanted
 from .krylov import EPSILON
 from .multigrid import Multigrid, Shared
 from .nodal_matrix import NodalMatrix
+from .stiffened import Stiffened, StiffenedMatrix
 from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)
@@ -24,6 +25,8 @@ _ASKED = "as asked for"
 # Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory, by
 # whether PARDISO makes the factor. In graded meshes it takes less from about 100,000.
 _MULTIGRID_FROM = {True: 60_000, False: 20_000}
+# The same where some cells are nearly incompressible, with three times the iterations.
+_STIFFENED_FROM = 100_000
 # Condensing is slower than a saddle point if it adds more entries than this share of the matrix;
 # up to the second number of entries it costs nothing.
 _FILL, _LEAST_FILL = 1.0, 1_000_000
@@ -43,7 +46,9 @@ class LinearSolver:
     round-off: what it solves is a solution only if refinement converges.
     """
 
-    def __init__(self, matrix: Symmetric, dim: int, solver: Factor | Multigrid | None, why: str):
+    def __init__(
+        self, matrix: Symmetric, dim: int, solver: Factor | Multigrid | Stiffened | None, why: str
+    ):
         """Without a `solver` the matrix is factored."""
         self._matrix, self._dim, self._why = matrix, dim, why
         self.gave_up = self.doubt = ""
@@ -62,7 +67,7 @@ class LinearSolver:
     @property
     def iterative(self) -> bool:
         """Whether a less accurate solution takes less time."""
-        return isinstance(self._solver, Multigrid)
+        return not isinstance(self._solver, Factor)
 
     @property
     def iterations(self) -> int:
@@ -77,7 +82,7 @@ class LinearSolver:
         try:
             return self._solver.solve(right, accuracy)
         except SolveError as error:
-            if not isinstance(self._solver, Multigrid):
+            if isinstance(self._solver, Factor):
                 raise
             self._why = self.gave_up = _instead(error)
             _LOG.info("%s", self.why)
@@ -116,13 +121,13 @@ def prepare(
     if unknowns is None:
         return LinearSolver(matrix, 3, None, "what multigrid asks for is not known")
     dim, size = unknowns.dim, matrix.shape[0]
-    against = gave_up or against_multigrid(size, unknowns)
+    against = gave_up or against_multigrid(size, unknowns) or _against_stiffened(matrix)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
         least = multigrid_from()
         why = f"{least} unknowns or more in 3D: faster and smaller than a factor"
         try:
-            solver = Multigrid(matrix, unknowns, shared)
+            solver = _iterative(matrix, unknowns, shared)
             return LinearSolver(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
@@ -131,6 +136,14 @@ def prepare(
     chosen = LinearSolver(matrix, dim, None, against)
     chosen.gave_up = gave_up
     return chosen
+
+
+def _iterative(
+    matrix: Symmetric, unknowns: Unknowns, shared: Shared | None
+) -> Multigrid | Stiffened:
+    if isinstance(matrix, StiffenedMatrix):
+        return Stiffened(matrix, unknowns, shared)
+    return Multigrid(matrix, unknowns, shared)
 
 
 def against_multigrid(size: int, unknowns: Unknowns) -> str:
@@ -143,7 +156,19 @@ def against_multigrid(size: int, unknowns: Unknowns) -> str:
     return f"fewer than {least} unknowns: a factor is faster than multigrid" * (size < least)
 
 
-def against_condensation(matrix: csr_matrix | NodalMatrix, constraints: csr_matrix) -> str:
+def _against_stiffened(matrix: Symmetric) -> str:
+    """Why a matrix of nearly incompressible material is factored; empty where it is not."""
+    if wanted() != "auto" or not isinstance(matrix, StiffenedMatrix):
+        return ""
+    if not matrix.stable:
+        return "nearly incompressible linear cells: a factor is faster than multigrid"
+    few = f"fewer than {_STIFFENED_FROM} unknowns, some of nearly incompressible cells"
+    return f"{few}: a factor is faster than multigrid" * (matrix.shape[0] < _STIFFENED_FROM)
+
+
+def against_condensation(
+    matrix: csr_matrix | NodalMatrix | StiffenedMatrix, constraints: csr_matrix
+) -> str:
     """Why `matrix` (n, n) should not be condensed by `constraints` (m, n); empty if it should.
 
     A constraint over w unknowns leaves a block of w² entries in the condensed

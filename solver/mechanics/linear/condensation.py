@@ -20,7 +20,7 @@ from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise_indefinite
 from .krylov import EPSILON, ROUGH
 from .multigrid import Shared
-from .nodal_matrix import NodalMatrix
+from .stiffened import StiffenedMatrix, Stiffness
 from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)
@@ -78,15 +78,22 @@ class ConstrainedSystem(Protocol):
 class CondensedSystem:
     """x = Z v + shift · b for constraints G x = b, and the factor of ZᵀKZ.
 
-    `pivot` (m,) the eliminated unknowns, `inverse` (m, m) that of their columns of G; `coupling`
-    (m, n) the rows of K that belong to them.
+    v are the unknowns `kept` (k,), which `follow` (m, k) leads to the eliminated ones `pivot` (m,):
+    the rows of Z. `inverse` (m, m): that of their columns of G; `coupling` (m, n): their rows of K.
     """
 
-    expansion: sparse.csr_matrix
+    kept: np.ndarray
+    follow: sparse.csr_matrix
     pivot: np.ndarray
     inverse: sparse.csr_matrix
     factor: LinearSolver
     coupling: sparse.csr_matrix
+
+    @property
+    def expansion(self) -> sparse.csr_matrix:
+        """Z (n, k), formed anew at each call: a solve does without it."""
+        k, rows = len(self.kept), np.concatenate([self.kept, self.pivot])
+        return sparse.vstack([sparse.identity(k), self.follow], format="csr")[np.argsort(rows)]
 
     @property
     def why(self) -> str:
@@ -102,10 +109,11 @@ class CondensedSystem:
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
         """The pivots alone meet the constraints; the others then restore equilibrium."""
-        change = np.zeros_like(force)
-        change[self.pivot] = self.inverse @ violation
-        moved = force - self.coupling.T @ change[self.pivot]
-        return change + self.expansion @ self.factor.solve(self.expansion.T @ moved, accuracy)
+        first = self.inverse @ violation
+        right = self._on_kept(force - self.coupling.T @ first)
+        found, change = self.factor.solve(right, accuracy), np.empty(force.shape)
+        change[self.kept], change[self.pivot] = found, first + self.follow @ found
+        return change
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """From the equilibrium of the pivots."""
@@ -113,7 +121,11 @@ class CondensedSystem:
 
     def imbalance(self, force: np.ndarray) -> float:
         """The largest force left on the unknowns v."""
-        return float(np.abs(self.expansion.T @ force).max(initial=0.0))
+        return float(np.abs(self._on_kept(force)).max(initial=0.0))
+
+    def _on_kept(self, force: np.ndarray) -> np.ndarray:
+        """Zᵀ f."""
+        return np.asarray(force[self.kept] + self.follow.T @ force[self.pivot])
 
 
 @dataclass(frozen=True)
@@ -208,7 +220,7 @@ def inverse_of(pivots: sparse.csr_matrix) -> sparse.csr_matrix:
 
 
 def condense(
-    matrix: sparse.csr_matrix | NodalMatrix,
+    matrix: Stiffness,
     constraints: sparse.csr_matrix,
     own: np.ndarray,
     unknowns: Unknowns | None = None,
@@ -233,26 +245,22 @@ def condense(
     kept_columns, coupling = np.flatnonzero(kept), matrix[pivot]
     inverse = inverse_of(constraints[:, pivot])
     follow = -(inverse @ constraints[:, kept_columns])
-    expansion = _expansion(n, kept_columns, pivot, follow)
-    condensed: Symmetric = matrix
-    if len(pivot):
-        pulled = (coupling[:, kept_columns].T @ follow).tocsr()
-        added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
-        condensed = CondensedMatrix(matrix, kept_columns, added.tocsr())
+    condensed = _condensed(matrix, kept_columns, pivot, follow) if len(pivot) else matrix
     factor = prepare(condensed, unknowns, gave_up, shared)
-    return CondensedSystem(expansion, pivot, inverse, factor, coupling)
+    return CondensedSystem(kept_columns, follow.tocsr(), pivot, inverse, factor, coupling)
 
 
-def _expansion(
-    n: int, kept: np.ndarray, pivot: np.ndarray, follow: sparse.csr_matrix
-) -> sparse.csr_matrix:
-    identity = sparse.csr_matrix(
-        (np.ones(len(kept)), (kept, np.arange(len(kept)))), shape=(n, len(kept))
-    )
-    place = sparse.csr_matrix(
-        (np.ones(len(pivot)), (pivot, np.arange(len(pivot)))), shape=(n, len(pivot))
-    )
-    return (identity + place @ follow).tocsr()
+def _condensed(
+    matrix: Stiffness, kept: np.ndarray, pivot: np.ndarray, follow: sparse.csr_matrix
+) -> Symmetric:
+    """ZᵀKZ for the unknowns `kept` (k,), which the others `follow` (m, k)."""
+    if isinstance(matrix, StiffenedMatrix):
+        opened = matrix.divergence[:, kept] + matrix.divergence[:, pivot] @ follow
+        return matrix.changed(_condensed(matrix.soft, kept, pivot, follow), opened.tocsr())
+    coupling = matrix[pivot]
+    pulled = (coupling[:, kept].T @ follow).tocsr()
+    added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
+    return CondensedMatrix(matrix, kept, added.tocsr())
 
 
 class Iterate(Protocol):

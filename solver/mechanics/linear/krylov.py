@@ -12,6 +12,7 @@ from ...system.threads import ahead
 _LOG = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of vectors at once
 _TOLD = 10  # iterations from one line of the log to the next
+_KEPT = 10  # directions of conjugate residuals; 40 save a tenth of the iterations, all no more
 
 Operator = Callable[[np.ndarray], np.ndarray]
 
@@ -36,20 +37,58 @@ def conjugate_gradients(
     direction = improved.copy()
     energy = _total(lambda some: _dot(residual[some], improved[some]), len(right))
     iteration, reached = 0, float(start.any())
-    thirds = most // 3, 2 * most // 3, most
     while reached > accuracy:
-        if iteration in thirds and reached > accuracy ** (iteration / most):
-            raise SolveError(
-                f"conjugate gradients leave a residual of {reached:.0e} in {iteration} iterations"
-            )
+        _give_up("conjugate gradients", iteration, reached, accuracy, most)
         left = _advance(solution, residual, direction, multiply(direction), energy)
         iteration += 1
         reached = float(_ratio(left, start).max())
-        if iteration % _TOLD == 0:
-            _LOG.info("conjugate gradients: iteration %d, residual %.1e", iteration, reached)
+        _tell("conjugate gradients", iteration, reached)
         if reached > accuracy:
             previous, improved = improved, precondition(residual)
             energy = _turn(direction, residual, improved, previous, energy)
+    return solution, iteration
+
+
+def conjugate_residuals(
+    multiply: Operator,
+    precondition: Operator,
+    right: np.ndarray,
+    measure: Callable[[np.ndarray], float],
+    accuracy: float,
+    most: int,
+) -> tuple[np.ndarray, int]:
+    """Solve for one `right` (n,), with any regular matrix; return the solution and the iterations.
+
+    Until the `measure` of the residual is `accuracy` times the first one; raises SolveError as
+    `conjugate_gradients`. Each residual is the smallest over the latest directions (Eisenstat,
+    Elman and Schultz, SIAM J. Numer. Anal. 20 (1983) 345: Orthomin). The preconditioner need not be
+    linear, nor symmetric.
+    """
+    solution, residual = np.zeros_like(right), right.copy()
+    directions = np.zeros((_KEPT, len(right)))
+    images = np.zeros_like(directions)
+    start = measure(residual)
+    iteration, reached = 0, float(start != 0)
+    while reached > accuracy:
+        _give_up("conjugate residuals", iteration, reached, accuracy, most)
+        direction = precondition(residual)
+        image = multiply(direction)
+        # No BLAS, whose sums depend on the number of threads.
+        shares = np.einsum("kn,n->k", images, image)
+        image -= np.einsum("k,kn->n", shares, images)
+        direction -= np.einsum("k,kn->n", shares, directions)
+        size = float(np.sqrt(np.sum(image * image)))
+        if not size:
+            raise SolveError(f"conjugate residuals break down after {iteration} iterations")
+        place = iteration % _KEPT
+        np.divide(image, size, out=images[place])
+        np.divide(direction, size, out=directions[place])
+        step = np.sum(residual * images[place])
+        solution += step * directions[place]
+        residual -= step * images[place]
+        iteration += 1
+        reached = measure(residual) / start
+        _tell("conjugate residuals", iteration, reached)
     return solution, iteration
 
 
@@ -122,6 +161,17 @@ def in_single(solve: Operator) -> Operator:
         return solve((right / size).astype(np.float32)) * size
 
     return lifted
+
+
+def _give_up(method: str, iteration: int, reached: float, accuracy: float, most: int) -> None:
+    thirds = most // 3, 2 * most // 3, most
+    if iteration in thirds and reached > accuracy ** (iteration / most):
+        raise SolveError(f"{method} leave a residual of {reached:.0e} in {iteration} iterations")
+
+
+def _tell(method: str, iteration: int, reached: float) -> None:
+    if iteration % _TOLD == 0:
+        _LOG.info("%s: iteration %d, residual %.1e", method, iteration, reached)
 
 
 def _ratio(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:

@@ -114,9 +114,9 @@ class Hierarchy:
         nodes = nodes_at(unknowns, self.place, self.size)
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
-        self.scale *= scale[self.place]
+        self.scale = self.scale * scale[self.place]
         if isinstance(matrix, NodalMatrix):
-            matrix.scaled_further(scale[self.place])
+            matrix.now_scaled(self.scale)
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
@@ -221,7 +221,7 @@ class Multigrid:
         accuracy = max(accuracy, self._least)
         solution, iterations = conjugate_gradients(
             lambda x: self._scale * (self._matrix @ (self._scale * x)),
-            in_single(partial(np.apply_along_axis, self._cycle, 0)),
+            self.cycle,
             self._scale * columns,
             accuracy,
             MAX_ITERATIONS,
@@ -235,6 +235,15 @@ class Multigrid:
         """Release the hierarchy; it solves no more."""
         self._levels = []
         self._shared.close()
+
+    @property
+    def scale(self) -> np.ndarray:
+        """The scale (n,) of the unknowns."""
+        return np.asarray(self._scale[:, 0])
+
+    def cycle(self, residual: np.ndarray) -> np.ndarray:
+        """The correction for a residual (n, k), one V-cycle; both scaled."""
+        return in_single(partial(np.apply_along_axis, self._cycle, 0))(residual)
 
     def _cycle(self, residual: np.ndarray) -> np.ndarray:
         padded = np.zeros(self._size, dtype=np.float32)

@@ -63,12 +63,12 @@ class NodalMatrix:
         """Its blocks in single precision, scaled on both sides by `scale` (n,), held rows zero.
 
         Blocks in single precision are scaled in place: no second copy of them is made. What the
-        caller scales in them further goes to `scaled_further`.
+        caller scales in them further goes to `now_scaled`.
         """
         factor = scale if self.scale is None else scale / self.scale
         data = self.blocks.data
         if self.single:
-            self.scale = scale.copy()
+            self.scale = scale
         else:
             data = np.empty(data.shape, dtype=np.float32)
         whole = self._on_all(factor)
@@ -76,10 +76,13 @@ class NodalMatrix:
         arrays = data, self.blocks.indices, self.blocks.indptr
         return bsr_matrix(arrays, shape=self.blocks.shape)
 
-    def scaled_further(self, factor: np.ndarray) -> None:
-        """Take note that the blocks which `scaled` returned are now scaled by `factor` (n,) too."""
+    def now_scaled(self, scale: np.ndarray) -> None:
+        """Take note that the blocks which `scaled` returned are now scaled by `scale` (n,) in all.
+
+        The array is kept, not a copy.
+        """
         if self.scale is not None:
-            self.scale *= factor
+            self.scale = scale
 
     def diagonal(self) -> np.ndarray:
         """Its diagonal (n,)."""

@@ -23,8 +23,8 @@ from .condensation import (
 from .direct import Factor
 from .krylov import EPSILON
 from .multigrid import Shared
-from .nodal_matrix import NodalMatrix
 from .stabilised import stabilise
+from .stiffened import Stiffness, part_of
 from .unknowns import Unknowns
 
 _NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
@@ -113,7 +113,7 @@ class Systems:
 
     def __init__(
         self,
-        matrix: sparse.csr_matrix | NodalMatrix,
+        matrix: Stiffness,
         constraints: sparse.csr_matrix,
         own: np.ndarray | None,
         unknowns: Unknowns,
@@ -168,7 +168,7 @@ class Systems:
         matrix, constraints = self._matrix, self._constraints[closed]
         own, unknowns = self._own, self._unknowns
         if chosen is not None:
-            matrix, constraints = matrix.tocsr()[chosen][:, chosen], constraints[:, chosen]
+            matrix, constraints = part_of(matrix, chosen), constraints[:, chosen]
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
             return _augmented(matrix.tocsr(), constraints, unknowns.dim)

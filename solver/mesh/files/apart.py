@@ -6,13 +6,13 @@ Some damaged files crash gmsh and HDF5, which are C++ and C libraries, or never 
 import os
 import pickle
 import signal
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 import meshio
 
 from ...system.errors import InputError
+from ...system.forks import fork
 
 # Processor time that a reader may take: fixed, and for each megabyte.
 _SECONDS, _SECONDS_PER_MB = 8.0, 5.0
@@ -31,9 +31,7 @@ def read_here(reader: Reader, path: Path) -> meshio.Mesh:
 def read_apart(reader: Reader, path: Path) -> meshio.Mesh:
     """The result of `reader(path)`; any failure becomes an InputError."""
     inward, outward = os.pipe()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # threads: none holds a lock here
-        child = os.fork()
+    child = fork()
     if child == 0:
         os.close(inward)
         _answer(reader, path, outward)

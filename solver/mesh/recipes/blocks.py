@@ -10,7 +10,7 @@ the edges have along each axis; blocks of QUAD and HEXA cells are regular grids.
 TETRA cells are unstructured inside; there `far` (divisions of the lateral edges on the side away
 from the interface, by default as on it), `inner` (edge length that gmsh aims at inside, in the
 units of `size`; by default the edges of the block decide) and `algorithm` (for the surfaces) shape
-the mesh.
+the mesh. Blocks of more than a million nodes are filled by HXT, which is ten times faster.
 Blocks of PENTA and PYRA cells are boxes cut in pieces (see `hybrid`).
 
 The interface lies in y = 0 (2D) or z = 0 (3D), the corner of both blocks at x = 0 (and y = 0).
@@ -29,11 +29,13 @@ import numpy as np
 
 from ..catalogue import BY_NAME
 from ..keys import BlockKeys, BlocksKeys, Recipe, each
+from ..size import fills_by_hxt
 from .gmsh_session import current_model, session
 from .sides import side_name
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
 _ALGORITHMS = {"frontal": 6, "delaunay": 5, "meshadapt": 1}
+_HXT = 10
 
 
 def blocks(recipe: BlocksKeys) -> meshio.Mesh:
@@ -79,6 +81,8 @@ class _Block:
         self.options: dict[str, float] = {}
         if not self.regular:
             self.options["Mesh__Algorithm"] = _ALGORITHMS[keys.algorithm or "frontal"]
+        if fills_by_hxt(cell.name, self.divisions):
+            self.options["Mesh__Algorithm3D"] = _HXT
         if keys.inner is not None:
             self.options["Mesh__MeshSizeExtendFromBoundary"] = 0
             self.options["Mesh__MeshSizeMax"] = keys.inner / refine

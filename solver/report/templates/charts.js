@@ -2,6 +2,8 @@
 (() => {
   const night = matchMedia("(prefers-color-scheme: dark)");
   const drawn = new Map();
+  let paper = false; // paper is light
+  const dark = () => night.matches && !paper;
   const csv = (records) => {
     const names = [...new Set(records.flatMap(Object.keys))];
     const cell = (value) => {
@@ -17,7 +19,7 @@
     let text = place.querySelector("script").textContent;
     const theme = JSON.stringify(THEME.config);
     text = `{"config": ${theme}, ${text.trim().slice(1)}`;
-    if (night.matches) for (const [light, dark] of Object.entries(THEME.dark)) text = text.replaceAll(light, dark);
+    if (dark()) for (const [light, dark] of Object.entries(THEME.dark)) text = text.replaceAll(light, dark);
     const spec = JSON.parse(text);
     if (Array.isArray(spec.data)) spec.data = { values: spec.data.flatMap(records) }; // else of a former version
     const width = place.clientWidth - 38; // beside the menu
@@ -36,7 +38,7 @@
       actions: { export: { svg: true, png: true }, source: false, compiled: false, editor: false },
       i18n: { SVG_ACTION: "SVG", PNG_ACTION: "PNG", CLICK_TO_VIEW_ACTIONS: "Save" },
       downloadFileName: place.id,
-      tooltip: { theme: night.matches ? "dark" : "light" },
+      tooltip: { theme: dark() ? "dark" : "light" },
     });
     drawn.set(place, result);
     if (!spec.width && !spec.vconcat) shown.classList.add("whole"); // as wide as it is, beside its menu
@@ -58,7 +60,11 @@
     }, { rootMargin: "500px" });
     places.forEach((place) => watch.observe(place));
     night.addEventListener("change", () => [...drawn.keys()].forEach(draw));
-    addEventListener("beforeprint", () => places.filter((place) => !drawn.has(place)).forEach(draw));
+    addEventListener("beforeprint", () => {
+      paper = true;
+      places.filter((place) => night.matches || !drawn.has(place)).forEach(draw);
+    });
+    addEventListener("afterprint", () => { paper = false; if (night.matches) [...drawn.keys()].forEach(draw); });
     let width = innerWidth;
     addEventListener("resize", () => {
       if (width !== innerWidth) { width = innerWidth; [...drawn.keys()].forEach(draw); }

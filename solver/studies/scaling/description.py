@@ -18,6 +18,8 @@
       - {title: …, series: hexa8, size: 1.0e+5, what: cpu, most: 12, unit: s, others: {…: 56}}
     quick:                        # a part of it: these series, no size above the largest
       {largest: 3.0e+4, series: [hexa8]}
+    large:                        # beyond it: these series at other sizes, with another limit
+      {limit: 3600, sizes: [1.0e+7], series: [hexa8]}
 
 A goal's `what` is `cpu` or `wall` (seconds of the whole process, from mesh file to result file),
 `memory` (its peak, GB), `pressure` (the largest error), or the exponent of a stage: `growth of
@@ -48,7 +50,7 @@ from ...case.typed import (
 from ...case.yaml import read_mapping
 from ...mesh.catalogue import BY_NAME
 from ...mesh.size import Size, of_bodies, of_body
-from .. import FULL, QUICK
+from .. import FULL, LARGE, QUICK
 from ..keys import Count, Name, Seconds, Unknowns
 from ..points import PointStudy
 
@@ -175,6 +177,12 @@ class _QuickScaling(Section, frozen=True):
     series: Annotated[tuple[Name, ...], ONCE]
 
 
+class _LargeScaling(Section, frozen=True):
+    limit: Seconds
+    sizes: Annotated[tuple[Unknowns, ...], ONCE]
+    series: Annotated[tuple[Name, ...], ONCE]
+
+
 class ScalingFile(Section, frozen=True):
     """The keys of `scaling.yaml`."""
 
@@ -184,6 +192,7 @@ class ScalingFile(Section, frozen=True):
     fit: SizeRange
     series: Annotated[tuple[SizeSeries, ...], Meta(min_length=1)]
     quick: _QuickScaling
+    large: _LargeScaling
     goals: tuple[Goal, ...] = ()
 
     def __post_init__(self) -> None:
@@ -192,8 +201,9 @@ class ScalingFile(Section, frozen=True):
         names = {series.name for series in self.series}
         for i, goal in enumerate(self.goals):
             refuse_unknown(("goals", i, "series"), goal.series, "series", names)
-        for i, name in enumerate(self.quick.series):
-            refuse_unknown(("quick", "series", i), name, "series", names)
+        for key, part in (("quick", self.quick), ("large", self.large)):
+            for i, name in enumerate(part.series):
+                refuse_unknown((key, "series", i), name, "series", names)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,24 +221,26 @@ class Scaling(PointStudy):
 
 
 def read_scaling(path: Path, size: str = FULL) -> Scaling:
-    """The family in a file, or its quick part; InputError says what is refused, what allowed."""
+    """The family in a file, its quick or its large part; InputError says what is refused."""
     content = read_as(ScalingFile, read_mapping(path), path)
+    large = content.large if size == LARGE else None
     largest = content.quick.largest if size == QUICK else math.inf
+    part = content.quick if size == QUICK else large
     series = [
         structs.replace(
             one,
-            sizes=tuple(sorted(int(n) for n in one.sizes if n <= largest)),
+            sizes=tuple(sorted(int(n) for n in (large or one).sizes if n <= largest)),
             fit=one.fit if any(one.fit) else content.fit,
         )
         for one in content.series
-        if size != QUICK or one.name in content.quick.series
+        if part is None or one.name in part.series
     ]
     return Scaling(
         path=path,
         title=content.title,
         size=size,
         threads=content.threads,
-        limit=content.limit,
+        limit=(large or content).limit,
         series=tuple(series),
         goals=content.goals,
     )

@@ -1,6 +1,7 @@
 """The page of growth with size, and its tables for machines."""
 
 from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -203,6 +204,8 @@ def _stage_chart(line: SeriesSolves, colors: dict[str, str]) -> Chart:
     ]
     title = f"{line.series.title}: stages"
     x, y = Axis("size", "unknowns", log=True), Axis("cost", "processor time, s", log=True)
-    looks = {stage: Look(color) for stage, color in colors.items()}
+    # On dark paper some colours are close: marks differ too.
+    marks = zip(colors.items(), cycle(SHAPES), strict=False)
+    looks = {stage: Look(color, shape) for (stage, color), shape in marks}
     fan = slopes(records, "size", "cost", _LINEAR)
     return series_chart(title, title, records, x, y, looks, layers=fan, width=380, height=200)

@@ -8,7 +8,8 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.nodal_matrix import NodalMatrix
-from solver.mechanics.linear.products import scale_blocks
+from solver.mechanics.linear.products import _PRODUCTS, _TRANSPOSED, scale_blocks
+from solver.system.compiled import available
 
 
 def example(seed, dim, share):
@@ -69,8 +70,8 @@ def test_blocks_scaled_in_place_are_still_the_matrix(dim):
         blocks = single.scaled(scale)
         assert np.shares_memory(blocks.data, single.blocks.data)
         scale_blocks(blocks, further, further)
-        single.scaled_further(further[matrix.free])
         total = scale * further[matrix.free]
+        single.now_scaled(total)
         scaled = blocks.toarray()
         expected = np.zeros_like(scaled, dtype=float)
         expected[np.ix_(matrix.free, matrix.free)] = dense * np.outer(total, total)
@@ -86,3 +87,25 @@ def test_blocks_in_double_precision_stay_as_they_are():
     matrix, dense, _ = example(3, 3, 0.8)
     assert not np.shares_memory(matrix.scaled(np.full(len(dense), 2.0)).data, matrix.blocks.data)
     np.testing.assert_array_equal(matrix.tocsr().toarray(), dense)
+
+
+@pytest.mark.skipif(not available(), reason="needs Numba")
+@pytest.mark.parametrize("transposed", [False, True])
+def test_kernels_reach_entries_past_two_to_the_31(transposed):
+    """As ten million unknowns of HEXA20 have; only the last pages of the arrays are touched."""
+    count = 2**31 // 9 + 10
+    try:
+        blocks, columns = np.zeros((count, 3, 3), np.float32), np.zeros(count, np.int32)
+    except MemoryError:
+        pytest.skip("the system reserves no memory beyond what it has")
+    rng, starts = np.random.default_rng(0), np.array([count - 2, count], np.int32)
+    blocks[-2:], columns[-2:] = rng.integers(1, 9, (2, 3, 3)), [0, 1]
+    row = np.concatenate(list(blocks[-2:]), axis=1).astype(float)
+    if transposed:
+        x, out = np.arange(1.0, 4.0), np.zeros(6)
+        _TRANSPOSED[3, 3](0, 1, starts, columns, blocks, x, out)
+        np.testing.assert_array_equal(out, row.T @ x)
+    else:
+        x, out = np.arange(1.0, 7.0), np.zeros(3)
+        _PRODUCTS[3, 3](0, 1, starts, columns, blocks, x, np.float32(1), out)
+        np.testing.assert_array_equal(out, row @ x)

@@ -169,6 +169,22 @@ def test_edges_of_unstructured_blocks_are_divided_evenly(cells):
     assert sorted(edge.tolist()) == [2 * k / 5 for k in range(6)]
 
 
+def test_large_blocks_of_tetrahedra_are_filled_by_hxt(monkeypatch):
+    """Another mesh with the same surface, the same again; the volume is filled."""
+    spec = recipe(block("TETRA4", 6), block("HEXA8"))
+    usual = generate(spec, "case.yaml")
+    monkeypatch.setattr("solver.mesh.size._HXT_FROM", 6**3)
+    first, second = generate(spec, "case.yaml"), generate(spec, "case.yaml")
+    np.testing.assert_array_equal(first.points, second.points)
+    (cells,), (others,), (again,) = (members(m, "bottom") for m in (first, usual, second))
+    np.testing.assert_array_equal(cells, again)
+    assert cells.shape != others.shape
+    assert measure(first.points, cells, "TETRA4") == pytest.approx(8, rel=1e-13)
+    assert (vertex_jacobians(first.points, cells, BY_NAME["TETRA4"]) > 0).all()
+    sides = [{tuple(p) for p in m.points[members(m, "base")[0].ravel()]} for m in (first, usual)]
+    assert sides[0] == sides[1]
+
+
 @pytest.mark.parametrize("stem", ["e", "q", "o", "z7"])
 def test_the_same_mesh_bit_for_bit(stem, tmp_path):
     spec = yaml.safe_load(Path(f"cases/ssnp170/{stem}.yaml").read_text(encoding="utf-8"))["mesh"]

@@ -61,6 +61,7 @@ def test_a_mesh_has_about_the_unknowns_it_should_have(content, read, cells):
         }
     ]
     content["quick"]["series"], content["goals"] = ["one"], []
+    content["large"]["series"] = ["one"]
     [point] = read().points
     mesh = generate(point.parsed(Path("point.yaml")).mesh, "here")
     counted = point.mesh.unknowns
@@ -83,6 +84,13 @@ def test_the_quick_part_is_small_and_takes_about_a_minute():
     assert {p.name for p in quick.points} < {p.name for p in full.points}
     assert max(p.size for p in quick.points) <= 3e4
     assert 30 < sum(p.seconds for p in quick.points) < 120
+
+
+def test_the_large_part_has_ten_million_unknowns():
+    large = read_scaling(FILE, "large")
+    assert [p.name for p in large.points] == ["hexa8/10000000", "tetra4/10000000"]
+    assert all(1e7 <= p.mesh.unknowns < 1.1e7 for p in large.points)
+    assert sum(p.seconds for p in large.points) < large.limit
 
 
 def test_an_unknown_point(read):
@@ -113,7 +121,8 @@ def test_what_is_refused(content, read, change, message):
         read()
 
 
-def test_the_quick_part_names_series_that_there_are(content, read):
-    content["quick"]["series"] = ["hexa9"]
-    with pytest.raises(InputError, match=r"quick.series\[0\] .* no such series; did you"):
-        read("quick")
+@pytest.mark.parametrize("part", ["quick", "large"])
+def test_a_part_names_series_that_there_are(content, read, part):
+    content[part]["series"] = ["hexa9"]
+    with pytest.raises(InputError, match=rf"{part}.series\[0\] .* no such series; did you"):
+        read(part)
