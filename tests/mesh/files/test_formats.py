@@ -145,7 +145,9 @@ def test_truncated_msh(tmp_path):
 def test_no_groups(tmp_path):
     path = tmp_path / "mesh.vtu"
     meshio.write(path, meshio.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [("triangle", [[0, 1, 2]])]))
-    assert refusal(path) == "groups: the mesh must have named groups of cells or faces"
+    assert refusal(path) == (
+        "groups: the mesh must have named groups of cells or faces (docs/formats.md)"
+    )
 
 
 def test_a_type_that_is_not_there(tmp_path):
