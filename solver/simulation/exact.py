@@ -64,7 +64,7 @@ class ExactValues:
 
     def __init__(self, solution: Solution, exact: ExactSolution):
         self.solution, self.exact = solution, exact
-        self._pressure: dict[str, np.ndarray] = {}
+        self._contact: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
     def _surface(self, zone: ZoneResult) -> SurfacePoints:
         points, around = self.solution.mesh.points, self.solution.case.axisymmetric
@@ -100,11 +100,16 @@ class ExactValues:
         return normal_stress(self.stress(nodes), normals)
 
     def pressure(self, zone: ZoneResult) -> np.ndarray:
-        """The mean contact pressure (m,) of each macro-element; several checks ask for it."""
-        if zone.name not in self._pressure:
+        """The mean contact pressure (m,) of each macro-element."""
+        return self._of_contact(zone)[0]
+
+    def _of_contact(self, zone: ZoneResult) -> tuple[np.ndarray, np.ndarray]:
+        """Mean pressure (m,) and share in contact (m,); several checks ask for them."""
+        if zone.name not in self._contact:
             at = self._surface(zone)
-            self._pressure[zone.name] = at.means(self.exact.contact_pressure(at.place))
-        return self._pressure[zone.name]
+            pressure = self.exact.contact_pressure(at.place)
+            self._contact[zone.name] = at.means(pressure), at.means((pressure > 0).astype(float))
+        return self._contact[zone.name]
 
     def gap(self, zone: ZoneResult) -> np.ndarray:
         """The mean gap (m,) of each macro-element."""
@@ -113,6 +118,5 @@ class ExactValues:
 
     def ends_within(self, zone: ZoneResult) -> np.ndarray:
         """Which macro-elements (m,) the contact area covers in part only."""
-        at = self._surface(zone)
-        share = at.means((self.exact.contact_pressure(at.place) > 0).astype(float))
+        share = self._of_contact(zone)[1]
         return (share > 0) & (share < 1 - 1e-9)

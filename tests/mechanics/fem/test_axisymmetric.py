@@ -139,7 +139,8 @@ def test_a_free_motion_is_named_without_round_off():
     # About the centre of the points the turns are orthogonal to the translations.
     moves, turns = motions[:, :3], motions[:, 3:]
     held = sparse.vstack([(moves @ others.T).T, turns.T]).tocsr()
-    found = unheld_motion(np.zeros((6, 6)), (held @ motions).tocsr(), 1)
+    supports = support_resistance(motions, sparse.eye_array(12).tocsr())
+    found = unheld_motion(supports, held @ motions, 1)
     assert found == (0, "move along (1, 0, -0.5)")
 
 
