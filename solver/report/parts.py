@@ -6,6 +6,7 @@ both drawn from these parts.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import meshio
 import numpy as np
@@ -52,7 +53,7 @@ class DrawnPart:
         """Whether it is a body with cells."""
         return self.zone is None and self.out is None
 
-    @property
+    @cached_property
     def used(self) -> np.ndarray:
         """The points (k,) of its faces."""
         return np.unique(np.concatenate([np.empty(0, int), *(f.ravel() for _, f, _ in self.faces)]))
