@@ -237,13 +237,13 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from ..system.progress import saying, telling
+    from ..system.progress import details, saying
     from ..verification.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
-    with telling(options.verbose, options.quiet), saying(log):
+    with details(options.verbose, options.quiet), saying(log):
         draw = partial(_draw, options.pictures, options.output.parent) if options.pictures else None
         verdict = solve(job, options.output, options.verdict, draw)
     return PASSED if verdict.sound else FAILED

@@ -2,7 +2,7 @@
 
 Modules log to the logger of their own name: outcomes at the level `OUTCOME`, which `saying` hands
 to a function, and details (each stage, each solution and its residual) as information, which
-`telling` writes with the time. Without either nothing is written, unless the program that uses the
+`details` writes with the time. Without either nothing is written, unless the program that uses the
 solver listens to the package's logger, `solver` or `mortarcheck`.
 """
 
@@ -59,7 +59,7 @@ def saying(say: Callable[[str], object]) -> Iterator[None]:
 
 
 @contextmanager
-def telling(verbose: bool, quiet: bool = False) -> Iterator[None]:
+def details(verbose: bool, quiet: bool = False) -> Iterator[None]:
     """Write the details that the solver logs to standard error: on a terminal, or if `verbose`.
 
     On a terminal all details are held back for the first `PATIENCE` seconds.

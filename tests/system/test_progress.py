@@ -61,7 +61,7 @@ def test_what_was_held_back_is_told_once_it_takes_long(capsys, monkeypatch):
     terminal(monkeypatch)
     monkeypatch.setattr(progress, "PATIENCE", 60.0)
     log = logging.getLogger("solver.any")
-    with progress.telling(verbose=False):
+    with progress.details(verbose=False):
         [held] = logging.getLogger("solver").handlers
         log.info("first")
         assert capsys.readouterr().err == ""

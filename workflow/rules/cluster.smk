@@ -62,8 +62,8 @@ def reason_of(failure):
     errors = [
         line.partition("error: ")[2].strip(" *'") for line in lines if "error: " in line
     ]
-    told = filter(None, [said.split(". ")[0], *errors[:1]])
-    return ": ".join(told) or "ended from outside"
+    parts = filter(None, [said.split(". ")[0], *errors[:1]])
+    return ": ".join(parts) or "ended from outside"
 
 
 def give_verdict(job, failure):

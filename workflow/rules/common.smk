@@ -45,10 +45,10 @@ def read_config():
     try:
         validate(config, "../schemas/config.schema.yaml")
     except WorkflowError as error:
-        told = re.search(r"^\w*Error: (.*)$", str(error), re.MULTILINE)
+        found = re.search(r"^\w*Error: (.*)$", str(error), re.MULTILINE)
         place = re.search(r"^On instance\['(\w+)'\]", str(error), re.MULTILINE)
         refuse(
-            f"config: {place[1] + ': ' if place else ''}{told[1] if told else error}"
+            f"config: {place[1] + ': ' if place else ''}{found[1] if found else error}"
         )
     cores = workflow.resource_settings.cores  # none where a cluster has the jobs
     if cores is not None and cores < 1:
@@ -105,8 +105,8 @@ def contents(*files):
 
     Snakemake compares parameters only if they depend on wildcards alone.
     """
-    told = "".join(f"{file} {content_of(file)}\n" for file in files)
-    return hashlib.sha256(told.encode("utf-8", "surrogateescape")).hexdigest()
+    found = "".join(f"{file} {content_of(file)}\n" for file in files)
+    return hashlib.sha256(found.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 SOLVER_CONTENT = contents(*SOLVER_SOURCES)

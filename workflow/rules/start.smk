@@ -74,7 +74,7 @@ def survive_termination():
     signal.signal(signal.SIGTERM, lambda *_: Thread(target=ending).start())
 
 
-def tell_progress():
+def report_progress():
     """Report the jobs in place of Snakemake's own lines; nothing in a quiet run."""
     settings, handlers = workflow.output_settings, logger.handlers
     if settings.dryrun:  # Snakemake reports it well
@@ -114,14 +114,14 @@ def measured_points(rule, read, file, size, folder):
 
 def announce():
     """Report how long the points to be measured will take."""
-    for rule, told in ANNOUNCED.items():
+    for rule, text in ANNOUNCED.items():
         due = [
             j.wildcards.point
             for j in workflow.dag.needrun_jobs()
             if j.rule.name == rule
         ]
         if due:
-            logger.info(told(due))
+            logger.info(text(due))
 
 
 # Not in a dry run, which changes nothing.
@@ -160,4 +160,4 @@ onerror:
 if workflow.is_main_process:
     if not workflow.output_settings.dryrun:
         forget_marker()
-    tell_progress()
+    report_progress()

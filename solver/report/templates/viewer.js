@@ -51,9 +51,9 @@
       this.canvas = element(place, "canvas", { tabIndex: 0, ariaLabel: "result; arrow keys turn it, + and − zoom" });
       const below = element(place, "div", { className: "scale" });
       this.scale = { low: element(below, "span"), bar: element(below, "i"), high: element(below, "span") };
-      this.told = element(place, "output", {}, `Drag to ${data.dim === 3 ? "turn (with Shift: move)" : "move"}, zoom by wheel or two fingers, point at a face for its value.`);
+      this.caption = element(place, "output", {}, `Drag to ${data.dim === 3 ? "turn (with Shift: move)" : "move"}, zoom by wheel or two fingers, point at a face for its value.`);
       this.gl = this.canvas.getContext("webgl2", { alpha: true, antialias: true, preserveDrawingBuffer: true });
-      if (!this.gl) { this.told.textContent = "This browser has no WebGL 2."; return; }
+      if (!this.gl) { this.caption.textContent = "This browser has no WebGL 2."; return; }
       this.prepare();
       this.listen();
       new ResizeObserver(() => this.see(this.box)).observe(this.canvas);
@@ -249,7 +249,7 @@
       const at = [...Array(this.data.dim).keys()].map((k) => +mean(part.points, k, 3).toPrecision(4)).join(", ");
       const values = part.fields[this.map.title];
       const value = values ? `${this.map.title} = ${+mean(values, 0, 1).toPrecision(5)}, ` : "";
-      this.told.textContent = `${part.name}: ${value}at (${at})`;
+      this.caption.textContent = `${part.name}: ${value}at (${at})`;
     }
 
     listen() {
