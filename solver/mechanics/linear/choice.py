@@ -25,8 +25,9 @@ _ASKED = "as asked for"
 # Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory, by
 # whether PARDISO makes the factor. In graded meshes it takes less from about 100,000.
 _MULTIGRID_FROM = {True: 60_000, False: 20_000}
-# The same where some cells are nearly incompressible, with three times the iterations.
-_STIFFENED_FROM = 100_000
+# The same where some cells are nearly incompressible, by whether displacements see all pressures:
+# with three times the iterations, and with twenty times.
+_STIFFENED_FROM = {True: 100_000, False: 250_000}
 # Condensing is slower than a saddle point if it adds more entries than this share of the matrix;
 # up to the second number of entries it costs nothing.
 _FILL, _LEAST_FILL = 1.0, 1_000_000
@@ -160,10 +161,9 @@ def _against_stiffened(matrix: Symmetric) -> str:
     """Why a matrix of nearly incompressible material is factored; empty where it is not."""
     if wanted() != "auto" or not isinstance(matrix, StiffenedMatrix):
         return ""
-    if not matrix.stable:
-        return "nearly incompressible linear cells: a factor is faster than multigrid"
-    few = f"fewer than {_STIFFENED_FROM} unknowns, some of nearly incompressible cells"
-    return f"{few}: a factor is faster than multigrid" * (matrix.shape[0] < _STIFFENED_FROM)
+    least, kind = _STIFFENED_FROM[matrix.stable], "" if matrix.stable else "linear "
+    few = f"fewer than {least} unknowns, some of nearly incompressible {kind}cells"
+    return f"{few}: a factor is faster than multigrid" * (matrix.shape[0] < least)
 
 
 def against_condensation(

@@ -136,7 +136,7 @@ def test_conjugate_residuals_give_up_where_they_gain_little():
         conjugate_residuals(lambda x: diagonal * x, np.copy, np.ones(200), np.linalg.norm, 1e-9, 60)
 
 
-def test_small_systems_and_linear_cells_are_factored(monkeypatch):
+def test_small_systems_are_factored(monkeypatch):
     matrix, whole = a_matrix()
     node, body = np.repeat(np.arange(10), 3), np.zeros(30, dtype=int)
     unknowns = Unknowns(3, node, lambda: np.ones((30, 1)), body)
@@ -144,12 +144,15 @@ def test_small_systems_and_linear_cells_are_factored(monkeypatch):
     few = choice.prepare(matrix, unknowns)
     assert few.why.startswith("fewer than 100000 unknowns, some of nearly incompressible cells")
     np.testing.assert_allclose(few.solve(whole @ np.ones(30)), 1.0, rtol=1e-10)
-    monkeypatch.setattr(choice, "_STIFFENED_FROM", 20)
-    linear = choice.prepare(replace(matrix, stable=False), unknowns)
-    assert linear.why.startswith("nearly incompressible linear cells")
-    chosen = choice.prepare(matrix, unknowns)
-    assert "residuals with multigrid" in chosen.name
-    np.testing.assert_allclose(chosen.solve(whole @ np.ones(30)), 1.0, rtol=1e-10)
+    monkeypatch.setattr(choice, "_STIFFENED_FROM", {True: 20, False: 40})
+    unstable = replace(matrix, stable=False)
+    linear = choice.prepare(unstable, unknowns)
+    assert linear.why.startswith("fewer than 40 unknowns, some of nearly incompressible linear")
+    monkeypatch.setattr(choice, "_STIFFENED_FROM", {True: 20, False: 20})
+    for large in (matrix, unstable):
+        chosen = choice.prepare(large, unknowns)
+        assert "residuals with multigrid" in chosen.name
+        np.testing.assert_allclose(chosen.solve(whole @ np.ones(30)), 1.0, rtol=1e-10)
 
 
 def test_nothing_to_solve():
