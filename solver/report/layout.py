@@ -144,7 +144,7 @@ def outlines(points: np.ndarray, kind: str, connectivity: np.ndarray) -> np.ndar
 def macro_edges(faces: Iterable[tuple[str, np.ndarray, np.ndarray]]) -> np.ndarray:
     """The edges around macro-elements, given their sub-faces (type, nodes, number).
 
-    Returns (n, 3): both ends, and the node between them, or an end again where there is none.
+    Returns (n, 3): both ends and the midside node. Without a midside node, one end is repeated.
     """
     edges = []
     for kind, nodes, owner in faces:

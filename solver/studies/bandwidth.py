@@ -164,7 +164,7 @@ class MovedBytes:
 
 
 def table(record: Record | None) -> MovedBytes | None:
-    """The parts of a record made by `measure`; None where there is none."""
+    """The parts of a record made by `measure`; None if nothing was solved."""
     if not record or record["outcome"] != SOLVED:
         return None
     found = record["parts"]

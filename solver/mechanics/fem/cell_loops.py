@@ -226,27 +226,25 @@ def _stiffness_rows(  # type: ignore[no-untyped-def]  # noqa: C901 -- one kernel
                 xz, zx = first * xz + second * zx, first * zx + second * xz
                 yz, zy = first * yz + second * zy, first * zy + second * yz
                 if here:
-                    block = out[_place(starts, columns, nodes[n], nodes[m])]
-                    block[0, 0] += xx
-                    block[0, 1] += xy
-                    block[0, 2] += xz
-                    block[1, 0] += yx
-                    block[1, 1] += yy
-                    block[1, 2] += yz
-                    block[2, 0] += zx
-                    block[2, 1] += zy
-                    block[2, 2] += zz
+                    place = _place(starts, columns, nodes[n], nodes[m])
+                    _add_block(out[place], xx, xy, xz, yx, yy, yz, zx, zy, zz)
                 if there:
-                    block = out[_place(starts, columns, nodes[m], nodes[n])]
-                    block[0, 0] += xx
-                    block[0, 1] += yx
-                    block[0, 2] += zx
-                    block[1, 0] += xy
-                    block[1, 1] += yy
-                    block[1, 2] += zy
-                    block[2, 0] += xz
-                    block[2, 1] += yz
-                    block[2, 2] += zz
+                    place = _place(starts, columns, nodes[m], nodes[n])
+                    _add_block(out[place], xx, yx, zx, xy, yy, zy, xz, yz, zz)
+
+
+@part_of_compiled
+def _add_block(block, xx, xy, xz, yx, yy, yz, zx, zy, zz):  # type: ignore[no-untyped-def]
+    """Add nine numbers to a block (3, 3), row by row."""
+    block[0, 0] += xx
+    block[0, 1] += xy
+    block[0, 2] += xz
+    block[1, 0] += yx
+    block[1, 1] += yy
+    block[1, 2] += yz
+    block[2, 0] += zx
+    block[2, 1] += zy
+    block[2, 2] += zz
 
 
 @part_of_compiled

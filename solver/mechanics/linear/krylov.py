@@ -11,7 +11,7 @@ from ...system.threads import ahead
 
 _LOG = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of vectors at once
-_TOLD = 10  # iterations from one line of the log to the next
+_LOGGED = 10  # iterations from one line of the log to the next
 _KEPT = 10  # directions of conjugate residuals; 40 save a tenth of the iterations, all no more
 
 Operator = Callable[[np.ndarray], np.ndarray]
@@ -42,7 +42,7 @@ def conjugate_gradients(
         left = _advance(solution, residual, direction, multiply(direction), energy)
         iteration += 1
         reached = float(_ratio(left, start).max())
-        _tell("conjugate gradients", iteration, reached)
+        _log_progress("conjugate gradients", iteration, reached)
         if reached > accuracy:
             previous, improved = improved, precondition(residual)
             energy = _turn(direction, residual, improved, previous, energy)
@@ -88,7 +88,7 @@ def conjugate_residuals(
         residual -= step * images[place]
         iteration += 1
         reached = measure(residual) / start
-        _tell("conjugate residuals", iteration, reached)
+        _log_progress("conjugate residuals", iteration, reached)
     return solution, iteration
 
 
@@ -169,8 +169,8 @@ def _give_up(method: str, iteration: int, reached: float, accuracy: float, most:
         raise SolveError(f"{method} leave a residual of {reached:.0e} in {iteration} iterations")
 
 
-def _tell(method: str, iteration: int, reached: float) -> None:
-    if iteration % _TOLD == 0:
+def _log_progress(method: str, iteration: int, reached: float) -> None:
+    if iteration % _LOGGED == 0:
         _LOG.info("%s: iteration %d, residual %.1e", method, iteration, reached)
 
 
