@@ -121,7 +121,7 @@ class CondensedSystem:
         """From the equilibrium of the pivots."""
         return -(self.inverse.T @ force[self.pivot])
 
-    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:  # noqa: ARG002
         """The largest force left on the unknowns v; no constraint is violated."""
         return float(np.abs(self._on_kept(force)).max(initial=0.0))
 
@@ -161,7 +161,7 @@ class SaddlePoint:
         found = self.factor.solve(np.concatenate([force, nothing]))[len(force) :]
         return (found.T / self.size).T
 
-    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:  # noqa: ARG002
         """The largest force left with the multipliers acting; see `CondensedSystem`."""
         left = force + self.constraints.T @ self.multiplier(force)
         return float(np.abs(left).max(initial=0.0))

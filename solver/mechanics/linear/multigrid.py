@@ -222,10 +222,7 @@ class Multigrid:
 
         Coarse levels hold the springs of stabilised contact: these are near contact alone.
         """
-        springs, about = (
-            condensed.shape[0] - len(condensed.kept),
-            (hierarchy.scale, hierarchy.place),
-        )
+        springs, about = len(spring_scale(condensed)), (hierarchy.scale, hierarchy.place)
         correction, beside = correction_of(condensed, *about), None
         self._levels, most = [], _MOST_BESIDE * self._size
         if springs:
