@@ -40,23 +40,22 @@ class Correction:
         way = csr_matrix((way.data, local, way.indptr), shape=(len(self.rows), len(columns)))
         return Correction(columns, (way.T @ (self.matrix @ way)).tocsr())
 
-    def corrected_rows(self, matrix: bsr_matrix) -> csr_matrix:
-        """The rows (r, n) of K + C, given K (n, n)."""
+    def corrected_rows(self, own: csr_matrix) -> csr_matrix:
+        """The rows (r, n) of K + C, given its `own` (r, n) of K."""
         columns = self.rows[self.matrix.indices]
-        shape = len(self.rows), matrix.shape[1]
-        own = csr_matrix((self.matrix.data, columns, self.matrix.indptr), shape=shape)
-        return (chosen_rows(matrix, self.rows) + own).tocsr()
+        arrays = self.matrix.data, columns, self.matrix.indptr
+        return (own + csr_matrix(arrays, shape=own.shape)).tocsr()
 
-    def weights(self, matrix: bsr_matrix, corrected: csr_matrix) -> np.ndarray:
+    def weights(self, own: csr_matrix, corrected: csr_matrix) -> np.ndarray:
         """The weight (n,) of each row in the smoother: one where nothing changed, 0 at pivots.
 
         Elsewhere the inverse of the diagonal of the `corrected` rows (r, n) of K + C; less where
-        the entries of a row add up to more than typical of K.
+        the entries of a row add up to more than typical of its `own` rows (r, n) of K.
         """
-        before = np.asarray(abs(chosen_rows(matrix, self.rows)).sum(axis=1)).ravel()
+        before = np.asarray(abs(own).sum(axis=1)).ravel()
         diagonal = _own_diagonal(corrected, self.rows)
         there = diagonal > _NOTHING
-        weight = np.ones(matrix.shape[0], dtype=np.float32)
+        weight = np.ones(own.shape[1], dtype=np.float32)
         weight[self.rows] = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
         sums = weight[self.rows] * (abs(corrected) @ weight)
         weight[self.rows] /= np.sqrt(np.maximum(1.0, sums / np.median(before)))

@@ -27,6 +27,7 @@ from .krylov import EPSILON, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
 from .slender import smoothed_along
+from .symmetric_blocks import SymmetricBlocks, halved
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
@@ -58,7 +59,7 @@ class Level:
     `interface`: the exact solve beside it, if these unknowns are not too many.
     """
 
-    matrix: bsr_matrix
+    matrix: SymmetricBlocks
     bound: np.float32
     prolongation: bsr_matrix
     correction: Correction | None = None
@@ -76,15 +77,16 @@ class Level:
 
     def remaining(self, residual: np.ndarray, change: np.ndarray) -> np.ndarray:
         """The residual (n,) after a change."""
-        left = multiply(self.matrix, change, residual, -1.0)
+        left = self.matrix.multiply(change, residual, -1.0)
         if self.correction is not None:
             self.correction.subtract_product(left, change)
         return left
 
     def corrected(self, correction: Correction, most: float) -> "Level":
         """The level under contact, with an exact solve of up to `most` unknowns beside it."""
-        rows = correction.corrected_rows(self.matrix)
-        weight, interface = correction.weights(self.matrix, rows), None
+        own = self.matrix.chosen_rows(correction.rows)
+        rows = correction.corrected_rows(own)
+        weight, interface = correction.weights(own, rows), None
         if len(correction.rows) <= most:
             interface = Interface(correction, rows)
         changed = replace(self, correction=correction, weight=weight, interface=interface)
@@ -115,8 +117,9 @@ class Hierarchy:
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale = self.scale * scale[self.place]
-        if isinstance(matrix, NodalMatrix):
-            matrix.now_scaled(self.scale)
+        self._nodal = matrix if isinstance(matrix, NodalMatrix) else None
+        if self._nodal is not None:
+            self._nodal.now_scaled(self.scale)
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
@@ -156,7 +159,9 @@ class Hierarchy:
         below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
         left = np.ones(prolongation.shape[0], dtype=np.float32)
         scale_blocks(prolongation, left, scale.astype(np.float32))
-        self.levels.append(Level(matrix, bound, prolongation))
+        self.levels.append(Level(halved(matrix), bound, prolongation))
+        if self._nodal is not None and len(self.levels) == 1:
+            self._nodal.halve(self.levels[0].matrix)
         return below, replace(nodes, motions=motions)
 
 
