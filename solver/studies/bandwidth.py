@@ -117,7 +117,6 @@ def counted() -> Iterator[Parts]:
 
     solver, outside = multigrid.Multigrid, (STAGE, SET_UP, ITERATIONS)
 
-
     def transposed(matrix: bsr_matrix, x: np.ndarray, _: None) -> np.ndarray:
         return products.multiply_transposed(matrix, x)
 

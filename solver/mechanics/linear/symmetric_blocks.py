@@ -141,8 +141,8 @@ def halved(matrix: bsr_matrix) -> SymmetricBlocks:
         kinds[some] = np.where(inside, np.where(rows < columns, _UPPER, _LOWER), _WHOLE)
 
     in_pieces(sort, matrix)
-    parts = (_of_kind(matrix, kinds, kind) for kind in (_WHOLE, _UPPER))
-    return SymmetricBlocks(*parts, tuple(slabs))
+    whole, upper = (_of_kind(matrix, kinds, kind) for kind in (_WHOLE, _UPPER))
+    return SymmetricBlocks(whole, upper, tuple(slabs))
 
 
 _WHOLE, _UPPER, _LOWER = range(3)
