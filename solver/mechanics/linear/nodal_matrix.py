@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ..fem.assembly import selected
+from .krylov import by_columns
 from .products import scale_blocks
 from .symmetric_blocks import SymmetricBlocks, halved
 
@@ -43,7 +44,7 @@ class NodalMatrix:
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """The product with x (n,) or its columns (n, k)."""
         if x.ndim > 1:
-            return np.stack([self @ column for column in x.T], axis=1)
+            return by_columns(self.__matmul__, x)
         x = x if self.scale is None else x / self.scale
         # In double precision, whatever that of the blocks.
         found = self.blocks.multiply(self._on_all(np.asarray(x, dtype=float)))[self.free]
