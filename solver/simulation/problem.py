@@ -13,6 +13,7 @@ from ..mechanics.fem.bodies import (
     unsupported,
 )
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
+from ..mechanics.linear.stabilised import Compliance
 from ..mechanics.linear.systems import Systems, parts_of
 from ..mechanics.mortar.status import StatusResult, Trial, find_status
 from ..system.errors import SolveError
@@ -333,16 +334,17 @@ class ContactProblem:
             correction=correction,
         )
 
-    def _compliance(self, closed: np.ndarray) -> sparse.csr_matrix:
-        """The compliance (c, c) of the closed multipliers (k,); zero in zones without one."""
-        parts = []
+    def _compliance(self, closed: np.ndarray) -> Compliance:
+        """The compliance of the closed multipliers (k,); zones without one have no part of it."""
+        parts, weight = [], [np.empty(0)]
         for zone in self.scene.zones:
             mine, recovery = closed[zone.numbers], zone.operator.recovery
             if zone.zone.stabilised and recovery and recovery.stabilisation:
-                parts.append(recovery.stabilisation.compliance(mine))
+                parts.append(recovery.stabilisation.scatter(mine))
+                weight.append(recovery.stabilisation.weight[mine])
             else:
-                parts.append(sparse.csr_matrix((int(mine.sum()),) * 2))
-        return sparse.block_diag(parts, format="csr")
+                parts.append(sparse.csr_matrix((0, int(mine.sum()))))
+        return Compliance(sparse.block_diag(parts, format="csr"), np.concatenate(weight))
 
     def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
         return self._systems.closed(closed)

@@ -61,8 +61,8 @@ class AugmentedSystem:
         """The multipliers that balance the force best: least squares with the weights 1/D."""
         return (-self.gram.solve(self.compliant @ force).T / self.size).T
 
-    def imbalance(self, force: np.ndarray) -> float:
-        """The largest force left with the multipliers acting."""
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:  # noqa: ARG002
+        """The largest force left with the multipliers acting; no constraint is violated."""
         acting = (self.multiplier(force).T * self.size).T
         return float(np.abs(force + self.scaled.T @ acting).max(initial=0.0))
 

@@ -90,23 +90,36 @@ class Interface:
         return self._solve(right[:, None])[:, 0].astype(np.float32)
 
 
-def correction_of(condensed: CondensedMatrix, scale: np.ndarray, place: np.ndarray) -> Correction:
-    """C of a condensed matrix, scaled by `scale` (n,); unknown i is in row `place[i]`."""
-    kept, added, stiffness = condensed.kept, condensed.added.tocoo(), condensed.stiffness
-    n = stiffness.shape[0]
-    eliminated = np.ones(n, dtype=bool)
-    eliminated[kept] = False
-    pivot = np.flatnonzero(eliminated)
-    gone = stiffness[pivot].tocoo()
+def correction_of(
+    condensed: CondensedMatrix, scale: np.ndarray, place: np.ndarray, springs: int = 0
+) -> Correction:
+    """C of a condensed matrix, scaled by `scale` (n,); unknown i is in row `place[i]`.
+
+    So many `springs` are in the rows of the first eliminated unknowns, scaled to a diagonal of one;
+    the others are held.
+    """
+    stiffness, pivot = condensed.stiffness, condensed.eliminated
+    size = len(condensed.kept) + springs
+    where = np.concatenate([condensed.kept, pivot[:springs]])
+    scales = np.concatenate([scale[condensed.kept], spring_scale(condensed)[:springs]])
+    some, eliminated = slice(size), np.zeros(stiffness.shape[0], dtype=bool)
+    eliminated[pivot] = True
+    added, gone = condensed.added[some, some].tocoo(), stiffness[pivot].tocoo()
     rows, columns = pivot[gone.row], gone.col
     once = ~eliminated[columns]
-    rows = np.concatenate([kept[added.row], rows, columns[once]])
-    columns = np.concatenate([kept[added.col], columns, pivot[gone.row][once]])
-    values = np.concatenate([added.data, -gone.data, -gone.data[once]])
-    values *= scale[rows] * scale[columns]
+    removed = -gone.data * scale[rows] * scale[columns]
+    rows = np.concatenate([where[added.row], rows, columns[once]])
+    columns = np.concatenate([where[added.col], columns, pivot[gone.row][once]])
+    given = added.data * scales[added.row] * scales[added.col]
+    values = np.concatenate([given, removed, removed[once]])
     chosen, local = np.unique(place[np.concatenate([rows, columns])], return_inverse=True)
     entries = values.astype(np.float32), (local[: len(rows)], local[len(rows) :])
     return Correction(chosen, coo_matrix(entries, shape=(len(chosen),) * 2).tocsr())
+
+
+def spring_scale(condensed: CondensedMatrix) -> np.ndarray:
+    """What scales the rows (s,) of springs to a diagonal of one."""
+    return np.asarray(1 / np.sqrt(condensed.added.diagonal()[len(condensed.kept) :]))
 
 
 def _own_diagonal(rows: csr_matrix, numbers: np.ndarray) -> np.ndarray:

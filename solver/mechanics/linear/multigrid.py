@@ -21,7 +21,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from ...system.errors import SolveError
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .contact_levels import Correction, Interface, correction_of
+from .contact_levels import Correction, Interface, correction_of, spring_scale
 from .galerkin import coarse, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
@@ -81,11 +81,18 @@ class Level:
             self.correction.subtract_product(left, change)
         return left
 
-    def corrected(self, correction: Correction, most: float) -> "Level":
-        """The level under contact, with an exact solve of up to `most` unknowns beside it."""
+    def corrected(
+        self, correction: Correction, most: float, beside: Correction | None = None
+    ) -> "Level":
+        """The level under contact, with an exact solve of up to `most` unknowns beside it.
+
+        Where there are springs, this solve is the one of the correction `beside`, which has them.
+        """
         rows = correction.corrected_rows(self.matrix)
         weight, interface = correction.weights(self.matrix, rows), None
-        if len(correction.rows) <= most:
+        if beside is not None:
+            interface = Interface(beside, beside.corrected_rows(self.matrix))
+        elif len(correction.rows) <= most:
             interface = Interface(correction, rows)
         changed = replace(self, correction=correction, weight=weight, interface=interface)
         half = np.sqrt(changed.weight)
@@ -191,24 +198,41 @@ class Multigrid:
         self.iterations = 0
         self._matrix, self._shared = matrix, shared or Shared()
         condensed = matrix if isinstance(matrix, CondensedMatrix) else None
-        kept = slice(None) if condensed is None else condensed.kept
         stiffness = condensed.stiffness if condensed else matrix
         single = isinstance(stiffness, NodalMatrix) and stiffness.single
         self._least = _LEAST_SINGLE if single else 0.0
         hierarchy = self._shared.hierarchy(stiffness, unknowns)
-        self._size, self._place = hierarchy.size, hierarchy.place[kept]
-        self._scale = hierarchy.scale[kept, None]
-        self._levels, last = hierarchy.levels, hierarchy.last.toarray().astype(float)
+        self._size, self._place = hierarchy.size, hierarchy.place
+        self._levels, scale = hierarchy.levels, hierarchy.scale
+        last = hierarchy.last.toarray().astype(float)
         if condensed is not None:
-            correction = correction_of(condensed, hierarchy.scale, hierarchy.place)
-            self._levels, most = [], _MOST_BESIDE * self._size
-            for level in hierarchy.levels:
-                self._levels.append(level.corrected(correction, most))
-                correction = correction.coarser(level.prolongation)
+            correction = self._correct(condensed, hierarchy)
             last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
+            springs = spring_scale(condensed)
+            where = np.concatenate([condensed.kept, condensed.eliminated[: len(springs)]])
+            self._place = hierarchy.place[where]
+            scale = np.concatenate([scale[condensed.kept], springs])
+        self._scale = scale[:, None]
         inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
         self._coarsest = inverse.astype(np.float32)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
+
+    def _correct(self, condensed: CondensedMatrix, hierarchy: Hierarchy) -> Correction:
+        """The levels under contact; return the correction of the last one.
+
+        Coarse levels hold the springs of stabilised contact: these are near contact alone.
+        """
+        springs, about = len(spring_scale(condensed)), (hierarchy.scale, hierarchy.place)
+        correction, beside = correction_of(condensed, *about), None
+        self._levels, most = [], _MOST_BESIDE * self._size
+        if springs:
+            beside = correction_of(condensed, *about, springs)
+            if not hierarchy.levels:
+                return beside
+        for level in hierarchy.levels:
+            self._levels.append(level.corrected(correction, most, beside))
+            correction, beside = correction.coarser(level.prolongation), None
+        return correction
 
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.

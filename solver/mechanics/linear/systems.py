@@ -23,7 +23,7 @@ from .condensation import (
 from .direct import Factor
 from .krylov import EPSILON
 from .multigrid import Shared
-from .stabilised import stabilise
+from .stabilised import Compliance, StabilisedSystem, stabilise
 from .stiffened import Stiffness, part_of
 from .unknowns import Unknowns
 
@@ -97,9 +97,10 @@ class IndependentSystems:
             found[mine] = system.multiplier(force[unknowns])
         return found
 
-    def imbalance(self, force: np.ndarray) -> float:
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
         """See `ConstrainedSystem`."""
-        return max(system.imbalance(force[unknowns]) for unknowns, _, system in self.parts)
+        left = (part[2].imbalance(force[part[0]], violation[part[1]]) for part in self.parts)
+        return max(left)
 
 
 class Systems:
@@ -107,8 +108,8 @@ class Systems:
 
     `matrix` K (n, n), `constraints` (k, n) of all multipliers, `own` (n,) the unknowns that may be
     eliminated by condensation, None where some multiplier has none: then the constraints augment
-    the stiffness. `unknowns` describes each. `compliance`: S (c, c) of the c multipliers that a
-    mask (k,) has closed, where contact is stabilised.
+    the stiffness. `unknowns` describes each. `compliance`: of the c multipliers that a mask (k,)
+    has closed, where contact is stabilised.
     """
 
     def __init__(
@@ -118,7 +119,7 @@ class Systems:
         own: np.ndarray | None,
         unknowns: Unknowns,
         parts: Sequence[Part],
-        compliance: Callable[[np.ndarray], sparse.csr_matrix] | None = None,
+        compliance: Callable[[np.ndarray], Compliance] | None = None,
     ):
         self._matrix, self._constraints, self._own = matrix, constraints, own
         self._unknowns, self._parts, self._compliance = unknowns, parts, compliance
@@ -136,7 +137,7 @@ class Systems:
     def _drop(self, number: int) -> None:
         """Drop a part's system, and remember why multigrid failed on it, if it did."""
         system = self._kept.pop(number)[1]
-        if isinstance(system, CondensedSystem) and system.factor.gave_up:
+        if isinstance(system, CondensedSystem | StabilisedSystem) and system.factor.gave_up:
             self._gave_up[number] = system.factor.gave_up
 
     def closed(self, closed: np.ndarray) -> ConstrainedSystem:
@@ -172,15 +173,15 @@ class Systems:
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         if own is None:
             return _augmented(matrix.tocsr(), constraints, unknowns.dim)
-        if self._compliance is not None and (soft := self._compliance(closed)).nnz:
-            return stabilise(matrix.tocsr(), constraints, own, soft)
+        known = self._gave_up.get(number, ""), self._shared[number]
+        if self._compliance is not None and len((soft := self._compliance(closed)).weight):
+            return stabilise(matrix, constraints, own, soft, unknowns, *known)
         if why := against_condensation(matrix, constraints):
             try:
                 return saddle_point(matrix.tocsr(), constraints, why, weighted=False)
             except SolveError:
                 pass  # pivots that no order of elimination avoids: condensation needs none of them
-        gave_up, shared = self._gave_up.get(number, ""), self._shared[number]
-        return condense(matrix, constraints, own, unknowns, gave_up, shared)
+        return condense(matrix, constraints, own, unknowns, *known)
 
 
 def _augmented(
