@@ -220,11 +220,13 @@ class Multigrid:
     def _correct(self, condensed: CondensedMatrix, hierarchy: Hierarchy) -> Correction:
         """The levels under contact; return the correction of the last one.
 
-        Coarse levels hold the springs of stabilised contact: these are near contact alone.
+        Coarse levels hold the springs of stabilised contact: these are near contact alone. They
+        and constraints that were added with a weight need the exact solve beside contact.
         """
         springs, about = len(spring_scale(condensed)), (hierarchy.scale, hierarchy.place)
         correction, beside = correction_of(condensed, *about), None
-        self._levels, most = [], _MOST_BESIDE * self._size
+        needed = springs or not len(condensed.eliminated)
+        self._levels, most = [], np.inf if needed else _MOST_BESIDE * self._size
         if springs:
             beside = correction_of(condensed, *about, springs)
             if not hierarchy.levels:
