@@ -21,7 +21,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from ...system.errors import SolveError
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .contact_levels import Correction, Interface, correction_of, spring_scale
+from .contact_levels import Correction, Interface, correction_of, scales_of
 from .galerkin import coarse, smoothed
 from .krylov import EPSILON, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
@@ -208,10 +208,8 @@ class Multigrid:
         if condensed is not None:
             correction = self._correct(condensed, hierarchy)
             last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
-            springs = spring_scale(condensed)
-            where = np.concatenate([condensed.kept, condensed.eliminated[: len(springs)]])
-            self._place = hierarchy.place[where]
-            scale = np.concatenate([scale[condensed.kept], springs])
+            self._place = hierarchy.place[condensed.places]
+            scale = scales_of(condensed, scale)
         self._scale = scale[:, None]
         inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
         self._coarsest = inverse.astype(np.float32)
@@ -223,12 +221,12 @@ class Multigrid:
         Coarse levels hold the springs of stabilised contact: these are near contact alone. They
         and constraints that were added with a weight need the exact solve beside contact.
         """
-        springs, about = len(spring_scale(condensed)), (hierarchy.scale, hierarchy.place)
-        correction, beside = correction_of(condensed, *about), None
-        needed = springs or not len(condensed.eliminated)
+        about = condensed, hierarchy.scale, hierarchy.place
+        correction, beside = correction_of(*about), None
+        needed = condensed.springs or not len(condensed.eliminated)
         self._levels, most = [], np.inf if needed else _MOST_BESIDE * self._size
-        if springs:
-            beside = correction_of(condensed, *about, springs)
+        if condensed.springs:
+            beside = correction_of(*about, condensed.springs)
             if not hierarchy.levels:
                 return beside
         for level in hierarchy.levels:
