@@ -221,8 +221,7 @@ class Multigrid:
         if condensed is not None:
             correction = self._correct(condensed, hierarchy)
             last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
-        about = hierarchy.scale, hierarchy.place, hierarchy.size
-        self._system = ScaledSystem(matrix, *about)
+        self._system = ScaledSystem(matrix, hierarchy.scale, hierarchy.place, hierarchy.size)
         inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
         self._coarsest = inverse.astype(np.float32)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
@@ -230,8 +229,8 @@ class Multigrid:
     def _correct(self, condensed: CondensedMatrix, hierarchy: Hierarchy) -> Correction:
         """The levels under contact; return the correction of the last one.
 
-        Coarse levels hold the springs of stabilised contact: these are near contact alone. They
-        and constraints that were added with a weight need the exact solve beside contact.
+        Coarse levels hold springs. These, and constraints that were added with a weight, need the
+        exact solve beside contact.
         """
         about = condensed, hierarchy.scale, hierarchy.place
         correction, beside = correction_of(*about), None
