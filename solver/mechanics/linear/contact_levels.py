@@ -108,7 +108,9 @@ def correction_of(
     scales = np.concatenate([scale[condensed.kept], spring_scale(condensed)[:springs]])
     some, eliminated = slice(size), np.zeros(stiffness.shape[0], dtype=bool)
     eliminated[pivot] = True
-    added, gone = condensed.added[some, some].tocoo(), stiffness[pivot].tocoo()
+    added, gone = condensed.added[some, some].tocoo(), stiffness[pivot]
+    gone.eliminate_zeros()
+    gone = gone.tocoo()
     rows, columns = pivot[gone.row], gone.col
     once = ~eliminated[columns]
     removed = -gone.data * scale[rows] * scale[columns]
