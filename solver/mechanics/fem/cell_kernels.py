@@ -303,35 +303,45 @@ def _place(starts, columns, row, column):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def squares(  # type: ignore[no-untyped-def]
+def squares(  # type: ignore[no-untyped-def]  # noqa: C901 -- one kernel
     bad, points, cells, displacement, on_reference, values, weights, lame, shear, u, gradient, out
 ):  # fmt: skip
     """Add to `out` (3, 2); see `cell_loops.squares`."""
     count, k = cells.shape[1], 0
-    apart, own, error = np.empty((count, 3)), np.empty((count, 3)), np.empty((3, 3))
+    apart, own = np.empty((count, 3)), np.empty((count, 3))
+    slope, error, measure = np.empty((3, 3)), np.empty((3, 3)), 0.0
     for c in range(len(cells)):
         nodes = cells[c]
         _apart(displacement, nodes, apart)
         for q in range(len(weights)):
-            measure = weights[q] * _gradients(points, nodes, on_reference[q], own)
-            if measure == 0.0:
-                bad[0] = True
-                return
+            if q == 0 or count > 4:  # in a linear simplex gradients are constant
+                measure = _gradients(points, nodes, on_reference[q], own)
+                if measure == 0.0:
+                    bad[0] = True
+                    return
+                slope[:] = 0.0
+                for n in range(count):
+                    for i in range(3):
+                        for j in range(3):
+                            slope[i, j] += apart[n, i] * own[n, j]
+            off = whole = steep_off = steep = 0.0
             for i in range(3):
                 found = displacement[0, nodes[0], i]
                 for n in range(count):
                     found += values[q, n] * apart[n, i]
-                out[0, 0] += measure * (found - u[k, i]) ** 2
-                out[0, 1] += measure * u[k, i] ** 2
+                off += (found - u[k, i]) ** 2
+                whole += u[k, i] ** 2
                 for j in range(3):
-                    slope = 0.0
-                    for n in range(count):
-                        slope += apart[n, i] * own[n, j]
-                    error[i, j] = slope - gradient[k, i, j]
-                    out[1, 0] += measure * error[i, j] ** 2
-                    out[1, 1] += measure * gradient[k, i, j] ** 2
-            out[2, 0] += measure * _square_of_stress(error, lame[c], shear[c])
-            out[2, 1] += measure * _square_of_stress(gradient[k], lame[c], shear[c])
+                    error[i, j] = slope[i, j] - gradient[k, i, j]
+                    steep_off += error[i, j] ** 2
+                    steep += gradient[k, i, j] ** 2
+            weight = weights[q] * measure
+            out[0, 0] += weight * off
+            out[0, 1] += weight * whole
+            out[1, 0] += weight * steep_off
+            out[1, 1] += weight * steep
+            out[2, 0] += weight * _square_of_stress(error, lame[c], shear[c])
+            out[2, 1] += weight * _square_of_stress(gradient[k], lame[c], shear[c])
             k += 1
 
 
