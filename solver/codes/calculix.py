@@ -24,7 +24,7 @@ from ..system.process import cores_for, run_apart
 from .deck import Deck, UnsupportedError
 from .files.read import read_result_files
 from .foreign import Field, ForeignResult
-from .shifted import needed, with_layers
+from .shifted import with_layers
 
 PROGRAM = "ccx"
 # Cells whose nodes have the same order here and there.
@@ -58,6 +58,7 @@ class CalculiX:
         return {
             "contact": "SURFACE TO SURFACE, frictionless",
             "pressure-overclosure": f"LINEAR, {self.stiffness:g} E",
+            "curved faces": "gaps as meshed: the overlap of facets is pressure",
             "elements": f"{', '.join([*ELEMENTS.values(), *RINGS.values()])}; "
             "plane cases as one layer",
         }
@@ -102,9 +103,9 @@ class CalculiX:
     @staticmethod
     def _on_bodies(found: ForeignResult, deck: Deck) -> ForeignResult:
         """The fields at the nodes of the deck: the node below a layer gets its pressure."""
-        if not any(map(needed, deck.pairs)):
-            return found
         count, below = len(deck.points), with_layers(deck)[1]
+        if not len(below):
+            return found
 
         def on_bodies(field: Field | None, layer: bool = False) -> Field | None:
             if field is None or field.nodes is None:

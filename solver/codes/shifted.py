@@ -1,12 +1,17 @@
-"""Slave surfaces apart from their bodies: a layer of soft cells that moves with each of them.
+"""Initial gaps for CalculiX: a number between flat faces, a layer of soft cells, or as meshed.
 
-CalculiX takes one clearance per pair. The faces of this layer have the gap that the case prescribes
-at each node; equations give each node of the layer the displacement of the body's node.
+CalculiX takes one clearance per pair, and moves the slave's nodes by it to the flat triangles
+between the corners of the master's faces: right between flat faces alone. Between curved ones, the
+bow of each quadratic face would become an overlap. There, surfaces that fit are left as meshed.
+
+A gap by place or an interference is a layer on the slave. Its faces have the gap that the case
+prescribes at each node; equations give each of its nodes the displacement of the body's node.
 """
 
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..case.material import Material
 from ..mechanics.fem.faces import FaceBlock, nodal_normals
@@ -17,35 +22,63 @@ from .layer import columns, over
 _THIN, _SOFT = 1e-3, 1e-6
 # Normals of a flat surface differ by no more.
 _FLAT = 1e-6
+# Curved surfaces fit if their gap is off by less, on the median, over the extent of the model.
+_FIT = 1e-4
 # The level of a node in the outer face of the layer; 0 is the inner one, 2 between.
 _ABOVE = 1
 
 
-def needed(pair: PairedFaces) -> bool:
+def with_layers(deck: Deck) -> tuple[Deck, np.ndarray]:
+    """The deck with a layer on each slave that needs one, and the node below each new node (k,).
+
+    A pair keeps its clearance between flat faces only. Raises UnsupportedError for a gap between
+    curved faces that is given by place, or by a number that is not the meshed gap.
+    """
+    deck = replace(deck, pairs=[_as_meshed(deck, pair) for pair in deck.pairs])
+    below = [np.empty(0, dtype=int)]
+    for number, pair in enumerate(deck.pairs):
+        if _needs_layer(pair):
+            deck, new = _with_layer(deck, number)
+            below.append(new)
+    return deck, np.concatenate(below)
+
+
+def _as_meshed(deck: Deck, pair: PairedFaces) -> PairedFaces:
+    """The pair; one with a number as gap between curved faces without this number."""
+    if not isinstance(pair.zone.clearance, float) or _are_flat(deck, pair):
+        return pair
+    extent = np.ptp(deck.points, axis=0).max()
+    if abs(np.median(_meshed_gap(deck, pair)) - pair.zone.clearance) > _FIT * extent:
+        problem = "initial gap on curved faces that is not the meshed one: not written for CalculiX"
+        raise UnsupportedError(problem)
+    return replace(pair, zone=replace(pair.zone, clearance=None), gap=None)
+
+
+def _needs_layer(pair: PairedFaces) -> bool:
     """Whether the gap of a pair is given by place, or adds to the meshed one."""
     if pair.gap is None:
         return bool(pair.zone.interference)
     return not isinstance(pair.zone.clearance, float)
 
 
-def with_layers(deck: Deck) -> tuple[Deck, np.ndarray]:
-    """The deck with a layer on each slave that needs one, and the node below each new node (k,).
+def _meshed_gap(deck: Deck, pair: PairedFaces) -> np.ndarray:
+    """About the gap (n,) at the slave's nodes, of surfaces that are near each other.
 
-    Raises UnsupportedError where a gap is given by place between faces that are not flat.
+    The nearest node of the master is at an offset along the surface. On a circle, an offset is
+    across the mean of the normals at its two ends.
     """
-    below = [np.empty(0, dtype=int)]
-    for number, pair in enumerate(deck.pairs):
-        if needed(pair):
-            deck, new = _with_layer(deck, number)
-            below.append(new)
-    return deck, np.concatenate(below)
+    nodes, others = _nodes(pair.slave), _nodes(pair.master)
+    _, near = cKDTree(deck.points[others]).query(deck.points[nodes])
+    facing = others[near]
+    normals = (_normals(deck, pair.master)[facing] - _normals(deck, pair.slave)[nodes]) / 2
+    return np.einsum("nd,nd->n", deck.points[nodes] - deck.points[facing], normals)
 
 
 def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
     pair, size = deck.pairs[number], len(deck.points)
-    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in pair.slave]))
+    nodes = _nodes(pair.slave)
     normals = _normals(deck, pair.slave)[nodes]
-    shift = _shift(deck, pair, nodes, normals)
+    shift = _shift(deck, pair, nodes)
     thick = _THIN * np.ptp(deck.points, axis=0).max()
     heights = np.array([-thick, 0.0, -thick / 2])[:, None] + shift
     places = deck.points[nodes] + heights[:, :, None] * normals
@@ -97,19 +130,30 @@ def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
     return longer, new
 
 
+def _nodes(faces: list[FaceBlock]) -> np.ndarray:
+    return np.unique(np.concatenate([block.nodes.ravel() for block in faces]))
+
+
 def _normals(deck: Deck, faces: list[FaceBlock]) -> np.ndarray:
     return nodal_normals(deck.points, [(block.type.name, block.nodes) for block in faces])
 
 
-def _shift(deck: Deck, pair: PairedFaces, nodes: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _are_flat(deck: Deck, pair: PairedFaces) -> bool:
+    """Whether the normals of both sides agree everywhere."""
+    outward = _normals(deck, pair.slave)[_nodes(pair.slave)]
+    facing = _normals(deck, pair.master)[_nodes(pair.master)]
+    return bool(np.abs(np.concatenate([-outward, facing]) - facing[0]).max() < _FLAT)
+
+
+def _shift(deck: Deck, pair: PairedFaces, nodes: np.ndarray) -> np.ndarray:
     """How far outward (k,) the slave's nodes are moved."""
     if pair.gap is None:
         return np.full(len(nodes), pair.zone.interference)
-    others = np.unique(np.concatenate([block.nodes.ravel() for block in pair.master]))
-    facing = _normals(deck, pair.master)[others]
-    if np.abs(facing - facing[0]).max() > _FLAT or np.abs(normals + facing[0]).max() > _FLAT:
+    if not _are_flat(deck, pair):
         raise UnsupportedError("initial gap by place on curved faces: CalculiX takes one number")
-    return (deck.points[nodes] - deck.points[others[0]]) @ facing[0] - pair.gap[nodes]
+    other = _nodes(pair.master)[0]
+    facing = _normals(deck, pair.master)[other]
+    return (deck.points[nodes] - deck.points[other]) @ facing - pair.gap[nodes]
 
 
 def _columns(block: FaceBlock) -> list[tuple[int, int]]:

@@ -13,8 +13,9 @@ from ..mechanics.fem.bodies import (
     unsupported,
 )
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
+from ..mechanics.linear.stabilised import Compliance
 from ..mechanics.linear.systems import Systems, parts_of
-from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
+from ..mechanics.mortar.status import StatusResult, Trial, find_status
 from ..system.errors import SolveError
 from ..system.memory import release
 from .accuracy import Accuracy, Roughness, estimate, judged, roughness
@@ -26,6 +27,7 @@ from .constraints import (
     unit_springs,
 )
 from .displacement import Displacement
+from .first_status import first_guess, moved
 from .free_stiffness import free_stiffness, free_unknowns
 from .iterate import ContactIterate
 from .scene import Scene
@@ -157,20 +159,28 @@ class ContactProblem:
         start: np.ndarray | None = None,
         bilateral: bool = False,
         correction: np.ndarray | float = 0.0,
+        before: Step | None = None,
     ) -> Equilibrium:
         """Equilibrium at a step, the status search starting from `start` (k,), a guess.
 
-        `bilateral`: no status is sought, all macro-elements stay closed, in tension too.
-        `correction` (n, dim): see `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0,
-        ḡ ≥ 0, p ḡ = 0, or a system is singular.
+        `before`: the step that `start` is the status of, if it is another one. `bilateral`: no
+        status is sought, all macro-elements stay closed, in tension too. `correction` (n, dim): see
+        `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0, or a system
+        is singular.
         """
         scene, eligible = self.scene, self.constraints.eligible
-        if not scene.options.shortcuts.status:
-            start = eligible
-        start = self._first_guess(step) if start is None else start
         if bilateral:
             first = self._at_rest(eligible, step, correction)
             return self._solve_closed(first, correction, _force_scale(first))
+        guess: np.ndarray | None
+        guess = first_guess(scene, self.constraints, step, self._free_motion)
+        if not scene.options.shortcuts.status:
+            start = eligible
+        elif start is None:
+            start, guess = guess, None
+        elif before is not None:
+            about = scene, self.constraints, self._free_motion
+            start = moved(start, before, step, *about)
         latest: list[Equilibrium] = []
         rough, known = scene.options.shortcuts.status, None
 
@@ -193,7 +203,7 @@ class ContactProblem:
             return self._gap_stiffness(step)
 
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
-        status = find_status(attempt, start, eligible, area, stiffness, confirm)
+        status = find_status(attempt, start, eligible, area, stiffness, confirm, guess)
         trial = latest[0].trial
         touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
         return replace(latest[0], status=replace(status, closed=status.closed | touching))
@@ -217,19 +227,6 @@ class ContactProblem:
         found = np.zeros(len(closed))
         found[closed] = system.multiplier(pushed - self.matrix @ change)
         return found
-
-    def _first_guess(self, step: Step) -> np.ndarray:
-        """Macro-elements (k,) that loads and imposed displacements are likely to close."""
-        scene, constraints = self.scene, self.constraints
-        eligible = constraints.eligible
-        acting, offset = scene.acting(step)
-        imposed = np.abs(offset).max(initial=0.0)
-        moduli = 2 * np.concatenate([block.shear for block in scene.blocks])
-        force = np.linalg.norm(acting, axis=1).sum()
-        push = force * (1 / moduli.min() + 1 / moduli.max())
-        gap = constraints.initial / np.where(eligible, constraints.covered, np.inf) - imposed
-        guess = likely_closed(gap, constraints.covered, eligible, push, scene.space)
-        return eligible if self._free_motion(guess) else guess
 
     def _free_motion(self, closed: np.ndarray) -> str:
         """See `free_motion`; the last answer is kept, as a guess is asked about more than once."""
@@ -337,16 +334,17 @@ class ContactProblem:
             correction=correction,
         )
 
-    def _compliance(self, closed: np.ndarray) -> sparse.csr_matrix:
-        """The compliance (c, c) of the closed multipliers (k,); zero in zones without one."""
-        parts = []
+    def _compliance(self, closed: np.ndarray) -> Compliance:
+        """The compliance of the closed multipliers (k,); zones without one have no part of it."""
+        parts, weight = [], [np.empty(0)]
         for zone in self.scene.zones:
             mine, recovery = closed[zone.numbers], zone.operator.recovery
             if zone.zone.stabilised and recovery and recovery.stabilisation:
-                parts.append(recovery.stabilisation.compliance(mine))
+                parts.append(recovery.stabilisation.scatter(mine))
+                weight.append(recovery.stabilisation.weight[mine])
             else:
-                parts.append(sparse.csr_matrix((int(mine.sum()),) * 2))
-        return sparse.block_diag(parts, format="csr")
+                parts.append(sparse.csr_matrix((0, int(mine.sum()))))
+        return Compliance(sparse.block_diag(parts, format="csr"), np.concatenate(weight))
 
     def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
         return self._systems.closed(closed)

@@ -95,6 +95,39 @@ def test_a_gap_by_place_on_curved_faces_is_refused():
         list(deck_lines(deck))
 
 
+def tubes(clearance):
+    """Two tubes of QUAD8, one in the other, under 25 MPa from inside."""
+    mesh = {"recipe": "rings", "radii": [20, 30, 40]}
+    mesh |= {
+        "bottom": {"cells": "QUAD8", "divisions": [12, 3]},
+        "top": {"cells": "QUAD8", "divisions": [9, 3]},
+    }
+    return case_of(
+        "QUAD8",
+        "QUAD8",
+        mesh=mesh,
+        supports=[{"group": "symx", "fix": ["x"]}, {"group": "farx", "fix": ["y"]}],
+        loads=[{"group": "base", "pressure": 25.0}],
+        contact=[SIDES | {} if clearance is None else SIDES | {"clearance": clearance}],
+    )
+
+
+@pytest.mark.skipif(not CalculiX().version(), reason="not installed")
+def test_curved_surfaces_that_fit_are_left_as_meshed(tmp_path):
+    """Lamé's 25 · 20² (40² − 30²) / (30² (40² − 20²)); `*CLEARANCE` gives pressures up to 25."""
+    deck = deck_of(*tubes(0.0), layer=True)
+    assert not any("*CLEARANCE" in line for line in deck_lines(deck))
+    assert slave_pressures(CalculiX(), deck, tmp_path) == pytest.approx(6.4814815, rel=0.1)
+    flat = deck_of(*pressed(1.0, clearance=0.1), layer=True)
+    [line] = [line for line in deck_lines(flat) if "*CLEARANCE" in line]
+    assert line.endswith("VALUE=0.1")
+
+
+def test_another_gap_than_the_meshed_one_on_curved_faces_is_refused():
+    with pytest.raises(UnsupportedError, match="not the meshed one"):
+        list(deck_lines(deck_of(*tubes(0.01), layer=True)))
+
+
 @pytest.mark.parametrize("code", CODES[:2])
 def test_supports_across_the_axes(code, tmp_path):
     """The patch test, turned."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from solver import solve_case
+from solver.mechanics.linear.direct import force_solver
 from solver.system.errors import InputError
 from tests.scenes import PRESSURE, block_case, block_mesh
 
@@ -108,6 +109,35 @@ def test_the_patch_test_stays_exact(bottom, top):
     case = block_case(dim, zone=", stabilised: true")
     found = solve_case(case, block_mesh(bottom, top, (3, 2)))
     assert found.pressure == pytest.approx(PRESSURE, rel=1e-12)
+
+
+def test_the_patch_test_stays_exact_by_multigrid():
+    case = block_case(3, zone=", stabilised: true")
+    with force_solver("multigrid"):
+        found = solve_case(case, block_mesh("PENTA6", "HEXA8", (4, 3)))
+    assert "multigrid" in found.solution.linear_solver
+    assert found.pressure == pytest.approx(PRESSURE, rel=1e-12)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+def test_multigrid_finds_the_pressures_of_a_factor(poisson):
+    """A layer that lifts off in places: several statuses are solved roughly."""
+    case = waves(("HEXA8", 6), ("HEXA8", 3), (1e4, 1e3), stabilised=True)
+    case["materials"]["bottom"]["poisson"] = poisson
+    case["supports"][-1]["fix"] = ["x", "y"]
+    case["loads"] = [{"group": "press", "pressure": 0.5}]
+    case.pop("reference")
+    found = []
+    for kind in ("multigrid", "auto"):
+        with force_solver(kind):
+            found.append(solve_case(case).solution)
+    one, other = (solution.zones[0] for solution in found)
+    assert [("multigrid" in solution.linear_solver) for solution in found] == [True, False]
+    assert found[0].iterations > 1
+    assert 0 < one.closed.sum() < len(one.closed)
+    assert (one.closed == other.closed).all()
+    peak = other.multiplier.max()
+    assert np.abs(one.multiplier - other.multiplier).max() < 1e-11 * peak
 
 
 def test_contact_that_opens():

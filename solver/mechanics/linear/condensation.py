@@ -38,6 +38,7 @@ _WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
 _SMALLEST_PIVOT = 1e-6
 # Zones whose slave surface is a master surface, one after another.
 _LAYERS = 4
+_NO_SPRINGS = np.empty(0)
 
 
 AnyIterate = TypeVar("AnyIterate", bound="Iterate")
@@ -70,8 +71,8 @@ class ConstrainedSystem(Protocol):
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """The multipliers p (m,) that balance f − K x = `force`."""
 
-    def imbalance(self, force: np.ndarray) -> float:
-        """The largest force that no multiplier can balance."""
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
+        """The largest force that no multiplier balances, or that `violation` brings up."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +120,8 @@ class CondensedSystem:
         """From the equilibrium of the pivots."""
         return -(self.inverse.T @ force[self.pivot])
 
-    def imbalance(self, force: np.ndarray) -> float:
-        """The largest force left on the unknowns v."""
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:  # noqa: ARG002
+        """The largest force left on the unknowns v; no constraint is violated."""
         return float(np.abs(self._on_kept(force)).max(initial=0.0))
 
     def _on_kept(self, force: np.ndarray) -> np.ndarray:
@@ -159,8 +160,8 @@ class SaddlePoint:
         found = self.factor.solve(np.concatenate([force, nothing]))[len(force) :]
         return (found.T / self.size).T
 
-    def imbalance(self, force: np.ndarray) -> float:
-        """The largest force left with the multipliers acting."""
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:  # noqa: ARG002
+        """The largest force left with the multipliers acting; see `CondensedSystem`."""
         left = force + self.constraints.T @ self.multiplier(force)
         return float(np.abs(left).max(initial=0.0))
 
@@ -226,41 +227,58 @@ def condense(
     unknowns: Unknowns | None = None,
     gave_up: str = "",
     shared: Shared | None = None,
+    springs: np.ndarray = _NO_SPRINGS,
 ) -> CondensedSystem:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
     `own` (n,) marks the unknowns that may be eliminated, `unknowns` describes all, `gave_up` says
-    why multigrid is not tried again, `shared`; none is needed (see `prepare`).
+    why multigrid is not tried again, `shared`; none is needed (see `prepare`). With `springs` (s,),
+    their stiffnesses, K has s unknowns more; the constraints (m, n + s) may hold these.
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
     n = matrix.shape[0]
-    pivot, found = choose_pivots(constraints, own)
+    pivot, found = choose_pivots(constraints[:, :n], own)
     if not found.all():
         raise SolveError(
             f"{int((~found).sum())} closed macro-elements have no unknown of their own to condense"
         )
-    kept = np.ones(n, dtype=bool)
+    kept = np.ones(constraints.shape[1], dtype=bool)
     kept[pivot] = False
-    kept_columns, coupling = np.flatnonzero(kept), matrix[pivot]
+    kept_columns, coupling = np.flatnonzero(kept), _wide(matrix[pivot], len(springs))
     inverse = inverse_of(constraints[:, pivot])
     follow = -(inverse @ constraints[:, kept_columns])
-    condensed = _condensed(matrix, kept_columns, pivot, follow) if len(pivot) else matrix
+    parts = kept_columns, pivot, follow, springs
+    condensed = _condensed(matrix, *parts) if len(pivot) else matrix
     factor = prepare(condensed, unknowns, gave_up, shared)
     return CondensedSystem(kept_columns, follow.tocsr(), pivot, inverse, factor, coupling)
 
 
 def _condensed(
-    matrix: Stiffness, kept: np.ndarray, pivot: np.ndarray, follow: sparse.csr_matrix
+    matrix: Stiffness,
+    kept: np.ndarray,
+    pivot: np.ndarray,
+    follow: sparse.csr_matrix,
+    springs: np.ndarray,
 ) -> Symmetric:
-    """ZᵀKZ for the unknowns `kept` (k,), which the others `follow` (m, k)."""
+    """ZᵀKZ for the unknowns `kept` (k,), which the others `follow` (m, k); `springs` come last."""
+    s = len(springs)
     if isinstance(matrix, StiffenedMatrix):
-        opened = matrix.divergence[:, kept] + matrix.divergence[:, pivot] @ follow
-        return matrix.changed(_condensed(matrix.soft, kept, pivot, follow), opened.tocsr())
-    coupling = matrix[pivot]
+        opened = _wide(matrix.divergence, s)[:, kept] + matrix.divergence[:, pivot] @ follow
+        return matrix.changed(_condensed(matrix.soft, kept, pivot, follow, springs), opened.tocsr())
+    coupling = _wide(matrix[pivot], s)
     pulled = (coupling[:, kept].T @ follow).tocsr()
     added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
-    return CondensedMatrix(matrix, kept, added.tocsr())
+    if s:
+        added = added + sparse.diags(np.concatenate([np.zeros(len(kept) - s), springs]))
+    return CondensedMatrix(matrix, kept[: len(kept) - s], added.tocsr())
+
+
+def _wide(rows: sparse.csr_matrix, more: int) -> sparse.csr_matrix:
+    """Rows of a matrix with so many columns more, which are zero."""
+    found = sparse.csr_matrix(rows)
+    found.resize((found.shape[0], found.shape[1] + more))
+    return found
 
 
 class Iterate(Protocol):
@@ -301,7 +319,7 @@ def solve(
         correction = system.correction(iterate.condensed(force), iterate.violation(), accuracy)
         following = iterate.advanced(correction)
         following_force = following.residual()
-        size = system.imbalance(following_force) / scale
+        size = system.imbalance(following_force, following.violation()) / scale
         if not np.isfinite(size):
             raise SolveError("the solution is not finite")
         _LOG.info("solution %d: residual %.1e", step + 1, size)

@@ -14,16 +14,11 @@ from ...system.errors import SolveError
 from ..fem.bodies import joined_bodies
 from .augmented import augment
 from .choice import LinearSolver, against_condensation
-from .condensation import (
-    CondensedSystem,
-    ConstrainedSystem,
-    condense,
-    saddle_point,
-)
+from .condensation import ConstrainedSystem, condense, saddle_point
 from .direct import Factor
 from .krylov import EPSILON
 from .multigrid import Shared
-from .stabilised import stabilise
+from .stabilised import Compliance, stabilise
 from .stiffened import Stiffness, part_of
 from .unknowns import Unknowns
 
@@ -97,9 +92,10 @@ class IndependentSystems:
             found[mine] = system.multiplier(force[unknowns])
         return found
 
-    def imbalance(self, force: np.ndarray) -> float:
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
         """See `ConstrainedSystem`."""
-        return max(system.imbalance(force[unknowns]) for unknowns, _, system in self.parts)
+        left = (part[2].imbalance(force[part[0]], violation[part[1]]) for part in self.parts)
+        return max(left)
 
 
 class Systems:
@@ -107,8 +103,8 @@ class Systems:
 
     `matrix` K (n, n), `constraints` (k, n) of all multipliers, `own` (n,) the unknowns that may be
     eliminated by condensation, None where some multiplier has none: then the constraints augment
-    the stiffness. `unknowns` describes each. `compliance`: S (c, c) of the c multipliers that a
-    mask (k,) has closed, where contact is stabilised.
+    the stiffness. `unknowns` describes each. `compliance`: of the c multipliers that a mask (k,)
+    has closed, where contact is stabilised.
     """
 
     def __init__(
@@ -118,7 +114,7 @@ class Systems:
         own: np.ndarray | None,
         unknowns: Unknowns,
         parts: Sequence[Part],
-        compliance: Callable[[np.ndarray], sparse.csr_matrix] | None = None,
+        compliance: Callable[[np.ndarray], Compliance] | None = None,
     ):
         self._matrix, self._constraints, self._own = matrix, constraints, own
         self._unknowns, self._parts, self._compliance = unknowns, parts, compliance
@@ -135,9 +131,9 @@ class Systems:
 
     def _drop(self, number: int) -> None:
         """Drop a part's system, and remember why multigrid failed on it, if it did."""
-        system = self._kept.pop(number)[1]
-        if isinstance(system, CondensedSystem) and system.factor.gave_up:
-            self._gave_up[number] = system.factor.gave_up
+        factor = self._kept.pop(number)[1].factor
+        if isinstance(factor, LinearSolver) and factor.gave_up:
+            self._gave_up[number] = factor.gave_up
 
     def closed(self, closed: np.ndarray) -> ConstrainedSystem:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
@@ -170,28 +166,28 @@ class Systems:
         if chosen is not None:
             matrix, constraints = part_of(matrix, chosen), constraints[:, chosen]
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
+        known = self._gave_up.get(number, ""), self._shared[number]
         if own is None:
-            return _augmented(matrix.tocsr(), constraints, unknowns.dim)
-        if self._compliance is not None and (soft := self._compliance(closed)).nnz:
-            return stabilise(matrix.tocsr(), constraints, own, soft)
+            return _augmented(matrix, constraints, unknowns, *known)
+        if self._compliance is not None and len((soft := self._compliance(closed)).weight):
+            return stabilise(matrix, constraints, own, soft, unknowns, *known)
         if why := against_condensation(matrix, constraints):
             try:
                 return saddle_point(matrix.tocsr(), constraints, why, weighted=False)
             except SolveError:
                 pass  # pivots that no order of elimination avoids: condensation needs none of them
-        gave_up, shared = self._gave_up.get(number, ""), self._shared[number]
-        return condense(matrix, constraints, own, unknowns, gave_up, shared)
+        return condense(matrix, constraints, own, unknowns, *known)
 
 
 def _augmented(
-    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, dim: int
+    matrix: Stiffness, constraints: sparse.csr_matrix, unknowns: Unknowns, why: str, shared: Shared
 ) -> ConstrainedSystem:
     try:
-        return augment(matrix, constraints, dim, _NOTHING_OWN)
+        return augment(matrix, constraints, _NOTHING_OWN, unknowns, why, shared)
     except SolveError:
         pass
     try:
-        return saddle_point(matrix, constraints, _DEPENDENT)
+        return saddle_point(matrix.tocsr(), constraints, _DEPENDENT)
     except SolveError as error:
         raise SolveError(
             f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "

@@ -39,13 +39,12 @@ class Stabilisation:
     moments: Moments
     near: sparse.csr_matrix
 
-    def compliance(self, closed: np.ndarray) -> sparse.csr_matrix:
-        """S (c, c) of the c closed macro-elements (m,)."""
+    def scatter(self, closed: np.ndarray) -> sparse.csr_matrix:
+        """I − R (c, c) of the c closed macro-elements (m,)."""
         form = FORMS["none"]
         found = reconstruct(self.moments, self.near, closed, form)
         k = form.count(self.moments.local.centre.shape[1])
-        off = found.matrix[k - 1 :: k][closed][:, closed]
-        return (off.T @ sparse.diags(self.weight[closed]) @ off).tocsr()
+        return found.matrix[k - 1 :: k][closed][:, closed].tocsr()
 
 
 def stabilisation(

@@ -2,12 +2,14 @@
 
 import logging
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from math import floor, log10
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 from msgspec import structs
 
 from ...case.model import Case
@@ -116,12 +118,16 @@ def _other(case: Case, mesh: Path, folder: Path, cores: Sequence[int], limit: fl
         return ended(MISSING, f"{code.name} is not installed")
     [pressure] = [load.value for load in case.loads if isinstance(load.value, float)]
     limits = Limits(seconds=limit, memory=float("inf"), cores=cores)
+    deck = deck_of(case, read_mesh(mesh), code.layer)
     try:
-        found = run_code(code, deck_of(case, read_mesh(mesh)), folder, limits)
+        found = run_code(code, deck, folder, limits)
     except (SolveError, CrashError) as error:
         return ended(FAILED, f"CalculiX: {error}")
-    if found.pressure is None:
+    if found.pressure is None or found.pressure.nodes is None:
         return ended(FAILED, "CalculiX: no contact pressure in its output")
+    # The field covers all nodes, with zero where no contact is defined.
+    slave = np.concatenate([b.nodes.ravel() for pair in deck.pairs for b in pair.slave])
+    pressures = found.pressure.values[np.isin(found.pressure.nodes, slave)]
     return ended(SOLVED, "") | {
         "process": {
             "wall": found.seconds,
@@ -130,7 +136,7 @@ def _other(case: Case, mesh: Path, folder: Path, cores: Sequence[int], limit: fl
         },
         "times": {},
         "linear_solver": "its own",
-        "pressure_max": max(abs(float(value) / pressure - 1) for value in found.pressure.values),
+        "pressure_max": float(np.abs(pressures / pressure - 1).max()),
         "resolved": resolution(pressure),
     }
 
@@ -143,6 +149,7 @@ def resolution(pressure: float) -> float:
 def solve_way(job: Mapping[str, Any]) -> dict[str, Any]:
     """One mesh solved in one way: the process up to the first solve's end, and warm repetitions."""
     from ...case.reader import load_case
+    from ...mechanics.linear.backends import free_software_alone
     from ...mechanics.linear.direct import force_solver
     from ...mesh import read_mesh
     from ...simulation.options import Options, Safeguards, Shortcuts
@@ -157,14 +164,12 @@ def solve_way(job: Mapping[str, Any]) -> dict[str, Any]:
         Shortcuts.none() if job["everything"] else Shortcuts(),
         Safeguards() if job["cures"] else Safeguards.none(),
     )
-    if job["free"]:
-        _without_mkl()
-    first = Clock()
+    first, packages = Clock(), free_software_alone() if job["free"] else nullcontext()
 
     def run(clock: Clock) -> Any:
         return simulate(case, mesh, options=options, clock=clock)
 
-    with force_solver(job["solver"]):
+    with force_solver(job["solver"]), packages:
         solution = run(first)
         process = used_since(job["started"])
         times = repeated(run, job["repetitions"]) if job["repetitions"] else {}
@@ -177,10 +182,3 @@ def solve_way(job: Mapping[str, Any]) -> dict[str, Any]:
         "linear_iterations": solution.linear_iterations,
         "pressure_max": errors(solution)["pressure_max"],
     }
-
-
-def _without_mkl() -> None:
-    """As where MKL is not installed."""
-    from ...mechanics.linear.backends import BACKENDS
-
-    BACKENDS["pardiso"] = replace(BACKENDS["pardiso"], available=lambda: False)

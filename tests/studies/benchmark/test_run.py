@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from solver.codes.calculix import CalculiX
 from solver.commands.cli import main
 from solver.studies.benchmark.description import read_benchmark
 from solver.studies.benchmark.page import ratios
@@ -62,6 +63,19 @@ def test_the_whole_of_it(file, tmp_path, capsys):
         assert ways[name]["process"]["cpu"] > 0
     said = capsys.readouterr().out
     assert "Ways (QUAD4, " in said
+
+
+@pytest.mark.skipif(not CalculiX().version(), reason="not installed")
+def test_calculix_is_judged_at_the_nodes_of_the_slave(file, content, tmp_path):
+    """The patch test: the six digits of its output, where nodes off the interface have zero."""
+    one = content["comparisons"][0] | {"repetitions": 0}
+    content["comparisons"] = [one | {"ways": [{"title": "other", "program": "calculix"}]}]
+    file.write_text(yaml.safe_dump(content))
+    output = tmp_path / "record.json"
+    assert main(["benchmark", str(file), "-o", str(output)]) == 0
+    [way] = json.loads(output.read_text())["comparisons"][0]["ways"]
+    assert way["outcome"] == "solved"
+    assert way["pressure_max"] < 1e-5
 
 
 def test_the_projects_own_is_valid_and_has_a_quick_version():
