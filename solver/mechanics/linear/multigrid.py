@@ -2,10 +2,10 @@
 
 Nodes are gathered into aggregates, whose rigid motions are the unknowns of the next level (Vanek,
 Mandel, Brezina, Computing 56 (1996) 179). Quadratic cells have a level of linear cells on their
-vertices first. Every level is scaled to a diagonal of at most one and
-kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer.
-Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in double
-precision take the solution to round-off.
+vertices first. Every level is scaled to a diagonal of at most one and kept in single precision; the
+smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer. Linear Algebra Appl. 30 (2023)
+e2518): products with the matrix alone. Conjugate gradients in double precision take the solution to
+round-off.
 
 The hierarchy is that of the bodies alone. Contact corrects its levels (`contact_levels`), and a
 factor of the unknowns beside it solves there exactly, before and after each cycle.
@@ -38,9 +38,8 @@ LARGEST_DENSE = 4_000
 MOST_NEIGHBOURS = 100
 """Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
-# A matrix in single precision differs from the true one by more than the first share of the
-# residual: who asks for less refines the solution. Each solve then goes to the second share, as
-# refinement brings its true residual down no further than to 1e-4 (a million unknowns).
+# A matrix in single precision differs from the true one by more than the first share of a residual.
+# Who asks for less refines: each solve then goes to the second (it can gain 1e-4 at a million).
 _LEAST_SINGLE, _SINGLE = 1e-5, 1e-3
 _ROWS_AT_ONCE = 30_000  # whole nodes
 # Lottes' optimised weights of the polynomial of degree two.
@@ -214,8 +213,7 @@ class Multigrid:
         self._shared = shared or Shared()
         condensed = matrix if isinstance(matrix, CondensedMatrix) else None
         stiffness = condensed.stiffness if condensed else matrix
-        single = isinstance(stiffness, NodalMatrix) and stiffness.single
-        self._single = single
+        self._single = isinstance(stiffness, NodalMatrix) and stiffness.single
         hierarchy = self._shared.hierarchy(stiffness, unknowns)
         self._levels = hierarchy.levels
         last = hierarchy.last.toarray().astype(float)
@@ -248,18 +246,17 @@ class Multigrid:
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
 
-        In 2-norms of the system scaled to a diagonal of at most one; to 10⁻³ where less than 10⁻⁵
-        is asked of a matrix in single precision. Raises SolveError where
-        `MAX_ITERATIONS` do not or will not suffice, and where the solution is not finite.
+        In 2-norms of the system scaled to a diagonal of at most one; to 10⁻³ where less than 10⁻⁵ is
+        asked of a matrix in single precision. Raises SolveError where `MAX_ITERATIONS` do not or
+        will not suffice, and where the solution is not finite.
         """
         columns = np.asarray(right, dtype=float)
         columns = columns if columns.ndim == 2 else columns[:, None]
         if self._single and accuracy < _LEAST_SINGLE:
             accuracy = _SINGLE
         system = self._system
-        solution, iterations = conjugate_gradients(
-            system.multiply, self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS
-        )
+        about = system.lifted(columns), accuracy, MAX_ITERATIONS
+        solution, iterations = conjugate_gradients(system.multiply, self._precondition, *about)
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         self.iterations = max(self.iterations, iterations)
