@@ -246,8 +246,8 @@ class Multigrid:
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
 
-        In 2-norms of the system scaled to a diagonal of at most one; to 10⁻³ where less than 10⁻⁵ is
-        asked of a matrix in single precision. Raises SolveError where `MAX_ITERATIONS` do not or
+        In 2-norms of the system scaled to a diagonal of at most one; to 10⁻³ where less than 10⁻⁵
+        is asked of a matrix in single precision. Raises SolveError where `MAX_ITERATIONS` do not or
         will not suffice, and where the solution is not finite.
         """
         columns = np.asarray(right, dtype=float)
