@@ -99,14 +99,12 @@ def correction_of(
 ) -> Correction:
     """C of a condensed matrix, scaled by `scale` (n,); unknown i is in row `place[i]`.
 
-    So many `springs` are in the rows of the first eliminated unknowns, scaled to a diagonal of one;
-    the others are held.
+    So many `springs` are in the rows of eliminated unknowns; the others are held.
     """
     stiffness, pivot = condensed.stiffness, condensed.eliminated
-    size = len(condensed.kept) + springs
-    where = np.concatenate([condensed.kept, pivot[:springs]])
-    scales = np.concatenate([scale[condensed.kept], spring_scale(condensed)[:springs]])
-    some, eliminated = slice(size), np.zeros(stiffness.shape[0], dtype=bool)
+    where, scales = condensed.places, scales_of(condensed, scale)
+    some = slice(len(condensed.kept) + springs)
+    eliminated = np.zeros(stiffness.shape[0], dtype=bool)
     eliminated[pivot] = True
     added, gone = condensed.added[some, some].tocoo(), stiffness[pivot].tocoo()
     rows, columns = pivot[gone.row], gone.col
@@ -121,9 +119,10 @@ def correction_of(
     return Correction(chosen, coo_matrix(entries, shape=(len(chosen),) * 2).tocsr())
 
 
-def spring_scale(condensed: CondensedMatrix) -> np.ndarray:
-    """What scales the rows (s,) of springs to a diagonal of one."""
-    return np.asarray(1 / np.sqrt(condensed.added.diagonal()[len(condensed.kept) :]))
+def scales_of(condensed: CondensedMatrix, scale: np.ndarray) -> np.ndarray:
+    """The scale (k + s,): of the stiffness (n,), and for springs to a diagonal of one."""
+    springs = condensed.added.diagonal()[len(condensed.kept) :]
+    return np.concatenate([scale[condensed.kept], 1 / np.sqrt(springs)])
 
 
 def _own_diagonal(rows: csr_matrix, numbers: np.ndarray) -> np.ndarray:

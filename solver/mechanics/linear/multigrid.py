@@ -21,7 +21,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from ...system.errors import SolveError
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .contact_levels import Correction, Interface, correction_of, spring_scale
+from .contact_levels import Correction, Interface, correction_of
 from .galerkin import coarse, smoothed
 from .krylov import EPSILON, by_columns, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
@@ -220,8 +220,7 @@ class Multigrid:
         if condensed is not None:
             correction = self._correct(condensed, hierarchy)
             last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
-        about = hierarchy.scale, hierarchy.place, hierarchy.size
-        self._system = ScaledSystem(matrix, *about)
+        self._system = ScaledSystem(matrix, hierarchy.scale, hierarchy.place, hierarchy.size)
         inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
         self._coarsest = inverse.astype(np.float32)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
@@ -229,13 +228,15 @@ class Multigrid:
     def _correct(self, condensed: CondensedMatrix, hierarchy: Hierarchy) -> Correction:
         """The levels under contact; return the correction of the last one.
 
-        Coarse levels hold the springs of stabilised contact: these are near contact alone.
+        Coarse levels hold springs. These, and constraints that were added with a weight, need the
+        exact solve beside contact.
         """
-        springs, about = len(spring_scale(condensed)), (hierarchy.scale, hierarchy.place)
-        correction, beside = correction_of(condensed, *about), None
-        self._levels, most = [], _MOST_BESIDE * hierarchy.size
-        if springs:
-            beside = correction_of(condensed, *about, springs)
+        about = condensed, hierarchy.scale, hierarchy.place
+        correction, beside = correction_of(*about), None
+        needed = condensed.springs or not len(condensed.eliminated)
+        self._levels, most = [], np.inf if needed else _MOST_BESIDE * hierarchy.size
+        if condensed.springs:
+            beside = correction_of(*about, condensed.springs)
             if not hierarchy.levels:
                 return beside
         for level in hierarchy.levels:

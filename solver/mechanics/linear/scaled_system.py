@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .contact_levels import spring_scale
+from .contact_levels import scales_of
 from .krylov import by_columns
 from .nodal_matrix import NodalMatrix
 
@@ -29,10 +29,9 @@ class ScaledSystem:
         self._springs = place[:0]
         stiffness = matrix
         if isinstance(matrix, CondensedMatrix):
-            stiffness, springs = matrix.stiffness, spring_scale(matrix)
-            self._springs = place[matrix.eliminated[: len(springs)]]
-            self.scale = np.concatenate([scale[matrix.kept], springs])
-            self.place = np.concatenate([place[matrix.kept], self._springs])
+            stiffness, self.place = matrix.stiffness, place[matrix.places]
+            self.scale = scales_of(matrix, scale)
+            self._springs = self.place[len(matrix.kept) :]
             self._add(matrix.added)
         idle = np.ones(size, dtype=bool)
         idle[self.place] = False

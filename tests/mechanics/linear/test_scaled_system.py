@@ -97,8 +97,10 @@ def test_smoothing_under_contact_is_the_polynomial():
 
 def test_springs_are_scaled_to_one():
     added = csr_matrix(np.diag([2.0, 3.0, 16.0]))
-    found = contact_levels.spring_scale(CondensedMatrix(csr_matrix(np.eye(4)), np.arange(2), added))
-    np.testing.assert_array_equal(found, [0.25])
+    condensed = CondensedMatrix(csr_matrix(np.eye(4)), np.array([0, 2]), added)
+    found = contact_levels.scales_of(condensed, np.array([5.0, 6.0, 7.0, 8.0]))
+    np.testing.assert_array_equal(found, [5.0, 7.0, 0.25])
+    np.testing.assert_array_equal(condensed.places, [0, 2, 1])
 
 
 def test_a_column_is_not_copied():
