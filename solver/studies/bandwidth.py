@@ -21,6 +21,7 @@ from unittest.mock import patch
 import numpy as np
 from scipy.sparse import bsr_matrix
 
+from ..mechanics.linear.symmetric_blocks import SymmetricBlocks
 from ..system.clock import Clock
 from ..system.threads import ahead, workers
 from .points import SOLVED, Record
@@ -55,20 +56,23 @@ def triad(length: int = _LENGTH) -> float:
     return 3 * a.nbytes / best
 
 
-def moved(matrix: bsr_matrix, x: np.ndarray, result: np.ndarray, adds: bool = True) -> int:
+def moved(
+    matrix: bsr_matrix | SymmetricBlocks, x: np.ndarray, result: np.ndarray, adds: bool = True
+) -> int:
     """The least bytes of a product: matrix and vector read, result written, if it `adds` read too.
 
     >>> moved(bsr_matrix(np.eye(6), blocksize=(3, 3)), np.ones(6), np.ones(6))
     308
     """
-    stored = matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes
+    parts = matrix.parts if isinstance(matrix, SymmetricBlocks) else [matrix]
+    stored = sum(a.nbytes for part in parts for a in (part.data, part.indices, part.indptr))
     return stored + x.nbytes + result.nbytes * (1 + adds)
 
 
 @contextmanager
 def counted() -> Iterator[Parts]:
     """Seconds and bytes of the products within, by what they are for."""
-    from ..mechanics.linear import multigrid, nodal_matrix, products
+    from ..mechanics.linear import multigrid, products
 
     parts: Parts = {}
     within: list[str] = []
@@ -78,15 +82,22 @@ def counted() -> Iterator[Parts]:
         part["seconds"] += seconds
         part["bytes"] += count
 
-    def product(work: Callable[..., np.ndarray], kind: str) -> Callable[..., np.ndarray]:
-        def call(matrix: bsr_matrix, x: np.ndarray, *more: Any) -> np.ndarray:
+    def product(work: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+        def call(
+            matrix: bsr_matrix | SymmetricBlocks,
+            x: np.ndarray,
+            base: np.ndarray | None = None,
+            *more: Any,
+            **named: Any,
+        ) -> np.ndarray:
             start = perf_counter()
-            result = work(matrix, x, *more)
+            result = work(matrix, x, base, *more, **named)
             seconds = perf_counter() - start
-            count, outer = moved(matrix, x, result, bool(more)), within[-1] if within else STAGE
+            count = moved(matrix, x, result, base is not None)
+            outer = within[-1] if within else STAGE
             if outer == ITERATIONS:
-                square = matrix.shape[0] == matrix.shape[1]
-                add(kind or (SMOOTHER if square else TRANSFER), seconds, count)
+                kind = DOUBLE if x.dtype == np.float64 else SMOOTHER
+                add(kind if isinstance(matrix, SymmetricBlocks) else TRANSFER, seconds, count)
             add(outer, 0.0, count)
             return result
 
@@ -105,12 +116,15 @@ def counted() -> Iterator[Parts]:
         return call
 
     solver, outside = multigrid.Multigrid, (STAGE, SET_UP, ITERATIONS)
-    transposed = product(products.multiply_transposed, TRANSFER)
+
+    def transposed(matrix: bsr_matrix, x: np.ndarray, _: None) -> np.ndarray:
+        return products.multiply_transposed(matrix, x)
+
     with ExitStack() as stack:
         for owner, name, work in (
-            (multigrid, "multiply", product(products.multiply, "")),
-            (multigrid, "multiply_transposed", transposed),
-            (nodal_matrix, "multiply", product(products.multiply, DOUBLE)),
+            (multigrid, "multiply", product(products.multiply)),
+            (multigrid, "multiply_transposed", product(transposed)),
+            (SymmetricBlocks, "multiply", product(SymmetricBlocks.multiply)),
             (solver, "__init__", around(solver.__init__, SET_UP)),
             (solver, "solve", around(solver.solve, ITERATIONS)),
         ):

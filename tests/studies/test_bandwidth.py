@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_matrix, csr_matrix
 
-from solver.mechanics.linear import multigrid, nodal_matrix
+from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.nodal_matrix import NodalMatrix
+from solver.mechanics.linear.symmetric_blocks import SymmetricBlocks
 from solver.studies import bandwidth
 from solver.studies.bandwidth import DOUBLE, ITERATIONS, SET_UP, SMOOTHER, STAGE, TRANSFER
 from solver.studies.scaling.description import ScalingPoint, read_scaling
@@ -32,8 +33,16 @@ def test_a_product_in_double_precision_is_counted_too():
     blocks = bsr_matrix(csr_matrix(np.eye(6)), blocksize=(3, 3))
     with bandwidth.counted() as parts:
         NodalMatrix(blocks, np.arange(6)) @ np.ones((6, 2))
-    assert parts[STAGE]["bytes"] == 2 * bandwidth.moved(blocks, np.ones(6), np.ones(6))
-    assert nodal_matrix.multiply.__module__ == "solver.mechanics.linear.products"
+    assert parts[STAGE]["bytes"] == 2 * (8 * 2 * 9 + 4 * (2 + 3) + 8 * 6 * 2)
+    assert SymmetricBlocks.multiply.__module__ == "solver.mechanics.linear.symmetric_blocks"
+
+
+def test_half_a_matrix_moves_what_is_stored():
+    """A block on the diagonal, one above it; two parts with column numbers and three row starts."""
+    blocks = np.ones((1, 3, 3), dtype=np.float32)
+    parts = (bsr_matrix((blocks, [k], [0, 1, 1]), shape=(6, 6)) for k in (0, 1))
+    x = np.ones(6, dtype=np.float32)
+    assert bandwidth.moved(SymmetricBlocks(*parts), x, x) == 2 * 4 * (9 + 1 + 3) + 3 * 4 * 6
 
 
 def test_the_triad_is_three_arrays_over_its_time(monkeypatch):

@@ -45,6 +45,16 @@ class CondensedMatrix:
         left[self.kept] = False
         return np.flatnonzero(left)
 
+    @property
+    def springs(self) -> int:
+        """How many of the unknowns are those of springs."""
+        return self.shape[0] - len(self.kept)
+
+    @property
+    def places(self) -> np.ndarray:
+        """The unknowns (k + s,) of the stiffness; for springs the first eliminated ones."""
+        return np.concatenate([self.kept, self.eliminated[: self.springs]])
+
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """See `Symmetric`."""
         whole, k = np.zeros((self.stiffness.shape[0], *x.shape[1:])), len(self.kept)

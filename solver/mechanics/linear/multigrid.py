@@ -21,12 +21,14 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from ...system.errors import SolveError
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .contact_levels import Correction, Interface, correction_of, spring_scale
+from .contact_levels import Correction, Interface, correction_of
 from .galerkin import coarse, smoothed
-from .krylov import EPSILON, conjugate_gradients, in_single
+from .krylov import EPSILON, by_columns, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
+from .scaled_system import ScaledSystem
 from .slender import smoothed_along
+from .symmetric_blocks import SymmetricBlocks, halved
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
@@ -40,9 +42,8 @@ MAX_ITERATIONS = 150
 # digits are those of a refinement.
 _LEAST_SINGLE = 1e-5
 _ROWS_AT_ONCE = 30_000  # whole nodes
-_ONE = np.float32(1)
 # Lottes' optimised weights of the polynomial of degree two.
-_FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
+_FIRST, _SECOND = 1.02387287570313, 1.26408905371085
 # The iteration approaches the largest eigenvalue from below.
 _SAFETY = 1.05
 _SMOOTHED = 4 / 3
@@ -54,29 +55,36 @@ _MOST_BESIDE = 1 / 4
 class Level:
     """One level: scaled matrix, bound of its eigenvalues, and the way up from the next.
 
-    `correction` and `weight` (n,): what contact changes in the matrix and in the smoother;
+    `correction` and `weight` (r,): what contact changes in r rows of matrix and smoother;
     `interface`: the exact solve beside it, if these unknowns are not too many.
     """
 
-    matrix: bsr_matrix
+    matrix: SymmetricBlocks
     bound: np.float32
     prolongation: bsr_matrix
     correction: Correction | None = None
-    weight: np.ndarray | np.float32 = _ONE
+    weight: np.ndarray | None = None
     interface: Interface | None = None
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
         """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
-        step = (np.float32(4 / 3) / self.bound) * self.weight * residual
-        change = self.remaining(residual, step)
-        change *= (_SECOND * np.float32(12 / 5) / self.bound) * self.weight
-        step *= _FIRST + _SECOND / np.float32(5)
-        change += step
+        factor, own = _SECOND * 12 / 5 / float(self.bound), _FIRST + _SECOND / 5
+        step = np.float32(4 / 3) / self.bound * residual
+        if self.correction is None:
+            return self.matrix.multiply(step, residual, -factor, factor, own)
+        rows = self.correction.rows
+        step[rows] *= self.weight
+        near = step[rows]
+        change = self.matrix.multiply(step, residual, -factor, factor, own)
+        left = change[rows] - own * near - factor * (self.correction.matrix @ near)
+        change[rows] = self.weight * left + own * near
         return change
 
-    def remaining(self, residual: np.ndarray, change: np.ndarray) -> np.ndarray:
-        """The residual (n,) after a change."""
-        left = multiply(self.matrix, change, residual, -1.0)
+    def remaining(
+        self, residual: np.ndarray, change: np.ndarray, out: np.ndarray | None = None
+    ) -> np.ndarray:
+        """The residual (n,) after a change; into `out` (n,), if given, which is none of both."""
+        left = self.matrix.multiply(change, residual, -1.0, out=out)
         if self.correction is not None:
             self.correction.subtract_product(left, change)
         return left
@@ -88,14 +96,17 @@ class Level:
 
         Where there are springs, this solve is the one of the correction `beside`, which has them.
         """
-        rows = correction.corrected_rows(self.matrix)
-        weight, interface = correction.weights(self.matrix, rows), None
+        own = self.matrix.chosen_rows(correction.rows)
+        rows = correction.corrected_rows(own)
+        weight, interface = correction.weights(own, rows), None
         if beside is not None:
-            interface = Interface(beside, beside.corrected_rows(self.matrix))
+            own = self.matrix.chosen_rows(beside.rows)
+            interface = Interface(beside, beside.corrected_rows(own))
         elif len(correction.rows) <= most:
             interface = Interface(correction, rows)
         changed = replace(self, correction=correction, weight=weight, interface=interface)
-        half = np.sqrt(changed.weight)
+        half = np.ones(self.matrix.shape[0], dtype=np.float32)
+        half[correction.rows] = np.sqrt(weight)
 
         def symmetric(x: np.ndarray, base: np.ndarray) -> np.ndarray:
             return base - half * changed.remaining(np.zeros_like(x), half * x)
@@ -122,8 +133,9 @@ class Hierarchy:
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale = self.scale * scale[self.place]
-        if isinstance(matrix, NodalMatrix):
-            matrix.now_scaled(self.scale)
+        self._nodal = matrix if isinstance(matrix, NodalMatrix) else None
+        if self._nodal is not None:
+            self._nodal.now_scaled(self.scale)
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
@@ -163,7 +175,9 @@ class Hierarchy:
         below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
         left = np.ones(prolongation.shape[0], dtype=np.float32)
         scale_blocks(prolongation, left, scale.astype(np.float32))
-        self.levels.append(Level(matrix, bound, prolongation))
+        self.levels.append(Level(halved(matrix), bound, prolongation))
+        if self._nodal is not None and len(self.levels) == 1:
+            self._nodal.halve(self.levels[0].matrix)
         return below, replace(nodes, motions=motions)
 
 
@@ -196,23 +210,18 @@ class Multigrid:
         coarse levels would fill in.
         """
         self.iterations = 0
-        self._matrix, self._shared = matrix, shared or Shared()
+        self._shared = shared or Shared()
         condensed = matrix if isinstance(matrix, CondensedMatrix) else None
         stiffness = condensed.stiffness if condensed else matrix
         single = isinstance(stiffness, NodalMatrix) and stiffness.single
         self._least = _LEAST_SINGLE if single else 0.0
         hierarchy = self._shared.hierarchy(stiffness, unknowns)
-        self._size, self._place = hierarchy.size, hierarchy.place
-        self._levels, scale = hierarchy.levels, hierarchy.scale
+        self._levels = hierarchy.levels
         last = hierarchy.last.toarray().astype(float)
         if condensed is not None:
             correction = self._correct(condensed, hierarchy)
             last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
-            springs = spring_scale(condensed)
-            where = np.concatenate([condensed.kept, condensed.eliminated[: len(springs)]])
-            self._place = hierarchy.place[where]
-            scale = np.concatenate([scale[condensed.kept], springs])
-        self._scale = scale[:, None]
+        self._system = ScaledSystem(matrix, hierarchy.scale, hierarchy.place, hierarchy.size)
         inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
         self._coarsest = inverse.astype(np.float32)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
@@ -220,13 +229,15 @@ class Multigrid:
     def _correct(self, condensed: CondensedMatrix, hierarchy: Hierarchy) -> Correction:
         """The levels under contact; return the correction of the last one.
 
-        Coarse levels hold the springs of stabilised contact: these are near contact alone.
+        Coarse levels hold springs. These, and constraints that were added with a weight, need the
+        exact solve beside contact.
         """
-        springs, about = len(spring_scale(condensed)), (hierarchy.scale, hierarchy.place)
-        correction, beside = correction_of(condensed, *about), None
-        self._levels, most = [], _MOST_BESIDE * self._size
-        if springs:
-            beside = correction_of(condensed, *about, springs)
+        about = condensed, hierarchy.scale, hierarchy.place
+        correction, beside = correction_of(*about), None
+        needed = condensed.springs or not len(condensed.eliminated)
+        self._levels, most = [], np.inf if needed else _MOST_BESIDE * hierarchy.size
+        if condensed.springs:
+            beside = correction_of(*about, condensed.springs)
             if not hierarchy.levels:
                 return beside
         for level in hierarchy.levels:
@@ -242,18 +253,14 @@ class Multigrid:
         """
         columns = np.asarray(right, dtype=float)
         columns = columns if columns.ndim == 2 else columns[:, None]
-        accuracy = max(accuracy, self._least)
+        accuracy, system = max(accuracy, self._least), self._system
         solution, iterations = conjugate_gradients(
-            lambda x: self._scale * (self._matrix @ (self._scale * x)),
-            self.cycle,
-            self._scale * columns,
-            accuracy,
-            MAX_ITERATIONS,
+            system.multiply, self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS
         )
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         self.iterations = max(self.iterations, iterations)
-        return (self._scale * solution).reshape(np.shape(right))
+        return system.solution(solution).reshape(np.shape(right))
 
     def close(self) -> None:
         """Release the hierarchy; it solves no more."""
@@ -263,16 +270,16 @@ class Multigrid:
     @property
     def scale(self) -> np.ndarray:
         """The scale (n,) of the unknowns."""
-        return np.asarray(self._scale[:, 0])
+        return self._system.scale
 
     def cycle(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n, k), one V-cycle; both scaled."""
-        return in_single(partial(np.apply_along_axis, self._cycle, 0))(residual)
+        """The correction for a residual (n,), one V-cycle; both scaled."""
+        return self._precondition(self._system.placed(residual[:, None]))[self._system.place, 0]
 
-    def _cycle(self, residual: np.ndarray) -> np.ndarray:
-        padded = np.zeros(self._size, dtype=np.float32)
-        padded[self._place] = residual
-        return self._descend(0, padded)[self._place]
+    def _precondition(self, residual: np.ndarray) -> np.ndarray:
+        """The same for columns (size, k) in the rows of the first level."""
+        cycles = partial(by_columns, partial(self._descend, 0))
+        return self._system.without_idle(in_single(cycles)(residual))
 
     def _descend(self, depth: int, residual: np.ndarray) -> np.ndarray:
         """One V-cycle from a level down."""
@@ -290,9 +297,10 @@ class Multigrid:
         """Smoothing before and after the levels below."""
         level = self._levels[depth]
         change = level.smooth(residual)
-        below = multiply_transposed(level.prolongation, level.remaining(residual, change))
-        change = multiply(level.prolongation, self._descend(depth + 1, below), change)
-        change += level.smooth(level.remaining(residual, change))
+        left = level.remaining(residual, change)
+        below = multiply_transposed(level.prolongation, left)
+        multiply(level.prolongation, self._descend(depth + 1, below), change, out=change)
+        change += level.smooth(level.remaining(residual, change, left))
         return change
 
 

@@ -7,7 +7,7 @@
     series:
       - name: hexa8
         title: HEXA8
-        case: templates/space.yaml     # a case file of the recipe `blocks`
+        case: templates/space.yaml     # a case file of the recipe `blocks` or `hertz`
         cells: HEXA8                   # of both blocks
         divisions: [5, 4]              # of slave and master: their proportion
         slab: false                    # blocks as thick as the finer one's cells are wide
@@ -16,14 +16,16 @@
         sizes: [1.0e+4, 1.0e+5]        # unknowns that a mesh has at least
     goals:                        # numbers to reach, shown beside those measured
       - {title: …, series: hexa8, size: 1.0e+5, what: cpu, most: 12, unit: s, others: {…: 56}}
+      - {…, series: sphere, over: hexa8, …}  # times what the other series takes at the same size
     quick:                        # a part of it: these series, no size above the largest
       {largest: 3.0e+4, series: [hexa8]}
     large:                        # beyond it: these series at other sizes, with another limit
       {limit: 3600, sizes: [1.0e+7], series: [hexa8]}
 
 A goal's `what` is `cpu` or `wall` (seconds of the whole process, from mesh file to result file),
-`memory` (its peak, GB), `pressure` (the largest error), or the exponent of a stage: `growth of
-solve`. A point is one series and size; its name is the path of its record: `hexa8/10000`.
+`memory` (its peak, GB), `pressure` (the largest error), `statuses` (solves for the contact status),
+or the exponent of a stage: `growth of solve`. A point is one series and size; its name is the path
+of its record: `hexa8/10000`.
 """
 
 import json
@@ -63,8 +65,8 @@ SizeRange = Annotated[
 _What = Annotated[
     str,
     Meta(
-        pattern=r"^(cpu|wall|memory|pressure|growth of [a-z]+)$(?!\n)",
-        description="cpu, wall, memory, pressure, or `growth of` and a stage",
+        pattern=r"^(cpu|wall|memory|pressure|statuses|growth of [a-z]+)$(?!\n)",
+        description="cpu, wall, memory, pressure, statuses, or `growth of` and a stage",
     ),
 ]
 
@@ -161,7 +163,10 @@ class ScalingPoint:
 
 
 class Goal(Section, frozen=True):
-    """A number to reach; `others` has what other codes needed for the same work."""
+    """A number to reach; `others` has what other codes needed for the same work.
+
+    `over`: it is a ratio to that of another series at the same size.
+    """
 
     title: Text
     series: Name
@@ -169,6 +174,7 @@ class Goal(Section, frozen=True):
     most: Positive
     unit: str
     size: Unknowns | None = None
+    over: Name | None = None
     others: dict[str, float] = field(default_factory=dict)
 
 
@@ -201,6 +207,7 @@ class ScalingFile(Section, frozen=True):
         names = {series.name for series in self.series}
         for i, goal in enumerate(self.goals):
             refuse_unknown(("goals", i, "series"), goal.series, "series", names)
+            refuse_unknown(("goals", i, "over"), goal.over or goal.series, "series", names)
         for key, part in (("quick", self.quick), ("large", self.large)):
             for i, name in enumerate(part.series):
                 refuse_unknown((key, "series", i), name, "series", names)

@@ -1,6 +1,6 @@
 """The points of the scaling family as the page shows them: costs of each, growth of each series."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -61,6 +61,8 @@ class ScaledSolve(MeasuredPoint):
         """The quantity of a goal at one point, or the processor seconds of a stage."""
         if what == "wall":
             return self.record["process"]["wall"]
+        if what == "statuses":
+            return self.record["iterations"]
         whole = {"cpu": self.cpu, WHOLE: self.cpu, "memory": self.memory, "pressure": self.pressure}
         return whole[what] if what in whole else self.stages.get(what, 0.0)
 
@@ -159,20 +161,26 @@ def read_series(scaling: Scaling, folder: Path) -> list[SeriesSolves]:
 def reached(scaling: Scaling, lines: Sequence[SeriesSolves]) -> list[Reached]:
     """Every goal with its measured number."""
     known = {line.series.name: line for line in lines}
-    return [_reached(goal, known.get(goal.series)) for goal in scaling.goals]
+    return [_reached(goal, known) for goal in scaling.goals]
 
 
-def _reached(goal: Goal, line: SeriesSolves | None) -> Reached:
+def _reached(goal: Goal, known: Mapping[str, SeriesSolves]) -> Reached:
+    line = known.get(goal.series)
     if line and goal.what.startswith(GROWTH):
         growth = line.growth(goal.what.removeprefix(GROWTH))
         if growth is None or not line.on_large:
             return Reached(goal, None, "too few of the large sizes are measured")
         return Reached(goal, growth.value, "")
-    points = line.points if line else ()
-    m = next((m for m in points if m.point.size == goal.size), None)
-    if m is None:
-        return Reached(goal, None, "not in this part of the family")
-    return Reached(goal, m.cost(goal.what), "") if m.solved else Reached(goal, None, m.why_not)
+    values = []
+    for name in (goal.series,) if goal.over is None else (goal.series, goal.over):
+        points = known[name].points if name in known else ()
+        m = next((m for m in points if m.point.size == goal.size), None)
+        if m is None:
+            return Reached(goal, None, "not in this part of the family")
+        if not m.solved:
+            return Reached(goal, None, m.why_not)
+        values.append(m.cost(goal.what))
+    return Reached(goal, values[0] / values[1] if goal.over else values[0], "")
 
 
 def failures(lines: Sequence[SeriesSolves]) -> list[tuple[str, str]]:

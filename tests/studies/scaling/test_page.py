@@ -88,6 +88,24 @@ def test_goals_are_compared_with_what_was_measured(scaling, results):
     assert found["fine-slave", "growth of pairing", None].value is None
 
 
+def test_a_goal_may_be_a_ratio_to_another_series(scaling, results):
+    """A sphere that takes six statuses and 2.5 times the time of the blocks."""
+    full = read_scaling(scaling.path)
+    sphere = next(s for s in full.series if s.name == "sphere")
+    both = replace(scaling, series=(*scaling.series, sphere))
+    (results / "sphere").mkdir()
+    goals = {("cpu", "hexa8"): (2.5, True), ("statuses", None): (6, True)}
+    for point in [p for p in both.points if p.series is sphere]:
+        slow = record(point, iterations=6)
+        slow["process"] = slow["process"] | {"cpu": 2.5 * slow["process"]["cpu"]}
+        (results / f"{point.name}.json").write_text(json.dumps(slow))
+    found = [r for r in reached(both, read_series(both, results)) if r.goal.series == "sphere"]
+    assert {(r.goal.what, r.goal.over): (pytest.approx(r.value), r.good) for r in found} == goals
+    (results / "hexa8" / "300000.json").unlink()
+    found = [r for r in reached(both, read_series(both, results)) if r.goal.over == "hexa8"]
+    assert [(r.value, r.why) for r in found] == [(None, "missing: not measured")]
+
+
 def test_an_exponent_of_small_sizes_answers_no_goal(scaling, results):
     series = tuple(structs.replace(s, sizes=s.sizes[:2]) for s in scaling.series)
     small = replace(scaling, series=series)
