@@ -82,6 +82,7 @@ def moved(
 def counted() -> Iterator[Parts]:
     """Seconds and bytes of the products within, by what they are for."""
     from ..mechanics.linear import multigrid, products
+    from ..mechanics.linear.stiffened import Stiffened
 
     parts: Parts = {}
     within: list[str] = []
@@ -137,6 +138,7 @@ def counted() -> Iterator[Parts]:
             (SymmetricBlocks, "multiply", product(SymmetricBlocks.multiply)),
             (solver, "__init__", around(solver.__init__, SET_UP)),
             (solver, "solve", around(solver.solve, ITERATIONS)),
+            (Stiffened, "solve", around(Stiffened.solve, ITERATIONS)),
         ):
             stack.enter_context(patch.object(owner, name, work))
         yield parts
