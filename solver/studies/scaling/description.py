@@ -13,6 +13,7 @@
         slab: false                    # blocks as thick as the finer one's cells are wide
         fit: [1.0e+4, 1.0e+5]          # of this series, where it is another
         threads: 1                     # of this series, to compare with the same on more
+        free: true                     # with free software alone, to compare with the same on MKL
         sizes: [1.0e+4, 1.0e+5]        # unknowns that a mesh has at least
     goals:                        # numbers to reach, shown beside those measured
       - {title: …, series: hexa8, size: 1.0e+5, what: cpu, most: 12, unit: s, others: {…: 56}}
@@ -57,7 +58,9 @@ from ..keys import Count, Name, Seconds, Unknowns
 from ..points import PointStudy
 
 GROWTH = "growth of "
-_START = 5.0  # seconds: three interpreters, libraries loaded, small mesh
+_START = 2.5  # seconds: two interpreters, libraries loaded, small mesh
+# Times as long as others: gmsh fills the blocks, or most unknowns are at the interface.
+_FILLED, _SLAB = 2.5, 4.0
 Division = Annotated[int, Meta(ge=1, le=1000)]
 SizeRange = Annotated[
     tuple[Unknowns, Unknowns], Meta(description="a list of two sizes, from and to")
@@ -85,6 +88,7 @@ class SizeSeries(Section, frozen=True, dict=True):
     slab: bool = False
     fit: SizeRange = (0, 0)
     threads: Count | None = None
+    free: bool = False
 
     @cached_property
     def template(self) -> dict[str, Any]:
@@ -93,7 +97,7 @@ class SizeSeries(Section, frozen=True, dict=True):
 
     @property
     def problem(self) -> tuple[Any, ...]:
-        """What its meshes are of: equal for series that differ in sizes and threads alone."""
+        """What its meshes are of: series of the same differ in sizes, threads and packages."""
         return self.case, self.cells, self.divisions, self.slab
 
     @property
@@ -132,9 +136,17 @@ class ScalingPoint:
         return self._mesh(self.divisions)
 
     @property
+    def counts_bytes(self) -> bool:
+        """Whether a further solve counts bytes: that of the largest mesh in 3D, by any packages."""
+        largest = self.size == max(self.series.sizes)
+        return self.series.dim == 3 and largest and not self.series.free
+
+    @property
     def seconds(self) -> float:
         """About how long the point takes."""
-        return _START + self.mesh.seconds
+        slow = _FILLED if self.series.cells == "TETRA4" else 1.0
+        slow = _SLAB if self.series.slab else slow
+        return (1 + self.counts_bytes) * (_START + slow * self.mesh.seconds)
 
     def _divisions(self, finer: int) -> tuple[list[int], list[int]]:
         proportion, dim = self.series.divisions, self.series.dim

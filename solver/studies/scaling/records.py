@@ -109,28 +109,49 @@ class SeriesSolves:
 
 
 @dataclass(frozen=True)
-class SpeedUp:
-    """The same mesh solved on `few` threads and on `many`."""
+class SolvedTwice:
+    """The same mesh solved in two ways: `one` on few threads or free software, and the `other`."""
 
-    few: ScaledSolve
-    many: ScaledSolve
+    one: ScaledSolve
+    other: ScaledSolve
 
     def of(self, stage: str) -> float | None:
-        """Wall time on few threads over that on many; None for a stage of no measurable time."""
-        before, after = (m.wall.get(stage, 0.0) for m in (self.few, self.many))
+        """Wall time of one over that of the other; None for a stage of no measurable time."""
+        before, after = (m.wall.get(stage, 0.0) for m in (self.one, self.other))
         return before / after if min(before, after) > _SHORT else None
 
+    @property
+    def threads(self) -> tuple[int, int]:
+        """Of the one and of the other."""
+        return self.one.record["threads"], self.other.record["threads"]
 
-def speed_ups(lines: Sequence[SeriesSolves]) -> list[SpeedUp]:
-    """Solved points of series that differ in their threads alone, smallest first."""
+    @property
+    def free(self) -> tuple[bool, bool]:
+        """Whether the one and the other are by free software alone."""
+        return self.one.point.series.free, self.other.point.series.free
+
+
+def speed_ups(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:
+    """Solved points of series that differ in their threads alone, few threads first."""
+    pairs = [(pair, *pair.threads) for pair in _solved_twice(lines) if len({*pair.free}) == 1]
+    return [pair for pair, few, many in pairs if few < many]
+
+
+def by_free_software(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:
+    """Solved points of series that differ in their packages alone, free software first."""
+    pairs = [pair for pair in _solved_twice(lines) if len({*pair.threads}) == 1]
+    return [pair for pair in pairs if pair.free == (True, False)]
+
+
+def _solved_twice(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:
+    """All pairs of solves of the same mesh, both ways round."""
     solved = [m for line in lines for m in line.solved]
     return [
-        SpeedUp(few, many)
-        for few in solved
-        for many in solved
-        if few.record["threads"] < many.record["threads"]
-        and few.point.size == many.point.size
-        and few.point.series.problem == many.point.series.problem
+        SolvedTwice(one, other)
+        for one in solved
+        for other in solved
+        if one.point.size == other.point.size
+        and one.point.series.problem == other.point.series.problem
     ]
 
 
