@@ -94,13 +94,14 @@ class Level:
             interface = Interface(beside, beside.corrected_rows(self.matrix))
         elif len(correction.rows) <= most:
             interface = Interface(correction, rows)
-        changed = replace(self, correction=correction, weight=weight, interface=interface)
-        half = np.sqrt(changed.weight)
+        own, half = rows[:, correction.rows], np.sqrt(weight[correction.rows])
 
         def symmetric(x: np.ndarray, base: np.ndarray) -> np.ndarray:
-            return base - half * changed.remaining(np.zeros_like(x), half * x)
+            return base + half * (own @ (half * x))
 
-        return replace(changed, bound=_bound(symmetric, self.matrix.shape[0]))
+        # A motion with the largest eigenvalue is either within the bodies or beside contact.
+        bound = max(self.bound, _bound(symmetric, len(half)))
+        return replace(self, bound=bound, correction=correction, weight=weight, interface=interface)
 
 
 class Hierarchy:
