@@ -17,6 +17,12 @@ def add_commands(commands: Any) -> None:
     command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
     command.add_argument("--list", type=Path, metavar="FILE", help="use those in FILE, one a line")
     command.add_argument(
+        "--older",
+        type=Path,
+        metavar="FILE",
+        help="also show those in FILE; they are no failures of this batch",
+    )
+    command.add_argument(
         "--families",
         type=Path,
         nargs="*",
@@ -37,7 +43,7 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
     """The verdicts named, listed, or in the folder of results, but those of ladders' levels."""
     verdicts = list(options.verdicts)
     if options.list:
-        verdicts += [Path(os.fsdecode(line)) for line in options.list.read_bytes().splitlines()]
+        verdicts += _listed(options.list)
     if options.results:
         found = sorted(options.results.glob("**/verdict.json"))
         # The levels of ladders have a page of their own.
@@ -48,6 +54,11 @@ def _verdicts(options: argparse.Namespace) -> list[Path]:
     return verdicts
 
 
+def _listed(file: Path) -> list[Path]:
+    """The paths in a file, one a line."""
+    return [Path(os.fsdecode(line)) for line in file.read_bytes().splitlines()]
+
+
 def _report(options: argparse.Namespace) -> int:
     from ..report import write_report
 
@@ -55,7 +66,8 @@ def _report(options: argparse.Namespace) -> int:
     families = options.families
     if families is None:
         families = sorted(Path("cases").glob("*/family.yaml"))
-    print(write_report(verdicts, options.output, families, options.processes))
+    older = _listed(options.older) if options.older else []
+    print(write_report(verdicts, options.output, families, options.processes, older))
     return PASSED
 
 

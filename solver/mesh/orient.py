@@ -8,7 +8,7 @@ from .catalogue import CellType
 # Below this share of the product of the edges that span it, a corner counts as flat.
 _FLAT = 1e-12
 # Cells that are looked at together.
-_AT_ONCE = 1 << 14
+_AT_ONCE = 1 << 12
 
 
 def vertex_jacobians(points: np.ndarray, cells: np.ndarray, cell: CellType) -> np.ndarray:
@@ -19,6 +19,7 @@ def vertex_jacobians(points: np.ndarray, cells: np.ndarray, cell: CellType) -> n
     those of the cell's own interpolation, mid-edge nodes included. The apex of a pyramid, where
     the Jacobian has no value, is left out.
     """
+    at = np.ascontiguousarray(points[cells].transpose(1, 2, 0))
     columns = []
     for vertex in range(cell.n_vertices):
         ends = [
@@ -29,20 +30,25 @@ def vertex_jacobians(points: np.ndarray, cells: np.ndarray, cell: CellType) -> n
         if len(ends) != cell.dim:
             continue
         sign = np.sign(np.linalg.det([cell.nodes[end] - cell.nodes[vertex] for end, _ in ends]))
-        tangents = np.stack([_tangent(points, cells, cell, vertex, *end) for end in ends], axis=1)
-        size = np.linalg.norm(tangents, axis=2).prod(axis=1)
+        tangents = [_tangent(at, cell, vertex, *end) for end in ends]
+        size = np.prod([np.sqrt(np.einsum("dn,dn->n", t, t)) for t in tangents], axis=0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            columns.append(sign * np.nan_to_num(np.linalg.det(tangents) / size))
+            columns.append(sign * np.nan_to_num(_determinant(*tangents) / size))
     return np.stack(columns, axis=1)
 
 
-def _tangent(
-    points: np.ndarray, cells: np.ndarray, cell: CellType, vertex: int, end: int, middle: int
-) -> np.ndarray:
-    start, stop = points[cells[:, vertex]], points[cells[:, end]]
-    if cell.order == 1:
-        return stop - start
-    return 4 * (points[cells[:, middle]] - start) - (stop - start)
+def _tangent(at: np.ndarray, cell: CellType, vertex: int, end: int, middle: int) -> np.ndarray:
+    """The tangent (dim, n) at a vertex of an edge, of cells with nodes `at` (n_nodes, dim, n)."""
+    chord = at[end] - at[vertex]
+    return chord if cell.order == 1 else 4 * (at[middle] - at[vertex]) - chord
+
+
+def _determinant(a: np.ndarray, b: np.ndarray, c: np.ndarray | None = None) -> np.ndarray:
+    """The determinants (n,) of two or three vectors (dim, n)."""
+    if c is None:
+        return a[0] * b[1] - a[1] * b[0]
+    cross = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
+    return a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2]
 
 
 def right_side_out(

@@ -58,10 +58,10 @@ _BYTES = {".vtu": 20}
 _BYTES_ELSE = 80
 # Seconds: factor and power of the unknowns, by dimension and degree of the cells.
 _SECONDS = {
-    (2, 1): (2.8e-5, 1.0),
-    (2, 2): (2.8e-5, 1.0),
-    (3, 1): (2.5e-5, 1.1),
-    (3, 2): (5.5e-5, 1.1),
+    (2, 1): (2.2e-5, 1.0),
+    (2, 2): (2.2e-5, 1.0),
+    (3, 1): (6.1e-6, 1.1),
+    (3, 2): (9.0e-6, 1.1),
 }
 # Bytes of the program, with what every hierarchy of multigrid takes, and for each unknown.
 _LEAST = {2: (100e6, 1.8e3), 3: (100e6, 1.1e3)}

@@ -10,15 +10,17 @@ def write_report(
     folder: Path,
     families: Sequence[Path] = (),
     processes: int | None = None,
+    older: Sequence[Path] = (),
 ) -> str:
     """Write the report of the verdict files into `folder`; returns what it found.
 
     Every verdict is in every file: the main page and the page of its family, summary.json,
-    .csv, .md, junit.xml, and failures.txt (empty when all passed); `bench.html` where other codes
-    have results; `matrix.html` with families. `families` are files `family.yaml`, each in the
-    folder of its family. Pictures are drawn by so many `processes`, one for each core where None is
-    given. Returned are the processor time by family, a line for each solve that did not pass, and
-    the outcome.
+    .csv, .md and junit.xml; `bench.html` where other codes have results; `matrix.html` with
+    families. `older` are the verdicts of solves that the batch did not ask for: all these files
+    show them too, but failures.txt does not. It lists what did not pass, and is empty when all
+    passed. `families` are files `family.yaml`, each in the folder of its family. Pictures are drawn
+    by so many `processes`, one for each core where None is given. Returned are the processor time
+    by family, a line for each solve that did not pass, and the outcome.
     """
     from functools import partial
 
@@ -38,8 +40,10 @@ def write_report(
 
     folder.mkdir(parents=True, exist_ok=True)
     files = {file.resolve().parent.name: file for file in families}
-    parts = sections(read_rows(verdicts), files, folder / "pictures")
+    parts = sections(read_rows([*verdicts, *older]), files, folder / "pictures")
     rows = [row for part in parts for row in part.rows]
+    earlier = {verdict.parent for verdict in older}
+    asked = [row for row in rows if row.folder not in earlier]
     folders = [file.resolve().parent for file in families]
     drawings = [partial(part.draw, row) for part in parts for row in part.drawn]
     with in_forks([partial(write_script, folder), *drawings], processes or workers()):
@@ -52,7 +56,7 @@ def write_report(
             "summary.csv": tables.to_csv(rows),
             "summary.md": tables.to_markdown(rows),
             "junit.xml": to_junit(rows),
-            "failures.txt": tables.to_failures(rows),
+            "failures.txt": tables.to_failures(asked),
         }
     contents |= {part.page: family_page(part, folder) for part in parts}
     for name, content in contents.items():
@@ -60,7 +64,11 @@ def write_report(
     write_script(folder)
     write_viewer(folder)
     complaints = "".join(f"{c}\n" for part in parts if (c := part.family.complaint))
-    outcome = f"{tables.outcome(rows)} Report: {folder / PAGE}"
+    said = tables.outcome(asked)
+    if older:
+        rest = tables.outcome([row for row in rows if row.folder in earlier])
+        said = f"Older results in the report, not of this run: {rest}\nThis run: {said}"
+    outcome = f"{said} Report: {folder / PAGE}"
     return f"{complaints}{_costs(parts)}\n{contents['failures.txt']}{outcome}"
 
 

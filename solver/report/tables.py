@@ -155,7 +155,7 @@ def outcome(rows: Sequence[Row]) -> str:
     mine = ours(rows)
     counts, others = counted(mine), len(rows) - len(mine)
     words = ", ".join(f"{n} {word}" for word, n in counts.items())
-    said = f"{len(mine)} solves: {words or 'none at all'}."
+    said = f"{len(mine)} solve{'s' * (len(mine) != 1)}: {words or 'none at all'}."
     if set(counts) == {"passed"}:
         said = f"All {len(mine)} solves passed." if len(mine) > 1 else "The one solve passed."
     if not others:

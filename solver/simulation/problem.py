@@ -15,7 +15,7 @@ from ..mechanics.fem.bodies import (
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ..mechanics.linear.stabilised import Compliance
 from ..mechanics.linear.systems import Systems, parts_of
-from ..mechanics.mortar.status import StatusResult, Trial, find_status, likely_closed
+from ..mechanics.mortar.status import StatusResult, Trial, find_status
 from ..system.errors import SolveError
 from ..system.memory import release
 from .accuracy import Accuracy, Roughness, estimate, judged, roughness
@@ -27,6 +27,7 @@ from .constraints import (
     unit_springs,
 )
 from .displacement import Displacement
+from .first_status import first_guess, moved
 from .free_stiffness import free_stiffness, free_unknowns
 from .iterate import ContactIterate
 from .scene import Scene
@@ -158,20 +159,28 @@ class ContactProblem:
         start: np.ndarray | None = None,
         bilateral: bool = False,
         correction: np.ndarray | float = 0.0,
+        before: Step | None = None,
     ) -> Equilibrium:
         """Equilibrium at a step, the status search starting from `start` (k,), a guess.
 
-        `bilateral`: no status is sought, all macro-elements stay closed, in tension too.
-        `correction` (n, dim): see `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0,
-        ḡ ≥ 0, p ḡ = 0, or a system is singular.
+        `before`: the step that `start` is the status of, if it is another one. `bilateral`: no
+        status is sought, all macro-elements stay closed, in tension too. `correction` (n, dim): see
+        `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0, or a system
+        is singular.
         """
         scene, eligible = self.scene, self.constraints.eligible
-        if not scene.options.shortcuts.status:
-            start = eligible
-        start = self._first_guess(step) if start is None else start
         if bilateral:
             first = self._at_rest(eligible, step, correction)
             return self._solve_closed(first, correction, _force_scale(first))
+        guess: np.ndarray | None
+        guess = first_guess(scene, self.constraints, step, self._free_motion)
+        if not scene.options.shortcuts.status:
+            start = eligible
+        elif start is None:
+            start, guess = guess, None
+        elif before is not None:
+            about = scene, self.constraints, self._free_motion
+            start = moved(start, before, step, *about)
         latest: list[Equilibrium] = []
         rough, known = scene.options.shortcuts.status, None
 
@@ -194,7 +203,7 @@ class ContactProblem:
             return self._gap_stiffness(step)
 
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
-        status = find_status(attempt, start, eligible, area, stiffness, confirm)
+        status = find_status(attempt, start, eligible, area, stiffness, confirm, guess)
         trial = latest[0].trial
         touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
         return replace(latest[0], status=replace(status, closed=status.closed | touching))
@@ -218,19 +227,6 @@ class ContactProblem:
         found = np.zeros(len(closed))
         found[closed] = system.multiplier(pushed - self.matrix @ change)
         return found
-
-    def _first_guess(self, step: Step) -> np.ndarray:
-        """Macro-elements (k,) that loads and imposed displacements are likely to close."""
-        scene, constraints = self.scene, self.constraints
-        eligible = constraints.eligible
-        acting, offset = scene.acting(step)
-        imposed = np.abs(offset).max(initial=0.0)
-        moduli = 2 * np.concatenate([block.shear for block in scene.blocks])
-        force = np.linalg.norm(acting, axis=1).sum()
-        push = force * (1 / moduli.min() + 1 / moduli.max())
-        gap = constraints.initial / np.where(eligible, constraints.covered, np.inf) - imposed
-        guess = likely_closed(gap, constraints.covered, eligible, push, scene.space)
-        return eligible if self._free_motion(guess) else guess
 
     def _free_motion(self, closed: np.ndarray) -> str:
         """See `free_motion`; the last answer is kept, as a guess is asked about more than once."""

@@ -156,7 +156,8 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
     case = problem.scene.case
     for factor, step in zip(case.factors, case.steps, strict=True):
         start = states[-1].status.closed if states else None
-        state = problem.solve(step, start)
+        before = case.steps[len(states) - 1] if states else None
+        state = problem.solve(step, start, before=before)
         if (state.trial.offence(state.iterate.closed) > 1).any():
             raise SolveError(f"{_called(step, factor)}: contact bears tension or surfaces overlap")
         state, field = recovered(problem, state, step)

@@ -1,33 +1,45 @@
-"""Bytes that the products of a multigrid solve move, beside the memory bandwidth of the machine.
+"""Bytes that the stages of a multigrid solve move, beside the memory bandwidth of the machine.
 
 A product with a matrix in blocks reads its blocks, column numbers and row starts, the vector and
 the sum that it adds to, and writes the result: each counts once, by the sizes of the arrays. That
 is the least that a product moves. What a small cache reads again is not counted, so a share of the
 bandwidth may be higher than shown; what a large cache keeps is counted, so a share may exceed one.
-Other work moves bytes in temporary arrays, which only counters of the hardware show.
+Other stages read their arrays and files once at least, and write their results once; the size of
+these is counted. What they move beyond, in temporary arrays, only counters of the hardware show.
+Cutting and pairing touch the interface alone, and have no count.
 
 Bandwidth is measured with the triad of STREAM, a = b + s c (McCalpin, IEEE TCCA Newsletter, 1995).
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from unittest.mock import patch
 
 import numpy as np
 from scipy.sparse import bsr_matrix
 
-from ..system.clock import Clock
+from ..mechanics.linear.symmetric_blocks import SymmetricBlocks
+from ..system.clock import processor_time
 from ..system.threads import ahead, workers
 from .points import SOLVED, Record
 
+if TYPE_CHECKING:
+    from ..simulation.problem import ContactProblem
+    from ..simulation.solution import Solution
+
 # What products are for, and what they are part of.
 SMOOTHER, TRANSFER, DOUBLE = "smoother and residuals", "transfer between levels", "matrix in double"
-SET_UP, ITERATIONS, STAGE = "set-up", "iterations", "stage solve"
+SET_UP, ITERATIONS, STAGE = "set-up", "iterations", "solve"
+_PARTS = (SET_UP, ITERATIONS, SMOOTHER, TRANSFER, DOUBLE)
+_STAGES = ("read", "assembly", STAGE, "recovery", "checks", "write")
+# A stage is at a limit that it reaches to this share.
+_REACHED = 0.5
 _LENGTH = 20_000_000  # doubles: three arrays of 160 MB are more than caches hold
 _PIECE = 8_192  # doubles: three pieces stay in the cache of a core
 _REPETITIONS = 6
@@ -55,20 +67,22 @@ def triad(length: int = _LENGTH) -> float:
     return 3 * a.nbytes / best
 
 
-def moved(matrix: bsr_matrix, x: np.ndarray, result: np.ndarray, adds: bool = True) -> int:
+def moved(
+    matrix: bsr_matrix | SymmetricBlocks, x: np.ndarray, result: np.ndarray, adds: bool = True
+) -> int:
     """The least bytes of a product: matrix and vector read, result written, if it `adds` read too.
 
     >>> moved(bsr_matrix(np.eye(6), blocksize=(3, 3)), np.ones(6), np.ones(6))
     308
     """
-    stored = matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes
-    return stored + x.nbytes + result.nbytes * (1 + adds)
+    return _stored(matrix) + x.nbytes + result.nbytes * (1 + adds)
 
 
 @contextmanager
 def counted() -> Iterator[Parts]:
     """Seconds and bytes of the products within, by what they are for."""
-    from ..mechanics.linear import multigrid, nodal_matrix, products
+    from ..mechanics.linear import multigrid, products
+    from ..mechanics.linear.stiffened import Stiffened
 
     parts: Parts = {}
     within: list[str] = []
@@ -78,15 +92,22 @@ def counted() -> Iterator[Parts]:
         part["seconds"] += seconds
         part["bytes"] += count
 
-    def product(work: Callable[..., np.ndarray], kind: str) -> Callable[..., np.ndarray]:
-        def call(matrix: bsr_matrix, x: np.ndarray, *more: Any) -> np.ndarray:
+    def product(work: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+        def call(
+            matrix: bsr_matrix | SymmetricBlocks,
+            x: np.ndarray,
+            base: np.ndarray | None = None,
+            *more: Any,
+            **named: Any,
+        ) -> np.ndarray:
             start = perf_counter()
-            result = work(matrix, x, *more)
+            result = work(matrix, x, base, *more, **named)
             seconds = perf_counter() - start
-            count, outer = moved(matrix, x, result, bool(more)), within[-1] if within else STAGE
+            count = moved(matrix, x, result, base is not None)
+            outer = within[-1] if within else STAGE
             if outer == ITERATIONS:
-                square = matrix.shape[0] == matrix.shape[1]
-                add(kind or (SMOOTHER if square else TRANSFER), seconds, count)
+                kind = DOUBLE if x.dtype == np.float64 else SMOOTHER
+                add(kind if isinstance(matrix, SymmetricBlocks) else TRANSFER, seconds, count)
             add(outer, 0.0, count)
             return result
 
@@ -95,54 +116,118 @@ def counted() -> Iterator[Parts]:
     def around(work: Callable[..., Any], name: str) -> Callable[..., Any]:
         def call(*given: Any, **more: Any) -> Any:
             within.append(name)
-            start = perf_counter()
+            start, cpu = perf_counter(), processor_time()
             try:
                 return work(*given, **more)
             finally:
                 within.pop()
                 add(name, perf_counter() - start, 0)
+                parts[name]["cpu"] = parts[name].get("cpu", 0.0) + processor_time() - cpu
 
         return call
 
     solver, outside = multigrid.Multigrid, (STAGE, SET_UP, ITERATIONS)
-    transposed = product(products.multiply_transposed, TRANSFER)
+
+    def transposed(matrix: bsr_matrix, x: np.ndarray, _: None) -> np.ndarray:
+        return products.multiply_transposed(matrix, x)
+
     with ExitStack() as stack:
         for owner, name, work in (
-            (multigrid, "multiply", product(products.multiply, "")),
-            (multigrid, "multiply_transposed", transposed),
-            (nodal_matrix, "multiply", product(products.multiply, DOUBLE)),
+            (multigrid, "multiply", product(products.multiply)),
+            (multigrid, "multiply_transposed", product(transposed)),
+            (SymmetricBlocks, "multiply", product(SymmetricBlocks.multiply)),
             (solver, "__init__", around(solver.__init__, SET_UP)),
             (solver, "solve", around(solver.solve, ITERATIONS)),
+            (Stiffened, "solve", around(Stiffened.solve, ITERATIONS)),
         ):
             stack.enter_context(patch.object(owner, name, work))
         yield parts
-    parts[STAGE] = {"seconds": 0.0, "bytes": sum(parts[n]["bytes"] for n in outside if n in parts)}
+    parts[STAGE] = {"bytes": sum(parts[n]["bytes"] for n in outside if n in parts)}
 
 
 def measure(job: Mapping[str, Any]) -> dict[str, Any]:
-    """A case solved by multigrid on its mesh: the bandwidth, bytes and seconds of the parts."""
-    from ..case.reader import load_case
-    from ..mechanics.linear.direct import force_solver
-    from ..mesh import read_mesh
-    from ..simulation.simulate import simulate
+    """A case solved by multigrid from mesh file to result file: bytes and times of all stages.
 
-    case, mesh, clock = load_case(Path(job["case"])), read_mesh(job["mesh"]), Clock()
+    The keys are `bandwidth` (bytes/s), `threads`, `dofs`, `iterations`, and `parts`: by name
+    `seconds` and `bytes`, and `cpu` except of products.
+    """
+    from ..mechanics.linear.direct import force_solver
+    from ..verification.run import Job, solve
+
+    mesh, stiffness, kept = Path(job["mesh"]), [0], []
     before = triad()
-    with force_solver("multigrid"), counted() as parts:
-        solution = simulate(case, mesh, clock=clock)
-    parts[STAGE]["seconds"] = clock.seconds["solve"]
+    with TemporaryDirectory() as folder:
+        result = Path(folder) / "result.vtkhdf"
+        with force_solver("multigrid"), counted() as parts, _assembled(stiffness):
+            solve(Job(Path(job["case"]), mesh), result, None, lambda s, _: kept.append(s))
+        [solution] = kept
+        for stage, least in least_bytes(solution, stiffness[0], mesh, result).items():
+            seconds, cpu = solution.seconds[stage], solution.stage_cpu_seconds[stage]
+            parts.setdefault(stage, {"bytes": least}).update(seconds=seconds, cpu=cpu)
     about = {"dofs": solution.dofs, "iterations": solution.linear_iterations, "parts": parts}
     return {"bandwidth": max(before, triad()), "threads": workers()} | about
 
 
+@contextmanager
+def _assembled(count: list[int]) -> Iterator[None]:
+    """The bytes of the stiffness that is assembled within, put into `count`."""
+    from ..simulation import simulate
+
+    original = simulate.solve_problem
+
+    def call(problem: "ContactProblem", *more: Any) -> "Solution":
+        count[0] = _stored(problem.matrix)
+        return original(problem, *more)
+
+    with patch.object(simulate, "solve_problem", call):
+        yield
+
+
+def least_bytes(solution: "Solution", stiffness: int, mesh: Path, result: Path) -> dict[str, int]:
+    """The bytes that each stage moves at least: what it reads and writes, once each."""
+    cells = _nbytes([solution.mesh.points, *(block.data for block in solution.mesh.cells)])
+    moved, stress = solution.displacement.nbytes, solution.stress.nbytes
+    return {
+        "read": mesh.stat().st_size + cells,
+        "assembly": cells + stiffness,
+        STAGE: 0,  # its products are counted
+        "recovery": cells + moved + stress,
+        "checks": solution.mesh.points.nbytes + moved + stress,
+        "write": cells + moved + stress + result.stat().st_size,
+    }
+
+
+def _stored(matrix: Any) -> int:
+    """The bytes of a sparse matrix, or of a stiffness in any of its forms."""
+    if hasattr(matrix, "divergence"):
+        return _stored(matrix.soft) + _stored(matrix.divergence) + int(matrix.weight.nbytes)
+    matrix = getattr(matrix, "blocks", matrix)
+    parts = getattr(matrix, "parts", [matrix])
+    return _nbytes(a for part in parts for a in (part.data, part.indices, part.indptr))
+
+
+def _nbytes(arrays: Iterable[np.ndarray]) -> int:
+    return sum(array.nbytes for array in arrays)
+
+
 @dataclass(frozen=True)
 class Moved:
-    """A part of a measured solve; `share` of the bandwidth (bytes/s) that the machine has."""
+    """A stage of a measured solve, or a part of one; `bandwidth` (bytes/s) is the machine's.
+
+    `busy`: threads at work on the mean; None for products, whose processor time is not measured.
+    """
 
     name: str
     seconds: float
     moved: float
     bandwidth: float
+    threads: int
+    busy: float | None
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is a stage, not a part of one."""
+        return self.name in _STAGES
 
     @property
     def rate(self) -> float:
@@ -154,10 +239,21 @@ class Moved:
         """Of the machine's bandwidth; above one where caches keep what is counted."""
         return self.rate / self.bandwidth
 
+    @property
+    def limit(self) -> str:
+        """What limits it: memory from half the bandwidth on, else how many threads are at work."""
+        if self.share > _REACHED:
+            return "memory"
+        if self.busy is None:
+            return ""
+        # Halfway between one thread and all.
+        shared = self.threads > 1 and self.busy - 1 > _REACHED * (self.threads - 1)
+        return "arithmetic, temporary arrays" if shared or self.threads == 1 else "one thread"
+
 
 @dataclass(frozen=True)
 class MovedBytes:
-    """A measured solve: its parts, the stage first."""
+    """A measured solve: its stages in the order of the work, the parts of the linear solve."""
 
     record: Record
     parts: list[Moved]
@@ -167,10 +263,17 @@ def table(record: Record | None) -> MovedBytes | None:
     """The parts of a record made by `measure`; None if nothing was solved."""
     if not record or record["outcome"] != SOLVED:
         return None
-    found = record["parts"]
-    order = (STAGE, SET_UP, ITERATIONS, SMOOTHER, TRANSFER, DOUBLE)
+    found, rate, threads = record["parts"], record["bandwidth"], record["threads"]
+    order = [part for stage in _STAGES for part in (stage, *(_PARTS if stage == STAGE else ()))]
     parts = [
-        Moved(name, found[name]["seconds"], found[name]["bytes"], record["bandwidth"])
+        Moved(
+            name,
+            found[name]["seconds"],
+            found[name]["bytes"],
+            rate,
+            threads,
+            found[name]["cpu"] / found[name]["seconds"] if "cpu" in found[name] else None,
+        )
         for name in order
         if name in found
     ]

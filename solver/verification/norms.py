@@ -36,7 +36,7 @@ import meshio
 import numpy as np
 
 from ..case.solutions.base import ElasticSolution, ExactSolution, lame_of
-from ..mechanics.fem import shape_functions
+from ..mechanics.fem import cell_loops, shape_functions
 from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop
 from ..mechanics.fem.faces import surface_points
 from ..mechanics.fem.gauss import gauss_rule
@@ -48,7 +48,8 @@ from .oscillation import grown, macro_neighbours, oscillation
 
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.
 _CHUNK = 1 << 17
-_TWICE = np.array([1, 1, 1, 2, 2, 2])  # off-diagonal components count twice
+# Off-diagonal components count twice in a square.
+_WHOLE = np.sqrt([1, 1, 1, 2, 2, 2])
 
 
 def errors(solution: Solution, exact: ExactSolution | None = None) -> dict[str, float]:
@@ -103,28 +104,34 @@ def _squares_in(
     """The integrals over the `chosen` cells of a block, with the `parts` (n_points,) of nodes."""
     points, kind, (reference, weights) = solution.mesh.points, cell_type(block.type), rule
     values = shape_functions(kind.name).values(reference)
-    cells = block.data[chosen]
+    cells, mixed = block.data[chosen], solution.mean_stress.get(kind.name)
+    part, place = parts[cells[:, 0]], (values @ points[cells]).reshape(-1, kind.dim)
+    at = np.repeat(part, len(weights))
+    u, gradient = exact.displacement(place, at), exact.gradient(place, at)
+    if kind.dim == 3 and mixed is None and cell_loops.pay(len(points)):
+        lame, shear = np.array([lame_of(material) for material in exact.materials])[part].T
+        moved = solution.displacement
+        return cell_loops.squares(points, kind, cells, moved, rule, (lame, shear), (u, gradient))
     # In a linear simplex gradients are constant.
     affine = kind.n_nodes == kind.dim + 1
     somewhere = reference[:1] if affine else reference
-    gradient, determinant = physical_gradients(points, cells, kind, somewhere)
+    own, determinant = physical_gradients(points, cells, kind, somewhere)
     nodal = solution.displacement[cells]
-    place, found = values @ points[cells], values @ nodal
-    apart = np.swapaxes(nodal - nodal[:, :1], 1, 2)
-    slope = apart[:, None] @ gradient
+    slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ own
     if affine:
         slope, determinant = (np.repeat(a, len(weights), axis=1) for a in (slope, determinant))
     if solution.case.axisymmetric:
         hoop, around = hoop_values(points, cells, kind, reference)
         slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
         determinant = determinant * around
-    part = np.repeat(parts[cells[:, 0]], len(weights))
-    flat = place.reshape(-1, kind.dim)
-    slope = slope.reshape(len(flat), *slope.shape[2:])
-    mixed = solution.mean_stress.get(kind.name)
+    slope = slope.reshape(len(place), *slope.shape[2:])
     mean = None if mixed is None else (mixed[chosen] @ values.T).ravel()
-    stress = _hooke(exact, slope, part, mean)
-    pairs = _with_exact(exact, flat, part, found.reshape(flat.shape), slope, stress)
+    stress, expected = _hooke(exact, slope, at, mean), exact.hooke(gradient, at)
+    pairs = (
+        ((values @ nodal).reshape(place.shape) - u, u),
+        (slope - gradient, gradient),
+        ((stress - expected) * _WHOLE, expected * _WHOLE),
+    )
     weight = (determinant * weights).ravel()
     return np.array([[_integral(weight, error), _integral(weight, u)] for error, u in pairs])
 
@@ -139,25 +146,6 @@ def _hooke(
     lame = np.array([lame_of(material)[0] for material in exact.materials])[part]
     stress[:, :3] += np.nan_to_num(mean - lame * np.einsum("nii->n", slope))[:, None]
     return stress
-
-
-def _with_exact(
-    exact: ElasticSolution,
-    x: np.ndarray,
-    part: np.ndarray,
-    found: np.ndarray,
-    slope: np.ndarray,
-    stress_found: np.ndarray,
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Error and exact value (n, …) of displacement, gradient and stress at points."""
-    u, gradient = exact.displacement(x, part), exact.gradient(x, part)
-    whole = np.sqrt(_TWICE)
-    stress = exact.hooke(gradient, part) * whole
-    return [
-        (found - u, u),
-        (slope - gradient, gradient),
-        (stress_found * whole - stress, stress),
-    ]
 
 
 def _integral(weight: np.ndarray, values: np.ndarray) -> float:

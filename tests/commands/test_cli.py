@@ -12,6 +12,8 @@ import pytest
 import solver.verification.run
 from solver.case.reader import load_case
 from solver.commands.cli import main
+from solver.mechanics.linear.backends import BACKENDS
+from solver.mechanics.linear.direct import force_solver
 from solver.system.errors import SolveError
 
 PLANE = """\
@@ -66,6 +68,21 @@ def test_passed_is_0(small, capsys):
     assert verdict["macro_elements"] == 3
     assert (small / "out/r.vtkhdf").is_file()
     assert capsys.readouterr().out.splitlines()[-1].startswith("small: passed, worst error ")
+
+
+@pytest.mark.parametrize("method", ["auto", "multigrid"])
+def test_free_software_alone_solves_without_mkl(small, method):
+    """In 3D; multigrid too has a factor, beside contact, of a small part of tall blocks."""
+    template = Path(__file__).parents[2] / "cases/scaling/templates/space.yaml"
+    tall = template.read_text().replace("5, 5, 5]", "5, 5, 30]").replace("4, 4, 4]", "4, 4, 30]")
+    (small / "c.yaml").write_text(tall)
+    installed = dict(BACKENDS)
+    with force_solver(method):
+        status, verdict = solve(small, "--free")
+    assert (status, verdict["verdict"]) == (0, "passed")
+    assert ("multigrid" in verdict["linear_solver"]) == (method == "multigrid")
+    assert "PARDISO" not in verdict["linear_solver"]
+    assert installed == BACKENDS
 
 
 def test_solve_prints_forces_without_round_off_and_the_initial_gap(small, capsys):

@@ -261,6 +261,19 @@ def test_a_batch_that_passed_leaves_no_failures(tmp_path):
     assert logged.splitlines()[-1].startswith("The one solve passed. Report: ")
 
 
+def test_older_results_are_shown_but_are_no_failures_of_this_batch(tmp_path):
+    new = put(tmp_path / "fam-a" / "verdict.json", verdict("fam-a", "passed"))
+    old = put(tmp_path / "fam-b" / "verdict.json", verdict("fam-b", "failed", "too coarse"))
+    logged = write_report([new], tmp_path / "report", older=[old]).splitlines()
+    assert (tmp_path / "report" / "failures.txt").read_text() == ""
+    assert logged[-2] == "Older results in the report, not of this run: 1 solve: 1 failed."
+    assert logged[-1].startswith("This run: The one solve passed. Report: ")
+    assert not any("too coarse" in line for line in logged)
+    assert "too coarse" in (tmp_path / "report" / "summary.html").read_text()
+    write_report([old], tmp_path / "report", older=[new])
+    assert (tmp_path / "report" / "failures.txt").read_text() == "fam-b: failed: too coarse\n"
+
+
 def test_a_badge_says_how_strictly_a_solve_was_judged(tmp_path):
     check = CHECK | {"error": 1e-3, "tolerance": 1.5e-3, "expected": 1.2e-3, "passed": True}
     made = verdict("fam-a", "passed") | {"judged": "expected error", "checks": [check]}

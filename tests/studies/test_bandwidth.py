@@ -1,13 +1,16 @@
 """Bytes of products and the bandwidth of memory: counts by hand, and a measured solve."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
+import meshio
 import numpy as np
 import pytest
 from scipy.sparse import bsr_matrix, csr_matrix
 
-from solver.mechanics.linear import multigrid, nodal_matrix
+from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.nodal_matrix import NodalMatrix
+from solver.mechanics.linear.symmetric_blocks import SymmetricBlocks
 from solver.studies import bandwidth
 from solver.studies.bandwidth import DOUBLE, ITERATIONS, SET_UP, SMOOTHER, STAGE, TRANSFER
 from solver.studies.scaling.description import ScalingPoint, read_scaling
@@ -32,8 +35,50 @@ def test_a_product_in_double_precision_is_counted_too():
     blocks = bsr_matrix(csr_matrix(np.eye(6)), blocksize=(3, 3))
     with bandwidth.counted() as parts:
         NodalMatrix(blocks, np.arange(6)) @ np.ones((6, 2))
-    assert parts[STAGE]["bytes"] == 2 * bandwidth.moved(blocks, np.ones(6), np.ones(6))
-    assert nodal_matrix.multiply.__module__ == "solver.mechanics.linear.products"
+    assert parts[STAGE]["bytes"] == 2 * (8 * 2 * 9 + 4 * (2 + 3) + 8 * 6 * 2)
+    assert SymmetricBlocks.multiply.__module__ == "solver.mechanics.linear.symmetric_blocks"
+
+
+def test_half_a_matrix_moves_what_is_stored():
+    """A block on the diagonal, one above it; two parts with column numbers and three row starts."""
+    blocks = np.ones((1, 3, 3), dtype=np.float32)
+    parts = (bsr_matrix((blocks, [k], [0, 1, 1]), shape=(6, 6)) for k in (0, 1))
+    x = np.ones(6, dtype=np.float32)
+    assert bandwidth.moved(SymmetricBlocks(*parts), x, x) == 2 * 4 * (9 + 1 + 3) + 3 * 4 * 6
+
+
+def test_a_stage_moves_its_files_and_arrays_once(tmp_path):
+    """Four nodes: places and displacement of 96 bytes, stress of 192, a cell of 32."""
+    mesh = meshio.Mesh(np.zeros((4, 3)), [("tetra", np.array([[0, 1, 2, 3]]))])
+    solution = SimpleNamespace(mesh=mesh, displacement=np.zeros((4, 3)), stress=np.zeros((4, 6)))
+    files = [tmp_path / "mesh", tmp_path / "result"]
+    for file, size in zip(files, (50, 70), strict=True):
+        file.write_bytes(bytes(size))
+    least = bandwidth.least_bytes(solution, 1000, *files)
+    assert least.pop(STAGE) == 0
+    assert least == {
+        "read": 50 + 128,
+        "assembly": 128 + 1000,
+        "recovery": 128 + 96 + 192,
+        "checks": 96 + 96 + 192,
+        "write": 128 + 96 + 192 + 70,
+    }
+
+
+@pytest.mark.parametrize(
+    ("share", "threads", "busy", "limit"),
+    [
+        (0.6, 2, 1.9, "memory"),
+        (0.6, 2, None, "memory"),
+        (0.4, 2, None, ""),
+        (0.4, 2, 1.9, "arithmetic, temporary arrays"),
+        (0.4, 2, 1.1, "one thread"),
+        (0.4, 8, 4.0, "one thread"),
+        (0.4, 1, 1.0, "arithmetic, temporary arrays"),
+    ],
+)
+def test_what_limits_a_stage(share, threads, busy, limit):
+    assert bandwidth.Moved("write", 2.0, 2e9 * share, 1e9, threads, busy).limit == limit
 
 
 def test_the_triad_is_three_arrays_over_its_time(monkeypatch):
@@ -44,11 +89,12 @@ def test_the_triad_is_three_arrays_over_its_time(monkeypatch):
 
 
 @pytest.fixture
-def solve(tmp_path, monkeypatch):
+def solve(tmp_path, monkeypatch, request):
     """A small block solved by multigrid, beside a bandwidth of 1 MB/s."""
     from solver.commands.cli import main
 
-    series = next(s for s in read_scaling(FILE).series if s.name == "hexa8")
+    name = getattr(request, "param", "hexa8")
+    series = next(s for s in read_scaling(FILE).series if s.name == name)
     case, mesh = tmp_path / "case.yaml", tmp_path / "mesh.vtkhdf"
     case.write_text(ScalingPoint(series, 3000).source())
     assert main(["mesh", str(case), "-o", str(mesh)]) == 0
@@ -66,8 +112,21 @@ def test_the_parts_of_a_solve_add_up(solve):
     # one product at least, in half the precision of the product of conjugate gradients.
     assert parts[SMOOTHER]["bytes"] > 4 * 0.4 * parts[DOUBLE]["bytes"]
     table = bandwidth.table(solve | {"outcome": "solved"})
-    assert [part.name for part in table.parts][:3] == [STAGE, SET_UP, ITERATIONS]
+    named = [part.name for part in table.parts]
+    assert named[:5] == ["read", "assembly", STAGE, SET_UP, ITERATIONS]
+    assert named[-3:] == ["recovery", "checks", "write"]
+    # 27 blocks of nine numbers at a node inside, 8 at a corner.
+    nodes = solve["dofs"] / 3
+    assert 8 * 9 * 8 * nodes < parts["assembly"]["bytes"] < 2 * 27 * 9 * 8 * nodes
     for part in table.parts:
         assert part.share == pytest.approx(part.moved / part.seconds / 1e6)
     assert bandwidth.table({"outcome": "failed"}) is None
     assert bandwidth.table(None) is None
+
+
+@pytest.mark.parametrize("solve", ["mixed-tetra10"], indirect=True)
+def test_the_iterations_of_the_mixed_form_are_counted(solve):
+    parts = solve["parts"]
+    within = [parts[name]["bytes"] for name in (SMOOTHER, TRANSFER)]
+    assert parts[ITERATIONS]["bytes"] == sum(within) > 0
+    assert parts[STAGE]["bytes"] == parts[ITERATIONS]["bytes"] + parts[SET_UP]["bytes"]

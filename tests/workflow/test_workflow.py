@@ -334,6 +334,10 @@ def test_a_family_alone_leaves_the_others_in_the_report(project):
     assert wrong.stdout.count(last) == 1
     done = snakemake(project, "--config", "family=tiny", "--forcerun", "report")
     assert done.returncode == 0, done.stdout  # what failed was not asked for
+    older = "Older results in the report, not of this run: 1 solve: 1 failed."
+    outcome = "This run: All 3 solves passed. Report: results/report/summary.html"
+    assert done.stdout.splitlines()[-2:] == [older, outcome]
+    assert "wrong: failed" not in done.stdout
     assert summary(project).keys() == {"tiny-a", "tiny-a-swapped", "tiny-b", "wrong"}
     again = snakemake(project)
     assert again.returncode == 1

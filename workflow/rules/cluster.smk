@@ -95,8 +95,9 @@ def report_failures():
     verdicts = [verdict_of(job) for job in RUN.values()]
     if lost and all(map(os.path.exists, verdicts)):
         command = [sys.executable, "-Es", "-m", "solver", "report"]
-        command += [*verdicts, *verdicts_there(OTHERS)]
-        subprocess.run([*command, "-o", "results/report", "--families", *FAMILY_FILES])
+        command += f"--list {VERDICTS} --older {OLDER_VERDICTS}".split()
+        command += ["-o", "results/report"]
+        subprocess.run([*command, "--families", *FAMILY_FILES])
         os.utime("results/report/failures.txt", (1, 1))
 
 

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from . import cell_loops
 from .elasticity import Block, Found, Shapes, by_part, shapes_in, stress_in
 
 
@@ -29,10 +30,14 @@ class Sizes:
 def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> Sizes:
     """Taken at the middle of each cell, from a displacement (n_nodes, dim) or several parts."""
     force, largest = np.zeros((2, len(points)))
-    displacement = displacement.reshape(-1, *points.shape).sum(axis=0)
+    parts = displacement.reshape(-1, *points.shape)
     highest = slender = 0.0
     for block in blocks:
-        seen = partial(_cell_sizes, points, block, displacement)
+        if cell_loops.serve(len(points), blocks):
+            term, on_small_faces = cell_loops.add_sizes(points, block, parts, force, largest)
+            highest, slender = max(highest, term), max(slender, on_small_faces)
+            continue
+        seen = partial(_cell_sizes, points, block, parts.sum(axis=0))
         for part, (forces, term, on_small_faces, norm) in _in_the_middle(points, block, seen):
             nodes = block.cells[part].ravel()
             np.add.at(force, nodes, forces.ravel())
@@ -75,6 +80,10 @@ def largest_strain(
     """
     largest = np.zeros(2)
     for block in blocks:
+        if cell_loops.serve(len(points), blocks):
+            compiled = cell_loops.largest_strain(points, block, displacement[None])
+            largest = np.maximum(largest, compiled)
+            continue
         seen = partial(_cell_strain, block, displacement)
         for _, found in _in_the_middle(points, block, seen):
             largest = np.maximum(largest, found)
@@ -111,11 +120,10 @@ def _in_the_middle(
     points: np.ndarray, block: Block, found: Callable[[slice, Shapes, np.ndarray], Found]
 ) -> Iterator[tuple[slice, Found]]:
     """Parts of a block, and what is `found` in the middle (q = 1) of their cells of sizes (n,)."""
-    reference, weights = block.rule
-    middle = (weights @ reference / weights.sum())[None]
+    middle, weight = block.middle
 
     def of(part: slice) -> Found:
         shapes = shapes_in(points, block, block.cells[part], middle)
-        return found(part, shapes, shapes.measure[:, 0] * weights.sum())
+        return found(part, shapes, shapes.measure[:, 0] * weight)
 
     return by_part(block, points.shape[1], of)

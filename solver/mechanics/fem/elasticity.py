@@ -51,6 +51,12 @@ class Block:
         """The quadrature points (q, dim) and weights (q,) of the block."""
         return volume_rule(self.type.name, self.straight)
 
+    @property
+    def middle(self) -> tuple[np.ndarray, np.ndarray]:
+        """The point (1, dim) in the middle of its cells, with all the weight (1,) of the rule."""
+        reference, weights = self.rule
+        return (weights @ reference / weights.sum())[None], weights.sum()[None]
+
     def of(self, chosen: np.ndarray | slice) -> "Block":
         """The chosen (n,) of its cells."""
         cells, lame, shear = self.cells[chosen], self.lame[chosen], self.shear[chosen]

@@ -13,8 +13,13 @@ import numpy as np
 from scipy import sparse
 
 from ...system.errors import SolveError
+from .choice import LinearSolver, prepare
+from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise
 from .krylov import EPSILON
+from .multigrid import Shared
+from .stiffened import StiffenedMatrix, Stiffness
+from .unknowns import Unknowns
 
 # A step leaves about 1/w of a violation; the factor loses as many digits, which refinement returns.
 _WEIGHT = 1e4
@@ -29,23 +34,36 @@ _GAIN = 0.5
 class AugmentedSystem:
     """`scaled` Ĝ (m, n): constraints, each divided by its `size` (m,); the `factor` of A.
 
-    `compliant` Ĝ D⁻¹ (m, n) with the diagonal D of K, and the factor `gram` of Ĝ D⁻¹ Ĝᵀ.
+    `compliance` (n,): the inverse of the diagonal D of K; the factor `gram` of Ĝ D⁻¹ Ĝᵀ.
     """
 
     scaled: sparse.csr_matrix
     size: np.ndarray
-    factor: Factor
-    compliant: sparse.csr_matrix
+    factor: LinearSolver
+    compliance: np.ndarray
     gram: Factor
-    why: str
-    doubt: str = ""
+    reason: str
+
+    @property
+    def why(self) -> str:
+        """Why it was chosen."""
+        return f"{self.reason}; {self.factor.why}"
+
+    @property
+    def doubt(self) -> str:
+        """See `LinearSolver`."""
+        return self.factor.doubt
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
         """Equilibrium under multipliers that are corrected until the constraints hold."""
-        wanted = (violation.T / self.size).T
-        change = self.factor.solve(force + _WEIGHT * (self.scaled.T @ wanted), accuracy)
+        # Multipliers of the present state leave forces that are as small as its error.
+        wanted, force = (violation.T / self.size).T, self._left(force)
+        pulled = self.scaled.T @ wanted
+        # The weight makes no force that may be left larger.
+        limit = accuracy * (self._norm(force) + self._norm(pulled))
+        change = self._solved(force + _WEIGHT * pulled, limit)
         last, first = np.inf, 0.0
         for _ in range(_MOST_STEPS):
             left = wanted - self.scaled @ change
@@ -53,34 +71,65 @@ class AugmentedSystem:
             first = first or size
             if size <= EPSILON * first or size > _GAIN * last:
                 break
-            last = size
-            change = change + self.factor.solve(_WEIGHT * (self.scaled.T @ left), accuracy)
+            last, right = size, _WEIGHT * (self.scaled.T @ left)
+            if (self._norm(right) <= limit).all():
+                break
+            change = change + self._solved(right, limit)
         return change
+
+    def _norm(self, force: np.ndarray) -> np.ndarray:
+        """The norm of each column of forces (n, …), scaled as the system is."""
+        return np.sqrt(self.compliance @ (force * force))
+
+    def _solved(self, right: np.ndarray, limit: np.ndarray) -> np.ndarray:
+        """Solved for `right` (n, …) until forces of the norm `limit` are left."""
+        share = limit / np.maximum(self._norm(right), np.finfo(float).tiny)
+        return self.factor.solve(right, min(max(float(np.min(share)), EPSILON), 1.0))
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """The multipliers that balance the force best: least squares with the weights 1/D."""
-        return (-self.gram.solve(self.compliant @ force).T / self.size).T
+        return (-self.gram.solve(self.scaled @ (self.compliance * force.T).T).T / self.size).T
 
     def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:  # noqa: ARG002
         """The largest force left with the multipliers acting; no constraint is violated."""
-        acting = (self.multiplier(force).T * self.size).T
-        return float(np.abs(force + self.scaled.T @ acting).max(initial=0.0))
+        return float(np.abs(self._left(force)).max(initial=0.0))
+
+    def _left(self, force: np.ndarray) -> np.ndarray:
+        """The forces left with the multipliers acting."""
+        return force + self.scaled.T @ (self.multiplier(force).T * self.size).T
 
 
 def augment(
-    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, dim: int, why: str
+    matrix: Stiffness,
+    constraints: sparse.csr_matrix,
+    why: str,
+    unknowns: Unknowns | None = None,
+    gave_up: str = "",
+    shared: Shared | None = None,
 ) -> AugmentedSystem:
-    """Factor K x = f + Gᵀ p, G x = b; `matrix` K (n, n), `constraints` G (m, n), `why`: so solved.
+    """Prepare K x = f + Gᵀ p, G x = b; `matrix` K (n, n), `constraints` G (m, n), `why`: so solved.
 
-    `dim`: of the mesh. Raises SolveError where constraints nearly depend on one another, or leave
-    a motion free.
+    `unknowns`, `gave_up`, `shared`: see `prepare`. Raises SolveError where constraints nearly
+    depend on one another, or a factor finds that they leave a motion free.
     """
-    inverse = sparse.diags(1 / matrix.diagonal())
-    size = np.sqrt(np.asarray(constraints.multiply(constraints @ inverse).sum(axis=1)).ravel())
+    compliance = 1 / matrix.diagonal()
+    square = constraints.multiply(constraints) @ compliance
+    size = np.sqrt(np.asarray(square).ravel())
     if not size.all():
         raise SolveError("a constraint holds no unknown")
     scaled = (sparse.diags(1 / size) @ constraints).tocsr()
-    compliant = (scaled @ inverse).tocsr()
-    gram = factorise(compliant @ scaled.T, dim=2, least=_LEAST)
-    factor = factorise(matrix + _WEIGHT * (scaled.T @ scaled), dim=dim)
-    return AugmentedSystem(scaled, size, factor, compliant, gram, why)
+    gram = factorise(scaled @ sparse.diags(compliance) @ scaled.T, dim=2, least=_LEAST)
+    factor = prepare(_augmented(matrix, scaled), unknowns, gave_up, shared)
+    if factor.doubt:
+        raise SolveError(factor.doubt)
+    return AugmentedSystem(scaled, size, factor, compliance, gram, why)
+
+
+def _augmented(matrix: Stiffness, scaled: sparse.csr_matrix) -> Symmetric:
+    """K + Ĝᵀ w Ĝ."""
+    if not scaled.shape[0]:
+        return matrix
+    if isinstance(matrix, StiffenedMatrix):
+        return matrix.changed(_augmented(matrix.soft, scaled), matrix.divergence)
+    everything = np.arange(matrix.shape[0])
+    return CondensedMatrix(matrix, everything, (_WEIGHT * (scaled.T @ scaled)).tocsr())

@@ -6,8 +6,9 @@ raises `BreakdownError` at a pivot that it cannot use. The solve takes and retur
 the factor's memory is released with the last reference to the solve.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -59,7 +60,7 @@ def _cholmod(upper: csr_matrix, definite: bool) -> Solve:
         raise BreakdownError from error
 
     def solve(right: np.ndarray) -> np.ndarray:
-        solution = matrix(np.asfortranarray(right))
+        solution = matrix(np.asfortranarray(right, dtype=float))
         cholmod.solve(factor, solution)
         return np.array(solution)
 
@@ -87,3 +88,14 @@ BACKENDS = {
     "cholmod": Backend("CHOLMOD", False, lambda: find_spec("cvxopt") is not None, _cholmod),
     "superlu": Backend("SuperLU", False, lambda: True, _superlu),
 }
+
+
+@contextmanager
+def free_software_alone() -> Iterator[None]:
+    """Within, systems are solved as where MKL is not installed: it is no free software."""
+    installed = BACKENDS["pardiso"]
+    BACKENDS["pardiso"] = replace(installed, available=lambda: False)
+    try:
+        yield
+    finally:
+        BACKENDS["pardiso"] = installed

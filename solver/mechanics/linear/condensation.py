@@ -38,9 +38,8 @@ _WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
 _SMALLEST_PIVOT = 1e-6
 # Zones whose slave surface is a master surface, one after another.
 _LAYERS = 4
-
-
 _NO_SPRINGS = np.empty(0)
+
 
 AnyIterate = TypeVar("AnyIterate", bound="Iterate")
 

@@ -40,26 +40,26 @@ class Correction:
         way = csr_matrix((way.data, local, way.indptr), shape=(len(self.rows), len(columns)))
         return Correction(columns, (way.T @ (self.matrix @ way)).tocsr())
 
-    def corrected_rows(self, matrix: bsr_matrix) -> csr_matrix:
-        """The rows (r, n) of K + C, given K (n, n)."""
+    def corrected_rows(self, own: csr_matrix) -> csr_matrix:
+        """The rows (r, n) of K + C, given its `own` (r, n) of K."""
         columns = self.rows[self.matrix.indices]
-        shape = len(self.rows), matrix.shape[1]
-        own = csr_matrix((self.matrix.data, columns, self.matrix.indptr), shape=shape)
-        return (chosen_rows(matrix, self.rows) + own).tocsr()
+        arrays = self.matrix.data, columns, self.matrix.indptr
+        return (own + csr_matrix(arrays, shape=own.shape)).tocsr()
 
-    def weights(self, matrix: bsr_matrix, corrected: csr_matrix) -> np.ndarray:
-        """The weight (n,) of each row in the smoother: one where nothing changed, 0 at pivots.
+    def weights(self, own: csr_matrix, corrected: csr_matrix) -> np.ndarray:
+        """The weight (r,) of its rows in the smoother: 0 at pivots. Other rows have one.
 
         Elsewhere the inverse of the diagonal of the `corrected` rows (r, n) of K + C; less where
-        the entries of a row add up to more than typical of K.
+        the entries of a row add up to more than typical of its `own` rows (r, n) of K.
         """
-        before = np.asarray(abs(chosen_rows(matrix, self.rows)).sum(axis=1)).ravel()
+        before = np.asarray(abs(own).sum(axis=1)).ravel()
         diagonal = _own_diagonal(corrected, self.rows)
         there = diagonal > _NOTHING
-        weight = np.ones(matrix.shape[0], dtype=np.float32)
-        weight[self.rows] = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
-        sums = weight[self.rows] * (abs(corrected) @ weight)
-        weight[self.rows] /= np.sqrt(np.maximum(1.0, sums / np.median(before)))
+        weight, on_all = np.zeros(len(there), np.float32), np.ones(own.shape[1], np.float32)
+        weight[there] = 1 / np.sqrt(diagonal[there])
+        on_all[self.rows] = weight
+        sums = weight * (abs(corrected) @ on_all)
+        weight /= np.sqrt(np.maximum(1.0, sums / np.median(before)))
         return weight * weight
 
 
@@ -72,19 +72,23 @@ class Interface:
         Raises SolveError where that is not positive definite.
         """
         there = np.flatnonzero(_own_diagonal(corrected, correction.rows) > _NOTHING)
-        self.chosen, self._rows = correction.rows[there], corrected[there]
-        own = self._rows[:, self.chosen] + _SHIFT * identity(len(there), np.float32)
+        self.chosen, rows = correction.rows[there], corrected[there]
+        own = rows[:, self.chosen] + _SHIFT * identity(len(there), np.float32)
         self._solve = factorise_roughly(own)
+        self._near, local = np.unique(rows.indices, return_inverse=True)
+        shape = len(there), len(self._near)
+        self._rows = csr_matrix((rows.data, local.astype(np.int32), rows.indptr), shape=shape)
 
     def before(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The change (r,) by a solve, and the residual (n,) left by it."""
-        first = self._solved(residual[self.chosen])
-        return first, residual - self._rows.T @ first
+        first, left = self._solved(residual[self.chosen]), residual.copy()
+        left[self._near] -= self._rows.T @ first
+        return first, left
 
     def after(self, residual: np.ndarray, change: np.ndarray, first: np.ndarray) -> None:
         """Add the `first` solve and another one to the `change` (n,) of a `residual` (n,)."""
         change[self.chosen] += first
-        change[self.chosen] += self._solved(residual[self.chosen] - self._rows @ change)
+        change[self.chosen] += self._solved(residual[self.chosen] - self._rows @ change[self._near])
 
     def _solved(self, right: np.ndarray) -> np.ndarray:
         return self._solve(right[:, None])[:, 0].astype(np.float32)
@@ -95,14 +99,12 @@ def correction_of(
 ) -> Correction:
     """C of a condensed matrix, scaled by `scale` (n,); unknown i is in row `place[i]`.
 
-    So many `springs` are in the rows of the first eliminated unknowns, scaled to a diagonal of one;
-    the others are held.
+    So many `springs` are in the rows of eliminated unknowns; the others are held.
     """
     stiffness, pivot = condensed.stiffness, condensed.eliminated
-    size = len(condensed.kept) + springs
-    where = np.concatenate([condensed.kept, pivot[:springs]])
-    scales = np.concatenate([scale[condensed.kept], spring_scale(condensed)[:springs]])
-    some, eliminated = slice(size), np.zeros(stiffness.shape[0], dtype=bool)
+    where, scales = condensed.places, scales_of(condensed, scale)
+    some = slice(len(condensed.kept) + springs)
+    eliminated = np.zeros(stiffness.shape[0], dtype=bool)
     eliminated[pivot] = True
     added, gone = condensed.added[some, some].tocoo(), stiffness[pivot].tocoo()
     rows, columns = pivot[gone.row], gone.col
@@ -117,9 +119,10 @@ def correction_of(
     return Correction(chosen, coo_matrix(entries, shape=(len(chosen),) * 2).tocsr())
 
 
-def spring_scale(condensed: CondensedMatrix) -> np.ndarray:
-    """What scales the rows (s,) of springs to a diagonal of one."""
-    return np.asarray(1 / np.sqrt(condensed.added.diagonal()[len(condensed.kept) :]))
+def scales_of(condensed: CondensedMatrix, scale: np.ndarray) -> np.ndarray:
+    """The scale (k + s,): of the stiffness (n,), and for springs to a diagonal of one."""
+    springs = condensed.added.diagonal()[len(condensed.kept) :]
+    return np.concatenate([scale[condensed.kept], 1 / np.sqrt(springs)])
 
 
 def _own_diagonal(rows: csr_matrix, numbers: np.ndarray) -> np.ndarray:

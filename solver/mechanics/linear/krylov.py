@@ -73,7 +73,7 @@ def conjugate_residuals(
         _give_up("conjugate residuals", iteration, reached, accuracy, most)
         direction = precondition(residual)
         image = multiply(direction)
-        # No BLAS, whose sums depend on the number of threads.
+        # No BLAS here: its sums depend on the number of threads. A `measure` may use it.
         shares = np.einsum("kn,n->k", images, image)
         image -= np.einsum("k,kn->n", shares, images)
         direction -= np.einsum("k,kn->n", shares, directions)
@@ -126,12 +126,11 @@ def _turn(
     change, following = _total(part, len(residual))
     share = _ratio(change, energy)
 
-    def turned(some: slice) -> float:
+    def turn(some: slice) -> None:
         direction[some] *= share
         direction[some] += improved[some]
-        return 0.0
 
-    _total(turned, len(direction))
+    _in_parts(turn, len(direction))
     return following
 
 
@@ -145,8 +144,20 @@ def _total(found: Callable[[slice], Any], size: int) -> np.ndarray:
 
     Threads find it; the sum is in the order of the rows.
     """
+    return np.asarray(sum(_in_parts(found, size), 0.0))
+
+
+def _in_parts(work: Callable[[slice], Any], size: int) -> list[Any]:
+    """What `work` returns for some rows at a time, in their order; threads do it."""
     parts = (slice(first, first + _ROWS) for first in range(0, size, _ROWS))
-    return np.asarray(sum(ahead(found, parts), 0.0))
+    return list(ahead(work, parts))
+
+
+def by_columns(function: Operator, x: np.ndarray) -> np.ndarray:
+    """What `function` makes of each column of x (n, k); a single one is not copied."""
+    if x.shape[1] == 1:
+        return function(x[:, 0])[:, None]
+    return np.stack([function(np.ascontiguousarray(column)) for column in x.T], axis=1)
 
 
 def in_single(solve: Operator) -> Operator:
@@ -156,9 +167,21 @@ def in_single(solve: Operator) -> Operator:
     """
 
     def lifted(right: np.ndarray) -> np.ndarray:
-        size = np.maximum(right.max(axis=0), -right.min(axis=0))
+        single, result = np.empty(right.shape, np.float32), np.empty_like(right)
+
+        def largest(some: slice) -> np.ndarray:
+            return np.maximum(right[some].max(axis=0), -right[some].min(axis=0))
+
+        size = np.max(_in_parts(largest, len(right)), axis=0)
         size[size == 0] = 1.0
-        return solve((right / size).astype(np.float32)) * size
+
+        def lower(some: slice) -> None:
+            np.divide(right[some], size, out=single[some], casting="same_kind")
+
+        _in_parts(lower, len(right))
+        found = solve(single)
+        _in_parts(lambda some: np.multiply(found[some], size, out=result[some]), len(right))
+        return result
 
     return lifted
 

@@ -2,10 +2,10 @@
 
 Nodes are gathered into aggregates, whose rigid motions are the unknowns of the next level (Vanek,
 Mandel, Brezina, Computing 56 (1996) 179). Quadratic cells have a level of linear cells on their
-vertices first. Every level is scaled to a diagonal of at most one and
-kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer.
-Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in double
-precision take the solution to round-off.
+vertices first. Every level is scaled to a diagonal of at most one and kept in single precision; the
+smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer. Linear Algebra Appl. 30 (2023)
+e2518): products with the matrix alone. Conjugate gradients in double precision take the solution to
+round-off.
 
 The hierarchy is that of the bodies alone. Contact corrects its levels (`contact_levels`), and a
 factor of the unknowns beside it solves there exactly, before and after each cycle.
@@ -20,13 +20,15 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.errors import SolveError
 from .aggregation import aggregate
-from .condensed_matrix import CondensedMatrix, Symmetric
-from .contact_levels import Correction, Interface, correction_of, spring_scale
+from .condensed_matrix import CondensedMatrix, Symmetric, in_blocks
+from .contact_levels import Correction, Interface, correction_of
 from .galerkin import coarse, smoothed
-from .krylov import EPSILON, conjugate_gradients, in_single
+from .krylov import EPSILON, by_columns, conjugate_gradients, in_single
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
+from .scaled_system import ScaledSystem
 from .slender import smoothed_along
+from .symmetric_blocks import SymmetricBlocks, halved
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600
@@ -36,13 +38,11 @@ LARGEST_DENSE = 4_000
 MOST_NEIGHBOURS = 100
 """Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
-# A matrix in single precision differs from the true one by more than this of the residual: further
-# digits are those of a refinement.
-_LEAST_SINGLE = 1e-5
-_ROWS_AT_ONCE = 30_000  # whole nodes
-_ONE = np.float32(1)
+# A matrix in single precision differs from the true one by more than the first share of a residual;
+# who asks for less refines, and each solve goes to the second (it gains 1e-4 at a million).
+_LEAST_SINGLE, _SINGLE = 1e-5, 1e-3
 # Lottes' optimised weights of the polynomial of degree two.
-_FIRST, _SECOND = np.float32(1.02387287570313), np.float32(1.26408905371085)
+_FIRST, _SECOND = 1.02387287570313, 1.26408905371085
 # The iteration approaches the largest eigenvalue from below.
 _SAFETY = 1.05
 _SMOOTHED = 4 / 3
@@ -54,29 +54,36 @@ _MOST_BESIDE = 1 / 4
 class Level:
     """One level: scaled matrix, bound of its eigenvalues, and the way up from the next.
 
-    `correction` and `weight` (n,): what contact changes in the matrix and in the smoother;
+    `correction` and `weight` (r,): what contact changes in r rows of matrix and smoother;
     `interface`: the exact solve beside it, if these unknowns are not too many.
     """
 
-    matrix: bsr_matrix
+    matrix: SymmetricBlocks
     bound: np.float32
     prolongation: bsr_matrix
     correction: Correction | None = None
-    weight: np.ndarray | np.float32 = _ONE
+    weight: np.ndarray | None = None
     interface: Interface | None = None
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
         """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
-        step = (np.float32(4 / 3) / self.bound) * self.weight * residual
-        change = self.remaining(residual, step)
-        change *= (_SECOND * np.float32(12 / 5) / self.bound) * self.weight
-        step *= _FIRST + _SECOND / np.float32(5)
-        change += step
+        factor, own = _SECOND * 12 / 5 / float(self.bound), _FIRST + _SECOND / 5
+        step = np.float32(4 / 3) / self.bound * residual
+        if self.correction is None:
+            return self.matrix.multiply(step, residual, -factor, factor, own)
+        rows = self.correction.rows
+        step[rows] *= self.weight
+        near = step[rows]
+        change = self.matrix.multiply(step, residual, -factor, factor, own)
+        left = change[rows] - own * near - factor * (self.correction.matrix @ near)
+        change[rows] = self.weight * left + own * near
         return change
 
-    def remaining(self, residual: np.ndarray, change: np.ndarray) -> np.ndarray:
-        """The residual (n,) after a change."""
-        left = multiply(self.matrix, change, residual, -1.0)
+    def remaining(
+        self, residual: np.ndarray, change: np.ndarray, out: np.ndarray | None = None
+    ) -> np.ndarray:
+        """The residual (n,) after a change; into `out` (n,), if given, which is none of both."""
+        left = self.matrix.multiply(change, residual, -1.0, out=out)
         if self.correction is not None:
             self.correction.subtract_product(left, change)
         return left
@@ -88,16 +95,18 @@ class Level:
 
         Where there are springs, this solve is the one of the correction `beside`, which has them.
         """
-        rows = correction.corrected_rows(self.matrix)
-        weight, interface = correction.weights(self.matrix, rows), None
+        own = self.matrix.chosen_rows(correction.rows)
+        rows = correction.corrected_rows(own)
+        weight, interface = correction.weights(own, rows), None
         if beside is not None:
-            interface = Interface(beside, beside.corrected_rows(self.matrix))
+            own = self.matrix.chosen_rows(beside.rows)
+            interface = Interface(beside, beside.corrected_rows(own))
         elif len(correction.rows) <= most:
             interface = Interface(correction, rows)
-        own, half = rows[:, correction.rows], np.sqrt(weight[correction.rows])
+        near, half = rows[:, correction.rows], np.sqrt(weight)
 
         def symmetric(x: np.ndarray, base: np.ndarray) -> np.ndarray:
-            return base + half * (own @ (half * x))
+            return base + half * (near @ (half * x))
 
         # A motion with the largest eigenvalue is either within the bodies or beside contact.
         bound = max(self.bound, _bound(symmetric, len(half)))
@@ -117,14 +126,15 @@ class Hierarchy:
         if not (diagonal > 0).all():
             raise SolveError("the matrix is not positive definite: its diagonal is not positive")
         self.scale = 1 / np.sqrt(diagonal)
-        blocks, self.place = _in_blocks(matrix, self.scale, unknowns)
+        blocks, self.place = in_blocks(matrix, self.scale, unknowns)
         self.size = blocks.shape[0]
         nodes = nodes_at(unknowns, self.place, self.size)
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale = self.scale * scale[self.place]
-        if isinstance(matrix, NodalMatrix):
-            matrix.now_scaled(self.scale)
+        self._nodal = matrix if isinstance(matrix, NodalMatrix) else None
+        if self._nodal is not None:
+            self._nodal.now_scaled(self.scale)
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
@@ -164,7 +174,9 @@ class Hierarchy:
         below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
         left = np.ones(prolongation.shape[0], dtype=np.float32)
         scale_blocks(prolongation, left, scale.astype(np.float32))
-        self.levels.append(Level(matrix, bound, prolongation))
+        self.levels.append(Level(halved(matrix), bound, prolongation))
+        if self._nodal is not None and len(self.levels) == 1:
+            self._nodal.halve(self.levels[0].matrix)
         return below, replace(nodes, motions=motions)
 
 
@@ -197,23 +209,17 @@ class Multigrid:
         coarse levels would fill in.
         """
         self.iterations = 0
-        self._matrix, self._shared = matrix, shared or Shared()
+        self._shared = shared or Shared()
         condensed = matrix if isinstance(matrix, CondensedMatrix) else None
         stiffness = condensed.stiffness if condensed else matrix
-        single = isinstance(stiffness, NodalMatrix) and stiffness.single
-        self._least = _LEAST_SINGLE if single else 0.0
+        self._single = isinstance(stiffness, NodalMatrix) and stiffness.single
         hierarchy = self._shared.hierarchy(stiffness, unknowns)
-        self._size, self._place = hierarchy.size, hierarchy.place
-        self._levels, scale = hierarchy.levels, hierarchy.scale
+        self._levels = hierarchy.levels
         last = hierarchy.last.toarray().astype(float)
         if condensed is not None:
             correction = self._correct(condensed, hierarchy)
             last[np.ix_(correction.rows, correction.rows)] += correction.matrix.toarray()
-            springs = spring_scale(condensed)
-            where = np.concatenate([condensed.kept, condensed.eliminated[: len(springs)]])
-            self._place = hierarchy.place[where]
-            scale = np.concatenate([scale[condensed.kept], springs])
-        self._scale = scale[:, None]
+        self._system = ScaledSystem(matrix, hierarchy.scale, hierarchy.place, hierarchy.size)
         inverse = np.linalg.pinv((last + last.T) / 2, rcond=1e-7, hermitian=True)
         self._coarsest = inverse.astype(np.float32)
         self.name = f"conjugate gradients with multigrid of {len(self._levels) + 1} levels"
@@ -221,13 +227,15 @@ class Multigrid:
     def _correct(self, condensed: CondensedMatrix, hierarchy: Hierarchy) -> Correction:
         """The levels under contact; return the correction of the last one.
 
-        Coarse levels hold the springs of stabilised contact: these are near contact alone.
+        Coarse levels hold springs. These, and constraints that were added with a weight, need the
+        exact solve beside contact.
         """
-        springs, about = len(spring_scale(condensed)), (hierarchy.scale, hierarchy.place)
-        correction, beside = correction_of(condensed, *about), None
-        self._levels, most = [], _MOST_BESIDE * self._size
-        if springs:
-            beside = correction_of(condensed, *about, springs)
+        about = condensed, hierarchy.scale, hierarchy.place
+        correction, beside = correction_of(*about), None
+        needed = condensed.springs or not len(condensed.eliminated)
+        self._levels, most = [], np.inf if needed else _MOST_BESIDE * hierarchy.size
+        if condensed.springs:
+            beside = correction_of(*about, condensed.springs)
             if not hierarchy.levels:
                 return beside
         for level in hierarchy.levels:
@@ -238,23 +246,21 @@ class Multigrid:
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
 
-        In 2-norms of the system scaled to a diagonal of at most one. Raises SolveError where
-        `MAX_ITERATIONS` do not or will not suffice, and where the solution is not finite.
+        In 2-norms of the system scaled to a diagonal of at most one; to 10⁻³ where less than 10⁻⁵
+        is asked of a matrix in single precision. Raises SolveError where `MAX_ITERATIONS` do not or
+        will not suffice, and where the solution is not finite.
         """
         columns = np.asarray(right, dtype=float)
         columns = columns if columns.ndim == 2 else columns[:, None]
-        accuracy = max(accuracy, self._least)
-        solution, iterations = conjugate_gradients(
-            lambda x: self._scale * (self._matrix @ (self._scale * x)),
-            self.cycle,
-            self._scale * columns,
-            accuracy,
-            MAX_ITERATIONS,
-        )
+        if self._single and accuracy < _LEAST_SINGLE:
+            accuracy = _SINGLE
+        system = self._system
+        about = self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS
+        solution, iterations = conjugate_gradients(system.multiply, *about)
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         self.iterations = max(self.iterations, iterations)
-        return (self._scale * solution).reshape(np.shape(right))
+        return system.solution(solution).reshape(np.shape(right))
 
     def close(self) -> None:
         """Release the hierarchy; it solves no more."""
@@ -264,16 +270,16 @@ class Multigrid:
     @property
     def scale(self) -> np.ndarray:
         """The scale (n,) of the unknowns."""
-        return np.asarray(self._scale[:, 0])
+        return self._system.scale
 
     def cycle(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n, k), one V-cycle; both scaled."""
-        return in_single(partial(np.apply_along_axis, self._cycle, 0))(residual)
+        """The correction for a residual (n,), one V-cycle; both scaled."""
+        return self._precondition(self._system.placed(residual[:, None]))[self._system.place, 0]
 
-    def _cycle(self, residual: np.ndarray) -> np.ndarray:
-        padded = np.zeros(self._size, dtype=np.float32)
-        padded[self._place] = residual
-        return self._descend(0, padded)[self._place]
+    def _precondition(self, residual: np.ndarray) -> np.ndarray:
+        """The same for columns (size, k) in the rows of the first level."""
+        cycles = partial(by_columns, partial(self._descend, 0))
+        return self._system.without_idle(in_single(cycles)(residual))
 
     def _descend(self, depth: int, residual: np.ndarray) -> np.ndarray:
         """One V-cycle from a level down."""
@@ -291,50 +297,11 @@ class Multigrid:
         """Smoothing before and after the levels below."""
         level = self._levels[depth]
         change = level.smooth(residual)
-        below = multiply_transposed(level.prolongation, level.remaining(residual, change))
-        change = multiply(level.prolongation, self._descend(depth + 1, below), change)
-        change += level.smooth(level.remaining(residual, change))
+        left = level.remaining(residual, change)
+        below = multiply_transposed(level.prolongation, left)
+        multiply(level.prolongation, self._descend(depth + 1, below), change, out=change)
+        change += level.smooth(level.remaining(residual, change, left))
         return change
-
-
-def _in_blocks(
-    matrix: Symmetric, scale: np.ndarray, unknowns: Unknowns
-) -> tuple[bsr_matrix, np.ndarray]:
-    """The scaled matrix in single precision and blocks of three, and the row (n,) of each unknown.
-
-    Rows without unknown are zero.
-    """
-    if isinstance(matrix, NodalMatrix):
-        return matrix.scaled(scale), matrix.free
-    place, size = places(unknowns)
-    return _of_rows(matrix, scale, place, size), place
-
-
-def _of_rows(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
-    """The same, row and column i at `place[i]` (n,) of `size`.
-
-    Rows are copied in parts, so that there is no second matrix in double precision.
-    """
-    order, place = np.argsort(place), place.astype(np.int32)
-    rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
-    blocks, columns = np.empty((0, 3, 3), dtype=np.float32), np.empty(0, dtype=np.int32)
-    for first in range(0, size, _ROWS_AT_ONCE):
-        last = min(first + _ROWS_AT_ONCE, size)
-        low, high = np.searchsorted(rows, (first, last))
-        some, counts = matrix[order[low:high]], np.zeros(last - first, dtype=int)
-        counts[rows[low:high] - first] = np.diff(some.indptr)
-        values = some.data * np.repeat(scale[order[low:high]], np.diff(some.indptr))
-        values *= scale[some.indices]
-        starts = np.concatenate([[0], np.cumsum(counts)])
-        arrays = values.astype(np.float32), place[some.indices], starts
-        part = csr_matrix(arrays, shape=(last - first, size)).tobsr((3, 3))
-        before, after = len(columns), len(columns) + len(part.indices)
-        # An array grows by moved pages: there are never two copies of it.
-        blocks.resize((after, 3, 3), refcheck=False)
-        columns.resize(after, refcheck=False)
-        blocks[before:], columns[before:] = part.data, part.indices
-        lengths.append(np.diff(part.indptr))
-    return bsr_matrix((blocks, columns, np.cumsum(np.concatenate(lengths))), shape=(size, size))
 
 
 def _bound_of(matrix: bsr_matrix) -> np.float32:

@@ -10,7 +10,9 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ..fem.assembly import selected
-from .products import chosen_rows, multiply, pattern, scale_blocks
+from .krylov import by_columns
+from .products import scale_blocks
+from .symmetric_blocks import SymmetricBlocks, halved
 
 
 class NodalMatrix:
@@ -22,7 +24,7 @@ class NodalMatrix:
     """
 
     def __init__(self, blocks: bsr_matrix, free: np.ndarray):
-        self.blocks, self.free = blocks, free
+        self.blocks, self.free = SymmetricBlocks(blocks), free
         self.shape = len(free), len(free)
         self.scale: np.ndarray | None = None
 
@@ -34,18 +36,18 @@ class NodalMatrix:
     @property
     def nnz(self) -> int:
         """How many entries of the blocks are between free degrees of freedom."""
-        near = pattern(self.blocks)
-        count = np.bincount(self.free // self.blocks.blocksize[0], minlength=near.shape[0])
-        beside = near @ count.astype(np.float32)
+        edge = self.blocks.blocksize
+        count = np.bincount(self.free // edge, minlength=self.blocks.shape[0] // edge)
+        beside = self.blocks.times_pattern(count.astype(np.float32))
         return int(count @ beside.astype(int))
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """The product with x (n,) or its columns (n, k)."""
         if x.ndim > 1:
-            return np.stack([self @ column for column in x.T], axis=1)
+            return by_columns(self.__matmul__, x)
         x = x if self.scale is None else x / self.scale
         # In double precision, whatever that of the blocks.
-        found = multiply(self.blocks, self._on_all(x), np.zeros(self.blocks.shape[0]))[self.free]
+        found = self.blocks.multiply(self._on_all(np.asarray(x, dtype=float)))[self.free]
         return found if self.scale is None else found / self.scale
 
     def _on_all(self, values: np.ndarray) -> np.ndarray:
@@ -56,7 +58,7 @@ class NodalMatrix:
 
     def __getitem__(self, rows: Any) -> csr_matrix:
         """Some of its rows, by mask, slice or numbers."""
-        chosen = chosen_rows(self.blocks, self.free[rows])[:, self.free]
+        chosen = self.blocks.chosen_rows(self.free[rows])[:, self.free]
         return chosen if self.scale is None else _unscaled(chosen, self.scale[rows], self.scale)
 
     def scaled(self, scale: np.ndarray) -> bsr_matrix:
@@ -66,15 +68,15 @@ class NodalMatrix:
         caller scales in them further goes to `now_scaled`.
         """
         factor = scale if self.scale is None else scale / self.scale
-        data = self.blocks.data
+        blocks = self.blocks.tobsr()
+        data = blocks.data
         if self.single:
-            self.scale = scale
+            self.scale, self.blocks = scale, SymmetricBlocks(blocks)
         else:
             data = np.empty(data.shape, dtype=np.float32)
         whole = self._on_all(factor)
-        scale_blocks(self.blocks, whole, whole, data)
-        arrays = data, self.blocks.indices, self.blocks.indptr
-        return bsr_matrix(arrays, shape=self.blocks.shape)
+        scale_blocks(blocks, whole, whole, data)
+        return bsr_matrix((data, blocks.indices, blocks.indptr), shape=blocks.shape)
 
     def now_scaled(self, scale: np.ndarray) -> None:
         """Take note that the blocks which `scaled` returned are now scaled by `scale` (n,) in all.
@@ -84,14 +86,18 @@ class NodalMatrix:
         if self.scale is not None:
             self.scale = scale
 
+    def halve(self, scaled: SymmetricBlocks) -> None:
+        """Keep one half, given the one of what `scaled` returned: itself, in single precision."""
+        self.blocks = scaled if self.single else halved(self.blocks.tobsr())
+
     def diagonal(self) -> np.ndarray:
         """Its diagonal (n,)."""
-        found = np.asarray(self.blocks.diagonal()[self.free], dtype=float)
+        found = self.blocks.diagonal()[self.free].astype(float)
         return found if self.scale is None else found / self.scale**2
 
     def tocsr(self) -> csr_matrix:
         """All of it, entry by entry."""
-        found = selected(self.blocks, self.free)
+        found = selected(self.blocks.tobsr(), self.free)
         return found if self.scale is None else _unscaled(found, self.scale, self.scale)
 
 

@@ -18,15 +18,24 @@ _PARTS = 16  # of a transposed product
 
 
 def multiply(
-    matrix: bsr_matrix, x: np.ndarray, base: np.ndarray | None = None, factor: float = 1.0
+    matrix: bsr_matrix,
+    x: np.ndarray,
+    base: np.ndarray | None = None,
+    factor: float = 1.0,
+    out: np.ndarray | None = None,
 ) -> np.ndarray:
     """`base` (m,) + `factor` · `matrix` (m, n) @ x (n,), in the precision of the matrix.
+
+    `out` (m,), if given, takes the result; it may be `base`.
 
     >>> matrix = bsr_matrix(2 * np.eye(6), blocksize=(3, 3))
     >>> multiply(matrix, np.ones(6), np.ones(6), -1.0)
     array([-1., -1., -1., -1., -1., -1.])
     """
-    out = np.zeros(matrix.shape[0], dtype=matrix.dtype) if base is None else base.copy()
+    if out is None:
+        out = np.zeros(matrix.shape[0], dtype=matrix.dtype) if base is None else base.copy()
+    elif out is not base:
+        out[:] = 0 if base is None else base
     height = matrix.blocksize[0]
     kernel = _PRODUCTS.get(matrix.blocksize) if worthwhile(matrix.data.size) else None
     arrays = matrix.indptr, matrix.indices, matrix.data

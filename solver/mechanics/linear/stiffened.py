@@ -129,7 +129,7 @@ class Stiffened:
         def precondition(residual: np.ndarray) -> np.ndarray:
             stress = -residual[n:]
             force = residual[:n] - scale * (self._transposed @ (root * stress))
-            return np.concatenate([self._soft.cycle(force[:, None])[:, 0], stress])
+            return np.concatenate([self._soft.cycle(force), stress])
 
         def left(residual: np.ndarray) -> float:
             """The residual of A, once the stress is eliminated."""

@@ -14,16 +14,11 @@ from ...system.errors import SolveError
 from ..fem.bodies import joined_bodies
 from .augmented import augment
 from .choice import LinearSolver, against_condensation
-from .condensation import (
-    CondensedSystem,
-    ConstrainedSystem,
-    condense,
-    saddle_point,
-)
+from .condensation import ConstrainedSystem, condense, saddle_point
 from .direct import Factor
 from .krylov import EPSILON
 from .multigrid import Shared
-from .stabilised import Compliance, StabilisedSystem, stabilise
+from .stabilised import Compliance, stabilise
 from .stiffened import Stiffness, part_of
 from .unknowns import Unknowns
 
@@ -136,9 +131,9 @@ class Systems:
 
     def _drop(self, number: int) -> None:
         """Drop a part's system, and remember why multigrid failed on it, if it did."""
-        system = self._kept.pop(number)[1]
-        if isinstance(system, CondensedSystem | StabilisedSystem) and system.factor.gave_up:
-            self._gave_up[number] = system.factor.gave_up
+        factor = self._kept.pop(number)[1].factor
+        if isinstance(factor, LinearSolver) and factor.gave_up:
+            self._gave_up[number] = factor.gave_up
 
     def closed(self, closed: np.ndarray) -> ConstrainedSystem:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
@@ -171,9 +166,9 @@ class Systems:
         if chosen is not None:
             matrix, constraints = part_of(matrix, chosen), constraints[:, chosen]
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
-        if own is None:
-            return _augmented(matrix.tocsr(), constraints, unknowns.dim)
         known = self._gave_up.get(number, ""), self._shared[number]
+        if own is None:
+            return _augmented(matrix, constraints, unknowns, *known)
         if self._compliance is not None and len((soft := self._compliance(closed)).weight):
             return stabilise(matrix, constraints, own, soft, unknowns, *known)
         if why := against_condensation(matrix, constraints):
@@ -185,14 +180,14 @@ class Systems:
 
 
 def _augmented(
-    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, dim: int
+    matrix: Stiffness, constraints: sparse.csr_matrix, unknowns: Unknowns, why: str, shared: Shared
 ) -> ConstrainedSystem:
     try:
-        return augment(matrix, constraints, dim, _NOTHING_OWN)
+        return augment(matrix, constraints, _NOTHING_OWN, unknowns, why, shared)
     except SolveError:
         pass
     try:
-        return saddle_point(matrix, constraints, _DEPENDENT)
+        return saddle_point(matrix.tocsr(), constraints, _DEPENDENT)
     except SolveError as error:
         raise SolveError(
             f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "

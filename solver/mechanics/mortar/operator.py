@@ -28,6 +28,8 @@ from .surface_points import Samples, Surface, face_samples
 _ROUND_OFF = 1e-13
 # A slave face that misses more than this share of its area is looked at again, farther away.
 _MISSED = 1e-6
+# The distance within which such faces are looked for grows by this factor at a time.
+_WIDER = 8.0
 # Surfaces come into contact where they are no farther apart, beyond their smallest distance, than
 # this share of the extent of the slave surface: displacements are small.
 _REACH = 0.5
@@ -182,24 +184,48 @@ def _search(
     search: float,
     meet: Meet,
 ) -> list[Segments]:
-    """Segments of all pairs of blocks, nearby first, then within the whole search distance."""
-    nearby = max(f.radius.max() for f in [*slaves, *masters])
-    reach = min(nearby, search)
-    found = meet(slaves, samples, masters, reach)
-    if reach == search:
-        return found
-    missed = [sample.weight.sum(axis=1) for sample in samples]
+    """Segments of all pairs of blocks, nearby first, then ever farther, up to `search`.
+
+    Only faces that are not covered whole are looked for farther away.
+    """
+    near, *farther = _reaches([*slaves, *masters], search)
+    found = meet(slaves, samples, masters, near)
+    for reach in farther:
+        lonely = _lonely(samples, found)
+        if not any(len(faces) for faces in lonely):
+            break
+        kept = [s.of(~np.isin(s.slave.face, lonely[s.slave.index])) for s in found]
+        found = kept + meet(slaves, samples, masters, reach, lonely)
+    return found
+
+
+def _reaches(faces: list[Facets], search: float) -> list[float]:
+    """Distances, ascending up to `search`, at which partners are looked for.
+
+    The first is about the size of usual faces: in a graded mesh, all small faces are within the
+    size of the largest one. A rigid surface is one face without end, and everything is near it.
+    """
+    radii = np.concatenate([block.radius for block in faces])
+    usual, largest = float(np.median(radii)), float(radii.max())
+    if not np.isfinite(largest):
+        return [search]
+    reaches = [largest]
+    while reaches[0] > _WIDER * usual:
+        reaches.insert(0, reaches[0] / _WIDER)
+    return [reach for reach in reaches if reach < search] + [search]
+
+
+def _lonely(samples: list[Samples], found: list[Segments]) -> list[np.ndarray]:
+    """By block, the slave faces that segments do not cover whole."""
     lonely = []
-    for a, whole in enumerate(missed):
+    for a, sample in enumerate(samples):
+        whole = sample.weight.sum(axis=1)
         covered = np.zeros(len(whole))
         for segments in found:
             if segments.slave.index == a:
                 np.add.at(covered, segments.slave.face, segments.area)
         lonely.append(np.flatnonzero(covered < (1 - _MISSED) * whole))
-    if not any(len(faces) for faces in lonely):
-        return found
-    kept = [s.of(~np.isin(s.slave.face, lonely[s.slave.index])) for s in found]
-    return kept + meet(slaves, samples, masters, search, lonely)
+    return lonely
 
 
 def _in_reach(found: list[Segments], slaves: list[Facets], n_macro: int) -> list[Segments]:

@@ -5,8 +5,12 @@ macro-elements as equality constraints; a closed one then opens where p < 0, an 
 where ḡ < 0, by more than round-off of its own size. Source: Hüeber, Wohlmuth, A primal–dual active
 set strategy for non-linear multibody contact problems, CMAME 194 (2005).
 
-This search may cycle, make no progress or open so much that a body moves freely. Then the linear
-complementarity problem |T| p = W ḡ + q of all macro-elements is formed on the factor that has them
+From few closed macro-elements, more would close at once than are in contact in the end, and these
+open ring by ring: an iteration closes no more than are closed already.
+
+This search may cycle, make no progress or open so much that a body moves freely. Then it is
+repeated from another start, if there is one. Where that fails too, the linear complementarity
+problem |T| p = W ḡ + q of all macro-elements is formed on the factor that has them
 all closed, and solved by a method that ends after finitely many steps (`complementarity`). A solve
 with the set found yields accurate p and ḡ, from which q is corrected until no status is wrong.
 """
@@ -14,17 +18,20 @@ with the set found yields accurate p and ḡ, from which q is corrected until no
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
 
 import numpy as np
 
 from ...system.errors import SolveError
+from ...system.progress import OUTCOME
 from ..linear.complementarity import complementary
 
 _LOG = logging.getLogger(__name__)
 
-# The quick search ends after so many solves without fewer wrong statuses than ever before.
-_PATIENCE = 10
+# The quick search ends where so many solves leave no fewer wrong statuses, in all, than as many
+# solves before them.
+_PATIENCE = 5
+# Up to so many may close at once, however few are closed.
+_FEW = 50
 _MAX_CORRECTIONS = 6
 
 
@@ -68,14 +75,15 @@ def find_status(
     area: np.ndarray,
     stiffness: Callable[[], np.ndarray],
     confirm: bool = False,
+    guess: np.ndarray | None = None,
 ) -> StatusResult:
     """Iterate from `start` (k,) until no status changes; only `eligible` (k,) may close.
 
-    `area` (k,) turns pressures into forces. `stiffness()` is asked for where the quick search
-    fails: the forces (e, e) that average gaps of the eligible multipliers bring up, each imposed
-    with all others closed. It may raise SolveError where no pressure makes equilibrium. `confirm`:
-    the set that is found is solved once more. Raises SolveError where no status fulfils the
-    conditions.
+    `guess` (k,): another start, where the search from the first one fails. `area` (k,) turns
+    pressures into forces. `stiffness()` is asked for where both fail: the forces (e, e) that
+    average gaps of the eligible multipliers bring up, each imposed with all others closed. It may
+    raise SolveError where no pressure makes equilibrium. `confirm`: the set that is found is solved
+    once more. Raises SolveError where no status fulfils the conditions.
 
     Two macro-elements, of which the second one would be pulled:
 
@@ -87,38 +95,74 @@ def find_status(
     >>> result.closed.tolist(), result.iterations
     ([True, False], 2)
     """
-    closed, seen = start & eligible, set()
     changes: list[int] = []
-    single = False
-    fewest, since = len(closed) + 1, 0
-    for iteration in count(1):
+    failure: SolveError | None = None
+    for number, begin in enumerate([start] if guess is None else [start, guess]):
+        changes += [0] * number
         try:
-            offence = np.where(eligible, solve(closed).offence(closed), 0.0)
+            closed = _quick(solve, begin & eligible, eligible, changes, confirm)
         except SolveError as error:
-            if iteration == 1:
+            if not changes:
                 raise
-            return _certain(solve, closed, eligible, area, stiffness, changes, error)
+            failure = error
+            continue
+        if closed is not None:
+            return StatusResult(closed, len(changes) + 1 + confirm, changes)
+    return _certain(solve, eligible, eligible, area, stiffness, changes, failure)
+
+
+def _quick(
+    solve: Solve, closed: np.ndarray, eligible: np.ndarray, changes: list[int], confirm: bool
+) -> np.ndarray | None:
+    """The status (k,) that Newton's steps find from `closed` (k,), None where they find none.
+
+    They are added to the `changes`. Raises the SolveError of a solve.
+    """
+    seen, single = set(), False
+    left: list[int] = []
+    while not _stuck(left):
+        offence = np.where(eligible, solve(closed).offence(closed), 0.0)
         wrong = offence > 1
-        _log(iteration, closed, wrong)
+        _log(len(changes) + 1, closed, wrong)
         if not wrong.any():
-            if confirm:
-                confirm = False
-                continue
-            return StatusResult(closed, iteration, changes)
-        since = 0 if wrong.sum() < fewest else since + 1
-        fewest = min(fewest, int(wrong.sum()))
-        if since == _PATIENCE:
-            break
+            if not confirm:
+                return closed
+            confirm = False
+            continue
+        left.append(int(wrong.sum()))
         seen.add(closed.tobytes())
-        following = closed ^ wrong
+        following = closed ^ _first_changes(closed, wrong, offence)
         # A cycle is broken by changing the worst offender alone from then on.
         single = single or following.tobytes() in seen
         if single:
             following = closed.copy()
             following[offence.argmax()] ^= True
-        changes.append(int((following ^ closed).sum()))
-        closed = following
-    return _certain(solve, closed, eligible, area, stiffness, changes, None)
+        if not _stuck(left):
+            changes.append(int((following ^ closed).sum()))
+            closed = following
+    return None
+
+
+def _stuck(left: list[int]) -> bool:
+    """Whether the numbers of wrong statuses that solves `left` no longer fall."""
+    before, latest = left[-2 * _PATIENCE : -_PATIENCE], left[-_PATIENCE:]
+    return len(before) == _PATIENCE and sum(latest) >= sum(before)
+
+
+def _first_changes(closed: np.ndarray, wrong: np.ndarray, offence: np.ndarray) -> np.ndarray:
+    """Those of the `wrong` (k,) that change now: all that open, and the worst of many that close.
+
+    From one closed macro-element, `_FEW` more close at once:
+
+    >>> closed, wrong = np.arange(100) == 0, np.arange(100) > 0
+    >>> np.flatnonzero(_first_changes(closed, wrong, np.arange(100.0)))[[0, -1]].tolist()
+    [50, 99]
+    """
+    closing = np.flatnonzero(wrong & ~closed)
+    most = max(int(closed.sum()), _FEW)
+    now = wrong & closed
+    now[closing[np.argsort(offence[closing], kind="stable")[-most:]]] = True
+    return now
 
 
 def _certain(
@@ -134,7 +178,8 @@ def _certain(
 
     Raises `failure`, why the quick search ended, where this one ends without a status too.
     """
-    _LOG.info("contact status: complementarity problem of %d multipliers", eligible.sum())
+    text = "contact status: complementarity problem, one solve for each of %d macro-elements"
+    _LOG.log(OUTCOME, text, eligible.sum())
     closed = eligible
     try:
         matrix = stiffness()

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from math import floor, log10
 from pathlib import Path
@@ -148,6 +149,7 @@ def resolution(pressure: float) -> float:
 def solve_way(job: Mapping[str, Any]) -> dict[str, Any]:
     """One mesh solved in one way: the process up to the first solve's end, and warm repetitions."""
     from ...case.reader import load_case
+    from ...mechanics.linear.backends import free_software_alone
     from ...mechanics.linear.direct import force_solver
     from ...mesh import read_mesh
     from ...simulation.options import Options, Safeguards, Shortcuts
@@ -162,14 +164,12 @@ def solve_way(job: Mapping[str, Any]) -> dict[str, Any]:
         Shortcuts.none() if job["everything"] else Shortcuts(),
         Safeguards() if job["cures"] else Safeguards.none(),
     )
-    if job["free"]:
-        _without_mkl()
-    first = Clock()
+    first, packages = Clock(), free_software_alone() if job["free"] else nullcontext()
 
     def run(clock: Clock) -> Any:
         return simulate(case, mesh, options=options, clock=clock)
 
-    with force_solver(job["solver"]):
+    with force_solver(job["solver"]), packages:
         solution = run(first)
         process = used_since(job["started"])
         times = repeated(run, job["repetitions"]) if job["repetitions"] else {}
@@ -182,10 +182,3 @@ def solve_way(job: Mapping[str, Any]) -> dict[str, Any]:
         "linear_iterations": solution.linear_iterations,
         "pressure_max": errors(solution)["pressure_max"],
     }
-
-
-def _without_mkl() -> None:
-    """As where MKL is not installed."""
-    from ...mechanics.linear.backends import BACKENDS
-
-    BACKENDS["pardiso"] = replace(BACKENDS["pardiso"], available=lambda: False)

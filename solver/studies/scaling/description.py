@@ -7,23 +7,26 @@
     series:
       - name: hexa8
         title: HEXA8
-        case: templates/space.yaml     # a case file of the recipe `blocks`
+        case: templates/space.yaml     # a case file of the recipe `blocks` or `hertz`
         cells: HEXA8                   # of both blocks
         divisions: [5, 4]              # of slave and master: their proportion
         slab: false                    # blocks as thick as the finer one's cells are wide
         fit: [1.0e+4, 1.0e+5]          # of this series, where it is another
         threads: 1                     # of this series, to compare with the same on more
+        free: true                     # with free software alone, to compare with the same on MKL
         sizes: [1.0e+4, 1.0e+5]        # unknowns that a mesh has at least
     goals:                        # numbers to reach, shown beside those measured
       - {title: …, series: hexa8, size: 1.0e+5, what: cpu, most: 12, unit: s, others: {…: 56}}
+      - {…, series: sphere, over: hexa8, …}  # times what the other series takes at the same size
     quick:                        # a part of it: these series, no size above the largest
       {largest: 3.0e+4, series: [hexa8]}
     large:                        # beyond it: these series at other sizes, with another limit
       {limit: 3600, sizes: [1.0e+7], series: [hexa8]}
 
 A goal's `what` is `cpu` or `wall` (seconds of the whole process, from mesh file to result file),
-`memory` (its peak, GB), `pressure` (the largest error), or the exponent of a stage: `growth of
-solve`. A point is one series and size; its name is the path of its record: `hexa8/10000`.
+`memory` (its peak, GB), `pressure` (the largest error), `statuses` (solves for the contact status),
+or the exponent of a stage: `growth of solve`. A point is one series and size; its name is the path
+of its record: `hexa8/10000`.
 """
 
 import json
@@ -55,7 +58,9 @@ from ..keys import Count, Name, Seconds, Unknowns
 from ..points import PointStudy
 
 GROWTH = "growth of "
-_START = 5.0  # seconds: three interpreters, libraries loaded, small mesh
+_START = 2.5  # seconds: two interpreters, libraries loaded, small mesh
+# Times as long as others: gmsh fills the blocks, or most unknowns are at the interface.
+_FILLED, _SLAB = 2.5, 4.0
 Division = Annotated[int, Meta(ge=1, le=1000)]
 SizeRange = Annotated[
     tuple[Unknowns, Unknowns], Meta(description="a list of two sizes, from and to")
@@ -63,8 +68,8 @@ SizeRange = Annotated[
 _What = Annotated[
     str,
     Meta(
-        pattern=r"^(cpu|wall|memory|pressure|growth of [a-z]+)$(?!\n)",
-        description="cpu, wall, memory, pressure, or `growth of` and a stage",
+        pattern=r"^(cpu|wall|memory|pressure|statuses|growth of [a-z]+)$(?!\n)",
+        description="cpu, wall, memory, pressure, statuses, or `growth of` and a stage",
     ),
 ]
 
@@ -83,6 +88,7 @@ class SizeSeries(Section, frozen=True, dict=True):
     slab: bool = False
     fit: SizeRange = (0, 0)
     threads: Count | None = None
+    free: bool = False
 
     @cached_property
     def template(self) -> dict[str, Any]:
@@ -91,7 +97,7 @@ class SizeSeries(Section, frozen=True, dict=True):
 
     @property
     def problem(self) -> tuple[Any, ...]:
-        """What its meshes are of: equal for series that differ in sizes and threads alone."""
+        """What its meshes are of: series of the same differ in sizes, threads and packages."""
         return self.case, self.cells, self.divisions, self.slab
 
     @property
@@ -130,9 +136,17 @@ class ScalingPoint:
         return self._mesh(self.divisions)
 
     @property
+    def counts_bytes(self) -> bool:
+        """Whether a further solve counts bytes: that of the largest mesh in 3D, by any packages."""
+        largest = self.size == max(self.series.sizes)
+        return self.series.dim == 3 and largest and not self.series.free
+
+    @property
     def seconds(self) -> float:
         """About how long the point takes."""
-        return _START + self.mesh.seconds
+        slow = _FILLED if self.series.cells == "TETRA4" else 1.0
+        slow = _SLAB if self.series.slab else slow
+        return (1 + self.counts_bytes) * (_START + slow * self.mesh.seconds)
 
     def _divisions(self, finer: int) -> tuple[list[int], list[int]]:
         proportion, dim = self.series.divisions, self.series.dim
@@ -161,7 +175,10 @@ class ScalingPoint:
 
 
 class Goal(Section, frozen=True):
-    """A number to reach; `others` has what other codes needed for the same work."""
+    """A number to reach; `others` has what other codes needed for the same work.
+
+    `over`: it is a ratio to that of another series at the same size.
+    """
 
     title: Text
     series: Name
@@ -169,6 +186,7 @@ class Goal(Section, frozen=True):
     most: Positive
     unit: str
     size: Unknowns | None = None
+    over: Name | None = None
     others: dict[str, float] = field(default_factory=dict)
 
 
@@ -201,6 +219,7 @@ class ScalingFile(Section, frozen=True):
         names = {series.name for series in self.series}
         for i, goal in enumerate(self.goals):
             refuse_unknown(("goals", i, "series"), goal.series, "series", names)
+            refuse_unknown(("goals", i, "over"), goal.over or goal.series, "series", names)
         for key, part in (("quick", self.quick), ("large", self.large)):
             for i, name in enumerate(part.series):
                 refuse_unknown((key, "series", i), name, "series", names)

@@ -81,7 +81,8 @@ def _solve(
     if meshed.status != 0:
         return found | ended(FAILED, f"no mesh: {meshed.reason}")
     command = [*COMMAND, "solve", str(case), "--mesh", str(mesh), "-o", str(folder / "r.vtkhdf")]
-    done = run_apart([*command, "--verdict", str(verdict)], cores, limit, memory)
+    command += ["--verdict", str(verdict), *["--free"] * point.series.free]
+    done = run_apart(command, cores, limit, memory)
     found["process"] = done.used
     if not verdict.is_file():
         return found | ended(FAILED if done.status is None else CRASHED, done.reason)
@@ -93,7 +94,7 @@ def _solve(
         reason = content.reason.removeprefix(f"{case}: ")
         return found | ended(word if word in (REFUSED, CRASHED) else FAILED, reason)
     found["faces"] = sum(body.faces for body in content.bodies)
-    if point.series.dim == 3 and point.size == max(point.series.sizes):
+    if point.counts_bytes:
         job = {"case": str(case), "mesh": str(mesh)}
         found["products"] = measure_apart(measure, job, folder / "products.json", cores, limit)
     return found | ended(SOLVED, content.reason)

@@ -1,6 +1,6 @@
 """The points of the scaling family as the page shows them: costs of each, growth of each series."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -61,6 +61,8 @@ class ScaledSolve(MeasuredPoint):
         """The quantity of a goal at one point, or the processor seconds of a stage."""
         if what == "wall":
             return self.record["process"]["wall"]
+        if what == "statuses":
+            return self.record["iterations"]
         whole = {"cpu": self.cpu, WHOLE: self.cpu, "memory": self.memory, "pressure": self.pressure}
         return whole[what] if what in whole else self.stages.get(what, 0.0)
 
@@ -107,28 +109,49 @@ class SeriesSolves:
 
 
 @dataclass(frozen=True)
-class SpeedUp:
-    """The same mesh solved on `few` threads and on `many`."""
+class SolvedTwice:
+    """The same mesh solved in two ways: `one` on few threads or free software, and the `other`."""
 
-    few: ScaledSolve
-    many: ScaledSolve
+    one: ScaledSolve
+    other: ScaledSolve
 
     def of(self, stage: str) -> float | None:
-        """Wall time on few threads over that on many; None for a stage of no measurable time."""
-        before, after = (m.wall.get(stage, 0.0) for m in (self.few, self.many))
+        """Wall time of one over that of the other; None for a stage of no measurable time."""
+        before, after = (m.wall.get(stage, 0.0) for m in (self.one, self.other))
         return before / after if min(before, after) > _SHORT else None
 
+    @property
+    def threads(self) -> tuple[int, int]:
+        """Of the one and of the other."""
+        return self.one.record["threads"], self.other.record["threads"]
 
-def speed_ups(lines: Sequence[SeriesSolves]) -> list[SpeedUp]:
-    """Solved points of series that differ in their threads alone, smallest first."""
+    @property
+    def free(self) -> tuple[bool, bool]:
+        """Whether the one and the other are by free software alone."""
+        return self.one.point.series.free, self.other.point.series.free
+
+
+def speed_ups(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:
+    """Solved points of series that differ in their threads alone, few threads first."""
+    pairs = [(pair, *pair.threads) for pair in _solved_twice(lines) if len({*pair.free}) == 1]
+    return [pair for pair, few, many in pairs if few < many]
+
+
+def by_free_software(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:
+    """Solved points of series that differ in their packages alone, free software first."""
+    pairs = [pair for pair in _solved_twice(lines) if len({*pair.threads}) == 1]
+    return [pair for pair in pairs if pair.free == (True, False)]
+
+
+def _solved_twice(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:
+    """All pairs of solves of the same mesh, both ways round."""
     solved = [m for line in lines for m in line.solved]
     return [
-        SpeedUp(few, many)
-        for few in solved
-        for many in solved
-        if few.record["threads"] < many.record["threads"]
-        and few.point.size == many.point.size
-        and few.point.series.problem == many.point.series.problem
+        SolvedTwice(one, other)
+        for one in solved
+        for other in solved
+        if one.point.size == other.point.size
+        and one.point.series.problem == other.point.series.problem
     ]
 
 
@@ -159,20 +182,26 @@ def read_series(scaling: Scaling, folder: Path) -> list[SeriesSolves]:
 def reached(scaling: Scaling, lines: Sequence[SeriesSolves]) -> list[Reached]:
     """Every goal with its measured number."""
     known = {line.series.name: line for line in lines}
-    return [_reached(goal, known.get(goal.series)) for goal in scaling.goals]
+    return [_reached(goal, known) for goal in scaling.goals]
 
 
-def _reached(goal: Goal, line: SeriesSolves | None) -> Reached:
+def _reached(goal: Goal, known: Mapping[str, SeriesSolves]) -> Reached:
+    line = known.get(goal.series)
     if line and goal.what.startswith(GROWTH):
         growth = line.growth(goal.what.removeprefix(GROWTH))
         if growth is None or not line.on_large:
             return Reached(goal, None, "too few of the large sizes are measured")
         return Reached(goal, growth.value, "")
-    points = line.points if line else ()
-    m = next((m for m in points if m.point.size == goal.size), None)
-    if m is None:
-        return Reached(goal, None, "not in this part of the family")
-    return Reached(goal, m.cost(goal.what), "") if m.solved else Reached(goal, None, m.why_not)
+    values = []
+    for name in (goal.series,) if goal.over is None else (goal.series, goal.over):
+        points = known[name].points if name in known else ()
+        m = next((m for m in points if m.point.size == goal.size), None)
+        if m is None:
+            return Reached(goal, None, "not in this part of the family")
+        if not m.solved:
+            return Reached(goal, None, m.why_not)
+        values.append(m.cost(goal.what))
+    return Reached(goal, values[0] / values[1] if goal.over else values[0], "")
 
 
 def failures(lines: Sequence[SeriesSolves]) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from solver.mechanics.fem import cell_loops
+from solver.mechanics.fem.cell_sizes import largest_strain, sizes
 from solver.mechanics.fem.elasticity import Block, internal_force, stiffness
 from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME
@@ -40,7 +41,10 @@ def scattered(name):
 def found(points, blocks, field):
     matrix = stiffness(points, blocks)
     force, stress = internal_force(points, blocks, field), nodal_stress(points, blocks, field)
-    return matrix.data, stiffness(points, blocks, single=True).data, force, stress
+    size, strain = sizes(points, blocks, field), largest_strain(points, blocks, field[0])
+    largest = np.array([size.highest]), np.array([size.slender]), np.array(strain)
+    single = stiffness(points, blocks, single=True)
+    return matrix.data, single.data, force, stress, size.forces, size.stress, *largest
 
 
 @pytest.mark.parametrize("name", SOLID)
@@ -79,12 +83,46 @@ def test_a_stretched_cube_by_hand(monkeypatch):
     np.testing.assert_allclose(product, force.ravel(), atol=1e-14)
 
 
+def test_the_sizes_of_a_stretched_cube_by_hand(monkeypatch):
+    """u = x in cells of edge ½: slopes √3/2 at 8 nodes, apart by ½ at 4 of them."""
+    choose(True, monkeypatch)
+    points, cells = grid(2)
+    lame, shear = 3.0, 0.5
+    block = Block(BY_NAME["HEXA8"], cells, np.full(8, lame), np.full(8, shear))
+    field = np.zeros((1, *points.shape))
+    field[0, :, 0] = points[:, 0]
+    found, slope = sizes(points, [block], field), np.sqrt(3) / 2
+    term = (lame + 2 * shear) * slope * 4 / 2
+    around = np.where(np.abs(2 * points - 1) == 1, 1, 2).prod(axis=1)
+    assert found.highest == pytest.approx(term, rel=1e-14)
+    assert found.slender == pytest.approx(term * slope * np.sqrt(3) / 2, rel=1e-14)
+    np.testing.assert_allclose(found.forces, around * term * slope / 8, rtol=1e-14)
+    norm = np.sqrt((lame + 2 * shear) ** 2 + 2 * lame**2)
+    np.testing.assert_allclose(found.stress, norm, rtol=1e-14)
+
+
+@pytest.mark.parametrize("values", [(3, -2, 1), (-4, -4, 1), (2, 2, -1), (0, 0, -5), (1, 1, 1)])
+def test_the_largest_principal_strain_and_rotation_are_known(values, monkeypatch):
+    """Equal principal values too; the gradient of u is the strain plus a turn by 0.2."""
+    choose(True, monkeypatch)
+    points, cells = grid(2)
+    axes = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+    turn = 0.2 * np.cross(np.eye(3), axes[1])
+    gradient = axes @ np.diag(values) @ axes.T + turn
+    block = Block(BY_NAME["HEXA8"], cells, np.ones(8), np.ones(8))
+    found = largest_strain(points, [block], points @ gradient.T)
+    assert found == pytest.approx((np.abs(values).max(), 0.2), rel=1e-14)
+
+
 def test_an_inverted_cell_is_refused(monkeypatch):
     choose(True, monkeypatch, 2)
     points, cells = grid(2)
     cells[5] = cells[5, [4, 5, 6, 7, 0, 1, 2, 3]]
     about = points, [Block(BY_NAME["HEXA8"], cells, np.ones(8), np.ones(8))]
-    for compute, *field in ((stiffness,), (internal_force, points), (nodal_stress, points)):
+    for compute, *field in (
+        (stiffness,),
+        *((call, points) for call in (internal_force, nodal_stress, sizes, largest_strain)),
+    ):
         with pytest.raises(SolveError, match="HEXA8 cells are inverted"):
             compute(*about, *field)
 

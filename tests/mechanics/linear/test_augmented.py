@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.augmented import augment
+from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear.multigrid import Multigrid
+from solver.mechanics.linear.systems import Part, Systems
 from solver.system.errors import SolveError
+from tests.mechanics.linear.test_contact_levels import pressed
 
 COUNT = 30
 
@@ -42,7 +47,7 @@ def test_equilibrium_under_overlapping_constraints(held, ratio, unit):
     matrix, constraints = sparse.block_diag(blocks).tocsr(), unit * overlapping(COUNT)
     rng = np.random.default_rng(0)
     force, violation = rng.standard_normal((60, 2)), unit * rng.standard_normal((10, 2))
-    system = augment(matrix, constraints, 2, "tried")
+    system = augment(matrix, constraints, "tried")
     found = system.correction(force, violation)
     true, multiplier = exact(matrix, constraints, force, violation)
     np.testing.assert_allclose(constraints @ found, violation, atol=1e-12 * np.abs(violation).max())
@@ -57,7 +62,7 @@ def test_equilibrium_under_overlapping_constraints(held, ratio, unit):
 def test_a_force_that_no_multiplier_balances_is_seen():
     """Unknown 1 lies in no constraint: what acts there stays."""
     matrix = sparse.identity(3, format="csr")
-    system = augment(matrix, sparse.csr_matrix([[1.0, 0.0, -1.0]]), 2, "tried")
+    system = augment(matrix, sparse.csr_matrix([[1.0, 0.0, -1.0]]), "tried")
     assert system.imbalance(np.array([2.0, 5.0, -2.0]), np.zeros(1)) == pytest.approx(5.0)
     assert system.multiplier(np.array([2.0, 5.0, -2.0])) == pytest.approx([-2.0])
 
@@ -66,9 +71,80 @@ def test_what_leaves_no_solution_is_refused():
     matrix = springs(4)
     twice = sparse.csr_matrix([[1.0, 1.0, 0.0, 0.0], [1.0, 1.0 + 1e-7, 0.0, 0.0]])
     with pytest.raises(SolveError, match="singular to working precision"):
-        augment(matrix, twice, 2, "tried")
+        augment(matrix, twice, "tried")
     with pytest.raises(SolveError, match="a constraint holds no unknown"):
-        augment(matrix, 0 * twice, 2, "tried")
+        augment(matrix, 0 * twice, "tried")
     floating = sparse.block_diag([springs(2, held=False), springs(2)]).tocsr()
     with pytest.raises(SolveError):
-        augment(floating, sparse.csr_matrix([[0.0, 0.0, 1.0, 0.0]]), 2, "tried")
+        augment(floating, sparse.csr_matrix([[0.0, 0.0, 1.0, 0.0]]), "tried")
+
+
+def sharing(slave: int, master: int):
+    """Two blocks; each constraint is the mean of the gaps at a slave node and beside it."""
+    matrix, gaps, _, unknowns = pressed(slave, master)
+    line = sparse.diags([1.0, 4.0, 1.0], [-1, 0, 1], shape=(slave + 1,) * 2)
+    return matrix, (sparse.kron(line, line) @ gaps).tocsr(), unknowns
+
+
+def loaded(matrix, constraints):
+    """Force, violation, and the displacement that they lead to."""
+    rng = np.random.default_rng(1)
+    force, violation = (rng.standard_normal(n) for n in constraints.shape[::-1])
+    whole = sparse.bmat([[matrix, -constraints.T], [constraints, None]]).tocsc()
+    found = sparse.linalg.splu(whole).solve(np.concatenate([force, violation]))
+    return force, violation, *np.split(found, [len(force)])
+
+
+@pytest.mark.parametrize(("slave", "master"), [(10, 8), (8, 10), (12, 3), (2, 1)])
+def test_multigrid_of_overlapping_constraints(slave, master, monkeypatch):
+    """In few iterations; the exact solve beside contact is needed, however large its share."""
+    monkeypatch.setattr(multigrid, "_MOST_BESIDE", 0.0)
+    matrix, constraints, unknowns = sharing(slave, master)
+    force, violation, exact, multiplier = loaded(matrix, constraints)
+    with force_solver("multigrid"):
+        system = augment(matrix, constraints, "tried", unknowns)
+    found = system.correction(force, violation)
+    assert "multigrid" in system.factor.name
+    assert system.factor.iterations <= 50
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-10 * np.abs(exact).max())
+    left = force - matrix @ found
+    largest = np.abs(multiplier).max()
+    np.testing.assert_allclose(system.multiplier(left), multiplier, rtol=0, atol=1e-9 * largest)
+
+
+def test_each_correction_gains_the_digits_asked_for():
+    """Forces that multipliers balance do not count: each step leaves 1e-4 of the error before."""
+    matrix, constraints, unknowns = sharing(8, 6)
+    force, violation, exact, _ = loaded(matrix, constraints)
+    with force_solver("multigrid"):
+        system = augment(matrix, constraints, "tried", unknowns)
+    found, errors = np.zeros(len(force)), [1.0]
+    for _ in range(3):
+        left = force - matrix @ found, violation - constraints @ found
+        found = found + system.correction(*left, 1e-4)
+        errors.append(np.abs(found - exact).max() / np.abs(exact).max())
+    assert (np.divide(errors[1:], errors[:-1]) < [1e-2, 1e-2, 1e-2]).all()
+    assert errors[-1] < 1e-10
+
+
+def test_multigrid_that_gave_up_is_not_tried_for_another_status(monkeypatch):
+    tried = []
+
+    def give_up(self, right, accuracy):
+        tried.append(self)
+        raise SolveError("conjugate gradients leave a residual of 1e-02 in 50 iterations")
+
+    monkeypatch.setattr(Multigrid, "solve", give_up)
+    matrix, constraints, unknowns = sharing(4, 3)
+    m, n = constraints.shape
+    parts = [Part(np.ones(n, dtype=bool), np.ones(m, dtype=bool))]
+    systems = Systems(matrix, constraints, None, unknowns, parts)
+    force = np.random.default_rng(2).standard_normal(n)
+    with force_solver("multigrid"):
+        for closed in (np.ones(m, dtype=bool), np.arange(m) % 5 > 0):
+            system = systems.closed(closed)
+            change = system.correction(force, np.zeros(int(closed.sum())))
+            assert "conjugate gradients leave a residual" in system.why
+            np.testing.assert_allclose(constraints[closed] @ change, 0.0, atol=1e-12)
+            assert system.imbalance(force - matrix @ change, np.zeros(1)) < 1e-9
+    assert len(tried) == 1

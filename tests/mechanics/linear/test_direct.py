@@ -121,6 +121,14 @@ def test_diagonal_matrix(kind):
         np.testing.assert_allclose(factor.solve(values), 1.0, rtol=4e-16)
 
 
+def test_columns_in_single_precision(kind):
+    """As multigrid has them: also without MKL, whose factor has that precision."""
+    exact = np.arange(1, 8, dtype=np.float32)[:, None]
+    matrix = springs(7)
+    solve = BACKENDS[kind].factor(csr_matrix(triu(matrix)), True)
+    np.testing.assert_allclose(solve((matrix @ exact).astype(np.float32)), exact, rtol=1e-6)
+
+
 def test_no_unknowns():
     assert factorise(csr_matrix((0, 0))).solve(np.zeros(0)).shape == (0,)
 

@@ -91,6 +91,55 @@ def test_no_end_is_an_error_and_not_an_answer():
         searched(solve, np.full(3, True), stiffness=lambda: np.eye(3))
 
 
+def test_a_search_that_shrinks_ring_by_ring_goes_on():
+    """The second ring has one macro-element, fewer than each of the next nineteen."""
+    rings = [30, 1, *range(20, 0, -1)]
+    closed_before = (8 + np.cumsum(rings[::-1])[::-1]).tolist()
+
+    def solve(closed):
+        pressure, count = np.where(closed, 1.0, 0.0), int(closed.sum())
+        if count in closed_before:
+            ring = rings[closed_before.index(count)]
+            pressure[count - ring : count] = -1.0
+        return trial(pressure, np.where(closed, 0.0, 1.0))
+
+    result = searched(solve, np.full(8 + sum(rings), True))
+    assert result.changes == rings
+    assert result.closed.sum() == 8
+
+
+def test_no_more_close_at_once_than_are_closed_and_the_worst_first():
+    """One holds all the load and sinks in; any other number that is closed holds what it should."""
+    deep = np.where(np.arange(400) < 300, 1.0 + np.arange(400), -1.0)
+
+    def solve(closed):
+        return trial(np.where(closed, deep, 0.0), np.where(closed, 0.0, -deep))
+
+    result = searched(solve, np.arange(400) == 0)
+    assert result.changes == [50, 51, 102, 96]
+    np.testing.assert_array_equal(result.closed, deep > 0)
+
+
+def test_the_search_is_repeated_from_a_guess_before_the_complementarity_problem():
+    """From all closed it alternates between halves; the guess is one step from the end."""
+    even, count = np.arange(40) % 2 == 0, 40
+
+    def solve(closed):
+        if closed[:4].all():
+            return trial(np.where(even, -1.0, 1.0), np.zeros(count))
+        wrong = closed if closed.sum() >= 10 else np.zeros(count, dtype=bool)
+        gap = np.where(~closed & (closed.sum() >= 10), -1.0, 1.0)
+        return trial(np.where(wrong, -1.0, 1.0), np.where(closed, 0.0, gap))
+
+    guess = np.arange(count) < 3
+    start, all_may = np.full(count, True), np.full(count, True)
+    found = find_status(solve, start, all_may, np.ones(count), not_needed, guess=guess)
+    np.testing.assert_array_equal(found.closed, guess)
+    assert found.iterations == len(found.changes) + 1 > 10
+    with pytest.raises(AssertionError, match="suffices"):
+        find_status(solve, start, all_may, np.ones(count), not_needed)
+
+
 def stiff_blocks(seed, count=40):
     """Gaps that stiff beams couple, on soft springs: `solve`, and what gaps bring up.
 

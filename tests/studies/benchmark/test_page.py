@@ -75,7 +75,7 @@ def test_the_page_shows_shares_above_one_and_speed_ups(tmp_path):
     """3 GB in 2 s are 1.5 GB/s: 1.5 times a bandwidth of 1 GB/s, 0.5 times one of 3 GB/s."""
     solves = [
         {"title": "HEXA8", "outcome": "solved", "threads": threads, "dofs": 12345}
-        | {"bandwidth": bandwidth, "parts": {"stage solve": {"seconds": s, "bytes": 3e9}}}
+        | {"bandwidth": bandwidth, "parts": {"solve": {"seconds": s, "bytes": 3e9, "cpu": 2.5}}}
         for threads, bandwidth, s in ((1, 1e9, 2.0), (2, 3e9, 1.25))
     ]
     comparison = {"title": "T <", "series": "S", "repetitions": 0, "ways": [way("a"), LOST]}

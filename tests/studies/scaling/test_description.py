@@ -112,7 +112,8 @@ def test_an_unknown_point(read):
             lambda c: c["goals"][0].update(series="hexa"),
             r"goals\[0\].series .* no such ser",
         ),
-        (lambda c: c["goals"][0].update(what="speed"), "must be cpu, wall, memory, pressure, or"),
+        (lambda c: c["goals"][0].update(over="hexa"), r"goals\[0\].over .* no such ser"),
+        (lambda c: c["goals"][0].update(what="speed"), "must be cpu, wall, memory, pressure, st"),
     ],
 )
 def test_what_is_refused(content, read, change, message):

@@ -10,7 +10,14 @@ from msgspec import structs
 
 from solver.studies.scaling.description import read_scaling
 from solver.studies.scaling.page import write_scaling
-from solver.studies.scaling.records import OTHER, failures, reached, read_series, speed_ups
+from solver.studies.scaling.records import (
+    OTHER,
+    by_free_software,
+    failures,
+    reached,
+    read_series,
+    speed_ups,
+)
 from tests.report.test_charts import specifications
 
 ROOT = Path(__file__).parents[3]
@@ -88,6 +95,24 @@ def test_goals_are_compared_with_what_was_measured(scaling, results):
     assert found["fine-slave", "growth of pairing", None].value is None
 
 
+def test_a_goal_may_be_a_ratio_to_another_series(scaling, results):
+    """A sphere that takes six statuses and 2.5 times the time of the blocks."""
+    full = read_scaling(scaling.path)
+    sphere = next(s for s in full.series if s.name == "sphere")
+    both = replace(scaling, series=(*scaling.series, sphere))
+    (results / "sphere").mkdir()
+    goals = {("cpu", "hexa8"): (2.5, True), ("statuses", None): (6, True)}
+    for point in [p for p in both.points if p.series is sphere]:
+        slow = record(point, iterations=6)
+        slow["process"] = slow["process"] | {"cpu": 2.5 * slow["process"]["cpu"]}
+        (results / f"{point.name}.json").write_text(json.dumps(slow))
+    found = [r for r in reached(both, read_series(both, results)) if r.goal.series == "sphere"]
+    assert {(r.goal.what, r.goal.over): (pytest.approx(r.value), r.good) for r in found} == goals
+    (results / "hexa8" / "300000.json").unlink()
+    found = [r for r in reached(both, read_series(both, results)) if r.goal.over == "hexa8"]
+    assert [(r.value, r.why) for r in found] == [(None, "missing: not measured")]
+
+
 def test_an_exponent_of_small_sizes_answers_no_goal(scaling, results):
     series = tuple(structs.replace(s, sizes=s.sizes[:2]) for s in scaling.series)
     small = replace(scaling, series=series)
@@ -130,7 +155,7 @@ def test_speed_up_is_wall_time_on_few_threads_over_that_on_many(scaling, results
         slow["process"] = slow["process"] | {"wall": 1.5}
         (results / f"{point.name}.json").write_text(json.dumps(slow))
     found = speed_ups(read_series(both, results))
-    assert [(u.few.point.series.name, u.many.point.size) for u in found] == [
+    assert [(u.one.point.series.name, u.other.point.size) for u in found] == [
         ("hexa8-one", size) for size in hexa.sizes
     ]
     assert [u.of("whole") for u in found] == pytest.approx([1.5] * len(found))
@@ -145,6 +170,31 @@ def test_speed_up_is_wall_time_on_few_threads_over_that_on_many(scaling, results
     assert "<td class=n>10.00</td>" in page
     write_scaling(scaling, results, tmp_path / "page")
     assert "Speed-up" not in (tmp_path / "page" / "scaling.html").read_text()
+
+
+def test_free_software_alone_is_compared_with_all_packages(scaling, results, tmp_path):
+    """A series on one thread and with free software has no counterpart, the others one."""
+    hexa = next(s for s in scaling.series if s.name == "hexa8")
+    free = structs.replace(hexa, name="hexa8-free", free=True, sizes=(10_000,))
+    slow = structs.replace(free, name="free-one", threads=1)
+    both = replace(scaling, series=(*scaling.series, free, slow))
+    for series in (free, slow):
+        [point] = [p for p in both.points if p.series is series]
+        found = record(point, threads=series.threads or 2) | {"linear_solver": "a free one"}
+        found["process"] = found["process"] | {"wall": 1.25, "peak_memory_mb": 300.0}
+        (results / series.name).mkdir()
+        (results / f"{point.name}.json").write_text(json.dumps(found))
+    lines = read_series(both, results)
+    [pair] = by_free_software(lines)
+    assert (pair.one.point.name, pair.other.point.name) == ("hexa8-free/10000", "hexa8/10000")
+    # On threads it is the other way round: of two by free software.
+    [pair] = speed_ups(lines)
+    assert (pair.one.point.series.name, pair.other.point.series.name) == ("free-one", "hexa8-free")
+    write_scaling(both, results, tmp_path / "page")
+    page = (tmp_path / "page" / "scaling.html").read_text()
+    assert "Free software alone" in page
+    for words in ("a free one", "×1.25", "0.30 GB</td><td class=n>×3.00"):
+        assert words in page
 
 
 def test_points_whose_checks_fail_are_listed(scaling, results):

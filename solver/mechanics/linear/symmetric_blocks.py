@@ -1,0 +1,253 @@
+"""Symmetric matrices in blocks, most pairs of rows and columns stored once: half the memory.
+
+A product is as fast as memory is read, so half the blocks take about half the time.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import bsr_matrix, csr_matrix
+
+from ...system.compiled import compiled, worthwhile
+from ...system.threads import ahead
+from .products import chosen_rows, in_pieces, multiply, pattern, ranges
+
+_SLABS = 8  # the most threads that share a product
+
+
+@dataclass(frozen=True)
+class SymmetricBlocks:
+    """A symmetric matrix W + U + Uᵀ of square blocks, (n, n).
+
+    `upper` U: the blocks above the diagonal whose row and column are in the same slab of rows;
+    `whole` W: all others. A thread writes the rows of its slab alone, and the matrix alone says
+    what the slabs are: no sum depends on the number of threads. Without `upper` W is everything.
+    """
+
+    whole: bsr_matrix
+    upper: bsr_matrix | None = None
+    slabs: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n, n)."""
+        return self.whole.shape
+
+    @property
+    def dtype(self) -> np.dtype:
+        """The precision of the blocks."""
+        return self.whole.dtype
+
+    @property
+    def blocksize(self) -> int:
+        """The edge of a block."""
+        return int(self.whole.blocksize[0])
+
+    @property
+    def parts(self) -> Iterator[bsr_matrix]:
+        """W, and U if there is one."""
+        yield self.whole
+        if self.upper is not None:
+            yield self.upper
+
+    def multiply(
+        self,
+        x: np.ndarray,
+        base: np.ndarray | None = None,
+        factor: float = 1.0,
+        share: float = 1.0,
+        own: float = 0.0,
+        out: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """`factor` · A x + `share` · `base` + `own` · x, for x and `base` (n,) of one precision.
+
+        Computed in the precision of x. `out` (n,), if given, is neither x nor `base`.
+        """
+        if out is None:
+            out = np.empty_like(x)
+        numbers = tuple(x.dtype.type(c) for c in (factor, 0 if base is None else share, own))
+        if self.upper is None:
+            out[:] = numbers[2] * x if base is None else numbers[1] * base + numbers[2] * x
+            return multiply(self.whole, x, out, factor, out)
+        arrays = [a for part in self.parts for a in (part.indptr, part.indices, part.data)]
+        vectors = x, x if base is None else base, out
+        kernel = _PRODUCTS[self.blocksize]
+        for _ in ahead(lambda some: kernel(*some, *arrays, *vectors, *numbers), self.slabs):
+            pass
+        return out
+
+    def chosen_rows(self, rows: np.ndarray) -> csr_matrix:
+        """Some rows (r,), one by one."""
+        found = chosen_rows(self.whole, rows)
+        if self.upper is None:
+            return found
+        return (found + chosen_rows(self.upper, rows) + self._below(rows)).tocsr()
+
+    def _below(self, rows: np.ndarray) -> csr_matrix:
+        """Some rows (r,) of Uᵀ."""
+        assert self.upper is not None
+        edge, count = self.blocksize, len(self.upper.indptr) - 1
+        chosen, local = np.unique(rows // edge, return_inverse=True)
+        number = np.full(count, -1, dtype=np.int32)
+        number[chosen] = np.arange(len(chosen))
+        entries = np.flatnonzero(number[self.upper.indices] >= 0)
+        row = number[self.upper.indices[entries]]
+        order = np.argsort(row, kind="stable")
+        column = np.searchsorted(self.upper.indptr, entries[order], side="right") - 1
+        starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(chosen)))])
+        arrays = self.upper.data[entries[order]].transpose(0, 2, 1), column, starts
+        some = bsr_matrix(arrays, shape=(edge * len(chosen), self.shape[1]))
+        return some.tocsr()[edge * local + rows % edge]
+
+    def times_pattern(self, x: np.ndarray) -> np.ndarray:
+        """The pattern of blocks, a one for each, times x (n / edge,)."""
+        found = pattern(self.whole) @ x
+        if self.upper is not None:
+            near = pattern(self.upper)
+            found = found + near @ x + near.T @ x
+        return np.asarray(found)
+
+    def diagonal(self) -> np.ndarray:
+        """The diagonal (n,)."""
+        return np.asarray(self.whole.diagonal())
+
+    def tobsr(self) -> bsr_matrix:
+        """All blocks, rows sorted."""
+        if self.upper is None:
+            return self.whole
+        full = self.whole + self.upper + self.upper.T
+        full.sort_indices()
+        return full.tobsr((self.blocksize,) * 2)
+
+
+def halved(matrix: bsr_matrix) -> SymmetricBlocks:
+    """A symmetric `matrix`: its blocks below the diagonal are not read where one above serves.
+
+    Everything stays where no compiled product is worthwhile; SciPy would copy blocks to transpose.
+    """
+    edge = matrix.blocksize[0]
+    if edge not in _PRODUCTS or not worthwhile(matrix.data.size):
+        return SymmetricBlocks(matrix)
+    slabs = ranges(matrix.indptr, edge**2, _SLABS)
+    slab = np.repeat(np.arange(len(slabs), dtype=np.int8), [last - first for first, last in slabs])
+    kinds = np.empty(len(matrix.indices), dtype=np.int8)
+
+    def sort(first: int, last: int) -> None:
+        some = slice(*matrix.indptr[[first, last]])
+        rows = np.repeat(np.arange(first, last), np.diff(matrix.indptr[first : last + 1]))
+        columns = matrix.indices[some]
+        inside = (slab[rows] == slab[columns]) & (rows != columns)
+        kinds[some] = np.where(inside, np.where(rows < columns, _UPPER, _LOWER), _WHOLE)
+
+    in_pieces(sort, matrix)
+    whole, upper = (_of_kind(matrix, kinds, kind) for kind in (_WHOLE, _UPPER))
+    return SymmetricBlocks(whole, upper, tuple(slabs))
+
+
+_WHOLE, _UPPER, _LOWER = range(3)
+
+
+def _of_kind(matrix: bsr_matrix, kinds: np.ndarray, kind: int) -> bsr_matrix:
+    """The blocks of one of the `kinds` (nnz,)."""
+    before = np.concatenate([[0], np.cumsum(kinds == kind, dtype=matrix.indptr.dtype)])
+    starts = before[matrix.indptr].astype(matrix.indptr.dtype)
+    data = np.empty((starts[-1], *matrix.blocksize), dtype=matrix.dtype)
+    indices = np.empty(starts[-1], dtype=matrix.indices.dtype)
+
+    def fill(first: int, last: int) -> None:
+        some, into = slice(*matrix.indptr[[first, last]]), slice(*starts[[first, last]])
+        chosen = kinds[some] == kind
+        data[into], indices[into] = matrix.data[some][chosen], matrix.indices[some][chosen]
+
+    in_pieces(fill, matrix)
+    return bsr_matrix((data, indices, starts), shape=matrix.shape)
+
+
+@compiled
+def _product_of_three(  # type: ignore[no-untyped-def]
+    first, last, w_starts, w_columns, whole, u_starts, u_columns, upper,
+    x, base, out, factor, share, own,
+):  # fmt: skip
+    for i in range(3 * first, 3 * last):
+        out[i] = 0
+    for i in range(first, last):
+        a = b = c = d = e = f = g = h = p = factor - factor
+        for k in range(w_starts[i], w_starts[i + 1]):
+            j = 3 * w_columns[k]
+            u, v, w = x[j], x[j + 1], x[j + 2]
+            a += whole[k, 0, 0] * u
+            b += whole[k, 0, 1] * v
+            c += whole[k, 0, 2] * w
+            d += whole[k, 1, 0] * u
+            e += whole[k, 1, 1] * v
+            f += whole[k, 1, 2] * w
+            g += whole[k, 2, 0] * u
+            h += whole[k, 2, 1] * v
+            p += whole[k, 2, 2] * w
+        q = 3 * i
+        r, s, t = x[q], x[q + 1], x[q + 2]
+        for k in range(u_starts[i], u_starts[i + 1]):
+            j = 3 * u_columns[k]
+            u, v, w = x[j], x[j + 1], x[j + 2]
+            a += upper[k, 0, 0] * u
+            b += upper[k, 0, 1] * v
+            c += upper[k, 0, 2] * w
+            d += upper[k, 1, 0] * u
+            e += upper[k, 1, 1] * v
+            f += upper[k, 1, 2] * w
+            g += upper[k, 2, 0] * u
+            h += upper[k, 2, 1] * v
+            p += upper[k, 2, 2] * w
+            out[j] += upper[k, 0, 0] * r + upper[k, 1, 0] * s + upper[k, 2, 0] * t
+            out[j + 1] += upper[k, 0, 1] * r + upper[k, 1, 1] * s + upper[k, 2, 1] * t
+            out[j + 2] += upper[k, 0, 2] * r + upper[k, 1, 2] * s + upper[k, 2, 2] * t
+        out[q] = factor * (out[q] + (a + b + c)) + share * base[q] + own * r
+        out[q + 1] = factor * (out[q + 1] + (d + e + f)) + share * base[q + 1] + own * s
+        out[q + 2] = factor * (out[q + 2] + (g + h + p)) + share * base[q + 2] + own * t
+
+
+@compiled
+def _product_of_six(  # type: ignore[no-untyped-def]
+    first, last, w_starts, w_columns, whole, u_starts, u_columns, upper,
+    x, base, out, factor, share, own,
+):  # fmt: skip
+    for i in range(6 * first, 6 * last):
+        out[i] = 0
+    for i in range(first, last):
+        q = 6 * i
+        for k in range(w_starts[i], w_starts[i + 1]):
+            j = 6 * w_columns[k]
+            u, v, w, x3, x4, x5 = x[j], x[j + 1], x[j + 2], x[j + 3], x[j + 4], x[j + 5]
+            for m in range(6):
+                out[q + m] += (
+                    whole[k, m, 0] * u + whole[k, m, 1] * v + whole[k, m, 2] * w
+                    + whole[k, m, 3] * x3 + whole[k, m, 4] * x4 + whole[k, m, 5] * x5
+                )  # fmt: skip
+        for k in range(u_starts[i], u_starts[i + 1]):
+            j = 6 * u_columns[k]
+            u, v, w, x3, x4, x5 = x[j], x[j + 1], x[j + 2], x[j + 3], x[j + 4], x[j + 5]
+            a = b = c = d = e = f = factor - factor
+            for m in range(6):
+                value = x[q + m]
+                out[q + m] += (
+                    upper[k, m, 0] * u + upper[k, m, 1] * v + upper[k, m, 2] * w
+                    + upper[k, m, 3] * x3 + upper[k, m, 4] * x4 + upper[k, m, 5] * x5
+                )  # fmt: skip
+                a += upper[k, m, 0] * value
+                b += upper[k, m, 1] * value
+                c += upper[k, m, 2] * value
+                d += upper[k, m, 3] * value
+                e += upper[k, m, 4] * value
+                f += upper[k, m, 5] * value
+            out[j] += a
+            out[j + 1] += b
+            out[j + 2] += c
+            out[j + 3] += d
+            out[j + 4] += e
+            out[j + 5] += f
+        for m in range(q, q + 6):
+            out[m] = factor * out[m] + share * base[m] + own * x[m]
+
+
+_PRODUCTS: dict[int, Callable[..., None]] = {3: _product_of_three, 6: _product_of_six}

@@ -1,0 +1,112 @@
+"""A scaled system in the rows of the first level: products against dense ones; symmetric cycles."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+
+from solver.mechanics.linear import contact_levels, products, symmetric_blocks
+from solver.mechanics.linear.condensed_matrix import CondensedMatrix
+from solver.mechanics.linear.multigrid import Multigrid
+from solver.mechanics.linear.nodal_matrix import NodalMatrix
+from solver.mechanics.linear.scaled_system import ScaledSystem
+from solver.mechanics.linear.symmetric_blocks import halved
+from solver.system.compiled import available
+from tests.mechanics.linear.test_contact_levels import condensed, pressed
+from tests.mechanics.linear.test_symmetric_blocks import symmetric
+
+PLAIN, DOUBLE, SINGLE, OTHER = "entries", "blocks", "blocks scaled in place", "scaled otherwise"
+
+
+@pytest.mark.parametrize("kind", [PLAIN, DOUBLE, SINGLE, OTHER])
+@pytest.mark.parametrize("springs", [None, 0, 2])
+def test_product_is_the_one_of_the_scaled_dense_matrix(kind, springs):
+    """Of a stiffness, and of one of which seven unknowns are eliminated; springs in two of them."""
+    single, rng = kind in (SINGLE, OTHER), np.random.default_rng(5)
+    blocks = symmetric(3, np.float32 if single else float)
+    free = np.flatnonzero(rng.random(blocks.shape[0]) < 0.8)
+    n, scale = len(free), rng.uniform(0.5, 2, len(free))
+    dense = blocks.toarray()[np.ix_(free, free)].astype(float)
+    stiffness = csr_matrix(dense) if kind is PLAIN else NodalMatrix(blocks, free)
+    place = free
+    if kind is PLAIN:
+        place = rng.permutation(blocks.shape[0])[:n]
+    else:
+        stiffness.halve(halved(stiffness.scaled(scale if kind is not OTHER else scale**2)))
+    matrix, close = stiffness, 1e-6 if single else 1e-14
+    if springs is not None:
+        kept = np.delete(np.arange(n), rng.permutation(n)[:7])
+        added = np.zeros((len(kept) + springs,) * 2)
+        some = np.r_[3:9, len(kept) : len(added)]
+        added[np.ix_(some, some)] = rng.standard_normal((len(some), len(some))) + 9 * np.eye(
+            len(some)
+        )
+        matrix = CondensedMatrix(stiffness, kept, csr_matrix(added + added.T))
+        held = np.zeros_like(added)
+        held[: len(kept), : len(kept)] = dense[np.ix_(kept, kept)]
+        dense = held + added + added.T
+    system = ScaledSystem(matrix, scale, place, blocks.shape[0])
+    exact = dense * np.outer(system.scale, system.scale)
+    x = rng.standard_normal((len(dense), 2))
+    padded = system.placed(x)
+    before = padded.copy()
+    found = system.multiply(padded)
+    np.testing.assert_array_equal(padded, before)
+    np.testing.assert_allclose(found[system.place], exact @ x, atol=close * 9 * np.abs(exact).max())
+    assert not np.delete(found, system.place, axis=0).any()
+    np.testing.assert_array_equal(system.solution(padded), x * system.scale[:, None])
+    np.testing.assert_array_equal(system.lifted(x), system.placed(x * system.scale[:, None]))
+    ones = np.ones_like(padded)
+    np.testing.assert_array_equal(system.without_idle(ones), system.placed(np.ones_like(x)))
+
+
+@pytest.mark.parametrize("compiled", [available(), False])
+def test_a_cycle_is_symmetric_and_positive(compiled, monkeypatch):
+    """With contact, an exact solve beside it, and pivots: to single precision."""
+    for module in (products, symmetric_blocks):
+        monkeypatch.setattr(module, "worthwhile", lambda numbers: compiled)
+    matrix, gaps, own, unknowns = pressed(6, 5)
+    solver = Multigrid(condensed(matrix, gaps, own, unknowns), unknowns)
+    assert solver._levels[0].interface is not None
+    rng, n = np.random.default_rng(6), len(solver.scale)
+    some = rng.standard_normal((n, 6))
+    images = np.stack([solver.cycle(column) for column in some.T], axis=1)
+    energy = some.T @ images
+    np.testing.assert_allclose(energy, energy.T, rtol=0, atol=1e-4 * np.abs(energy).max())
+    assert (np.linalg.eigvalsh(energy + energy.T) > 0).all()
+
+
+def test_smoothing_under_contact_is_the_polynomial():
+    """x = W^½ p(W^½ A W^½) W^½ r with Lottes' weights, for A with its correction, in dense form."""
+    matrix, gaps, own, unknowns = pressed(6, 5)
+    solver = Multigrid(condensed(matrix, gaps, own, unknowns), unknowns)
+    level = solver._levels[0]
+    dense = level.matrix.tobsr().toarray().astype(float)
+    rows, weight = level.correction.rows, np.ones(len(dense))
+    dense[np.ix_(rows, rows)] += level.correction.matrix.toarray()
+    weight[rows] = level.weight
+    assert (weight == 0).any()
+    assert ((weight > 0) & (weight != 1)).any()
+    right = np.random.default_rng(7).standard_normal(len(dense))
+    first, second, bound = 1.02387287570313, 1.26408905371085, float(level.bound)
+    step = 4 / 3 / bound * weight * right
+    following = step / 5 + 12 / 5 / bound * weight * (right - dense @ step)
+    exact = first * step + second * following
+    found = level.smooth(right.astype(np.float32))
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+
+
+def test_springs_are_scaled_to_one():
+    added = csr_matrix(np.diag([2.0, 3.0, 16.0]))
+    condensed = CondensedMatrix(csr_matrix(np.eye(4)), np.array([0, 2]), added)
+    found = contact_levels.scales_of(condensed, np.array([5.0, 6.0, 7.0, 8.0]))
+    np.testing.assert_array_equal(found, [5.0, 7.0, 0.25])
+    np.testing.assert_array_equal(condensed.places, [0, 2, 1])
+
+
+def test_a_column_is_not_copied():
+    from solver.mechanics.linear.krylov import by_columns
+
+    x = np.arange(6.0)[:, None]
+    assert np.shares_memory(by_columns(lambda column: column, x), x)
+    both = by_columns(lambda column: 2 * column, np.ones((3, 2)))
+    np.testing.assert_array_equal(both, np.full((3, 2), 2.0))

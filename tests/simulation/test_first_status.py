@@ -1,0 +1,99 @@
+"""The contact status that a search starts from, on a graded sphere and on blocks that touch."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.mechanics.mortar import operator
+from solver.mechanics.mortar.pairing import candidate_pairs
+from solver.simulation import first_status
+from solver.simulation.first_status import first_guess, moved
+from solver.simulation.problem import ContactProblem
+from tests.simulation.test_rough_statuses import sphere
+
+
+@pytest.fixture(scope="module")
+def problem() -> ContactProblem:
+    return ContactProblem(sphere("[12, 12, 6]", "[10, 10, 6]"))
+
+
+def guessed(problem: ContactProblem, step, free_motion=lambda closed: ""):
+    return first_guess(problem.scene, problem.constraints, step, free_motion)
+
+
+def changed(problem: ContactProblem, start, before, step, free_motion=lambda closed: ""):
+    return moved(start, before, step, problem.scene, problem.constraints, free_motion)
+
+
+def test_a_step_starts_from_the_last_status_changed_as_the_guess_is(problem):
+    small, large = (guessed(problem, step) for step in (0.3, 1.0))
+    assert 0 < small.sum() < large.sum()
+    # A macro-element that no guess has, and one less than the guess of the step before.
+    start = small.copy()
+    start[[np.flatnonzero(small)[0], np.flatnonzero(~large)[-1]]] ^= True
+    more = changed(problem, start, 0.3, 1.0)
+    np.testing.assert_array_equal(more, start | (large & ~small))
+    np.testing.assert_array_equal(changed(problem, more, 1.0, 0.3), start)
+    np.testing.assert_array_equal(changed(problem, start, 0.3, 0.3), start)
+
+
+def test_a_start_that_leaves_a_body_free_is_not_taken(problem):
+    start = guessed(problem, 1.0)
+    kept = changed(problem, start, 1.0, 0.1, lambda closed: "a motion")
+    np.testing.assert_array_equal(kept, start)
+
+
+def test_a_guess_that_holds_no_body_is_widened_no_more_than_need_be(problem):
+    least = guessed(problem, 1.0).sum() + 5
+
+    def few(closed):
+        return "a motion" if closed.sum() < least else ""
+
+    guess, eligible = guessed(problem, 1.0, few), problem.constraints.eligible
+    assert least <= guess.sum() < eligible.sum()
+    gap = problem.constraints.initial / problem.constraints.covered
+    assert gap[guess].max() <= gap[~guess].min()
+    np.testing.assert_array_equal(guessed(problem, 1.0, lambda closed: "a motion"), eligible)
+
+
+def test_load_steps_of_a_growing_contact_take_fewer_solves(problem, monkeypatch):
+    def solves():
+        first = problem.solve(0.2)
+        found = problem.solve(1.0, first.status.closed, before=0.2)
+        return found.status
+
+    near = solves()
+    monkeypatch.setattr(first_status, "_likely", lambda *more: problem.constraints.eligible)
+    far = solves()
+    np.testing.assert_array_equal(near.closed, far.closed)
+    assert near.iterations < far.iterations
+
+
+def test_a_graded_surface_has_the_same_pairs_found_among_fewer(monkeypatch):
+    counted, found = [], []
+
+    def count(*arguments):
+        pairs = candidate_pairs(*arguments)
+        counted[-1] += len(pairs[0])
+        return pairs
+
+    monkeypatch.setattr("solver.mechanics.mortar.pairing.candidate_pairs", count)
+    for wider in (operator._WIDER, np.inf):
+        monkeypatch.setattr(operator, "_WIDER", wider)
+        counted.append(0)
+        found.append(sphere("[20, 20, 1]", "[18, 18, 1]").zones[0].operator)
+    assert counted[0] < 0.3 * counted[1]
+    few, all_pairs = found
+    assert few.segments == all_pairs.segments
+    for name in ("initial", "covered"):
+        np.testing.assert_allclose(getattr(few, name), getattr(all_pairs, name), rtol=1e-12)
+    assert abs(few.matrix - all_pairs.matrix).max() < 1e-13 * abs(all_pairs.matrix).max()
+
+
+def test_a_receding_contact_starts_from_the_last_status(problem):
+    """Surfaces that touch are all guessed closed at any load: the guess changes nothing."""
+    constraints = replace(problem.constraints, initial=np.zeros(len(problem.constraints.initial)))
+    start = np.arange(len(constraints.initial)) % 3 == 0
+    found = moved(start, 0.3, 1.0, problem.scene, constraints, lambda closed: "")
+    np.testing.assert_array_equal(found, start)
