@@ -132,9 +132,8 @@ class Hierarchy:
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale = self.scale * scale[self.place]
-        self._nodal = matrix if isinstance(matrix, NodalMatrix) else None
-        if self._nodal is not None:
-            self._nodal.now_scaled(self.scale)
+        if isinstance(matrix, NodalMatrix):
+            matrix.now_scaled(self.scale)
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
@@ -155,6 +154,8 @@ class Hierarchy:
             size = blocks.shape[0]
             raise SolveError(f"its levels end at {size} unknowns: nothing coarsens further")
         self.last = blocks
+        if isinstance(matrix, NodalMatrix) and self.levels:
+            matrix.halve(self.levels[0].matrix)
 
     def _add_linear(self, matrix: bsr_matrix, unknowns: Unknowns) -> tuple[bsr_matrix, LevelNodes]:
         """Add the level of quadratic cells; return matrix and nodes of the linear ones."""
@@ -175,8 +176,6 @@ class Hierarchy:
         left = np.ones(prolongation.shape[0], dtype=np.float32)
         scale_blocks(prolongation, left, scale.astype(np.float32))
         self.levels.append(Level(halved(matrix), bound, prolongation))
-        if self._nodal is not None and len(self.levels) == 1:
-            self._nodal.halve(self.levels[0].matrix)
         return below, replace(nodes, motions=motions)
 
 
