@@ -39,7 +39,8 @@ def free_stiffness(scene: Scene, unknowns: Unknowns, single: bool) -> tuple[Stif
     divergence = (mean.divergence[stiff] @ free.basis).tocsr()
     weight = beyond[stiff]
     schur = 1 / weight + near[stiff]
-    return StiffenedMatrix(soft, divergence, weight, schur, mean.stable), diagonal
+    about = mean.stable, mean.locks
+    return StiffenedMatrix(soft, divergence, weight, schur, *about), diagonal
 
 
 def free_unknowns(scene: Scene) -> Unknowns:
@@ -55,5 +56,5 @@ def free_unknowns(scene: Scene) -> Unknowns:
     if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
         return Unknowns(*about)
     return Unknowns(
-        *about, *linear_unknowns(basis, dim, *from_vertices(len(scene.points), scene.blocks))
+        *about, *linear_unknowns(basis, dim, *from_vertices(scene.points, scene.blocks))
     )

@@ -74,6 +74,7 @@ def test_a_stage_moves_its_files_and_arrays_once(tmp_path):
         (0.4, 2, 1.9, "arithmetic, temporary arrays"),
         (0.4, 2, 1.1, "one thread"),
         (0.4, 8, 4.0, "one thread"),
+        (0.4, 2, 0.3, "waiting"),
         (0.4, 1, 1.0, "arithmetic, temporary arrays"),
     ],
 )
@@ -89,11 +90,12 @@ def test_the_triad_is_three_arrays_over_its_time(monkeypatch):
 
 
 @pytest.fixture
-def solve(tmp_path, monkeypatch):
+def solve(tmp_path, monkeypatch, request):
     """A small block solved by multigrid, beside a bandwidth of 1 MB/s."""
     from solver.commands.cli import main
 
-    series = next(s for s in read_scaling(FILE).series if s.name == "hexa8")
+    name = getattr(request, "param", "hexa8")
+    series = next(s for s in read_scaling(FILE).series if s.name == name)
     case, mesh = tmp_path / "case.yaml", tmp_path / "mesh.vtkhdf"
     case.write_text(ScalingPoint(series, 3000).source())
     assert main(["mesh", str(case), "-o", str(mesh)]) == 0
@@ -121,3 +123,11 @@ def test_the_parts_of_a_solve_add_up(solve):
         assert part.share == pytest.approx(part.moved / part.seconds / 1e6)
     assert bandwidth.table({"outcome": "failed"}) is None
     assert bandwidth.table(None) is None
+
+
+@pytest.mark.parametrize("solve", ["mixed-tetra10"], indirect=True)
+def test_the_iterations_of_the_mixed_form_are_counted(solve):
+    parts = solve["parts"]
+    within = [parts[name]["bytes"] for name in (SMOOTHER, TRANSFER)]
+    assert parts[ITERATIONS]["bytes"] == sum(within) > 0
+    assert parts[STAGE]["bytes"] == parts[ITERATIONS]["bytes"] + parts[SET_UP]["bytes"]

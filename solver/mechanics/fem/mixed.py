@@ -91,6 +91,12 @@ class MeanStress:
         """Whether displacements see all s, whatever the mesh: cells are quadratic (inf–sup)."""
         return all(part.block.type.order == 2 for part in self._parts)
 
+    @property
+    def locks(self) -> bool:
+        """Whether most cells are TETRA4, which have more s than displacements can follow."""
+        simplices = [len(part.cells) for part in self._parts if part.name == "TETRA4"]
+        return 2 * sum(simplices) > self.n_cells
+
     def stiffness(self, weight: np.ndarray | None = None) -> sparse.csr_matrix:
         """The part (n_dofs, n_dofs) of s in the stiffness once it is eliminated: Bᵀ C⁻¹ B.
 

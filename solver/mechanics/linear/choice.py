@@ -161,6 +161,8 @@ def _against_stiffened(matrix: Symmetric) -> str:
     """Why a matrix of nearly incompressible material is factored; empty where it is not."""
     if wanted() != "auto" or not isinstance(matrix, StiffenedMatrix):
         return ""
+    if matrix.locks:
+        return "nearly incompressible TETRA4 lock: multigrid does not converge"
     least, kind = _STIFFENED_FROM[matrix.stable], "" if matrix.stable else "linear "
     few = f"fewer than {least} unknowns, some of nearly incompressible {kind}cells"
     return f"{few}: a factor is faster than multigrid" * (matrix.shape[0] < least)

@@ -3,9 +3,12 @@
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import bsr_matrix, csr_matrix
 
 from .nodal_matrix import NodalMatrix
+from .unknowns import Unknowns, places
+
+_ROWS_AT_ONCE = 30_000  # whole nodes
 
 
 class Symmetric(Protocol):
@@ -78,3 +81,43 @@ class CondensedMatrix:
         found = csr_matrix(self.stiffness[self.kept][:, self.kept])
         found.resize(self.shape)
         return found + self.added
+
+
+def in_blocks(
+    matrix: Symmetric, scale: np.ndarray, unknowns: Unknowns
+) -> tuple[bsr_matrix, np.ndarray]:
+    """The scaled matrix in single precision and blocks of three, and the row (n,) of each unknown.
+
+    Rows without unknown are zero.
+    """
+    if isinstance(matrix, NodalMatrix):
+        return matrix.scaled(scale), matrix.free
+    place, size = places(unknowns)
+    return _of_rows(matrix, scale, place, size), place
+
+
+def _of_rows(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
+    """The same, row and column i at `place[i]` (n,) of `size`.
+
+    Rows are copied in parts, so that there is no second matrix in double precision.
+    """
+    order, place = np.argsort(place), place.astype(np.int32)
+    rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
+    blocks, columns = np.empty((0, 3, 3), dtype=np.float32), np.empty(0, dtype=np.int32)
+    for first in range(0, size, _ROWS_AT_ONCE):
+        last = min(first + _ROWS_AT_ONCE, size)
+        low, high = np.searchsorted(rows, (first, last))
+        some, counts = matrix[order[low:high]], np.zeros(last - first, dtype=int)
+        counts[rows[low:high] - first] = np.diff(some.indptr)
+        values = some.data * np.repeat(scale[order[low:high]], np.diff(some.indptr))
+        values *= scale[some.indices]
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        arrays = values.astype(np.float32), place[some.indices], starts
+        part = csr_matrix(arrays, shape=(last - first, size)).tobsr((3, 3))
+        before, after = len(columns), len(columns) + len(part.indices)
+        # An array grows by moved pages: there are never two copies of it.
+        blocks.resize((after, 3, 3), refcheck=False)
+        columns.resize(after, refcheck=False)
+        blocks[before:], columns[before:] = part.data, part.indices
+        lengths.append(np.diff(part.indptr))
+    return bsr_matrix((blocks, columns, np.cumsum(np.concatenate(lengths))), shape=(size, size))

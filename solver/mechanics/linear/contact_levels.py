@@ -106,7 +106,9 @@ def correction_of(
     some = slice(len(condensed.kept) + springs)
     eliminated = np.zeros(stiffness.shape[0], dtype=bool)
     eliminated[pivot] = True
-    added, gone = condensed.added[some, some].tocoo(), stiffness[pivot].tocoo()
+    added, gone = condensed.added[some, some].tocoo(), stiffness[pivot]
+    gone.eliminate_zeros()
+    gone = gone.tocoo()
     rows, columns = pivot[gone.row], gone.col
     once = ~eliminated[columns]
     removed = -gone.data * scale[rows] * scale[columns]

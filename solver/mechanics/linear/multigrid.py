@@ -2,10 +2,10 @@
 
 Nodes are gathered into aggregates, whose rigid motions are the unknowns of the next level (Vanek,
 Mandel, Brezina, Computing 56 (1996) 179). Quadratic cells have a level of linear cells on their
-vertices first. Every level is scaled to a diagonal of at most one and
-kept in single precision; the smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer.
-Linear Algebra Appl. 30 (2023) e2518): products with the matrix alone. Conjugate gradients in double
-precision take the solution to round-off.
+vertices first. Every level is scaled to a diagonal of at most one and kept in single precision; the
+smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer. Linear Algebra Appl. 30 (2023)
+e2518): products with the matrix alone. Conjugate gradients in double precision take the solution to
+round-off.
 
 The hierarchy is that of the bodies alone. Contact corrects its levels (`contact_levels`), and a
 factor of the unknowns beside it solves there exactly, before and after each cycle.
@@ -20,7 +20,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.errors import SolveError
 from .aggregation import aggregate
-from .condensed_matrix import CondensedMatrix, Symmetric
+from .condensed_matrix import CondensedMatrix, Symmetric, in_blocks
 from .contact_levels import Correction, Interface, correction_of
 from .galerkin import coarse, smoothed
 from .krylov import EPSILON, by_columns, conjugate_gradients, in_single
@@ -38,10 +38,9 @@ LARGEST_DENSE = 4_000
 MOST_NEIGHBOURS = 100
 """Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
-# A matrix in single precision differs from the true one by more than this of the residual: further
-# digits are those of a refinement.
-_LEAST_SINGLE = 1e-5
-_ROWS_AT_ONCE = 30_000  # whole nodes
+# A matrix in single precision differs from the true one by more than the first share of a residual;
+# who asks for less refines, and each solve goes to the second (it gains 1e-4 at a million).
+_LEAST_SINGLE, _SINGLE = 1e-5, 1e-3
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = 1.02387287570313, 1.26408905371085
 # The iteration approaches the largest eigenvalue from below.
@@ -127,15 +126,14 @@ class Hierarchy:
         if not (diagonal > 0).all():
             raise SolveError("the matrix is not positive definite: its diagonal is not positive")
         self.scale = 1 / np.sqrt(diagonal)
-        blocks, self.place = _in_blocks(matrix, self.scale, unknowns)
+        blocks, self.place = in_blocks(matrix, self.scale, unknowns)
         self.size = blocks.shape[0]
         nodes = nodes_at(unknowns, self.place, self.size)
         nodes.motions[self.place] /= self.scale[:, None]
         blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale = self.scale * scale[self.place]
-        self._nodal = matrix if isinstance(matrix, NodalMatrix) else None
-        if self._nodal is not None:
-            self._nodal.now_scaled(self.scale)
+        if isinstance(matrix, NodalMatrix):
+            matrix.now_scaled(self.scale)
         self.levels: list[Level] = []
         nodes = replace(nodes, motions=motions)
         if unknowns.quadratic and self.size > COARSEST:
@@ -156,6 +154,8 @@ class Hierarchy:
             size = blocks.shape[0]
             raise SolveError(f"its levels end at {size} unknowns: nothing coarsens further")
         self.last = blocks
+        if isinstance(matrix, NodalMatrix) and self.levels:
+            matrix.halve(self.levels[0].matrix)
 
     def _add_linear(self, matrix: bsr_matrix, unknowns: Unknowns) -> tuple[bsr_matrix, LevelNodes]:
         """Add the level of quadratic cells; return matrix and nodes of the linear ones."""
@@ -176,8 +176,6 @@ class Hierarchy:
         left = np.ones(prolongation.shape[0], dtype=np.float32)
         scale_blocks(prolongation, left, scale.astype(np.float32))
         self.levels.append(Level(halved(matrix), bound, prolongation))
-        if self._nodal is not None and len(self.levels) == 1:
-            self._nodal.halve(self.levels[0].matrix)
         return below, replace(nodes, motions=motions)
 
 
@@ -213,8 +211,7 @@ class Multigrid:
         self._shared = shared or Shared()
         condensed = matrix if isinstance(matrix, CondensedMatrix) else None
         stiffness = condensed.stiffness if condensed else matrix
-        single = isinstance(stiffness, NodalMatrix) and stiffness.single
-        self._least = _LEAST_SINGLE if single else 0.0
+        self._single = isinstance(stiffness, NodalMatrix) and stiffness.single
         hierarchy = self._shared.hierarchy(stiffness, unknowns)
         self._levels = hierarchy.levels
         last = hierarchy.last.toarray().astype(float)
@@ -248,15 +245,17 @@ class Multigrid:
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
 
-        In 2-norms of the system scaled to a diagonal of at most one. Raises SolveError where
-        `MAX_ITERATIONS` do not or will not suffice, and where the solution is not finite.
+        In 2-norms of the system scaled to a diagonal of at most one; to 10⁻³ where less than 10⁻⁵
+        is asked of a matrix in single precision. Raises SolveError where `MAX_ITERATIONS` do not or
+        will not suffice, and where the solution is not finite.
         """
         columns = np.asarray(right, dtype=float)
         columns = columns if columns.ndim == 2 else columns[:, None]
-        accuracy, system = max(accuracy, self._least), self._system
-        solution, iterations = conjugate_gradients(
-            system.multiply, self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS
-        )
+        if self._single and accuracy < _LEAST_SINGLE:
+            accuracy = _SINGLE
+        system = self._system
+        about = self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS
+        solution, iterations = conjugate_gradients(system.multiply, *about)
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         self.iterations = max(self.iterations, iterations)
@@ -302,46 +301,6 @@ class Multigrid:
         multiply(level.prolongation, self._descend(depth + 1, below), change, out=change)
         change += level.smooth(level.remaining(residual, change, left))
         return change
-
-
-def _in_blocks(
-    matrix: Symmetric, scale: np.ndarray, unknowns: Unknowns
-) -> tuple[bsr_matrix, np.ndarray]:
-    """The scaled matrix in single precision and blocks of three, and the row (n,) of each unknown.
-
-    Rows without unknown are zero.
-    """
-    if isinstance(matrix, NodalMatrix):
-        return matrix.scaled(scale), matrix.free
-    place, size = places(unknowns)
-    return _of_rows(matrix, scale, place, size), place
-
-
-def _of_rows(matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int) -> bsr_matrix:
-    """The same, row and column i at `place[i]` (n,) of `size`.
-
-    Rows are copied in parts, so that there is no second matrix in double precision.
-    """
-    order, place = np.argsort(place), place.astype(np.int32)
-    rows, lengths = place[order], [np.zeros(1, dtype=np.int32)]
-    blocks, columns = np.empty((0, 3, 3), dtype=np.float32), np.empty(0, dtype=np.int32)
-    for first in range(0, size, _ROWS_AT_ONCE):
-        last = min(first + _ROWS_AT_ONCE, size)
-        low, high = np.searchsorted(rows, (first, last))
-        some, counts = matrix[order[low:high]], np.zeros(last - first, dtype=int)
-        counts[rows[low:high] - first] = np.diff(some.indptr)
-        values = some.data * np.repeat(scale[order[low:high]], np.diff(some.indptr))
-        values *= scale[some.indices]
-        starts = np.concatenate([[0], np.cumsum(counts)])
-        arrays = values.astype(np.float32), place[some.indices], starts
-        part = csr_matrix(arrays, shape=(last - first, size)).tobsr((3, 3))
-        before, after = len(columns), len(columns) + len(part.indices)
-        # An array grows by moved pages: there are never two copies of it.
-        blocks.resize((after, 3, 3), refcheck=False)
-        columns.resize(after, refcheck=False)
-        blocks[before:], columns[before:] = part.data, part.indices
-        lengths.append(np.diff(part.indptr))
-    return bsr_matrix((blocks, columns, np.cumsum(np.concatenate(lengths))), shape=(size, size))
 
 
 def _bound_of(matrix: bsr_matrix) -> np.float32:

@@ -36,7 +36,8 @@ _MOST_UNSTABLE = 600
 class StiffenedMatrix:
     """K + Bᵀ W B: `soft` K (n, n), `divergence` B (s, n), `weight` W (s,); `schur` is S (s,).
 
-    `stable`: whether displacements see all pressures, so that few iterations suffice.
+    `stable`: whether displacements see all pressures, so that few iterations suffice; `locks`:
+    whether there are more pressures than they can follow, so that iterations do not converge.
     """
 
     soft: Any
@@ -44,6 +45,7 @@ class StiffenedMatrix:
     weight: np.ndarray
     schur: np.ndarray
     stable: bool = True
+    locks: bool = False
 
     def __post_init__(self) -> None:
         self.shape: tuple[int, int] = self.soft.shape
@@ -91,7 +93,7 @@ def part_of(matrix: Stiffness, chosen: np.ndarray) -> csr_matrix | StiffenedMatr
     if not mine.any():
         return soft
     parts = divergence[mine], matrix.weight[mine], matrix.schur[mine]
-    return StiffenedMatrix(soft, *parts, matrix.stable)
+    return StiffenedMatrix(soft, *parts, matrix.stable, matrix.locks)
 
 
 class Stiffened:

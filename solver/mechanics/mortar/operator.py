@@ -203,10 +203,13 @@ def _reaches(faces: list[Facets], search: float) -> list[float]:
     """Distances, ascending up to `search`, at which partners are looked for.
 
     The first is about the size of usual faces: in a graded mesh, all small faces are within the
-    size of the largest one.
+    size of the largest one. A rigid surface is one face without end, and everything is near it.
     """
     radii = np.concatenate([block.radius for block in faces])
-    reaches, usual = [float(radii.max())], float(np.median(radii))
+    usual, largest = float(np.median(radii)), float(radii.max())
+    if not np.isfinite(largest):
+        return [search]
+    reaches = [largest]
     while reaches[0] > _WIDER * usual:
         reaches.insert(0, reaches[0] / _WIDER)
     return [reach for reach in reaches if reach < search] + [search]

@@ -21,17 +21,36 @@ def one_cell(name: str) -> tuple[np.ndarray, Block]:
 @pytest.mark.parametrize("name", QUADRATIC)
 def test_linear_fields_are_carried_from_the_vertices(name):
     points, block = one_cell(name)
-    vertex, means = from_vertices(len(points), [block])
+    vertex, means = from_vertices(points, [block])
     assert vertex.sum() == block.type.n_vertices
     field = points @ np.arange(1, points.shape[1] + 1) + 4.0
     np.testing.assert_allclose(means @ np.where(vertex, field, 7.0), field)
 
 
+@pytest.mark.parametrize("name", ["HEXA20", "HEXA27"])
+def test_nodes_in_the_middle_of_long_edges_stay(name):
+    """Of a cell ten times flatter than wide only those of the four short edges are interpolated."""
+    points, block = one_cell(name)
+    points = points * [1.0, 1.0, 0.1]
+    stays, means = from_vertices(points, [block])
+    middle = np.isclose(points[:, 2], 0.5 * (points[:, 2].min() + points[:, 2].max()))
+    on_edge = middle & np.isclose(abs(points[:, :2] - points[:, :2].mean(axis=0)), 0.5).all(axis=1)
+    np.testing.assert_array_equal(stays, ~on_edge)
+    assert (np.diff(means.indptr) == np.where(stays, 1, 2)).all()
+    np.testing.assert_allclose(means @ np.where(stays, points[:, 0], 7.0), points[:, 0])
+
+
+def test_a_cell_three_times_as_long_as_wide_is_a_linear_one():
+    points, block = one_cell("HEXA20")
+    assert from_vertices(points * [1.0, 1.0, 3.0], [block])[0].sum() == 8
+
+
 def test_nodes_that_cells_share_are_counted_once():
-    _, block = one_cell("TRIA6")
+    points, block = one_cell("TRIA6")
     twice = Block(block.type, np.vstack([block.cells, block.cells]), np.ones(2), np.ones(2))
     np.testing.assert_array_equal(
-        from_vertices(6, [twice])[1].toarray(), from_vertices(6, [block])[1].toarray()
+        from_vertices(points, [twice])[1].toarray(),
+        from_vertices(points, [block])[1].toarray(),
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.sparse import block_array, block_diag, bsr_matrix, csr_matrix, eye
 
 from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
-from solver.mechanics.linear import choice, multigrid, products
+from solver.mechanics.linear import choice, condensed_matrix, multigrid, products
 from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.direct import force_solver
@@ -209,7 +209,7 @@ def test_parts_of_a_setup_make_no_difference(monkeypatch):
     matrix, unknowns = two_blocks(8)
     right = np.random.default_rng(2).standard_normal(matrix.shape[0])
     whole = Multigrid(matrix, unknowns).solve(right)
-    monkeypatch.setattr(multigrid, "_ROWS_AT_ONCE", 90)
+    monkeypatch.setattr(condensed_matrix, "_ROWS_AT_ONCE", 90)
     monkeypatch.setattr(products, "_LEAST", 500)
     found = Multigrid(matrix, unknowns).solve(right)
     np.testing.assert_allclose(found, whole, rtol=0, atol=1e-12 * np.abs(whole).max())
@@ -302,7 +302,7 @@ def test_free_body_is_in_doubt():
 
 
 def test_memory_beside_the_stiffness_is_less_than_one_and_a_half_of_its_own(monkeypatch):
-    monkeypatch.setattr(multigrid, "_ROWS_AT_ONCE", 3_000)
+    monkeypatch.setattr(condensed_matrix, "_ROWS_AT_ONCE", 3_000)
     monkeypatch.setattr(products, "_LEAST", 100_000)
     matrix, unknowns = clamped(24)
     size = matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes

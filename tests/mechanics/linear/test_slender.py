@@ -1,19 +1,24 @@
 """Slender cells: what is near, the filtered matrix, nodes without near neighbours, iterations."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.sparse import bsr_matrix
 
+from solver.mechanics.fem import vertices
 from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
 from solver.mechanics.linear import aggregation, slender
+from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.slender import Near, filtered, smoothed_along
 from solver.mechanics.linear.unknowns import LevelNodes
 from solver.mesh.catalogue import BY_NAME
 from tests.mechanics.linear.test_multigrid import held, motions
-from tests.scenes import grid
+from tests.scenes import grid, replaced, solved
+
+ROOT = Path(__file__).parents[3]
 
 
 def graded(count: int) -> tuple[np.ndarray, bsr_matrix]:
@@ -50,6 +55,21 @@ def test_a_filter_that_moves_no_force_to_the_diagonal_shows_in_the_iterations(mo
     """A planted fault: translations are then not free of force."""
     monkeypatch.setattr(slender, "_inverses", lambda moved: 0.0 * moved.transpose(0, 2, 1))
     assert iterations(18) > 30
+
+
+def iterations_on_a_sphere() -> int:
+    """Of the longest solve of a graded Hertz sphere; 150 where multigrid gave up."""
+    text = replaced((ROOT / "cases/hertz/sphere-tetra10.yaml").read_text(), ("TETRA10", "HEXA20"))
+    with force_solver("multigrid"):
+        solution = solved(text)
+    return solution.linear_iterations if "multigrid" in solution.linear_solver else 150
+
+
+def test_graded_quadratic_cells_take_few_iterations(monkeypatch):
+    """And too many where nodes in the middle of long edges follow the vertices, a planted fault."""
+    assert iterations_on_a_sphere() < 60
+    monkeypatch.setattr(vertices, "_LONG", np.inf)
+    assert iterations_on_a_sphere() == 150
 
 
 def test_a_flat_cell_is_near_along_its_thickness_alone():

@@ -153,6 +153,11 @@ def test_small_systems_are_factored(monkeypatch):
         chosen = choice.prepare(large, unknowns)
         assert "residuals with multigrid" in chosen.name
         np.testing.assert_allclose(chosen.solve(whole @ np.ones(30)), 1.0, rtol=1e-10)
+    locked = choice.prepare(replace(unstable, locks=True), unknowns)
+    assert "TETRA4 lock" in locked.why
+    assert not locked.iterative
+    with force_solver("multigrid"):
+        assert choice.prepare(replace(unstable, locks=True), unknowns).iterative
 
 
 def test_nothing_to_solve():

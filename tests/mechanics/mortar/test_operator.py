@@ -7,7 +7,7 @@ import pytest
 
 from solver.mechanics.mortar.closure import shape_integrals
 from solver.mechanics.mortar.facets import facets, with_nodal_normals
-from solver.mechanics.mortar.operator import LAC, gap_operator
+from solver.mechanics.mortar.operator import LAC, _reaches, gap_operator
 from solver.mechanics.mortar.pairing import candidate_pairs
 from solver.mesh.catalogue import BY_NAME
 from tests.patches import segment_pair, square_pair
@@ -110,6 +110,20 @@ def test_pairs_are_all_that_come_near_whatever_their_sizes():
         wanted = np.argwhere(distance <= r[:, None] + s[None] + 0.1)
         found = np.column_stack(candidate_pairs(a, r, b, s, 0.1))
         assert found.tolist() == wanted.tolist()
+
+
+def test_faces_are_looked_for_at_the_distance_of_usual_ones_first():
+    """Of graded edges, then of even ones, then beside a rigid surface, a face without end."""
+    kind = BY_NAME["SEG2"]
+    places = np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0], [204.0, 0.0]])
+    graded = facets(places, kind, np.array([[0, 1], [1, 2], [2, 3]]), np.arange(3))
+    even = facets(places, kind, np.array([[0, 1], [1, 2]]), np.arange(2))
+    # Radii 1, 1 and 100: first within 100 / 8² of the usual radius 1.
+    assert _reaches([graded], 300.0) == [100 / 64, 12.5, 100.0, 300.0]
+    assert _reaches([graded], 50.0) == [100 / 64, 12.5, 50.0]
+    assert _reaches([even], 300.0) == [1.0, 300.0]
+    endless = replace(even, radius=np.array([1.0, np.inf]))
+    assert _reaches([endless], 300.0) == [300.0]
 
 
 def test_pairs_grow_with_the_faces_alone():
