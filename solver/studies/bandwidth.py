@@ -225,9 +225,9 @@ class Moved:
     busy: float | None
 
     @property
-    def whole(self) -> bool:
-        """Whether it is a stage, not a part of one."""
-        return self.name in _STAGES
+    def depth(self) -> int:
+        """0 for a stage, 1 for a part of the linear solve, 2 for products within the iterations."""
+        return 0 if self.name in _STAGES else 1 if self.name in (SET_UP, ITERATIONS) else 2
 
     @property
     def rate(self) -> float:
@@ -241,11 +241,13 @@ class Moved:
 
     @property
     def limit(self) -> str:
-        """What limits it: memory from half the bandwidth on, else how many threads are at work."""
+        """Memory from half the bandwidth on, else by how many threads are at work."""
         if self.share > _REACHED:
             return "memory"
         if self.busy is None:
             return ""
+        if self.busy < _REACHED:
+            return "waiting"
         # Halfway between one thread and all.
         shared = self.threads > 1 and self.busy - 1 > _REACHED * (self.threads - 1)
         return "arithmetic, temporary arrays" if shared or self.threads == 1 else "one thread"

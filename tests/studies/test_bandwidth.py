@@ -74,6 +74,7 @@ def test_a_stage_moves_its_files_and_arrays_once(tmp_path):
         (0.4, 2, 1.9, "arithmetic, temporary arrays"),
         (0.4, 2, 1.1, "one thread"),
         (0.4, 8, 4.0, "one thread"),
+        (0.4, 2, 0.3, "waiting"),
         (0.4, 1, 1.0, "arithmetic, temporary arrays"),
     ],
 )
