@@ -54,7 +54,7 @@ def _determinant(a: np.ndarray, b: np.ndarray, c: np.ndarray | None = None) -> n
 def right_side_out(
     points: np.ndarray, cells: np.ndarray, cell: CellType
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cells with mirrored ones renumbered, and a mask (n_cells,) of invalid cells.
+    """Cells, mirrored ones renumbered in a copy, and a mask (n_cells,) of invalid cells.
 
     The latter have a Jacobian that is zero at a vertex or changes its sign from one to another.
     """
@@ -67,6 +67,8 @@ def right_side_out(
 
     parts = list(ahead(judged, range(0, max(1, len(cells)), _AT_ONCE)))
     mirrored, bad = (np.concatenate(masks) for masks in zip(*parts, strict=True))
+    if not mirrored.any():
+        return cells, bad
     turned = cells.copy()
     turned[mirrored] = cells[mirrored][:, list(cell.mirror)]
     return turned, bad

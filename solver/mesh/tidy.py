@@ -106,7 +106,7 @@ class _Table:
 
     def merged(self, cell: CellType) -> _CellBlock:
         parts = [block for block in self.blocks if block.cell is cell]
-        nodes = np.concatenate([part.nodes for part in parts])
+        nodes = parts[0].nodes if len(parts) == 1 else np.concatenate([p.nodes for p in parts])
         first = rank = np.arange(len(nodes))
         if not _all_differ(nodes):
             key = np.sort(nodes, axis=1)
@@ -118,8 +118,10 @@ class _Table:
             mask = [part.groups.get(name, np.zeros(len(part.nodes), bool)) for part in parts]
             groups[name] = np.isin(np.arange(len(first)), rank[np.concatenate(mask)])
         number = np.concatenate([part.number for part in parts])
-        first = np.sort(first)
-        return _CellBlock(cell, nodes[first], number[first], groups)
+        if len(first) < len(nodes):
+            first = np.sort(first)
+            nodes, number = nodes[first], number[first]
+        return _CellBlock(cell, nodes, number, groups)
 
 
 def _all_differ(cells: np.ndarray) -> bool:
@@ -188,7 +190,7 @@ def _attached(blocks: list[_CellBlock], dim: int, n_points: int, where: object) 
         if block.cell.dim == dim - 1:
             wanted |= ~inside[block.nodes].any(axis=1) & block.named()
         if wanted.any():
-            kept.append(block.taken(wanted))
+            kept.append(block if wanted.all() else block.taken(wanted))
     return kept
 
 

@@ -13,6 +13,8 @@ from .unknowns import LevelNodes
 _SLENDER, _NEAR = 3.5, 2.5
 # A node with no more of these, itself counted, is on a line.
 _LINE = 6
+# A motion that leaves less beside the ones before it is none of the aggregate's own.
+_HELD = 1e-10
 
 
 def aggregate(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[bsr_matrix, LevelNodes, Near | None]:
@@ -20,22 +22,40 @@ def aggregate(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[bsr_matrix, LevelN
 
     The aggregates, as the nodes of the next level. What is near where cells are slender.
     """
-    from pyamg.aggregation import (
-        fit_candidates,
-        standard_aggregation,
-    )
+    from pyamg.aggregation import standard_aggregation
 
     body = nodes.body
     graph, near = _graph(matrix, nodes)
     aggregates, _ = standard_aggregation(_along_lines(graph))
-    tentative, motions = fit_candidates(aggregates, nodes.motions)
+    tentative, motions = _fitted(aggregates, nodes.motions)
     members, points = aggregates.tocoo(), None
     coarse_body = np.zeros(aggregates.shape[1], dtype=body.dtype)
     coarse_body[members.col] = body[members.row]
     if nodes.points is not None:
         points = (aggregates.T @ nodes.points) / aggregates.sum(axis=0).reshape(-1, 1)
         points = np.asarray(points)
-    return bsr_matrix(tentative, dtype=np.float32), LevelNodes(motions, coarse_body, points), near
+    return tentative, LevelNodes(motions, coarse_body, points), near
+
+
+def _fitted(aggregates: csr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.ndarray]:
+    """Orthonormal motions of each aggregate, and what they are to be multiplied by (c, 3 or 6).
+
+    `aggregates` (n, a) has at most one entry in a row, `motions` are (h n, 3 or 6). PyAMG's own
+    function for this transposes the blocks in double precision.
+    """
+    from pyamg import amg_core
+
+    members, count = aggregates.tocsc(), motions.shape[1]
+    height = motions.shape[0] // aggregates.shape[0]
+    fitted = np.empty((aggregates.nnz, height, count))
+    coarse = np.empty((aggregates.shape[1], count, count))
+    arrays = members.indptr, members.indices, fitted.ravel(), motions.ravel(), coarse.ravel()
+    amg_core.fit_candidates(*aggregates.shape, height, count, *arrays, _HELD)
+    blocks = np.empty(fitted.shape, dtype=np.float32)
+    blocks[aggregates.indptr[members.indices]] = fitted
+    shape = len(motions), coarse.shape[0] * count
+    tentative = bsr_matrix((blocks, aggregates.indices, aggregates.indptr), shape=shape)
+    return tentative, coarse.reshape(-1, count)
 
 
 def _along_lines(graph: csr_matrix) -> csr_matrix:

@@ -12,9 +12,10 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.compiled import compiled, worthwhile
 from ...system.threads import ahead
-from .products import pattern, rows_of, share_rows
+from .products import pattern, ranges, rows_of, share_rows
 
 _PARTS = 8  # of a product that SciPy forms in parts
+_MARKS = 30  # neighbours that an entry of a pattern adds, as multiplications
 
 
 def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_matrix:
@@ -25,7 +26,8 @@ def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_ma
         change.data *= -np.float32(weight)
         return (tentative + change).tobsr(sizes)
     own = pattern(tentative)
-    total = _empty((pattern(matrix) @ own + own).tocsr(), tentative)
+    near = pattern(matrix)
+    total = _empty(lambda some: near[some] @ own + own[some], matrix.indptr, tentative)
     kernel = _smooth_rows(*sizes)
     arrays = [a for m in (matrix, tentative, total) for a in (m.indptr, m.indices, m.data)]
     share_rows(lambda *some: kernel(*some, *arrays, np.float32(-weight)), matrix.indptr, 54)
@@ -47,7 +49,8 @@ def coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
 
         return sum(ahead(part, range(step, count, step)), part(0))
     ways = pattern(prolongation)
-    total = _empty((ways.T @ (pattern(matrix) @ ways)).tocsr(), prolongation, width)
+    near, felt = pattern(matrix), ways.T.tocsr()
+    total = _empty(lambda some: felt[some] @ near @ ways, felt.indptr, prolongation, width)
     kernel, most = _coarse_rows(*prolongation.blocksize), np.diff(total.indptr).max(initial=0)
     arrays = [a for m in (matrix, prolongation, total) for a in (m.indptr, m.indices, m.data)]
     share_rows(lambda *some: kernel(*some, *arrays, most), total.indptr, 1000)
@@ -56,14 +59,29 @@ def coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
     return total
 
 
-def _empty(pattern: csr_matrix, like: bsr_matrix, height: int | None = None) -> bsr_matrix:
-    """Zero blocks in a pattern, rows sorted."""
-    pattern.sort_indices()
+def _empty(
+    pattern: Callable[[slice], csr_matrix],
+    starts: np.ndarray,
+    like: bsr_matrix,
+    height: int | None = None,
+) -> bsr_matrix:
+    """Zero blocks in the `pattern` of some rows, which threads find; rows sorted.
+
+    `starts` (n + 1,): rows are shared out by these numbers of entries.
+    """
+
+    def part(some: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        found = pattern(slice(*some))
+        found.sort_indices()
+        return found.indices.astype(np.int32, copy=False), np.diff(found.indptr)
+
+    parts = list(ahead(part, ranges(starts, _MARKS, _PARTS)))
+    indices = np.concatenate([columns for columns, _ in parts])
+    counts = np.concatenate([[0], *(lengths for _, lengths in parts)])
     size = like.blocksize if height is None else (height, like.blocksize[1])
-    data = np.zeros((len(pattern.indices), *size), dtype=np.float32)
-    shape = pattern.shape[0] * size[0], pattern.shape[1] * size[1]
-    indices, starts = (a.astype(np.int32, copy=False) for a in (pattern.indices, pattern.indptr))
-    return bsr_matrix((data, indices, starts), shape=shape)
+    data = np.zeros((len(indices), *size), dtype=np.float32)
+    shape = (len(starts) - 1) * size[0], like.shape[1]
+    return bsr_matrix((data, indices, np.cumsum(counts, dtype=np.int32)), shape=shape)
 
 
 @cache

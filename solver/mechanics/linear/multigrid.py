@@ -103,14 +103,14 @@ class Level:
             interface = Interface(beside, beside.corrected_rows(own))
         elif len(correction.rows) <= most:
             interface = Interface(correction, rows)
-        changed = replace(self, correction=correction, weight=weight, interface=interface)
-        half = np.ones(self.matrix.shape[0], dtype=np.float32)
-        half[correction.rows] = np.sqrt(weight)
+        near, half = rows[:, correction.rows], np.sqrt(weight)
 
         def symmetric(x: np.ndarray, base: np.ndarray) -> np.ndarray:
-            return base - half * changed.remaining(np.zeros_like(x), half * x)
+            return base + half * (near @ (half * x))
 
-        return replace(changed, bound=_bound(symmetric, self.matrix.shape[0]))
+        # A motion with the largest eigenvalue is either within the bodies or beside contact.
+        bound = max(self.bound, _bound(symmetric, len(half)))
+        return replace(self, bound=bound, correction=correction, weight=weight, interface=interface)
 
 
 class Hierarchy:

@@ -11,6 +11,7 @@ from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.contact_levels import Correction, correction_of
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.multigrid import Hierarchy, Multigrid
+from solver.mechanics.linear.symmetric_blocks import halved
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
 from tests.mechanics.linear.test_multigrid import block, motions
@@ -89,6 +90,30 @@ def test_condensed_system_in_few_iterations(slave, master):
     np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-10)
     assert solver.iterations <= 35
     assert all(level.interface is not None for level in solver._levels)
+
+
+def test_bound_of_a_corrected_level_is_that_of_the_whole_matrix():
+    """Though it comes from the bodies and from the rows beside contact, one without the other."""
+    matrix, gaps, own, unknowns = pressed(6, 5)
+    level = Multigrid(condensed(matrix, gaps, own, unknowns), unknowns)._levels[0]
+    assert level.correction is not None
+    whole, rows = level.matrix.tobsr().toarray().astype(float), level.correction.rows
+    whole[np.ix_(rows, rows)] += level.correction.matrix.toarray()
+    half = np.ones(len(whole))
+    half[rows] = np.sqrt(level.weight)
+    largest = np.linalg.eigvalsh(half[:, None] * whole * half)[-1]
+    assert largest < level.bound < 1.1 * largest
+
+
+@pytest.mark.parametrize(("changed", "expected"), [(1.0, 2.0), (0.0, 1.5)])
+def test_bound_by_hand(changed, expected):
+    """Of rows (1, -1/2, -1/2), where contact turns the sign beside the diagonal of the first."""
+    node = np.full((3, 3), -0.5) + 1.5 * np.eye(3)
+    matrix = bsr_matrix(block_diag([node] * 4), blocksize=(3, 3)).astype(np.float32)
+    change = csr_matrix(changed * (np.ones((3, 3)) - np.eye(3)), dtype=np.float32)
+    level = multigrid.Level(halved(matrix), np.float32(1.05 * 1.5), matrix)
+    found = level.corrected(Correction(np.arange(3), change), most=0)
+    assert found.bound == pytest.approx(1.05 * expected, rel=1e-6)
 
 
 def test_exact_solve_beside_contact_saves_iterations(monkeypatch):
