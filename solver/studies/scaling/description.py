@@ -58,6 +58,7 @@ from ..keys import Count, Name, Seconds, Unknowns
 from ..points import PointStudy
 
 GROWTH = "growth of "
+_LARGEST_COUNTED = 2_000_000  # unknowns
 _START = 2.5  # seconds: two interpreters, libraries loaded, small mesh
 # Times as long as others: gmsh fills the blocks, or most unknowns are at the interface.
 _FILLED, _SLAB = 2.5, 4.0
@@ -137,8 +138,11 @@ class ScalingPoint:
 
     @property
     def counts_bytes(self) -> bool:
-        """Whether a further solve counts bytes: that of the largest mesh in 3D, by any packages."""
-        largest = self.size == max(self.series.sizes)
+        """Whether a further solve counts bytes: that of the largest mesh in 3D, by any packages.
+
+        Ten million unknowns take as many for each unknown as a million, and ten times as long.
+        """
+        largest = self.size == max(self.series.sizes) and self.size <= _LARGEST_COUNTED
         return self.series.dim == 3 and largest and not self.series.free
 
     @property

@@ -91,6 +91,7 @@ def test_the_large_part_has_ten_million_unknowns():
     assert [p.name for p in large.points] == ["hexa8/10000000", "tetra4/10000000"]
     assert all(1e7 <= p.mesh.unknowns < 1.1e7 for p in large.points)
     assert sum(p.seconds for p in large.points) < large.limit
+    assert not any(p.counts_bytes for p in large.points)  # it would take as long again
 
 
 def test_an_unknown_point(read):
