@@ -4,7 +4,6 @@ import atexit
 import fcntl
 import logging
 import signal
-from functools import partial
 from threading import Thread
 
 from snakemake.settings.enums import Quietness
@@ -125,30 +124,6 @@ def announce():
             logger.info(text(due))
 
 
-class Remaining:
-    """The jobs that have not started, found when they are asked for."""
-
-    def __init__(self, find):
-        self.find = find
-
-    def __iter__(self):
-        return iter(self.find())
-
-    def __bool__(self):
-        return bool(self.find())
-
-
-def find_remaining_late():
-    """Let Snakemake find the remaining jobs when it uses them.
-
-    It lists them with each search for jobs to start, among thousands in vain: the greedy choice
-    does not use the list.
-    """
-    scheduler = type(workflow.scheduler)
-    find = scheduler.remaining_jobs.fget
-    scheduler.remaining_jobs = property(lambda self: Remaining(partial(find, self)))
-
-
 # Not in a dry run, which changes nothing.
 onstart:
     if workflow.is_main_process:
@@ -162,7 +137,6 @@ onstart:
             # Each search for jobs to start sets a timer for another one, so their number grows.
             # Without them the batch takes 3.4 s of Snakemake's own processor time, else 9.5 s.
             workflow.scheduler.job_rate_limiter = None
-        find_remaining_late()
         keep_warm()
 
 
