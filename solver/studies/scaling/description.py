@@ -140,10 +140,10 @@ class ScalingPoint:
     def counts_bytes(self) -> bool:
         """Whether a further solve counts bytes: that of the largest mesh in 3D, by any packages.
 
-        Ten million unknowns take as many for each unknown as a million, and ten times as long.
+        Not where it would take minutes: of flat blocks and of ten million unknowns.
         """
         largest = self.size == max(self.series.sizes) and self.size <= _LARGEST_COUNTED
-        return self.series.dim == 3 and largest and not self.series.free
+        return self.series.dim == 3 and largest and not (self.series.free or self.series.slab)
 
     @property
     def seconds(self) -> float:
