@@ -13,7 +13,7 @@ from .scene import Scene
 _NEARER, _NEAREST = 4.0, 4.0**12
 
 FreeMotion = Callable[[np.ndarray], str]
-"""The motion that a status (k,) leaves free, in words; empty if there is none."""
+"""Takes a status (k,) and describes the motion that it leaves free; empty if nothing can move."""
 
 
 def first_guess(

@@ -1,8 +1,9 @@
 """The contact problem of a scene at one load factor: status, displacement, pressure."""
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy import sparse
@@ -172,12 +173,12 @@ class ContactProblem:
         if bilateral:
             first = self._at_rest(eligible, step, correction)
             return self._solve_closed(first, correction, _force_scale(first))
-        guess: np.ndarray | None
-        guess = first_guess(scene, self.constraints, step, self._free_motion)
+        guess: Callable[[], np.ndarray] | None
+        guess = partial(first_guess, scene, self.constraints, step, self._free_motion)
         if not scene.options.shortcuts.status:
             start = eligible
         elif start is None:
-            start, guess = guess, None
+            start, guess = guess(), None
         elif before is not None:
             about = scene, self.constraints, self._free_motion
             start = moved(start, before, step, *about)

@@ -32,12 +32,13 @@ def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> 
     force, largest = np.zeros((2, len(points)))
     parts = displacement.reshape(-1, *points.shape)
     highest = slender = 0.0
+    whole = None if cell_loops.serve(len(points), blocks) else parts.sum(axis=0)
     for block in blocks:
-        if cell_loops.serve(len(points), blocks):
+        if whole is None:
             term, on_small_faces = cell_loops.add_sizes(points, block, parts, force, largest)
             highest, slender = max(highest, term), max(slender, on_small_faces)
             continue
-        seen = partial(_cell_sizes, points, block, parts.sum(axis=0))
+        seen = partial(_cell_sizes, points, block, whole)
         for part, (forces, term, on_small_faces, norm) in _in_the_middle(points, block, seen):
             nodes = block.cells[part].ravel()
             np.add.at(force, nodes, forces.ravel())
@@ -79,14 +80,15 @@ def largest_strain(
     Of a displacement (n_nodes, dim). Both are small where linear elasticity holds.
     """
     largest = np.zeros(2)
+    compiled = cell_loops.serve(len(points), blocks)
     for block in blocks:
-        if cell_loops.serve(len(points), blocks):
-            compiled = cell_loops.largest_strain(points, block, displacement[None])
-            largest = np.maximum(largest, compiled)
+        if compiled:
+            found = cell_loops.largest_strain(points, block, displacement[None])
+            largest = np.maximum(largest, found)
             continue
         seen = partial(_cell_strain, block, displacement)
-        for _, found in _in_the_middle(points, block, seen):
-            largest = np.maximum(largest, found)
+        for _, of_part in _in_the_middle(points, block, seen):
+            largest = np.maximum(largest, of_part)
     return float(largest[0]), float(largest[1])
 
 

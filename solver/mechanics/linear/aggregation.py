@@ -13,7 +13,7 @@ from .unknowns import LevelNodes
 _SLENDER, _NEAR = 3.5, 2.5
 # A node with no more of these, itself counted, is on a line.
 _LINE = 6
-# A motion that leaves less beside the ones before it is none of the aggregate's own.
+# A motion with a smaller part independent of those before it is left out of the aggregate.
 _HELD = 1e-10
 
 

@@ -1,5 +1,6 @@
 """The matrix of a condensed system, of which only what differs from the stiffness is stored."""
 
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -41,7 +42,7 @@ class CondensedMatrix:
         self.stiffness, self.kept, self.added = stiffness, kept, added
         self.shape: tuple[int, int] = added.shape
 
-    @property
+    @cached_property
     def eliminated(self) -> np.ndarray:
         """The other unknowns (n - k,) of the stiffness: at least as many as there are springs."""
         left = np.ones(self.stiffness.shape[0], dtype=bool)

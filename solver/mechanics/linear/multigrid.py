@@ -82,7 +82,7 @@ class Level:
     def remaining(
         self, residual: np.ndarray, change: np.ndarray, out: np.ndarray | None = None
     ) -> np.ndarray:
-        """The residual (n,) after a change; into `out` (n,), if given, which is none of both."""
+        """The residual (n,) after a change; into `out` (n,), if given, which is neither."""
         left = self.matrix.multiply(change, residual, -1.0, out=out)
         if self.correction is not None:
             self.correction.subtract_product(left, change)

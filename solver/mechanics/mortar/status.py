@@ -75,12 +75,12 @@ def find_status(
     area: np.ndarray,
     stiffness: Callable[[], np.ndarray],
     confirm: bool = False,
-    guess: np.ndarray | None = None,
+    guess: Callable[[], np.ndarray] | None = None,
 ) -> StatusResult:
     """Iterate from `start` (k,) until no status changes; only `eligible` (k,) may close.
 
-    `guess` (k,): another start, where the search from the first one fails. `area` (k,) turns
-    pressures into forces. `stiffness()` is asked for where both fail: the forces (e, e) that
+    `guess()` (k,) is asked for another start where the search from the first one fails. `area` (k,)
+    turns pressures into forces. `stiffness()` is asked for where both fail: the forces (e, e) that
     average gaps of the eligible multipliers bring up, each imposed with all others closed. It may
     raise SolveError where no pressure makes equilibrium. `confirm`: the set that is found is solved
     once more. Raises SolveError where no status fulfils the conditions.
@@ -97,10 +97,13 @@ def find_status(
     """
     changes: list[int] = []
     failure: SolveError | None = None
-    for number, begin in enumerate([start] if guess is None else [start, guess]):
+    for number, begin in enumerate((lambda: start, guess)):
+        if begin is None:
+            break
         changes += [0] * number
+        begun = begin() & eligible
         try:
-            closed = _quick(solve, begin & eligible, eligible, changes, confirm)
+            closed = _quick(solve, begun, eligible, changes, confirm)
         except SolveError as error:
             if not changes:
                 raise
@@ -108,7 +111,7 @@ def find_status(
             continue
         if closed is not None:
             return StatusResult(closed, len(changes) + 1 + confirm, changes)
-    return _certain(solve, eligible, eligible, area, stiffness, changes, failure)
+    return _certain(solve, eligible, area, stiffness, changes, failure)
 
 
 def _quick(
@@ -167,7 +170,6 @@ def _first_changes(closed: np.ndarray, wrong: np.ndarray, offence: np.ndarray) -
 
 def _certain(
     solve: Solve,
-    latest: np.ndarray,
     eligible: np.ndarray,
     area: np.ndarray,
     stiffness: Callable[[], np.ndarray],
@@ -180,7 +182,7 @@ def _certain(
     """
     text = "contact status: complementarity problem, one solve for each of %d macro-elements"
     _LOG.log(OUTCOME, text, eligible.sum())
-    closed = eligible
+    latest = closed = eligible
     try:
         matrix = stiffness()
     except SolveError as error:

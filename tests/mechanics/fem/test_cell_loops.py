@@ -63,14 +63,20 @@ def test_loops_are_numpys_sums_whatever_the_threads(name, monkeypatch):
             np.testing.assert_array_equal(ours, one)
 
 
+def stretched_cube(lame, shear, parts):
+    """Eight cells, u = x as the first of so many parts (parts, 27, 3) of the displacement."""
+    points, cells = grid(2)
+    block = Block(BY_NAME["HEXA8"], cells, np.full(8, lame), np.full(8, shear))
+    field = np.zeros((parts, *points.shape))
+    field[0, :, 0] = points[:, 0]
+    return points, block, field
+
+
 def test_a_stretched_cube_by_hand(monkeypatch):
     """u = x: σ = (λ + 2μ, λ, λ); a corner of a cell carries a quarter of each face's force."""
     choose(True, monkeypatch)
-    points, cells = grid(2)
     lame, shear = 3.0, 0.5
-    block = Block(BY_NAME["HEXA8"], cells, np.full(8, lame), np.full(8, shear))
-    field = np.zeros((2, *points.shape))
-    field[0, :, 0] = points[:, 0]
+    points, block, field = stretched_cube(lame, shear, 2)
     normal = np.array([lame + 2 * shear, lame, lame])
     stress = nodal_stress(points, [block], field)
     np.testing.assert_allclose(stress, [[*normal, 0, 0, 0]] * len(points), atol=1e-14)
@@ -86,11 +92,8 @@ def test_a_stretched_cube_by_hand(monkeypatch):
 def test_the_sizes_of_a_stretched_cube_by_hand(monkeypatch):
     """u = x in cells of edge ½: slopes √3/2 at 8 nodes, apart by ½ at 4 of them."""
     choose(True, monkeypatch)
-    points, cells = grid(2)
     lame, shear = 3.0, 0.5
-    block = Block(BY_NAME["HEXA8"], cells, np.full(8, lame), np.full(8, shear))
-    field = np.zeros((1, *points.shape))
-    field[0, :, 0] = points[:, 0]
+    points, block, field = stretched_cube(lame, shear, 1)
     found, slope = sizes(points, [block], field), np.sqrt(3) / 2
     term = (lame + 2 * shear) * slope * 4 / 2
     around = np.where(np.abs(2 * points - 1) == 1, 1, 2).prod(axis=1)

@@ -133,7 +133,7 @@ def test_the_search_is_repeated_from_a_guess_before_the_complementarity_problem(
 
     guess = np.arange(count) < 3
     start, all_may = np.full(count, True), np.full(count, True)
-    found = find_status(solve, start, all_may, np.ones(count), not_needed, guess=guess)
+    found = find_status(solve, start, all_may, np.ones(count), not_needed, guess=lambda: guess)
     np.testing.assert_array_equal(found.closed, guess)
     assert found.iterations == len(found.changes) + 1 > 10
     with pytest.raises(AssertionError, match="suffices"):

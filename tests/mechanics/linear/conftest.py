@@ -1,0 +1,17 @@
+import pytest
+
+from solver.mechanics.linear.multigrid import Multigrid
+from solver.system.errors import SolveError
+
+
+@pytest.fixture
+def gave_up(monkeypatch):
+    """Multigrid that always gives up; the list of those that did."""
+    tried = []
+
+    def give_up(self, right, accuracy):
+        tried.append(self)
+        raise SolveError("conjugate gradients leave a residual of 1e-02 in 50 iterations")
+
+    monkeypatch.setattr(Multigrid, "solve", give_up)
+    return tried
