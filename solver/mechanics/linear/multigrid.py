@@ -65,6 +65,14 @@ class Level:
     weight: np.ndarray | None = None
     interface: Interface | None = None
 
+    @property
+    def all_beside(self) -> bool:
+        """Whether all of its unknowns are beside contact: the exact solve leaves nothing to smooth.
+
+        Levels below still serve motions so soft that the round-off of its factor hides them.
+        """
+        return self.interface is not None and self.interface.everything
+
     def smooth(self, residual: np.ndarray) -> np.ndarray:
         """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
         factor, own = _SECOND * 12 / 5 / float(self.bound), _FIRST + _SECOND / 5
@@ -295,6 +303,9 @@ class Multigrid:
     def _through(self, depth: int, residual: np.ndarray) -> np.ndarray:
         """Smoothing before and after the levels below."""
         level = self._levels[depth]
+        if level.all_beside:
+            below = multiply_transposed(level.prolongation, residual)
+            return multiply(level.prolongation, self._descend(depth + 1, below))
         change = level.smooth(residual)
         left = level.remaining(residual, change)
         below = multiply_transposed(level.prolongation, left)
