@@ -9,8 +9,12 @@ round-off.
 
 The hierarchy is that of the bodies alone. Contact corrects its levels (`contact_levels`), and a
 factor of the unknowns beside it solves there exactly, before and after each cycle.
+
+Where iterations are slow, each coarse level takes two steps of conjugate gradients instead of one
+cycle: a K-cycle (Notay and Vassilevski, Numer. Linear Algebra Appl. 15 (2008) 473).
 """
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,13 +27,15 @@ from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric, in_blocks
 from .contact_levels import Correction, Interface, correction_of
 from .galerkin import coarse, smoothed
-from .krylov import EPSILON, by_columns, conjugate_gradients, in_single
+from .krylov import EPSILON, by_columns, conjugate_gradients, in_single, two_steps
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
 from .scaled_system import ScaledSystem
 from .slender import smoothed_along
 from .symmetric_blocks import SymmetricBlocks, halved
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
+
+_LOG = logging.getLogger(__name__)
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
@@ -38,6 +44,9 @@ LARGEST_DENSE = 4_000
 MOST_NEIGHBOURS = 100
 """Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
+# Two steps on each coarse level where the first so many iterations, continued at the same rate,
+# would need more than the second number. An iteration then costs up to twice as much.
+_PATIENCE, _SLOW = 30, 60
 # A matrix in single precision differs from the true one by more than the first share of a residual;
 # who asks for less refines, and each solve goes to the second (it gains 1e-4 at a million).
 _LEAST_SINGLE, _SINGLE = 1e-5, 1e-3
@@ -95,6 +104,13 @@ class Level:
         if self.correction is not None:
             self.correction.subtract_product(left, change)
         return left
+
+    def product(self, x: np.ndarray) -> np.ndarray:
+        """The product of its matrix with x (n,), contact included."""
+        found = self.matrix.multiply(x)
+        if self.correction is not None:
+            found[self.correction.rows] += self.correction.matrix @ x[self.correction.rows]
+        return found
 
     def corrected(
         self, correction: Correction, most: float, beside: Correction | None = None
@@ -188,11 +204,15 @@ class Hierarchy:
 
 
 class Shared:
-    """The hierarchy of one stiffness matrix, set up once for all contact statuses."""
+    """The hierarchy of one stiffness matrix, set up once for all contact statuses.
+
+    `slow`: whether iterations were so slow that coarse levels take two steps each from then on.
+    """
 
     def __init__(self) -> None:
         """Nothing is set up yet."""
         self._hierarchy: Hierarchy | None = None
+        self.slow = False
 
     def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
         """The hierarchy of `matrix`, the same at each call until it is closed."""
@@ -262,7 +282,13 @@ class Multigrid:
         if self._single and accuracy < _LEAST_SINGLE:
             accuracy = _SINGLE
         system = self._system
-        about = self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS
+
+        def watch(iteration: int, reached: float) -> None:
+            if iteration == _PATIENCE and reached > accuracy ** (_PATIENCE / _SLOW):
+                _LOG.info("slow iterations: coarse levels take two steps each")
+                self._shared.slow = True
+
+        about = self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS, watch
         solution, iterations = conjugate_gradients(system.multiply, *about)
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
@@ -280,7 +306,7 @@ class Multigrid:
         return self._system.scale
 
     def cycle(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n,), one V-cycle; both scaled."""
+        """The correction for a residual (n,), one cycle; both scaled."""
         return self._precondition(self._system.placed(residual[:, None]))[self._system.place, 0]
 
     def _precondition(self, residual: np.ndarray) -> np.ndarray:
@@ -289,9 +315,16 @@ class Multigrid:
         return self._system.without_idle(in_single(cycles)(residual))
 
     def _descend(self, depth: int, residual: np.ndarray) -> np.ndarray:
-        """One V-cycle from a level down."""
+        """One cycle from a level down; where that is slow two steps on each coarse level."""
         if depth == len(self._levels):
             return self._coarsest @ residual
+        once = partial(self._once, depth)
+        if depth == 0 or not self._shared.slow:
+            return once(residual)
+        return two_steps(once, self._levels[depth].product, residual)
+
+    def _once(self, depth: int, residual: np.ndarray) -> np.ndarray:
+        """One cycle from a level down, exact before and after it beside contact."""
         level = self._levels[depth]
         if level.interface is None:
             return self._through(depth, residual)
