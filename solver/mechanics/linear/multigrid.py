@@ -15,7 +15,6 @@ cycle: a K-cycle (Notay and Vassilevski, Numer. Linear Algebra Appl. 15 (2008) 4
 """
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,7 +26,7 @@ from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric, in_blocks
 from .contact_levels import Correction, Interface, correction_of
 from .galerkin import coarse, smoothed
-from .krylov import EPSILON, by_columns, conjugate_gradients, in_single, two_steps
+from .krylov import EPSILON, by_columns, conjugate_gradients, eigenvalue_bound, in_single, two_steps
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
 from .scaled_system import ScaledSystem
@@ -52,8 +51,6 @@ _PATIENCE, _SLOW = 30, 60
 _LEAST_SINGLE, _SINGLE = 1e-5, 1e-3
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = 1.02387287570313, 1.26408905371085
-# The iteration approaches the largest eigenvalue from below.
-_SAFETY = 1.05
 _SMOOTHED = 4 / 3
 # A share of the unknowns: where more are beside contact, a factor of these is one of everything.
 _MOST_BESIDE = 1 / 4
@@ -73,6 +70,14 @@ class Level:
     correction: Correction | None = None
     weight: np.ndarray | None = None
     interface: Interface | None = None
+
+    @property
+    def all_beside(self) -> bool:
+        """Whether all of its unknowns are beside contact: the exact solve leaves nothing to smooth.
+
+        Levels below still serve motions so soft that the round-off of its factor hides them.
+        """
+        return self.interface is not None and self.interface.everything
 
     def smooth(self, residual: np.ndarray) -> np.ndarray:
         """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
@@ -125,7 +130,7 @@ class Level:
             return base + half * (near @ (half * x))
 
         # A motion with the largest eigenvalue is either within the bodies or beside contact.
-        bound = max(self.bound, _bound(symmetric, len(half)))
+        bound = max(self.bound, eigenvalue_bound(symmetric, len(half)))
         return replace(self, bound=bound, correction=correction, weight=weight, interface=interface)
 
 
@@ -328,6 +333,9 @@ class Multigrid:
     def _through(self, depth: int, residual: np.ndarray) -> np.ndarray:
         """Smoothing before and after the levels below."""
         level = self._levels[depth]
+        if level.all_beside:
+            below = multiply_transposed(level.prolongation, residual)
+            return multiply(level.prolongation, self._descend(depth + 1, below))
         change = level.smooth(residual)
         left = level.remaining(residual, change)
         below = multiply_transposed(level.prolongation, left)
@@ -337,12 +345,7 @@ class Multigrid:
 
 
 def _bound_of(matrix: bsr_matrix) -> np.float32:
-    return _bound(partial(multiply, matrix), matrix.shape[0])
-
-
-def _bound(multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int) -> np.float32:
-    """A bound of the eigenvalues of A, given A x + y for x and y (n,)."""
-    return np.float32(_SAFETY * _largest_eigenvalue(multiplied, size))
+    return eigenvalue_bound(partial(multiply, matrix), matrix.shape[0])
 
 
 def _refuse_fill(prolongation: bsr_matrix) -> None:
@@ -369,24 +372,3 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     scale_blocks(matrix, single, single)
     scale = single.astype(float)
     return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
-
-
-def _largest_eigenvalue(
-    multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int, steps: int = 10
-) -> float:
-    """Largest eigenvalue by Lanczos' iteration, from below."""
-    from scipy.linalg import eigh_tridiagonal
-
-    vector: np.ndarray = np.random.default_rng(0).uniform(-1, 1, size).astype(np.float32)
-    vector /= np.linalg.norm(vector)
-    previous = np.zeros_like(vector)
-    diagonal, beside = [], [np.float32(0)]
-    for _ in range(steps):
-        image = multiplied(vector, -beside[-1] * previous)
-        diagonal.append(np.float32(vector @ image))
-        image -= diagonal[-1] * vector
-        beside.append(np.float32(np.linalg.norm(image)))
-        if beside[-1] < 1e-5:
-            break
-        previous, vector = vector, image / beside[-1]
-    return float(eigh_tridiagonal(diagonal, beside[1 : len(diagonal)], eigvals_only=True)[-1])
