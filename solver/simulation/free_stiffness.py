@@ -50,7 +50,7 @@ def free_unknowns(scene: Scene) -> Unknowns:
 
     def motions() -> np.ndarray:
         # Those of axisymmetric sections in their plane hardly strain rings far from the axis.
-        return np.asarray(basis.T @ whole_motions(scene.points, scene.body))
+        return scene.free.gathered(whole_motions(scene.points, scene.body))
 
     about = dim, node, motions, scene.body[node], scene.points
     if dim == 2 or all(block.type.order == 1 for block in scene.blocks):

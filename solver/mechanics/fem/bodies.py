@@ -41,7 +41,10 @@ def rigid_motions(
 
 def whole_motions(points: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Rigid motions (n_dofs, 3 or 6) of all bodies at once, each about its own centre."""
-    return np.stack([field.ravel() for field in _fields(points, body)], axis=1)
+    found = np.empty((points.size, 3 if points.shape[1] == 2 else 6))
+    for number, field in enumerate(_fields(points, body)):
+        found[:, number] = field.ravel()
+    return found
 
 
 def _fields(points: np.ndarray, body: np.ndarray) -> Iterator[np.ndarray]:

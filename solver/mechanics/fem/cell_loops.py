@@ -126,7 +126,9 @@ def _shared(
     owner, bad = np.zeros(len(points), dtype=np.int32), np.zeros(1, dtype=bool)
     if count > 1:
         # Across the longest side. The planes of a regular mesh are oblique to the slabs.
-        along = points @ np.array([1e-6, 1e-3, 1.0])[np.ptp(points, axis=0).argsort().argsort()]
+        # No BLAS here: its threads would keep a core busy for a while.
+        x, y, z = points.T[np.ptp(points, axis=0).argsort()]
+        along = 1e-6 * x + 1e-3 * y + z
         cuts = np.quantile(along[::101], np.arange(1, count) / count)
         owner = np.searchsorted(cuts, along, side="right").astype(np.int32)
     known = points, block.cells, block.lame, block.shear, on_reference, weights

@@ -8,13 +8,14 @@ levels do not fill in.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
 
 from .condensed_matrix import CondensedMatrix
 from .direct import factorise_roughly
-from .products import chosen_rows
+from .products import chosen_rows, multiply, of_entries
 
 # A share of the diagonal: rows with less, those of pivots, are not smoothed.
 _NOTHING = 1e-4
@@ -29,9 +30,14 @@ class Correction:
     rows: np.ndarray
     matrix: csr_matrix
 
+    @cached_property
+    def entries(self) -> bsr_matrix:
+        """The `matrix`, for products by threads."""
+        return of_entries(self.matrix)
+
     def subtract_product(self, left: np.ndarray, x: np.ndarray) -> None:
         """Subtract C x from what is `left` (n,)."""
-        left[self.rows] -= self.matrix @ x[self.rows]
+        left[self.rows] -= multiply(self.entries, x[self.rows])
 
     def coarser(self, prolongation: bsr_matrix) -> "Correction":
         """PᵀCP."""
@@ -75,20 +81,28 @@ class Interface:
         self.chosen, rows = correction.rows[there], corrected[there]
         own = rows[:, self.chosen] + _SHIFT * identity(len(there), np.float32)
         self._solve = factorise_roughly(own)
-        self._near, local = np.unique(rows.indices, return_inverse=True)
-        shape = len(there), len(self._near)
-        self._rows = csr_matrix((rows.data, local.astype(np.int32), rows.indptr), shape=shape)
+        others = np.ones(rows.shape[1], dtype=bool)
+        others[self.chosen] = False
+        rows = rows.tocoo()
+        outer = others[rows.col]
+        self._near, local = np.unique(rows.col[outer], return_inverse=True)
+        entries = rows.data[outer], (rows.row[outer], local.astype(np.int32))
+        outwards = csr_matrix(entries, shape=(len(there), len(self._near)))
+        self._outwards, self._inwards = of_entries(outwards), of_entries(outwards.T.tocsr())
 
     def before(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The change (r,) by a solve, and the residual (n,) left by it."""
         first, left = self._solved(residual[self.chosen]), residual.copy()
-        left[self._near] -= self._rows.T @ first
+        left[self.chosen] = _SHIFT * first
+        left[self._near] -= multiply(self._inwards, first)
         return first, left
 
     def after(self, residual: np.ndarray, change: np.ndarray, first: np.ndarray) -> None:
         """Add the `first` solve and another one to the `change` (n,) of a `residual` (n,)."""
-        change[self.chosen] += first
-        change[self.chosen] += self._solved(residual[self.chosen] - self._rows @ change[self._near])
+        right = residual[self.chosen] - multiply(self._outwards, change[self._near])
+        # The factor of A + shift yields the new values, not their change.
+        right += _SHIFT * (first + change[self.chosen])
+        change[self.chosen] = self._solved(right)
 
     def _solved(self, right: np.ndarray) -> np.ndarray:
         return self._solve(right[:, None])[:, 0].astype(np.float32)

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ...system.compiled import worthwhile
 from ...system.errors import SolveError
 from ...system.threads import ahead
+from . import vectors
 
 _LOG = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of vectors at once
@@ -100,6 +102,10 @@ def _advance(
     energy: np.ndarray,
 ) -> np.ndarray:
     """One step along a direction, in place; the norms (k,) of the residual."""
+    if _compiled(solution):
+        step = _ratio(energy, vectors.product(direction[:, 0], image[:, 0]))
+        about = (each[:, 0] for each in (solution, residual, direction, image))
+        return np.sqrt(vectors.advance(float(step[0]), *about))
     step = _ratio(energy, _total(lambda some: _dot(direction[some], image[some]), len(image)))
 
     def part(some: slice) -> np.ndarray:
@@ -118,6 +124,11 @@ def _turn(
     energy: np.ndarray,
 ) -> np.ndarray:
     """The next direction, in place, and its energy (k,)."""
+    if _compiled(direction):
+        about = (each[:, 0] for each in (residual, improved, previous))
+        change, following = vectors.products_of_change(*about)[:, None]
+        vectors.turn(float(_ratio(change, energy)[0]), direction[:, 0], improved[:, 0])
+        return following
 
     def part(some: slice) -> np.ndarray:
         change = improved[some] - previous[some]
@@ -132,6 +143,11 @@ def _turn(
 
     _in_parts(turn, len(direction))
     return following
+
+
+def _compiled(columns: np.ndarray) -> bool:
+    """Whether compiled loops serve: for a single column."""
+    return columns.shape[1] == 1 and worthwhile(columns.size)
 
 
 def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -87,6 +87,12 @@ def rows_of(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
     return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
 
 
+def of_entries(matrix: csr_matrix) -> bsr_matrix:
+    """A sparse matrix as one of blocks of one entry, which SciPy multiplies fast, in threads."""
+    arrays = matrix.data.reshape(-1, 1, 1), matrix.indices, matrix.indptr
+    return bsr_matrix(arrays, shape=matrix.shape)
+
+
 def chosen_rows(matrix: bsr_matrix, rows: np.ndarray) -> csr_matrix:
     """Some rows (r,) of a matrix in blocks, one by one."""
     height = matrix.blocksize[0]

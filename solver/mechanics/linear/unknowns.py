@@ -68,9 +68,15 @@ def places(unknowns: Unknowns) -> tuple[np.ndarray, int]:
     return 3 * number + rank, 3 * len(count)
 
 
-def nodes_at(unknowns: Unknowns, place: np.ndarray, size: int) -> LevelNodes:
-    """The nodes of `size` rows; those without unknowns belong to no body, −1."""
+def nodes_at(
+    unknowns: Unknowns, place: np.ndarray, size: int, scale: np.ndarray | float = 1.0
+) -> LevelNodes:
+    """The nodes of `size` rows; those without unknowns belong to no body, −1.
+
+    The unknowns are in units of `scale` (n,).
+    """
     given = unknowns.motions()
+    given *= np.reshape(1 / np.asarray(scale), (-1, 1))
     motions, body = np.zeros((size, given.shape[1])), np.full(size // 3, -1)
     motions[place], body[place // 3] = given, unknowns.body
     if unknowns.points is None:
