@@ -127,7 +127,7 @@ def _shared(
     if count > 1:
         # Across the longest side. The planes of a regular mesh are oblique to the slabs.
         # No BLAS here: its threads would keep a core busy for a while.
-        x, y, z = points.T[np.ptp(points, axis=0).argsort()]
+        x, y, z = sorted(points.T, key=np.ptp)
         along = 1e-6 * x + 1e-3 * y + z
         cuts = np.quantile(along[::101], np.arange(1, count) / count)
         owner = np.searchsorted(cuts, along, side="right").astype(np.int32)
