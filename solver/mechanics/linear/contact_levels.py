@@ -15,7 +15,7 @@ from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
 
 from .condensed_matrix import CondensedMatrix
 from .direct import factorise_roughly
-from .products import chosen_rows, multiply, of_entries
+from .products import InParts, chosen_rows
 
 # A share of the diagonal: rows with less, those of pivots, are not smoothed.
 _NOTHING = 1e-4
@@ -31,13 +31,13 @@ class Correction:
     matrix: csr_matrix
 
     @cached_property
-    def entries(self) -> bsr_matrix:
-        """The `matrix`, for products by threads."""
-        return of_entries(self.matrix)
+    def parts(self) -> InParts:
+        """The `matrix`, for products."""
+        return InParts(self.matrix)
 
     def subtract_product(self, left: np.ndarray, x: np.ndarray) -> None:
         """Subtract C x from what is `left` (n,)."""
-        left[self.rows] -= multiply(self.entries, x[self.rows])
+        left[self.rows] -= self.parts @ x[self.rows]
 
     def coarser(self, prolongation: bsr_matrix) -> "Correction":
         """PᵀCP."""
@@ -88,18 +88,18 @@ class Interface:
         self._near, local = np.unique(rows.col[outer], return_inverse=True)
         entries = rows.data[outer], (rows.row[outer], local.astype(np.int32))
         outwards = csr_matrix(entries, shape=(len(there), len(self._near)))
-        self._outwards, self._inwards = of_entries(outwards), of_entries(outwards.T.tocsr())
+        self._outwards, self._inwards = InParts(outwards), InParts(outwards.T.tocsr())
 
     def before(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The change (r,) by a solve, and the residual (n,) left by it."""
         first, left = self._solved(residual[self.chosen]), residual.copy()
         left[self.chosen] = _SHIFT * first
-        left[self._near] -= multiply(self._inwards, first)
+        left[self._near] -= self._inwards @ first
         return first, left
 
     def after(self, residual: np.ndarray, change: np.ndarray, first: np.ndarray) -> None:
         """Add the `first` solve and another one to the `change` (n,) of a `residual` (n,)."""
-        right = residual[self.chosen] - multiply(self._outwards, change[self._near])
+        right = residual[self.chosen] - self._outwards @ change[self._near]
         # The factor of A + shift yields the new values, not their change.
         right += _SHIFT * (first + change[self.chosen])
         change[self.chosen] = self._solved(right)

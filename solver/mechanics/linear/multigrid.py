@@ -86,7 +86,7 @@ class Level:
         residual[rows] = given
         before = 0 if onto is None else onto[rows]
         left = found[rows] - before - numbers[2] * near + factor * given
-        left -= factor * first * multiply(self.correction.entries, near)
+        left -= factor * first * (self.correction.parts @ near)
         found[rows] = before + self.weight * left + own * near
         return found
 
