@@ -24,7 +24,7 @@ import numpy as np
 from scipy import sparse
 
 from ..mechanics.fem import shape_functions
-from ..mechanics.fem.cell_sizes import steepness
+from ..mechanics.fem.cell_sizes import steepest, steepness
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, area_vectors
 from ..mechanics.mortar.facets import FLAT
@@ -131,20 +131,19 @@ class Roughness:
 def roughness(scene: Scene) -> Roughness:
     """The roughness of a scene's mesh by rounded coordinates."""
     points, dim = scene.points, scene.points.shape[1]
-    steep = steepness(points, scene.blocks)
-    steepest = max(float(slope.sum(axis=1).max()) for slope in steep)
-    tilt, turned = np.zeros((2, len(points)))
+    tilt, turned, steep = *np.zeros((2, len(points))), []
     for zone in scene.zones:
         for faces in (*zone.slave_faces, *zone.master_faces):
             np.maximum.at(tilt, faces.nodes, _tilts(points, faces, scene.rounding)[:, None])
     if scene.free.selection is None:
-        around = np.zeros(len(points))
+        steep, around = steepness(points, scene.blocks), np.zeros(len(points))
         for block, slope in zip(scene.blocks, steep, strict=True):
             np.maximum.at(around, block.cells, slope.sum(axis=1)[:, None])
         entries = scene.free.basis.tocoo()
         node = entries.row[np.bincount(entries.col)[entries.col] > 1] // dim
         turned[node] = scene.rounding * around[node]
-    return Roughness(scene.rounding * steepest, tilt, turned, steep if turned.any() else [])
+    strain = scene.rounding * steepest(points, scene.blocks)
+    return Roughness(strain, tilt, turned, steep if turned.any() else [])
 
 
 def _tilts(points: np.ndarray, faces: FaceBlock, noise: float) -> np.ndarray:

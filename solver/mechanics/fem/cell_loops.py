@@ -89,6 +89,13 @@ def largest_strain(
     return float(largest[:, 0].max()), float(largest[:, 1].max())
 
 
+def steepest(points: np.ndarray, block: "Block") -> float:
+    """The largest sum of the sizes of the gradients in a block; see `cell_sizes.steepest`."""
+    largest = np.zeros(workers())
+    _shared(cell_kernels.steep_rows, points, block, largest, middle=True)
+    return float(largest.max())
+
+
 def squares(
     points: np.ndarray,
     kind: CellType,
