@@ -57,6 +57,13 @@ def duration(value: float) -> str:
     return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"
 
 
+def gigabytes(value: float) -> str:
+    """Bytes in two digits: `12 MB`, `1.2 GB`; from ten gigabytes on whole ones."""
+    if value < 0.0995e9:
+        return f"{value / 1e6:.2g} MB"
+    return f"{value / 1e9:.2g} GB" if value < 9.95e9 else f"{value / 1e9:.0f} GB"
+
+
 def count(value: float) -> str:
     """A whole number: `102,357`."""
     return f"{value:,.0f}"

@@ -85,6 +85,7 @@ def environment(*folders: Path) -> Environment:
         "number": formats.number,
         "seconds": formats.seconds,
         "duration": formats.duration,
+        "gigabytes": formats.gigabytes,
         "count": formats.count,
     }
     templates.globals |= {

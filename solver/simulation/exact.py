@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from ..case.solutions.base import ExactSolution
 from ..mechanics.fem import shape_functions
-from ..mechanics.fem.faces import FACE_POINTS, SurfacePoints, nodal_normals, surface_points
+from ..mechanics.fem.faces import FACE_POINTS, means_on_faces, nodal_normals
 from ..mechanics.fem.gauss import gauss_rule
 from ..mechanics.fem.stress import normal_stress
 from ..mesh.catalogue import cell_type
@@ -66,9 +66,10 @@ class ExactValues:
         self.solution, self.exact = solution, exact
         self._contact: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
-    def _surface(self, zone: ZoneResult) -> SurfacePoints:
+    def _means(self, zone: ZoneResult, values: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """The means (c, m) over macro-elements of what a function of places has."""
         points, around = self.solution.mesh.points, self.solution.case.axisymmetric
-        return surface_points(points, zone.faces, around)
+        return means_on_faces(points, zone.faces, values, around)
 
     @cached_property
     def part(self) -> np.ndarray:
@@ -106,15 +107,19 @@ class ExactValues:
     def _of_contact(self, zone: ZoneResult) -> tuple[np.ndarray, np.ndarray]:
         """Mean pressure (m,) and share in contact (m,); several checks ask for them."""
         if zone.name not in self._contact:
-            at = self._surface(zone)
-            pressure = self.exact.contact_pressure(at.place)
-            self._contact[zone.name] = at.means(pressure), at.means((pressure > 0).astype(float))
+
+            def values(place: np.ndarray) -> np.ndarray:
+                pressure = self.exact.contact_pressure(place)
+                return np.stack([pressure, pressure > 0])
+
+            mean, share = self._means(zone, values)
+            self._contact[zone.name] = mean, share
         return self._contact[zone.name]
 
     def gap(self, zone: ZoneResult) -> np.ndarray:
         """The mean gap (m,) of each macro-element."""
-        at = self._surface(zone)
-        return at.means(self.exact.gap(at.place))
+        [mean] = self._means(zone, lambda place: self.exact.gap(place)[None])
+        return mean
 
     def ends_within(self, zone: ZoneResult) -> np.ndarray:
         """Which macro-elements (m,) the contact area covers in part only."""

@@ -14,7 +14,7 @@ import os
 import statistics
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -22,13 +22,16 @@ from typing import Any
 
 from ..system.clock import now
 from ..system.errors import InputError, SolveError, hint
-from ..system.process import run_apart
+from ..system.process import Ended, run_apart
 from . import FULL
 
 SOLVED, REFUSED, FAILED, CRASHED, MISSING = "solved", "refused", "failed", "crashed", "missing"
 # A machine that was busier than this when a point began may have disturbed it.
 _BUSY = 1.0
 _PACKAGES = ("python", "numpy", "scipy")
+# Lines that Numba prints, with this variable set, about functions it loaded or compiled and kept.
+_NUMBA = {"NUMBA_DEBUG_CACHE": "1"}
+_CACHE, _COMPILED = "[cache] ", "[cache] data saved"
 
 Record = Mapping[str, Any]
 
@@ -102,6 +105,25 @@ def read_record(path: Path, *keys: str) -> dict[str, Any]:
     return record
 
 
+def run_compiled(
+    command: Callable[[], Sequence[str]],
+    cores: Sequence[int],
+    limit: float,
+    memory: float = float("inf"),
+) -> Ended:
+    """What `run_apart` returns of a command in which Numba compiles nothing.
+
+    If Numba compiled functions, as the first large solve of an installation does, these are kept
+    and the command runs a second time. `command` is called before each run.
+    """
+    for _ in range(2):
+        done = run_apart(command(), cores, limit, memory, environment=_NUMBA)
+        lines = done.output.splitlines(keepends=True)
+        if done.status != 0 or not any(line.startswith(_COMPILED) for line in lines):
+            break
+    return replace(done, output="".join(line for line in lines if not line.startswith(_CACHE)))
+
+
 def measure_apart(
     work: Callable[[Any], Mapping[str, Any]],
     job: Mapping[str, Any],
@@ -116,9 +138,12 @@ def measure_apart(
     key `started` is added: when the process was started, by `clock.now`.
     """
     task: dict[str, Any] = {"module": work.__module__, "work": work.__name__, "output": str(output)}
-    task |= {"job": {**job, "started": now()}}
-    command = [sys.executable, "-m", __name__, json.dumps(task)]
-    done = run_apart(command, cores, limit)
+
+    def command() -> list[str]:
+        started = task | {"job": {**job, "started": now()}}
+        return [sys.executable, "-m", __name__, json.dumps(started)]
+
+    done = run_compiled(command, cores, limit)
     if done.status == 0:
         return json.loads(output.read_text(encoding="utf-8"))
     return ended(FAILED if done.status is None else CRASHED, done.reason)

@@ -5,7 +5,7 @@ import resource
 import signal
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,12 +82,13 @@ def run_apart(
     limit: float,
     memory: float = float("inf"),
     folder: Path | None = None,
+    environment: Mapping[str, str] = {},
 ) -> Ended:
     """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
 
     Without `cores` it has one thread, on any of them. `memory` (bytes) is the most that it may ask
-    for, `folder` where it runs if not here. Its standard input is empty; its output is kept. What
-    it started ends with it.
+    for, `folder` where it runs if not here, `environment` has variables beside those of this
+    process. Its standard input is empty; its output is kept. What it started ends with it.
     """
 
     def prepare() -> None:
@@ -102,7 +103,7 @@ def run_apart(
         process = subprocess.Popen(
             command,
             cwd=folder,
-            env={**os.environ, **threads},
+            env={**os.environ, **environment, **threads},
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=complaint,

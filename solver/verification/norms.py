@@ -30,6 +30,7 @@ quadrature is no part of what is seen.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import meshio
@@ -38,11 +39,11 @@ import numpy as np
 from ..case.solutions.base import ElasticSolution, ExactSolution, lame_of
 from ..mechanics.fem import cell_loops, shape_functions
 from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop
-from ..mechanics.fem.faces import surface_points
+from ..mechanics.fem.faces import SlaveFaces, pieces, surface_points
 from ..mechanics.fem.gauss import gauss_rule
 from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues, computed_pressure
-from ..simulation.solution import Solution
+from ..simulation.solution import Solution, ZoneResult
 from ..system.threads import ahead
 from .oscillation import grown, macro_neighbours, oscillation
 
@@ -160,17 +161,12 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
     squares, means = np.zeros(2), np.zeros(2)
     largest, highest, second, inner = 0.0, 0.0, 0.0, 0.0
     for zone in solution.zones:
-        at = surface_points(solution.mesh.points, zone.faces, solution.case.axisymmetric)
-        pressure = exact.contact_pressure(at.place)
-        error = computed_pressure(solution.mesh.points, zone) - pressure
-        covered = (zone.coverage > 0)[at.macro] & exact.regular(at.place)
-        weight = at.weight * zone.coverage[at.macro]
-        squares += _integral(weight, error), _integral(weight, pressure)
-        mean = at.means(pressure)
+        integrals, most, peak = zip(*_pressures(solution, zone, exact), strict=True)
+        squares += np.sum(integrals, axis=0)
+        largest, highest = max(largest, *most), max(highest, *peak)
+        mean = ExactValues(solution, exact).pressure(zone)
         weight = zone.area * zone.coverage
         means += _integral(weight, zone.multiplier - mean), _integral(weight, mean)
-        largest = max(largest, np.abs(error[covered]).max(initial=0.0))
-        highest = max(highest, pressure.max())
         second = max(second, oscillation(solution.mesh.points, zone, exact, mean))
         inside = ~grown(macro_neighbours(zone), mean <= 0, 2) & (zone.coverage > 0)
         inner = max(inner, np.abs(zone.multiplier - mean)[inside].max(initial=0.0))
@@ -184,6 +180,24 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
     if "half_width" in exact.quantities:
         found |= _ellipse_errors(solution, exact)
     return found
+
+
+def _pressures(
+    solution: Solution, zone: ZoneResult, exact: ExactSolution
+) -> Iterator[tuple[np.ndarray, float, float]]:
+    """By piece of a zone: ∫ of squares (2,) of error and exact pressure, largest error, peak."""
+    points = solution.mesh.points
+
+    def within(piece: SlaveFaces) -> tuple[np.ndarray, float, float]:
+        at = surface_points(points, [piece], solution.case.axisymmetric)
+        pressure = exact.contact_pressure(at.place)
+        error = computed_pressure(points, replace(zone, faces=[piece])) - pressure
+        covered = (zone.coverage > 0)[at.macro] & exact.regular(at.place)
+        weight = at.weight * zone.coverage[at.macro]
+        integrals = np.array([_integral(weight, error), _integral(weight, pressure)])
+        return integrals, float(np.abs(error[covered]).max(initial=0.0)), float(pressure.max())
+
+    return ahead(within, pieces(zone.faces))
 
 
 def _ellipse_errors(solution: Solution, exact: ExactSolution) -> dict[str, float]:

@@ -59,17 +59,22 @@ def macro_neighbours(zone: ZoneResult) -> Neighbours:
     for name, nodes, macro in zone.faces:
         kind = cell_type(name)
         ends = [(0,), (1,)] if kind.dim == 1 else list(kind.edges)
-        sides.append(np.sort(nodes[:, ends].reshape(len(nodes) * len(ends), -1), axis=1))
+        sides.append(np.sort(nodes[:, ends].reshape(len(nodes) * len(ends), -1)[:, :2], axis=1))
         owner.append(np.repeat(macro, len(ends)))
-    _, side = np.unique(np.concatenate(sides), axis=0, return_inverse=True)
-    owners = np.concatenate(owner)
+    side, owners = _one_number(np.concatenate(sides)), np.concatenate(owner)
     order = np.argsort(side, kind="stable")
-    side, owners = side.ravel()[order], owners[order]
+    side, owners = side[order], owners[order]
     shared = side[1:] == side[:-1]
     pairs = np.stack([owners[:-1], owners[1:]], axis=1)[shared]
     alone = ~(np.append(shared, False) | np.append(False, shared))
     rim = np.bincount(owners[alone], minlength=len(zone.area)) > 0
-    return np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0), rim
+    pairs = np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1)
+    return pairs[np.unique(_one_number(pairs), return_index=True)[1]], rim
+
+
+def _one_number(rows: np.ndarray) -> np.ndarray:
+    """A number (n,) for each row (n, 1 or 2) of whole numbers: ascending as the rows are."""
+    return rows[:, 0].astype(np.int64) * (1 + rows.max(initial=0)) + rows[:, -1]
 
 
 def _nodes(zone: ZoneResult, nodal: NodalContact) -> Neighbours:

@@ -9,6 +9,7 @@ area that the facets break into spots smaller than themselves is the same fault 
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy import sparse
@@ -18,6 +19,7 @@ from scipy.spatial import cKDTree
 from ..mechanics.mortar.facets import tangents_of
 from ..mesh.catalogue import cell_type
 from ..simulation.solution import Solution, ZoneResult
+from ..system.threads import ahead
 
 LIMIT = 0.04
 """A pressure that oscillates by more than this share of its peak is unreliable.
@@ -38,6 +40,7 @@ _SAME_SIDE = np.cos(np.radians(30))
 _RANK, _CENTRED = 0.03, 0.3
 # A macro-element that is covered by less than this has a mean of another place.
 _COVERED = 0.99
+_AT_ONCE = 1 << 15  # pairs
 
 
 def oscillating(solution: Solution) -> str:
@@ -110,17 +113,21 @@ class _Near:
         count = np.bincount(i, minlength=self.count)
         return np.bincount(i, values[j], minlength=self.count) / np.maximum(count, 1), count
 
+    def _sum(self, values: np.ndarray) -> np.ndarray:
+        """The sum (m,) over the neighbours of values (p,)."""
+        return np.bincount(self.i, values, minlength=self.count)
+
     def off_trend(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (m,) less the linear fit to the neighbours' ones, and where that is determined."""
-        terms = np.concatenate([np.ones((len(self.i), 1)), self.place], axis=1)
-        squares = np.zeros((self.count, terms.shape[1], terms.shape[1]))
-        right = np.zeros(squares.shape[:2])
-        np.add.at(squares, self.i, terms[:, :, None] * terms[:, None])
-        np.add.at(right, self.i, terms * values[self.j][:, None])
+        terms = np.concatenate([np.ones((1, len(self.i))), self.place.T])
+        squares = np.empty((self.count, len(terms), len(terms)))
+        for (a, one), (b, other) in combinations_with_replacement(enumerate(terms), 2):
+            squares[:, a, b] = squares[:, b, a] = self._sum(one * other)
+        right = np.stack([self._sum(term * values[self.j]) for term in terms], axis=1)
         number = np.maximum(squares[:, 0, 0], 1)
         known = np.linalg.eigvalsh(squares)[:, 0] > _RANK * number
         known &= np.linalg.norm(squares[:, 0, 1:], axis=1) < _CENTRED * number
-        squares[~known] = np.eye(terms.shape[1])
+        squares[~known] = np.eye(len(terms))
         fit = np.linalg.solve(squares, right[..., None])[:, 0, 0]
         return np.where(known, values - fit, 0.0), known
 
@@ -128,12 +135,19 @@ class _Near:
 def _near(zone: ZoneResult, reach: np.ndarray) -> _Near:
     """Neighbours within the reach (m,) of each macro-element, on the same side of kinks."""
     pairs = cKDTree(zone.centre).query_pairs(reach.max(), output_type="ndarray")
-    i, j = np.concatenate([pairs, pairs[:, ::-1]]).T
-    away = zone.centre[j] - zone.centre[i]
-    near = np.linalg.norm(away, axis=1) <= reach[i]
-    near &= np.einsum("pd,pd->p", zone.normal[i], zone.normal[j]) > _SAME_SIDE
-    i, j, away = i[near], j[near], away[near]
-    place = np.einsum("ptd,pd->pt", tangents_of(zone.normal)[i], away) / reach[i][:, None]
+    tangents = tangents_of(zone.normal)
+
+    def part(first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        some = pairs[first : first + _AT_ONCE]
+        i, j = np.concatenate([some, some[:, ::-1]]).T.astype(np.int32)
+        away = zone.centre[j] - zone.centre[i]
+        near = np.linalg.norm(away, axis=1) <= reach[i]
+        near &= np.einsum("pd,pd->p", zone.normal[i], zone.normal[j]) > _SAME_SIDE
+        i, j, away = i[near], j[near], away[near]
+        return i, j, np.einsum("ptd,pd->pt", tangents[i], away) / reach[i][:, None]
+
+    parts = ahead(part, range(0, max(len(pairs), 1), _AT_ONCE))
+    i, j, place = (np.concatenate(every) for every in zip(*parts, strict=True))
     return _Near(i, j, place, len(reach))
 
 

@@ -1,13 +1,16 @@
 """The time that a study is expected to take, from what was measured before and from the model."""
 
 import json
+import sys
 from math import prod
 from pathlib import Path
 
 import pytest
 
-from solver.studies.points import announcement, expected, measured_before
+from solver.studies.points import announcement, expected, measured_before, run_compiled
 from solver.studies.work_precision.description import read_study
+from solver.system.compiled import available
+from solver.system.process import cores_for
 
 FILE = Path(__file__).parents[2] / "cases/study/study.yaml"
 STUDY = read_study(FILE, "quick")
@@ -64,3 +67,50 @@ def test_records_that_cannot_be_read_are_no_measurements(tmp_path):
     good.write_text('{"point": "a/b/c/1", "outcome": "failed", "reason": "", "whole": 3}')
     bad.write_text("{")
     assert measured_before([good, bad, tmp_path / "none.json"]) == {"a/b/c/1": 3.0}
+
+
+_PROGRAM = """
+import sys
+with open({runs!r}, "a") as runs:
+    runs.write("x")
+sys.path.insert(0, {folder!r})
+import loops, numpy
+out = numpy.zeros(1)
+loops.add(numpy.arange(5.0), out)
+print("sum", out[0])
+sys.exit({status})
+"""
+
+
+@pytest.fixture
+def compiling(tmp_path, monkeypatch):
+    """Runs a program with a compiled function; the runs, and how the last one ended."""
+    (tmp_path / "loops.py").write_text(
+        "from solver.system.compiled import compiled\n@compiled\ndef add(numbers, out):\n"
+        "    for number in numbers:\n        out[0] += number\n"
+    )
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+
+    def run(status=0):
+        runs = tmp_path / "runs"
+        runs.write_text("")
+        text = _PROGRAM.format(runs=str(runs), folder=str(tmp_path), status=status)
+        done = run_compiled(lambda: [sys.executable, "-c", text], cores_for(1), 60.0)
+        return len(runs.read_text()), done
+
+    return run
+
+
+@pytest.mark.skipif(not available(), reason="Numba is not installed")
+def test_a_run_that_compiled_functions_is_not_measured(compiling):
+    runs, done = compiling()
+    assert (runs, done.status, done.output) == (2, 0, "sum 10.0\n")
+    # They are kept: nothing is compiled any more.
+    runs, done = compiling()
+    assert (runs, done.status, done.output) == (1, 0, "sum 10.0\n")
+
+
+@pytest.mark.skipif(not available(), reason="Numba is not installed")
+def test_a_run_that_failed_is_not_repeated(compiling):
+    runs, done = compiling(status=3)
+    assert (runs, done.reason) == (1, "the process died with exit status 3: sum 10.0")

@@ -41,10 +41,10 @@ class Correction:
 
     def coarser(self, prolongation: bsr_matrix) -> "Correction":
         """PᵀCP."""
-        way = chosen_rows(prolongation, self.rows)
-        columns, local = np.unique(way.indices, return_inverse=True)
-        way = csr_matrix((way.data, local, way.indptr), shape=(len(self.rows), len(columns)))
-        return Correction(columns, (way.T @ (self.matrix @ way)).tocsr())
+        columns, way = _without_empty_columns(chosen_rows(prolongation, self.rows))
+        matrix = (way.T @ (self.matrix @ way)).tocsr()
+        matrix.sort_indices()
+        return Correction(columns, matrix)
 
     def corrected_rows(self, own: csr_matrix) -> csr_matrix:
         """The rows (r, n) of K + C, given its `own` (r, n) of K."""
@@ -70,7 +70,11 @@ class Correction:
 
 
 class Interface:
-    """The unknowns `chosen` (r,) of a level beside contact, solved exactly with the others held."""
+    """The unknowns `chosen` (r,) of a level beside contact, solved exactly with the others held.
+
+    `everything`: the correction has all rows of the level. What the round-off of the factor leaves
+    in the chosen rows is kept there alone: elsewhere these leave nothing but the shift.
+    """
 
     def __init__(self, correction: Correction, corrected: csr_matrix):
         """Factor, given the `corrected` rows (r, n) of the level's matrix.
@@ -79,30 +83,34 @@ class Interface:
         """
         there = np.flatnonzero(_own_diagonal(corrected, correction.rows) > _NOTHING)
         self.chosen, rows = correction.rows[there], corrected[there]
+        self.everything = len(correction.rows) == corrected.shape[1]
         own = rows[:, self.chosen] + _SHIFT * identity(len(there), np.float32)
         self._solve = factorise_roughly(own)
-        others = np.ones(rows.shape[1], dtype=bool)
-        others[self.chosen] = False
-        rows = rows.tocoo()
-        outer = others[rows.col]
-        self._near, local = np.unique(rows.col[outer], return_inverse=True)
-        entries = rows.data[outer], (rows.row[outer], local.astype(np.int32))
-        outwards = csr_matrix(entries, shape=(len(there), len(self._near)))
+        if not self.everything:
+            others = np.ones(rows.shape[1], dtype=bool)
+            others[self.chosen] = False
+            rows.data *= others[rows.indices]
+            rows.eliminate_zeros()
+        self._near, outwards = _without_empty_columns(rows)
         self._outwards, self._inwards = InParts(outwards), InParts(outwards.T.tocsr())
 
     def before(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The change (r,) by a solve, and the residual (n,) left by it."""
         first, left = self._solved(residual[self.chosen]), residual.copy()
-        left[self.chosen] = _SHIFT * first
+        if not self.everything:
+            left[self.chosen] = _SHIFT * first
         left[self._near] -= self._inwards @ first
         return first, left
 
     def after(self, residual: np.ndarray, change: np.ndarray, first: np.ndarray) -> None:
         """Add the `first` solve and another one to the `change` (n,) of a `residual` (n,)."""
+        change[self.chosen] += first
         right = residual[self.chosen] - self._outwards @ change[self._near]
-        # The factor of A + shift yields the new values, not their change.
-        right += _SHIFT * (first + change[self.chosen])
-        change[self.chosen] = self._solved(right)
+        if self.everything:
+            change[self.chosen] += self._solved(right)
+        else:
+            # The factor of A + shift yields the new values, not their change.
+            change[self.chosen] = self._solved(right + _SHIFT * change[self.chosen])
 
     def _solved(self, right: np.ndarray) -> np.ndarray:
         return self._solve(right[:, None])[:, 0].astype(np.float32)
@@ -116,23 +124,47 @@ def correction_of(
     So many `springs` are in the rows of eliminated unknowns; the others are held.
     """
     stiffness, pivot = condensed.stiffness, condensed.eliminated
-    where, scales = condensed.places, scales_of(condensed, scale)
-    some = slice(len(condensed.kept) + springs)
-    eliminated = np.zeros(stiffness.shape[0], dtype=bool)
-    eliminated[pivot] = True
-    added, gone = condensed.added[some, some].tocoo(), stiffness[pivot]
+    size = len(condensed.kept) + springs
+    own, scales = place[condensed.places[:size]], scales_of(condensed, scale)
+    rows = np.flatnonzero(np.diff(condensed.added.indptr[: size + 1]))
+    rows = rows[np.argsort(own[rows])]
+    added = condensed.added[rows] if springs == condensed.springs else condensed.added[rows, :size]
+    gone = stiffness[pivot]
     gone.eliminate_zeros()
     gone = gone.tocoo()
-    rows, columns = pivot[gone.row], gone.col
-    once = ~eliminated[columns]
-    removed = -gone.data * scale[rows] * scale[columns]
-    rows = np.concatenate([where[added.row], rows, columns[once]])
-    columns = np.concatenate([where[added.col], columns, pivot[gone.row][once]])
-    given = added.data * scales[added.row] * scales[added.col]
-    values = np.concatenate([given, removed, removed[once]])
-    chosen, local = np.unique(place[np.concatenate([rows, columns])], return_inverse=True)
-    entries = values.astype(np.float32), (local[: len(rows)], local[len(rows) :])
-    return Correction(chosen, coo_matrix(entries, shape=(len(chosen),) * 2).tocsr())
+    one, other = place[pivot[gone.row]], place[gone.col]
+    chosen, number = _numbered(np.concatenate([own[rows], one, other]), 1 + int(place.max()))
+    added.data *= scales[added.indices]
+    added.data *= np.repeat(scales[rows], np.diff(added.indptr))
+    shape = (len(chosen),) * 2
+    starts = np.zeros(len(chosen) + 1, dtype=np.int32)
+    starts[1 + number[own[rows]]] = np.diff(added.indptr)
+    entries = added.data.astype(np.float32), number[own][added.indices], np.cumsum(starts)
+    # Rows and columns of the eliminated unknowns; between two of these each entry once.
+    removed = (-gone.data * scale[pivot[gone.row]] * scale[gone.col]).astype(np.float32)
+    eliminated = np.zeros(len(scale), dtype=bool)
+    eliminated[pivot] = True
+    once = ~eliminated[gone.col]
+    rows = number[np.concatenate([one, other[once]])]
+    columns = number[np.concatenate([other, one[once]])]
+    gone = coo_matrix((np.concatenate([removed, removed[once]]), (rows, columns)), shape=shape)
+    matrix = csr_matrix(entries, shape=shape)
+    matrix.sort_indices()  # sums and factors take sorted rows faster
+    return Correction(chosen, matrix + gone.tocsr())
+
+
+def _numbered(used: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """The numbers `used` (k,) below `size` once each, ascending, and the place of each in these."""
+    there = np.zeros(size, dtype=bool)
+    there[used] = True
+    return np.flatnonzero(there), np.cumsum(there, dtype=np.int32) - 1
+
+
+def _without_empty_columns(rows: csr_matrix) -> tuple[np.ndarray, csr_matrix]:
+    """The columns (c,) that hold an entry of `rows` (r, n), and these columns (r, c) of it."""
+    columns, number = _numbered(rows.indices, rows.shape[1])
+    arrays = rows.data, number[rows.indices], rows.indptr
+    return columns, csr_matrix(arrays, shape=(rows.shape[0], len(columns)))
 
 
 def scales_of(condensed: CondensedMatrix, scale: np.ndarray) -> np.ndarray:

@@ -24,14 +24,20 @@ ROUGH = 1e-9
 
 
 def conjugate_gradients(
-    multiply: Operator, precondition: Operator, right: np.ndarray, accuracy: float, most: int
+    multiply: Operator,
+    precondition: Operator,
+    right: np.ndarray,
+    accuracy: float,
+    most: int,
+    watch: Callable[[int, float], None] = lambda *_: None,
 ) -> tuple[np.ndarray, int]:
     """Solve for the columns of `right` (n, k) at once; return the solution and the iterations.
 
     `accuracy` is residual over right-hand side, in 2-norms. Raises SolveError where `most`
     iterations do not reach it, or where one third (two thirds) of them reach less than one third
     (two thirds) of the digits. The flexible form (Golub and Ye, SIAM J. Sci. Comput. 21 (1999)
-    1305): the preconditioner is rounded, so it is linear only to single precision.
+    1305): the preconditioner is rounded, so it is linear only to single precision. `watch` gets
+    each number of iterations and the residual reached, and may change the preconditioner.
     """
     solution, residual = np.zeros_like(right), right.copy()
     start = np.sqrt(_total(lambda some: _dot(right[some], right[some]), len(right)))
@@ -45,6 +51,7 @@ def conjugate_gradients(
         iteration += 1
         reached = float(_ratio(left, start).max())
         _log_progress("conjugate gradients", iteration, reached)
+        watch(iteration, reached)
         if reached > accuracy:
             previous, improved = improved, precondition(residual)
             energy = _turn(direction, residual, improved, previous, energy)
@@ -92,6 +99,32 @@ def conjugate_residuals(
         reached = measure(residual) / start
         _log_progress("conjugate residuals", iteration, reached)
     return solution, iteration
+
+
+def two_steps(precondition: Operator, multiply: Operator, residual: np.ndarray) -> np.ndarray:
+    """The change (n,) for a `residual` (n,): two steps of conjugate gradients from zero.
+
+    The second direction is conjugate to the first, so the energy of the error is the least in their
+    plane, whatever the preconditioner.
+    """
+    first = precondition(residual)
+    image = multiply(first)
+    energy = _inner(first, image)
+    if not energy > 0:  # nothing to solve, or only round-off
+        return first
+    share = np.float32(_inner(first, residual) / energy)
+    second = precondition(residual - share * image)
+    second -= np.float32(_inner(second, image) / energy) * first
+    turned = _inner(second, multiply(second))
+    change = share * first
+    if turned > 0:
+        change += np.float32(_inner(second, residual) / turned) * second
+    return change
+
+
+def _inner(one: np.ndarray, other: np.ndarray) -> float:
+    """The product of vectors in single precision. No BLAS: see `conjugate_residuals`."""
+    return float(np.sum(one * other, dtype=float))
 
 
 def _advance(

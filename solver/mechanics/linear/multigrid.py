@@ -9,8 +9,12 @@ round-off.
 
 The hierarchy is that of the bodies alone. Contact corrects its levels (`contact_levels`), and a
 factor of the unknowns beside it solves there exactly, before and after each cycle.
+
+Where iterations are slow, each coarse level takes two steps of conjugate gradients instead of one
+cycle: a K-cycle (Notay and Vassilevski, Numer. Linear Algebra Appl. 15 (2008) 473).
 """
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,14 +28,17 @@ from ...system.threads import ahead
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric, in_blocks
 from .contact_levels import Correction, Interface, correction_of
+from .eigenvalues import upper_bound
 from .galerkin import coarse, smoothed
-from .krylov import EPSILON, by_columns, conjugate_gradients, in_single
+from .krylov import EPSILON, by_columns, conjugate_gradients, in_single, two_steps
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
 from .scaled_system import ScaledSystem
 from .slender import smoothed_along
 from .symmetric_blocks import SymmetricBlocks, halved
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
+
+_LOG = logging.getLogger(__name__)
 
 COARSEST = 600
 """The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
@@ -40,13 +47,14 @@ LARGEST_DENSE = 4_000
 MOST_NEIGHBOURS = 100
 """Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
 MAX_ITERATIONS = 150
+# Two steps on each coarse level where the first so many iterations, continued at the same rate,
+# would need more than the second number. An iteration then costs up to twice as much.
+_PATIENCE, _SLOW = 30, 60
 # A matrix in single precision differs from the true one by more than the first share of a residual;
 # who asks for less refines, and each solve goes to the second (it gains 1e-4 at a million).
 _LEAST_SINGLE, _SINGLE = 1e-5, 1e-3
 # Lottes' optimised weights of the polynomial of degree two.
 _FIRST, _SECOND = 1.02387287570313, 1.26408905371085
-# The iteration approaches the largest eigenvalue from below.
-_SAFETY = 1.05
 _SMOOTHED = 4 / 3
 # A share of the unknowns: where more are beside contact, a factor of these is one of everything.
 _MOST_BESIDE = 1 / 4
@@ -66,6 +74,14 @@ class Level:
     correction: Correction | None = None
     weight: np.ndarray | None = None
     interface: Interface | None = None
+
+    @property
+    def all_beside(self) -> bool:
+        """Whether all of its unknowns are beside contact: the exact solve leaves nothing to smooth.
+
+        Levels below still serve motions so soft that the round-off of its factor hides them.
+        """
+        return self.interface is not None and self.interface.everything
 
     def smooth(self, residual: np.ndarray, onto: np.ndarray | None = None) -> np.ndarray:
         """`onto` (n,) plus the correction for a residual (n,): the Chebyshev polynomial of it.
@@ -99,6 +115,13 @@ class Level:
             self.correction.subtract_product(left, change)
         return left
 
+    def product(self, x: np.ndarray) -> np.ndarray:
+        """The product of its matrix with x (n,), contact included."""
+        found = self.matrix.multiply(x)
+        if self.correction is not None:
+            found[self.correction.rows] += self.correction.parts @ x[self.correction.rows]
+        return found
+
     def corrected(
         self, correction: Correction, most: float, beside: Correction | None = None
     ) -> "Level":
@@ -120,7 +143,7 @@ class Level:
             return base + half * (near @ (half * x))
 
         # A motion with the largest eigenvalue is either within the bodies or beside contact.
-        bound = max(self.bound, _bound(symmetric, len(half)))
+        bound = max(self.bound, upper_bound(symmetric, len(half)))
         return replace(self, bound=bound, correction=correction, weight=weight, interface=interface)
 
 
@@ -190,11 +213,15 @@ class Hierarchy:
 
 
 class Shared:
-    """The hierarchy of one stiffness matrix, set up once for all contact statuses."""
+    """The hierarchy of one stiffness matrix, set up once for all contact statuses.
+
+    `slow`: whether iterations were so slow that coarse levels take two steps each from then on.
+    """
 
     def __init__(self) -> None:
         """Nothing is set up yet."""
         self._hierarchy: Hierarchy | None = None
+        self.slow = False
 
     def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
         """The hierarchy of `matrix`, the same at each call until it is closed."""
@@ -277,7 +304,13 @@ class Multigrid:
         if self._single and accuracy < _LEAST_SINGLE:
             accuracy = _SINGLE
         system = self._system
-        about = self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS
+
+        def watch(iteration: int, reached: float) -> None:
+            if iteration == _PATIENCE and reached > accuracy ** (_PATIENCE / _SLOW):
+                _LOG.info("slow iterations: coarse levels take two steps each")
+                self._shared.slow = True
+
+        about = self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS, watch
         solution, iterations = conjugate_gradients(system.multiply, *about)
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
@@ -295,7 +328,7 @@ class Multigrid:
         return self._system.scale
 
     def cycle(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n,), one V-cycle; both scaled."""
+        """The correction for a residual (n,), one cycle; both scaled."""
         return self._precondition(self._system.placed(residual[:, None]))[self._system.place, 0]
 
     def _precondition(self, residual: np.ndarray) -> np.ndarray:
@@ -304,10 +337,17 @@ class Multigrid:
         return self._system.without_idle(in_single(cycles)(residual))
 
     def _descend(self, depth: int, residual: np.ndarray) -> np.ndarray:
-        """One V-cycle from a level down."""
+        """One cycle from a level down; where that is slow two steps on each coarse level."""
         if depth == len(self._levels):
-            # No BLAS here nor below: its threads keep a core busy for a while, idle as they are.
+            # No BLAS here: its threads keep a core busy for a while, idle as they are.
             return np.asarray(np.einsum("ij,j->i", self._coarsest, residual))
+        once = partial(self._once, depth)
+        if depth == 0 or not self._shared.slow:
+            return once(residual)
+        return two_steps(once, self._levels[depth].product, residual)
+
+    def _once(self, depth: int, residual: np.ndarray) -> np.ndarray:
+        """One cycle from a level down, exact before and after it beside contact."""
         level = self._levels[depth]
         if level.interface is None:
             return self._through(depth, residual)
@@ -319,6 +359,9 @@ class Multigrid:
     def _through(self, depth: int, residual: np.ndarray) -> np.ndarray:
         """Smoothing before and after the levels below."""
         level = self._levels[depth]
+        if level.all_beside:
+            below = multiply_transposed(level.prolongation, residual)
+            return multiply(level.prolongation, self._descend(depth + 1, below))
         change = level.smooth(residual)
         left = level.remaining(residual, change)
         below = multiply_transposed(level.prolongation, left)
@@ -327,12 +370,7 @@ class Multigrid:
 
 
 def _bound_of(matrix: bsr_matrix) -> np.float32:
-    return _bound(partial(multiply, matrix), matrix.shape[0])
-
-
-def _bound(multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int) -> np.float32:
-    """A bound of the eigenvalues of A, given A x + y for x and y (n,)."""
-    return np.float32(_SAFETY * _largest_eigenvalue(multiplied, size))
+    return upper_bound(partial(multiply, matrix), matrix.shape[0])
 
 
 def _refuse_fill(prolongation: bsr_matrix) -> None:
@@ -360,28 +398,3 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     scale = single.astype(float)
     motions *= np.where(there, 1 / np.where(there, scale, 1.0), 0.0)[:, None]
     return matrix, motions, scale
-
-
-def _largest_eigenvalue(
-    multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int, steps: int = 10
-) -> float:
-    """Largest eigenvalue by Lanczos' iteration, from below."""
-    from scipy.linalg import eigh_tridiagonal
-
-    vector: np.ndarray = np.random.default_rng(0).uniform(-1, 1, size).astype(np.float32)
-    vector /= _norm(vector)
-    previous = np.zeros_like(vector)
-    diagonal, beside = [], [np.float32(0)]
-    for _ in range(steps):
-        image = multiplied(vector, -beside[-1] * previous)
-        diagonal.append(np.sum(vector * image))
-        image -= diagonal[-1] * vector
-        beside.append(_norm(image))
-        if beside[-1] < 1e-5:
-            break
-        previous, vector = vector, image / beside[-1]
-    return float(eigh_tridiagonal(diagonal, beside[1 : len(diagonal)], eigvals_only=True)[-1])
-
-
-def _norm(vector: np.ndarray) -> np.float32:
-    return np.float32(np.sqrt(np.sum(vector * vector)))

@@ -1,7 +1,8 @@
 """One point of the scaling family: meshed, then solved by the command line, and put on record.
 
 The solve is what a user types: `python -m solver solve`, from a mesh file to a result file, in a
-process of its own that is pinned to its cores. Its verdict has the cost of each stage; the
+process of its own that is pinned to its cores; a process in which Numba compiled functions is not
+measured, but the next one. Its verdict has the cost of each stage; the
 operating system reports processor time and peak memory of the whole process. Beside the keys of
 `studies.points` the record has:
 
@@ -28,7 +29,17 @@ from ...system.package import COMMAND
 from ...system.process import cores_for, run_apart
 from ...verification.verdict import read_verdict
 from ..bandwidth import measure
-from ..points import CRASHED, FAILED, REFUSED, SOLVED, Record, ended, measure_apart, surroundings
+from ..points import (
+    CRASHED,
+    FAILED,
+    REFUSED,
+    SOLVED,
+    Record,
+    ended,
+    measure_apart,
+    run_compiled,
+    surroundings,
+)
 from .description import Scaling, ScalingPoint
 
 # The share of the machine's free memory that a point may take: the rest is for other programs.
@@ -82,7 +93,7 @@ def _solve(
         return found | ended(FAILED, f"no mesh: {meshed.reason}")
     command = [*COMMAND, "solve", str(case), "--mesh", str(mesh), "-o", str(folder / "r.vtkhdf")]
     command += ["--verdict", str(verdict), *["--free"] * point.series.free]
-    done = run_apart(command, cores, limit, memory)
+    done = run_compiled(lambda: command, cores, limit, memory)
     found["process"] = done.used
     if not verdict.is_file():
         return found | ended(FAILED if done.status is None else CRASHED, done.reason)

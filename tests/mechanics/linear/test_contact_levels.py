@@ -92,6 +92,19 @@ def test_condensed_system_in_few_iterations(slave, master):
     assert all(level.interface is not None for level in solver._levels)
 
 
+@pytest.mark.parametrize("count", [12, 9])
+def test_where_all_is_beside_contact_nothing_is_left_to_smooth(count):
+    matrix = (
+        np.diag(np.full(12, 1.0)) - np.diag(np.full(11, 0.4), 1) - np.diag(np.full(11, 0.4), -1)
+    )
+    way = bsr_matrix(np.kron(np.ones((4, 1)), np.eye(3, 6)), blocksize=(3, 6), dtype=np.float32)
+    whole = halved(bsr_matrix(matrix, blocksize=(3, 3), dtype=np.float32))
+    nothing = Correction(np.arange(count), csr_matrix((count, count), dtype=np.float32))
+    level = multigrid.Level(whole, np.float32(2.0), way).corrected(nothing, most=np.inf)
+    _, left = level.interface.before(np.ones(12, np.float32))
+    assert level.all_beside == (count == 12) == bool(np.abs(left).max() < 1e-5)
+
+
 def test_bound_of_a_corrected_level_is_that_of_the_whole_matrix():
     """Though it comes from the bodies and from the rows beside contact, one without the other."""
     matrix, gaps, own, unknowns = pressed(6, 5)

@@ -12,8 +12,8 @@ from solver.mechanics.linear import choice, condensed_matrix, multigrid, product
 from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.direct import force_solver
-from solver.mechanics.linear.krylov import ROUGH
-from solver.mechanics.linear.multigrid import Multigrid
+from solver.mechanics.linear.krylov import ROUGH, two_steps
+from solver.mechanics.linear.multigrid import Multigrid, Shared
 from solver.mechanics.linear.nodal_matrix import NodalMatrix
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
@@ -192,17 +192,58 @@ def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
     assert chosen.gave_up == chosen.why
 
 
-def test_threads_change_no_digit(monkeypatch):
+@pytest.mark.parametrize("slow", [False, True])
+def test_threads_change_no_digit(monkeypatch, slow):
     monkeypatch.setattr(products, "_LEAST", 1000)
+    monkeypatch.setattr(multigrid, "COARSEST", 60)
     matrix, unknowns = two_blocks(8)
     right = np.random.default_rng(5).standard_normal(matrix.shape[0])
     found = []
     for count in (1, 2, 5):
         for module in (products, threads):
             monkeypatch.setattr(module, "workers", lambda n=count: n)
-        found.append(Multigrid(matrix, unknowns).solve(right))
+        shared = Shared()
+        shared.slow = slow
+        solver = Multigrid(matrix, unknowns, shared)
+        assert len(solver._levels) > 1
+        found.append(solver.solve(right))
     np.testing.assert_array_equal(found[1], found[0])
     np.testing.assert_array_equal(found[2], found[0])
+
+
+def test_two_steps_leave_the_least_energy_in_their_plane():
+    rng = np.random.default_rng(6)
+    root = rng.standard_normal((30, 30))
+    matrix = (root @ root.T + 5 * np.eye(30)).astype(np.float32)
+    residual, directions = rng.standard_normal(30).astype(np.float32), []
+
+    def precondition(x):
+        directions.append(np.float32(0.1) * np.tanh(x) + x / matrix.diagonal())
+        return directions[-1].copy()
+
+    found = two_steps(precondition, matrix.__matmul__, residual)
+    assert len(directions) == 2
+    plane = np.stack(directions, axis=1).astype(float)
+    least = plane @ np.linalg.solve(plane.T @ matrix @ plane, plane.T @ residual)
+    np.testing.assert_allclose(found, least, rtol=0, atol=1e-5 * np.abs(least).max())
+
+
+def test_two_steps_for_nothing():
+    nothing = np.zeros(4, np.float32)
+    np.testing.assert_array_equal(two_steps(np.copy, np.copy, nothing), nothing)
+
+
+def test_the_product_of_a_level_is_what_it_leaves_of_a_residual():
+    """Under contact too."""
+    matrix, unknowns = clamped(10)
+    n = matrix.shape[0]
+    rows = csr_matrix(([1.0, -1.0], ([0, 0], [0, 90])), shape=(1, n))
+    with force_solver("multigrid"):
+        solver = condense(matrix, rows, np.arange(n) == 0, unknowns).factor
+    for level in solver._solver._levels:
+        assert level.correction is not None
+        x, b = np.random.default_rng(7).standard_normal((2, level.matrix.shape[0])).astype("f4")
+        np.testing.assert_allclose(level.remaining(b, x), b - level.product(x), atol=1e-5)
 
 
 def test_parts_of_a_setup_make_no_difference(monkeypatch):

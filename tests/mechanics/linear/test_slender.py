@@ -9,7 +9,7 @@ from scipy.sparse import bsr_matrix
 
 from solver.mechanics.fem import vertices
 from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
-from solver.mechanics.linear import aggregation, slender
+from solver.mechanics.linear import aggregation, multigrid, slender
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.slender import Near, filtered, smoothed_along
@@ -57,9 +57,9 @@ def test_a_filter_that_moves_no_force_to_the_diagonal_shows_in_the_iterations(mo
     assert iterations(18) > 30
 
 
-def iterations_on_a_sphere() -> int:
+def iterations_on_a_sphere(cells: str = "HEXA20") -> int:
     """Of the longest solve of a graded Hertz sphere; 150 where multigrid gave up."""
-    text = replaced((ROOT / "cases/hertz/sphere-tetra10.yaml").read_text(), ("TETRA10", "HEXA20"))
+    text = replaced((ROOT / "cases/hertz/sphere-tetra10.yaml").read_text(), ("TETRA10", cells))
     with force_solver("multigrid"):
         solution = solved(text)
     return solution.linear_iterations if "multigrid" in solution.linear_solver else 150
@@ -70,6 +70,13 @@ def test_graded_quadratic_cells_take_few_iterations(monkeypatch):
     assert iterations_on_a_sphere() < 60
     monkeypatch.setattr(vertices, "_LONG", np.inf)
     assert iterations_on_a_sphere() == 150
+
+
+def test_two_steps_on_coarse_levels_where_iterations_are_slow(monkeypatch):
+    """And many more iterations where slow ones are not noticed, a planted fault."""
+    assert iterations_on_a_sphere("TETRA10") <= 75
+    monkeypatch.setattr(multigrid, "_PATIENCE", 0)
+    assert iterations_on_a_sphere("TETRA10") > 90
 
 
 def test_a_flat_cell_is_near_along_its_thickness_alone():

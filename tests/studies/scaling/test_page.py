@@ -18,6 +18,7 @@ from solver.studies.scaling.records import (
     read_series,
     speed_ups,
 )
+from tests.browser import MISSING, browser
 from tests.report.test_charts import specifications
 
 ROOT = Path(__file__).parents[3]
@@ -210,3 +211,25 @@ def test_a_family_without_any_record_still_has_a_page(scaling, tmp_path):
     page = (tmp_path / "scaling.html").read_text()
     assert "not measured" in page
     assert "These sizes answer no goal" in page
+
+
+def test_bytes_are_written_out_in_full(scaling, results, tmp_path):
+    part = {"seconds": 2.0, "bytes": 1.5e11, "cpu": 2.0}
+    products = {"outcome": "solved", "bandwidth": 1e10, "threads": 2, "dofs": 10_000}
+    path = results / "hexa8" / "1000000.json"
+    moved = {"products": products | {"parts": {"solve": part, "read": part | {"bytes": 3e6}}}}
+    path.write_text(json.dumps(json.loads(path.read_text()) | moved))
+    write_scaling(scaling, results, tmp_path / "page")
+    page = (tmp_path / "page" / "scaling.html").read_text()
+    for cells in ("150 GB</td><td class=n>75 GB/s<", "3 MB</td><td class=n>1.5 MB/s<"):
+        assert cells in page
+
+
+@pytest.mark.skipif(bool(MISSING), reason=MISSING)
+def test_the_table_of_goals_fits_a_window(scaling, results, tmp_path):
+    """Also beside the longest reason in place of a number."""
+    write_scaling(scaling, results, tmp_path)
+    with browser() as window:
+        window.open(tmp_path / "scaling.html", 1280)
+        wide = "document.querySelector('#goals .wide')"
+        assert window.run(f"{wide}.scrollWidth - {wide}.clientWidth") == 0
