@@ -14,6 +14,7 @@ from . import vectors
 _LOG = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of vectors at once
 _LOGGED = 10  # iterations from one line of the log to the next
+_SAFETY = 1.05  # of a bound from below
 _KEPT = 10  # directions of conjugate residuals; 40 save a tenth of the iterations, all no more
 
 Operator = Callable[[np.ndarray], np.ndarray]
@@ -249,3 +250,28 @@ def _log_progress(method: str, iteration: int, reached: float) -> None:
 def _ratio(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
     # A column that is solved exactly has a denominator of zero.
     return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > 0)
+
+
+def eigenvalue_bound(
+    multiplied: Callable[[np.ndarray, np.ndarray], np.ndarray], size: int, steps: int = 10
+) -> np.float32:
+    """A bound of the eigenvalues of a symmetric A, given A x + y for x and y (n,), in single.
+
+    Lanczos' iteration approaches the largest one from below: a margin is added.
+    """
+    from scipy.linalg import eigh_tridiagonal
+
+    vector: np.ndarray = np.random.default_rng(0).uniform(-1, 1, size).astype(np.float32)
+    vector /= np.float32(np.sqrt(_inner(vector, vector)))
+    previous = np.zeros_like(vector)
+    diagonal, beside = [], [np.float32(0)]
+    for _ in range(steps):
+        image = multiplied(vector, -beside[-1] * previous)
+        diagonal.append(np.float32(_inner(vector, image)))
+        image -= diagonal[-1] * vector
+        beside.append(np.float32(np.sqrt(_inner(image, image))))
+        if beside[-1] < 1e-5:
+            break
+        previous, vector = vector, image / beside[-1]
+    found = eigh_tridiagonal(diagonal, beside[1 : len(diagonal)], eigvals_only=True)
+    return np.float32(_SAFETY * found[-1])

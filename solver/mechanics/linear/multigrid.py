@@ -28,9 +28,8 @@ from ...system.threads import ahead
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric, in_blocks
 from .contact_levels import Correction, Interface, correction_of
-from .eigenvalues import upper_bound
 from .galerkin import coarse, smoothed
-from .krylov import EPSILON, by_columns, conjugate_gradients, in_single, two_steps
+from .krylov import EPSILON, by_columns, conjugate_gradients, eigenvalue_bound, in_single, two_steps
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed, pattern, scale_blocks, sums_of_sizes
 from .scaled_system import ScaledSystem
@@ -143,7 +142,7 @@ class Level:
             return base + half * (near @ (half * x))
 
         # A motion with the largest eigenvalue is either within the bodies or beside contact.
-        bound = max(self.bound, upper_bound(symmetric, len(half)))
+        bound = max(self.bound, eigenvalue_bound(symmetric, len(half)))
         return replace(self, bound=bound, correction=correction, weight=weight, interface=interface)
 
 
@@ -370,7 +369,7 @@ class Multigrid:
 
 
 def _bound_of(matrix: bsr_matrix) -> np.float32:
-    return upper_bound(partial(multiply, matrix), matrix.shape[0])
+    return eigenvalue_bound(partial(multiply, matrix), matrix.shape[0])
 
 
 def _refuse_fill(prolongation: bsr_matrix) -> None:
