@@ -24,7 +24,7 @@ import numpy as np
 from scipy import sparse
 
 from ..mechanics.fem import shape_functions
-from ..mechanics.fem.cell_sizes import steepness
+from ..mechanics.fem.cell_sizes import steepest, steepness
 from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, area_vectors
 from ..mechanics.mortar.facets import FLAT
@@ -131,19 +131,19 @@ class Roughness:
 def roughness(scene: Scene) -> Roughness:
     """The roughness of a scene's mesh by rounded coordinates."""
     points, dim = scene.points, scene.points.shape[1]
-    steep = steepness(points, scene.blocks)
-    around, tilt, turned = np.zeros((3, len(points)))
-    for block, slope in zip(scene.blocks, steep, strict=True):
-        np.maximum.at(around, block.cells, slope.sum(axis=1)[:, None])
-    around *= scene.rounding
+    tilt, turned, steep = *np.zeros((2, len(points))), []
     for zone in scene.zones:
         for faces in (*zone.slave_faces, *zone.master_faces):
             np.maximum.at(tilt, faces.nodes, _tilts(points, faces, scene.rounding)[:, None])
     if scene.free.selection is None:
+        steep, around = steepness(points, scene.blocks), np.zeros(len(points))
+        for block, slope in zip(scene.blocks, steep, strict=True):
+            np.maximum.at(around, block.cells, slope.sum(axis=1)[:, None])
         entries = scene.free.basis.tocoo()
         node = entries.row[np.bincount(entries.col)[entries.col] > 1] // dim
-        turned[node] = around[node]
-    return Roughness(float(around.max()), tilt, turned, steep if turned.any() else [])
+        turned[node] = scene.rounding * around[node]
+    strain = scene.rounding * steepest(points, scene.blocks)
+    return Roughness(strain, tilt, turned, steep if turned.any() else [])
 
 
 def _tilts(points: np.ndarray, faces: FaceBlock, noise: float) -> np.ndarray:
@@ -215,7 +215,7 @@ def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) 
     """
     scene, constraints, dim = iterate.scene, iterate.constraints, iterate.scene.points.shape[1]
     left = iterate.residual() + constraints.on_free.T @ pressure
-    unbalanced = np.abs(scene.free.basis @ left)
+    unbalanced = np.abs(scene.free.spread(left))
     forces, known = np.repeat(_rounding_of_forces(iterate), dim), _rounding_of_gaps(iterate)
     moving, limit = constraints.moving, np.zeros(len(pressure))
     for zone in scene.zones:

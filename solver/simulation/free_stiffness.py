@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..mechanics.fem.bodies import nodes_of_unknowns, whole_motions
+from ..mechanics.fem.bodies import motion_fields, nodes_of_unknowns
 from ..mechanics.fem.elasticity import stiffness
 from ..mechanics.fem.vertices import from_vertices, linear_unknowns
 from ..mechanics.linear.choice import against_multigrid
@@ -50,7 +50,10 @@ def free_unknowns(scene: Scene) -> Unknowns:
 
     def motions() -> np.ndarray:
         # Those of axisymmetric sections in their plane hardly strain rings far from the axis.
-        return np.asarray(basis.T @ whole_motions(scene.points, scene.body))
+        found = np.empty((len(node), 3 if dim == 2 else 6))
+        for number, field in enumerate(motion_fields(scene.points, scene.body)):
+            found[:, number] = scene.free.gathered(field.ravel())
+        return found
 
     about = dim, node, motions, scene.body[node], scene.points
     if dim == 2 or all(block.type.order == 1 for block in scene.blocks):

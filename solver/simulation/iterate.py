@@ -84,11 +84,14 @@ class ContactIterate:
 
     def residual(self) -> np.ndarray:
         """Loads less internal forces (n_free,), contact forces left out."""
-        return self.scene.free.basis.T @ (self.force - self.internal).astype(float).ravel()
+        left = (self.force - self.internal).astype(float, copy=False).ravel()
+        return self.scene.free.gathered(left)
 
     def condensed(self, force: np.ndarray) -> np.ndarray:
         """The forces (n_free,) to balance once the change of mean stress is eliminated."""
-        return force + self.scene.free.basis.T @ self.scene.mean.condensed_force(self.defect)
+        if not self.scene.mean.size:
+            return force
+        return force + self.scene.free.gathered(self.scene.mean.condensed_force(self.defect))
 
     def violation(self) -> np.ndarray:
         """By how much ∫ gap of the closed multipliers is below zero."""
@@ -97,7 +100,7 @@ class ContactIterate:
 
     def advanced(self, change: np.ndarray) -> "ContactIterate":
         """The iterate with the free unknowns changed by `change` (n_free,)."""
-        move = self.scene.free.basis @ change
+        move = self.scene.free.spread(change)
         stress = self.mean_stress + self.scene.mean.change(move, self.defect)
         moved = replace(self, displacement=self.displacement.moved(move), mean_stress=stress)
         return moved._knowing(self, "sizes")

@@ -223,7 +223,7 @@ class ContactProblem:
 
         Two digits more than the change has, for a factor that iterates.
         """
-        system, pushed = self._constrained(closed), self.scene.free.basis.T @ force
+        system, pushed = self._constrained(closed), self.scene.free.gathered(force)
         change = system.correction(pushed, np.zeros(int(closed.sum())), _CHANGE)
         found = np.zeros(len(closed))
         found[closed] = system.multiplier(pushed - self.matrix @ change)

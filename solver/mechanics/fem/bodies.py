@@ -6,6 +6,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ...system.threads import ahead
+
 # Eigenvalues below this share of the largest belong to unresisted motions.
 _FREE = 1e-12
 
@@ -29,7 +31,7 @@ def rigid_motions(
     larger angle than about others.
     """
     n, dim = points.shape
-    fields = list(_fields(points, body))
+    fields = list(motion_fields(points, body))
     fields = fields[1:2] if axisymmetric else fields
     per_body = len(fields)
     rows = [np.flatnonzero(field).astype(np.int32) for field in fields]
@@ -39,24 +41,28 @@ def rigid_motions(
     return sparse.csc_matrix(entries, shape=(n * dim, (int(body.max()) + 1) * per_body))
 
 
-def whole_motions(points: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """Rigid motions (n_dofs, 3 or 6) of all bodies at once, each about its own centre."""
-    return np.stack([field.ravel() for field in _fields(points, body)], axis=1)
+def motion_fields(points: np.ndarray, body: np.ndarray) -> Iterator[np.ndarray]:
+    """Each rigid motion as a displacement (n, dim) of all bodies at once, about their centres.
 
-
-def _fields(points: np.ndarray, body: np.ndarray) -> Iterator[np.ndarray]:
-    """The displacement (n, dim) of each rigid motion, in all bodies at once."""
-    n, dim = points.shape
+    Threads compute them.
+    """
+    dim = points.shape[1]
     count = np.bincount(body)
     centre = np.stack([np.bincount(body, points[:, d]) / count for d in range(dim)], axis=1)
-    arm = points - centre[body]
-    for d in range(dim):
-        yield np.tile(np.eye(dim)[d], (n, 1))
-    turns = [np.stack([-arm[:, 1], arm[:, 0]], axis=1)]
-    for turn in turns if dim == 2 else (np.cross(np.eye(3)[d], arm) for d in range(3)):
+
+    def field(number: int) -> np.ndarray:
+        if number < dim:
+            return np.tile(np.eye(dim)[number], (len(points), 1))
+        arm = points - centre[body]
+        if dim == 2:
+            turn = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+        else:
+            turn = np.cross(np.eye(3)[number - 3], arm)
         size = np.zeros(len(count))
         np.maximum.at(size, body, np.linalg.norm(turn, axis=1))
-        yield turn / np.where(size > 0, size, 1.0)[body][:, None]
+        return np.asarray(turn / np.where(size > 0, size, 1.0)[body][:, None])
+
+    return ahead(field, range(3 if dim == 2 else 6))
 
 
 def support_resistance(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> np.ndarray:

@@ -132,6 +132,26 @@ def strain_rows(  # type: ignore[no-untyped-def]
 
 
 @compiled
+def steep_rows(  # type: ignore[no-untyped-def]
+    mine, owner, bad, points, cells, _, __, on_reference, ___, largest
+):  # fmt: skip
+    """Raise `largest` (threads,) to the sums of the sizes of the gradients in a cell."""
+    gradient = np.empty((cells.shape[1], 3))
+    for c in range(len(cells)):
+        nodes = cells[c]
+        if owner[nodes[0]] != mine:
+            continue
+        if _gradients(points, nodes, on_reference[0], gradient) == 0.0:
+            bad[0] = True
+            return
+        total = 0.0
+        for n in range(len(nodes)):
+            x, y, z = gradient[n, 0], gradient[n, 1], gradient[n, 2]
+            total += np.sqrt(x * x + y * y + z * z)
+        largest[mine] = max(largest[mine], total)
+
+
+@compiled
 def size_rows(  # type: ignore[no-untyped-def]
     mine, owner, bad, points, cells, lame, shear, on_reference, weights, displacement, force, most,
     highest

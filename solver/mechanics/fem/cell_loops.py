@@ -89,6 +89,13 @@ def largest_strain(
     return float(largest[:, 0].max()), float(largest[:, 1].max())
 
 
+def steepest(points: np.ndarray, block: "Block") -> float:
+    """The largest sum of the sizes of the gradients in a block; see `cell_sizes.steepest`."""
+    largest = np.zeros(workers())
+    _shared(cell_kernels.steep_rows, points, block, largest, middle=True)
+    return float(largest.max())
+
+
 def squares(
     points: np.ndarray,
     kind: CellType,
@@ -126,7 +133,9 @@ def _shared(
     owner, bad = np.zeros(len(points), dtype=np.int32), np.zeros(1, dtype=bool)
     if count > 1:
         # Across the longest side. The planes of a regular mesh are oblique to the slabs.
-        along = points @ np.array([1e-6, 1e-3, 1.0])[np.ptp(points, axis=0).argsort().argsort()]
+        # No BLAS here: its threads would keep a core busy for a while.
+        x, y, z = sorted(points.T, key=np.ptp)
+        along = 1e-6 * x + 1e-3 * y + z
         cuts = np.quantile(along[::101], np.arange(1, count) / count)
         owner = np.searchsorted(cuts, along, side="right").astype(np.int32)
     known = points, block.cells, block.lame, block.shear, on_reference, weights

@@ -118,6 +118,13 @@ def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
     ]
 
 
+def steepest(points: np.ndarray, blocks: list[Block]) -> float:
+    """The largest sum over a cell's nodes of the sizes of `steepness`."""
+    if cell_loops.serve(len(points), blocks):
+        return max(cell_loops.steepest(points, block) for block in blocks)
+    return max(float(found.sum(axis=1).max()) for found in steepness(points, blocks))
+
+
 def _in_the_middle(
     points: np.ndarray, block: Block, found: Callable[[slice, Shapes, np.ndarray], Found]
 ) -> Iterator[tuple[slice, Found]]:

@@ -50,6 +50,20 @@ class FreeMotion:
     offset: np.ndarray
     selection: np.ndarray | None
 
+    def gathered(self, values: np.ndarray) -> np.ndarray:
+        """The part basisᵀ · `values` on free unknowns, of `values` (n_dofs,) or (n_dofs, k)."""
+        if self.selection is not None:
+            return values[self.selection]
+        return np.asarray(self.basis.T @ values)
+
+    def spread(self, x: np.ndarray) -> np.ndarray:
+        """The displacement basis · x (n_dofs,), x (n_free,)."""
+        if self.selection is None:
+            return np.asarray(self.basis @ x)
+        found = np.zeros(self.basis.shape[0])
+        found[self.selection] = x
+        return found
+
     def reduced(self, matrix: sparse.spmatrix) -> sparse.csr_matrix:
         """basisᵀ · matrix · basis."""
         if self.selection is not None:

@@ -8,13 +8,14 @@ levels do not fill in.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
 
 from .condensed_matrix import CondensedMatrix
 from .direct import factorise_roughly
-from .products import chosen_rows
+from .products import InParts, chosen_rows
 
 # A share of the diagonal: rows with less, those of pivots, are not smoothed.
 _NOTHING = 1e-4
@@ -29,9 +30,14 @@ class Correction:
     rows: np.ndarray
     matrix: csr_matrix
 
+    @cached_property
+    def parts(self) -> InParts:
+        """The `matrix`, for products."""
+        return InParts(self.matrix)
+
     def subtract_product(self, left: np.ndarray, x: np.ndarray) -> None:
         """Subtract C x from what is `left` (n,)."""
-        left[self.rows] -= self.matrix @ x[self.rows]
+        left[self.rows] -= self.parts @ x[self.rows]
 
     def coarser(self, prolongation: bsr_matrix) -> "Correction":
         """PᵀCP."""
@@ -66,7 +72,8 @@ class Correction:
 class Interface:
     """The unknowns `chosen` (r,) of a level beside contact, solved exactly with the others held.
 
-    `everything`: the correction has all rows of the level.
+    `everything`: the correction has all rows of the level. What the round-off of the factor leaves
+    in the chosen rows is kept there alone: elsewhere these leave nothing but the shift.
     """
 
     def __init__(self, correction: Correction, corrected: csr_matrix):
@@ -79,18 +86,31 @@ class Interface:
         self.everything = len(correction.rows) == corrected.shape[1]
         own = rows[:, self.chosen] + _SHIFT * identity(len(there), np.float32)
         self._solve = factorise_roughly(own)
-        self._near, self._rows = _without_empty_columns(rows)
+        if not self.everything:
+            others = np.ones(rows.shape[1], dtype=bool)
+            others[self.chosen] = False
+            rows.data *= others[rows.indices]
+            rows.eliminate_zeros()
+        self._near, outwards = _without_empty_columns(rows)
+        self._outwards, self._inwards = InParts(outwards), InParts(outwards.T.tocsr())
 
     def before(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The change (r,) by a solve, and the residual (n,) left by it."""
         first, left = self._solved(residual[self.chosen]), residual.copy()
-        left[self._near] -= self._rows.T @ first
+        if not self.everything:
+            left[self.chosen] = _SHIFT * first
+        left[self._near] -= self._inwards @ first
         return first, left
 
     def after(self, residual: np.ndarray, change: np.ndarray, first: np.ndarray) -> None:
         """Add the `first` solve and another one to the `change` (n,) of a `residual` (n,)."""
         change[self.chosen] += first
-        change[self.chosen] += self._solved(residual[self.chosen] - self._rows @ change[self._near])
+        right = residual[self.chosen] - self._outwards @ change[self._near]
+        if self.everything:
+            change[self.chosen] += self._solved(right)
+        else:
+            # The factor of A + shift yields the new values, not their change.
+            change[self.chosen] = self._solved(right + _SHIFT * change[self.chosen])
 
     def _solved(self, right: np.ndarray) -> np.ndarray:
         return self._solve(right[:, None])[:, 0].astype(np.float32)

@@ -144,10 +144,14 @@ def _coarse_rows(height: int, width: int) -> Callable[..., None]:  # noqa: C901 
                         found[s] = p_columns[q]
                         product[s] = 0
                     for r in range(height):
-                        for c in range(height):
-                            value = blocks[k, r, c]
-                            for m in range(width):
-                                product[s, r, m] += value * ways[q, c, m]
+                        for m in range(0, width, 3):
+                            u, v, w = product[s, r, m], product[s, r, m + 1], product[s, r, m + 2]
+                            for c in range(height):
+                                value = blocks[k, r, c]
+                                u += value * ways[q, c, m]
+                                v += value * ways[q, c, m + 1]
+                                w += value * ways[q, c, m + 2]
+                            product[s, r, m], product[s, r, m + 1], product[s, r, m + 2] = u, v, w
             for q in range(p_starts[i], p_starts[i + 1]):
                 row = p_columns[q]
                 if first <= row < last:
@@ -155,12 +159,16 @@ def _coarse_rows(height: int, width: int) -> Callable[..., None]:  # noqa: C901 
                     for s in range(count):
                         if found[s] < row:
                             continue
-                        place = low + np.searchsorted(places[low:high], found[s])
-                        for c in range(height):
-                            for r in range(width):
-                                value = ways[q, c, r]
-                                for m in range(width):
-                                    out[place, r, m] += value * product[s, c, m]
+                        t = low + np.searchsorted(places[low:high], found[s])
+                        for r in range(width):
+                            for m in range(0, width, 3):
+                                u, v, w = out[t, r, m], out[t, r, m + 1], out[t, r, m + 2]
+                                for c in range(height):
+                                    value = ways[q, c, r]
+                                    u += value * product[s, c, m]
+                                    v += value * product[s, c, m + 1]
+                                    w += value * product[s, c, m + 2]
+                                out[t, r, m], out[t, r, m + 1], out[t, r, m + 2] = u, v, w
             for s in range(count):
                 slot[found[s]] = -1
 

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ...system.compiled import worthwhile
 from ...system.errors import SolveError
 from ...system.threads import ahead
+from . import vectors
 
 _LOG = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of vectors at once
@@ -134,6 +136,10 @@ def _advance(
     energy: np.ndarray,
 ) -> np.ndarray:
     """One step along a direction, in place; the norms (k,) of the residual."""
+    if _compiled(solution):
+        step = _ratio(energy, vectors.product(direction[:, 0], image[:, 0]))
+        about = (each[:, 0] for each in (solution, residual, direction, image))
+        return np.sqrt(vectors.advance(float(step[0]), *about))
     step = _ratio(energy, _total(lambda some: _dot(direction[some], image[some]), len(image)))
 
     def part(some: slice) -> np.ndarray:
@@ -152,6 +158,11 @@ def _turn(
     energy: np.ndarray,
 ) -> np.ndarray:
     """The next direction, in place, and its energy (k,)."""
+    if _compiled(direction):
+        about = (each[:, 0] for each in (residual, improved, previous))
+        change, following = vectors.products_of_change(*about)[:, None]
+        vectors.turn(float(_ratio(change, energy)[0]), direction[:, 0], improved[:, 0])
+        return following
 
     def part(some: slice) -> np.ndarray:
         change = improved[some] - previous[some]
@@ -166,6 +177,11 @@ def _turn(
 
     _in_parts(turn, len(direction))
     return following
+
+
+def _compiled(columns: np.ndarray) -> bool:
+    """Whether compiled loops serve: for a single column."""
+    return columns.shape[1] == 1 and worthwhile(columns.size)
 
 
 def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -246,14 +262,14 @@ def eigenvalue_bound(
     from scipy.linalg import eigh_tridiagonal
 
     vector: np.ndarray = np.random.default_rng(0).uniform(-1, 1, size).astype(np.float32)
-    vector /= np.linalg.norm(vector)
+    vector /= np.float32(np.sqrt(_inner(vector, vector)))
     previous = np.zeros_like(vector)
     diagonal, beside = [], [np.float32(0)]
     for _ in range(steps):
         image = multiplied(vector, -beside[-1] * previous)
-        diagonal.append(np.float32(vector @ image))
+        diagonal.append(np.float32(_inner(vector, image)))
         image -= diagonal[-1] * vector
-        beside.append(np.float32(np.linalg.norm(image)))
+        beside.append(np.float32(np.sqrt(_inner(image, image))))
         if beside[-1] < 1e-5:
             break
         previous, vector = vector, image / beside[-1]

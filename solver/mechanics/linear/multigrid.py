@@ -15,13 +15,16 @@ cycle: a K-cycle (Notay and Vassilevski, Numer. Linear Algebra Appl. 15 (2008) 4
 """
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.errors import SolveError
+from ...system.threads import ahead
 from .aggregation import aggregate
 from .condensed_matrix import CondensedMatrix, Symmetric, in_blocks
 from .contact_levels import Correction, Interface, correction_of
@@ -79,19 +82,28 @@ class Level:
         """
         return self.interface is not None and self.interface.everything
 
-    def smooth(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n,): the Chebyshev polynomial applied to it."""
-        factor, own = _SECOND * 12 / 5 / float(self.bound), _FIRST + _SECOND / 5
-        step = np.float32(4 / 3) / self.bound * residual
+    def smooth(self, residual: np.ndarray, onto: np.ndarray | None = None) -> np.ndarray:
+        """`onto` (n,) plus the correction for a residual (n,): the Chebyshev polynomial of it.
+
+        The polynomial is `_SECOND` 12/5 / bound · (1 − A S) + (`_FIRST` + `_SECOND` / 5) S with
+        S = 4/3 / bound · W; the weights W are one but beside contact, where they are on both sides.
+        """
+        first, factor = 4 / 3 / float(self.bound), _SECOND * 12 / 5 / float(self.bound)
+        own = (_FIRST + _SECOND / 5) * first
+        numbers = -factor * first, 1.0, factor + own
         if self.correction is None:
-            return self.matrix.multiply(step, residual, -factor, factor, own)
+            return self.matrix.multiply(residual, onto, *numbers)
         rows = self.correction.rows
-        step[rows] *= self.weight
-        near = step[rows]
-        change = self.matrix.multiply(step, residual, -factor, factor, own)
-        left = change[rows] - own * near - factor * (self.correction.matrix @ near)
-        change[rows] = self.weight * left + own * near
-        return change
+        given = residual[rows]
+        near = self.weight * given
+        residual[rows] = near
+        found = self.matrix.multiply(residual, onto, *numbers)
+        residual[rows] = given
+        before = 0 if onto is None else onto[rows]
+        left = found[rows] - before - numbers[2] * near + factor * given
+        left -= factor * first * (self.correction.parts @ near)
+        found[rows] = before + self.weight * left + own * near
+        return found
 
     def remaining(
         self, residual: np.ndarray, change: np.ndarray, out: np.ndarray | None = None
@@ -106,7 +118,7 @@ class Level:
         """The product of its matrix with x (n,), contact included."""
         found = self.matrix.multiply(x)
         if self.correction is not None:
-            found[self.correction.rows] += self.correction.matrix @ x[self.correction.rows]
+            found[self.correction.rows] += self.correction.parts @ x[self.correction.rows]
         return found
 
     def corrected(
@@ -149,8 +161,7 @@ class Hierarchy:
         self.scale = 1 / np.sqrt(diagonal)
         blocks, self.place = in_blocks(matrix, self.scale, unknowns)
         self.size = blocks.shape[0]
-        nodes = nodes_at(unknowns, self.place, self.size)
-        nodes.motions[self.place] /= self.scale[:, None]
+        nodes = nodes_at(unknowns, self.place, self.size, self.scale)
         blocks, motions, scale = _scaled(blocks, nodes.motions)
         self.scale = self.scale * scale[self.place]
         if isinstance(matrix, NodalMatrix):
@@ -260,12 +271,25 @@ class Multigrid:
         self._levels, most = [], np.inf if needed else _MOST_BESIDE * hierarchy.size
         if condensed.springs:
             beside = correction_of(*about, condensed.springs)
-            if not hierarchy.levels:
-                return beside
-        for level in hierarchy.levels:
-            self._levels.append(level.corrected(correction, most, beside))
-            correction, beside = correction.coarser(level.prolongation), None
-        return correction
+        if not hierarchy.levels:
+            return beside or correction
+        finest, *coarser = hierarchy.levels
+
+        def below() -> tuple[list[Level], Correction]:
+            found, change = [], correction.coarser(finest.prolongation)
+            for level in coarser:
+                found.append(level.corrected(change, most))
+                change = change.coarser(level.prolongation)
+            return found, change
+
+        # The exact solve of the first level takes about as long to set up as all that is below.
+        tasks: list[Callable[[], Any]] = [
+            partial(finest.corrected, correction, most, beside),
+            below,
+        ]
+        first, (others, last) = ahead(lambda task: task(), tasks)
+        self._levels = [first, *others]
+        return last
 
     def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
         """Solve for `right` (n,) or (n, k), to a residual of `accuracy` times that.
@@ -314,7 +338,8 @@ class Multigrid:
     def _descend(self, depth: int, residual: np.ndarray) -> np.ndarray:
         """One cycle from a level down; where that is slow two steps on each coarse level."""
         if depth == len(self._levels):
-            return self._coarsest @ residual
+            # No BLAS here: its threads keep a core busy for a while, idle as they are.
+            return np.asarray(np.einsum("ij,j->i", self._coarsest, residual))
         once = partial(self._once, depth)
         if depth == 0 or not self._shared.slow:
             return once(residual)
@@ -340,8 +365,7 @@ class Multigrid:
         left = level.remaining(residual, change)
         below = multiply_transposed(level.prolongation, left)
         multiply(level.prolongation, self._descend(depth + 1, below), change, out=change)
-        change += level.smooth(level.remaining(residual, change, left))
-        return change
+        return level.smooth(level.remaining(residual, change, left), change)
 
 
 def _bound_of(matrix: bsr_matrix) -> np.float32:
@@ -357,7 +381,7 @@ def _refuse_fill(prolongation: bsr_matrix) -> None:
 
 
 def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
-    """Matrix and motions scaled to a diagonal of at most one, and the scale (n,).
+    """Matrix and motions scaled to a diagonal of at most one, in place, and the scale (n,).
 
     Rows whose entries add up to more than the typical sum are scaled down further: otherwise the
     few at a contact surface would set the eigenvalue bound for all. Zero rows, which have no
@@ -371,4 +395,5 @@ def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.nda
     single = scale.astype(np.float32)
     scale_blocks(matrix, single, single)
     scale = single.astype(float)
-    return matrix, motions / np.where(there, scale, 1.0)[:, None] * there[:, None], scale
+    motions *= np.where(there, 1 / np.where(there, scale, 1.0), 0.0)[:, None]
+    return matrix, motions, scale

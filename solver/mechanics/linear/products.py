@@ -87,6 +87,23 @@ def rows_of(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
     return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
 
 
+class InParts:
+    """A sparse matrix (m, n) for products by threads, a few rows in each."""
+
+    def __init__(self, matrix: csr_matrix):
+        """The parts depend on the matrix alone and share its memory."""
+        self._parts = []
+        for first, last in ranges(matrix.indptr, 1, _PARTS):
+            starts = matrix.indptr[first : last + 1]
+            some = slice(starts[0], starts[-1])
+            arrays = matrix.data[some], matrix.indices[some], starts - starts[0]
+            self._parts.append(csr_matrix(arrays, shape=(last - first, matrix.shape[1])))
+
+    def __matmul__(self, x: np.ndarray) -> np.ndarray:
+        """The product (m,) with x (n,)."""
+        return np.concatenate(list(ahead(lambda part: part @ x, self._parts)))
+
+
 def chosen_rows(matrix: bsr_matrix, rows: np.ndarray) -> csr_matrix:
     """Some rows (r,) of a matrix in blocks, one by one."""
     height = matrix.blocksize[0]

@@ -3,7 +3,7 @@
 A product is as fast as memory is read, so half the blocks take about half the time.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.compiled import compiled, worthwhile
 from ...system.threads import ahead
-from .products import chosen_rows, in_pieces, multiply, pattern, ranges
+from .products import chosen_rows, multiply, pattern, ranges
 
 _SLABS = 8  # the most threads that share a product
 
@@ -72,9 +72,7 @@ class SymmetricBlocks:
             return multiply(self.whole, x, out, factor, out)
         arrays = [a for part in self.parts for a in (part.indptr, part.indices, part.data)]
         vectors = x, x if base is None else base, out
-        kernel = _PRODUCTS[self.blocksize]
-        for _ in ahead(lambda some: kernel(*some, *arrays, *vectors, *numbers), self.slabs):
-            pass
+        _on_slabs(_PRODUCTS[self.blocksize], self.slabs, *arrays, *vectors, *numbers)
         return out
 
     def chosen_rows(self, rows: np.ndarray) -> csr_matrix:
@@ -130,38 +128,61 @@ def halved(matrix: bsr_matrix) -> SymmetricBlocks:
     if edge not in _PRODUCTS or not worthwhile(matrix.data.size):
         return SymmetricBlocks(matrix)
     slabs = ranges(matrix.indptr, edge**2, _SLABS)
-    slab = np.repeat(np.arange(len(slabs), dtype=np.int8), [last - first for first, last in slabs])
-    kinds = np.empty(len(matrix.indices), dtype=np.int8)
-
-    def sort(first: int, last: int) -> None:
-        some = slice(*matrix.indptr[[first, last]])
-        rows = np.repeat(np.arange(first, last), np.diff(matrix.indptr[first : last + 1]))
-        columns = matrix.indices[some]
-        inside = (slab[rows] == slab[columns]) & (rows != columns)
-        kinds[some] = np.where(inside, np.where(rows < columns, _UPPER, _LOWER), _WHOLE)
-
-    in_pieces(sort, matrix)
-    whole, upper = (_of_kind(matrix, kinds, kind) for kind in (_WHOLE, _UPPER))
+    counts = np.zeros((2, len(matrix.indptr)), dtype=matrix.indptr.dtype)
+    given = matrix.indptr, matrix.indices
+    _on_slabs(_count, slabs, *given, counts)
+    parts = []
+    for starts in np.cumsum(counts, axis=1, dtype=counts.dtype):
+        data = np.empty((starts[-1], edge, edge), dtype=matrix.dtype)
+        parts.append((data, np.empty(starts[-1], dtype=matrix.indices.dtype), starts))
+    _on_slabs(_part, slabs, *given, matrix.data, *parts[0], *parts[1])
+    whole, upper = (bsr_matrix(part, shape=matrix.shape) for part in parts)
     return SymmetricBlocks(whole, upper, tuple(slabs))
 
 
-_WHOLE, _UPPER, _LOWER = range(3)
+def _on_slabs(
+    kernel: Callable[..., None], slabs: Iterable[tuple[int, int]], *about: object
+) -> None:
+    """Call a kernel for each slab of rows; threads do it."""
+    for _ in ahead(lambda some: kernel(*some, *about), slabs):
+        pass
 
 
-def _of_kind(matrix: bsr_matrix, kinds: np.ndarray, kind: int) -> bsr_matrix:
-    """The blocks of one of the `kinds` (nnz,)."""
-    before = np.concatenate([[0], np.cumsum(kinds == kind, dtype=matrix.indptr.dtype)])
-    starts = before[matrix.indptr].astype(matrix.indptr.dtype)
-    data = np.empty((starts[-1], *matrix.blocksize), dtype=matrix.dtype)
-    indices = np.empty(starts[-1], dtype=matrix.indices.dtype)
+@compiled
+def _count(first, last, starts, columns, counts):  # type: ignore[no-untyped-def]
+    """How many blocks of each row of a slab go to W and to U, into the next row's `counts`."""
+    for i in range(first, last):
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            if j == i or j < first or j >= last:
+                counts[0, i + 1] += 1
+            elif j > i:
+                counts[1, i + 1] += 1
 
-    def fill(first: int, last: int) -> None:
-        some, into = slice(*matrix.indptr[[first, last]]), slice(*starts[[first, last]])
-        chosen = kinds[some] == kind
-        data[into], indices[into] = matrix.data[some][chosen], matrix.indices[some][chosen]
 
-    in_pieces(fill, matrix)
-    return bsr_matrix((data, indices, starts), shape=matrix.shape)
+@compiled
+def _part(  # type: ignore[no-untyped-def]
+    first, last, starts, columns, blocks,
+    whole, w_columns, w_starts, upper, u_columns, u_starts,
+):  # fmt: skip
+    """Copy the blocks of a slab that go to W and to U."""
+    edge = blocks.shape[1]
+    for i in range(first, last):
+        w, u = w_starts[i], u_starts[i]
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            if j == i or j < first or j >= last:
+                w_columns[w] = j
+                for r in range(edge):
+                    for m in range(edge):
+                        whole[w, r, m] = blocks[k, r, m]
+                w += 1
+            elif j > i:
+                u_columns[u] = j
+                for r in range(edge):
+                    for m in range(edge):
+                        upper[u, r, m] = blocks[k, r, m]
+                u += 1
 
 
 @compiled

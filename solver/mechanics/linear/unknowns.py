@@ -6,6 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ...system.threads import ahead
+
+_ROWS = 1 << 15  # that a thread handles at once
+
 
 @dataclass(frozen=True)
 class Unknowns:
@@ -68,11 +72,24 @@ def places(unknowns: Unknowns) -> tuple[np.ndarray, int]:
     return 3 * number + rank, 3 * len(count)
 
 
-def nodes_at(unknowns: Unknowns, place: np.ndarray, size: int) -> LevelNodes:
-    """The nodes of `size` rows; those without unknowns belong to no body, −1."""
+def nodes_at(
+    unknowns: Unknowns, place: np.ndarray, size: int, scale: np.ndarray | float = 1.0
+) -> LevelNodes:
+    """The nodes of `size` rows; those without unknowns belong to no body, −1.
+
+    The unknowns are in units of `scale` (n,).
+    """
     given = unknowns.motions()
+    units = np.broadcast_to(scale, place.shape)
     motions, body = np.zeros((size, given.shape[1])), np.full(size // 3, -1)
-    motions[place], body[place // 3] = given, unknowns.body
+    body[place // 3] = unknowns.body
+
+    def fill(first: int) -> None:
+        some = slice(first, first + _ROWS)
+        motions[place[some]] = given[some] / units[some, None]
+
+    for _ in ahead(fill, range(0, len(place), _ROWS)):
+        pass
     if unknowns.points is None:
         return LevelNodes(motions, body, None)
     points = np.zeros((size // 3, unknowns.points.shape[1]))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.mechanics.fem import cell_loops
-from solver.mechanics.fem.cell_sizes import largest_strain, sizes
+from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepest
 from solver.mechanics.fem.elasticity import Block, internal_force, stiffness
 from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME
@@ -42,7 +42,8 @@ def found(points, blocks, field):
     matrix = stiffness(points, blocks)
     force, stress = internal_force(points, blocks, field), nodal_stress(points, blocks, field)
     size, strain = sizes(points, blocks, field), largest_strain(points, blocks, field[0])
-    largest = np.array([size.highest]), np.array([size.slender]), np.array(strain)
+    steep = np.array([steepest(points, blocks)])
+    largest = np.array([size.highest]), np.array([size.slender]), np.array(strain), steep
     single = stiffness(points, blocks, single=True)
     return matrix.data, single.data, force, stress, size.forces, size.stress, *largest
 
@@ -117,6 +118,18 @@ def test_the_largest_principal_strain_and_rotation_are_known(values, monkeypatch
     assert found == pytest.approx((np.abs(values).max(), 0.2), rel=1e-14)
 
 
+@pytest.mark.parametrize("loops", [True, False])
+def test_the_steepest_cell_is_the_smallest_cube(loops, monkeypatch):
+    """The gradient of each of eight nodes is (±1, ±1, ±1) / (4 h) in the middle."""
+    choose(loops, monkeypatch, 2)
+    points, cells = grid(2)
+    points = np.vstack([points, points / 4])
+    cells = np.vstack([cells, cells + len(points) // 2])
+    edge = np.ptp(points[cells[-1]], axis=0)[0]
+    block = Block(BY_NAME["HEXA8"], cells, np.ones(16), np.ones(16))
+    assert steepest(points, [block]) == pytest.approx(2 * np.sqrt(3) / edge, rel=1e-14)
+
+
 def test_an_inverted_cell_is_refused(monkeypatch):
     choose(True, monkeypatch, 2)
     points, cells = grid(2)
@@ -124,6 +137,7 @@ def test_an_inverted_cell_is_refused(monkeypatch):
     about = points, [Block(BY_NAME["HEXA8"], cells, np.ones(8), np.ones(8))]
     for compute, *field in (
         (stiffness,),
+        (steepest,),
         *((call, points) for call in (internal_force, nodal_stress, sizes, largest_strain)),
     ):
         with pytest.raises(SolveError, match="HEXA8 cells are inverted"):

@@ -126,3 +126,15 @@ def test_scaled_blocks_and_sums_are_the_dense_ones(size, monkeypatch):
     products.scale_blocks(matrix, left, right)
     np.testing.assert_array_equal(matrix.data, scaled)
     np.testing.assert_allclose(matrix.toarray(), left[:, None] * dense * right, rtol=1e-6)
+
+
+def test_parts_of_a_matrix_multiply_as_all_of_it(monkeypatch):
+    matrix = random_array((97, 31), density=0.2, rng=np.random.default_rng(3), format="csr")
+    x, exact = np.arange(31.0), matrix.toarray() @ np.arange(31.0)
+    np.testing.assert_allclose(products.InParts(matrix) @ x, exact, rtol=1e-14)
+    for count in (1, 2, 3):
+        on_threads(count, monkeypatch)
+        parts = products.InParts(matrix)
+        np.testing.assert_array_equal(parts @ x, matrix @ x)
+    assert len(parts._parts) == products._PARTS
+    np.testing.assert_array_equal(products.InParts(matrix[:0]) @ x, np.zeros(0))

@@ -91,8 +91,36 @@ def test_smoothing_under_contact_is_the_polynomial():
     step = 4 / 3 / bound * weight * right
     following = step / 5 + 12 / 5 / bound * weight * (right - dense @ step)
     exact = first * step + second * following
-    found = level.smooth(right.astype(np.float32))
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+    given, onto = right.astype(np.float32), np.float32(3.0) * np.ones(len(dense), np.float32)
+    before = given.copy()
+    for base in (None, onto):
+        found = level.smooth(given, base)
+        wanted = exact if base is None else exact + 3
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-5 * np.abs(exact).max())
+        np.testing.assert_array_equal(given, before)
+
+
+def test_solve_beside_contact_is_the_exact_one():
+    """Before: x = A⁻¹ r in its rows, and r − A x is left. After: nothing is left in them."""
+    matrix, gaps, own, unknowns = pressed(6, 5)
+    solver = Multigrid(condensed(matrix, gaps, own, unknowns), unknowns)
+    level = solver._levels[0]
+    dense = level.matrix.tobsr().toarray().astype(float)
+    rows = level.correction.rows
+    dense[np.ix_(rows, rows)] += level.correction.matrix.toarray()
+    chosen, rng = level.interface.chosen, np.random.default_rng(8)
+    residual, change = rng.standard_normal((2, len(dense))).astype(np.float32)
+    first, left = level.interface.before(residual)
+    exact = np.linalg.solve(dense[np.ix_(chosen, chosen)], residual[chosen])
+    close = {"rtol": 0, "atol": 2e-3 * np.abs(exact).max()}
+    np.testing.assert_allclose(first, exact, **close)
+    np.testing.assert_allclose(left, residual - dense[:, chosen] @ first, **close)
+    assert (np.delete(left, chosen) != np.delete(residual, chosen)).any()
+    outside = np.delete(change, chosen)
+    level.interface.after(residual, change, first)
+    np.testing.assert_array_equal(np.delete(change, chosen), outside)
+    remaining = (residual - dense @ change)[chosen]
+    np.testing.assert_allclose(remaining, 0, atol=2e-3 * np.abs(dense @ change).max())
 
 
 def test_springs_are_scaled_to_one():
