@@ -60,8 +60,10 @@ from ..points import PointStudy
 GROWTH = "growth of "
 _LARGEST_COUNTED = 2_000_000  # unknowns
 _START = 2.5  # seconds: two interpreters, libraries loaded, small mesh
-# Times as long as others: gmsh fills the blocks, or most unknowns are at the interface.
-_FILLED, _SLAB = 2.5, 4.0
+# Times as long as others: gmsh fills the blocks or several statuses are solved; most unknowns are
+# at the interface or material is nearly incompressible.
+_LONGER, _LONGEST = 2.5, 4.0
+_NEARLY_INCOMPRESSIBLE = 0.49
 Division = Annotated[int, Meta(ge=1, le=1000)]
 SizeRange = Annotated[
     tuple[Unknowns, Unknowns], Meta(description="a list of two sizes, from and to")
@@ -148,8 +150,12 @@ class ScalingPoint:
     @property
     def seconds(self) -> float:
         """About how long the point takes."""
-        slow = _FILLED if self.series.cells == "TETRA4" else 1.0
-        slow = _SLAB if self.series.slab else slow
+        template, slow = self.series.template, 1.0
+        if self.series.cells == "TETRA4" or template["mesh"]["recipe"] == "hertz":
+            slow = _LONGER
+        poisson = max(material["poisson"] for material in template["materials"].values())
+        if self.series.slab or poisson > _NEARLY_INCOMPRESSIBLE:
+            slow = _LONGEST
         return (1 + self.counts_bytes) * (_START + slow * self.mesh.seconds)
 
     def _divisions(self, finer: int) -> tuple[list[int], list[int]]:
