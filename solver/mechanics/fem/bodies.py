@@ -6,8 +6,6 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ...system.threads import ahead
-
 # Eigenvalues below this share of the largest belong to unresisted motions.
 _FREE = 1e-12
 
@@ -42,10 +40,7 @@ def rigid_motions(
 
 
 def motion_fields(points: np.ndarray, body: np.ndarray) -> Iterator[np.ndarray]:
-    """Each rigid motion as a displacement (n, dim) of all bodies at once, about their centres.
-
-    Threads compute them.
-    """
+    """Each rigid motion as a displacement (n, dim) of all bodies at once, about their centres."""
     dim = points.shape[1]
     count = np.bincount(body)
     centre = np.stack([np.bincount(body, points[:, d]) / count for d in range(dim)], axis=1)
@@ -62,7 +57,7 @@ def motion_fields(points: np.ndarray, body: np.ndarray) -> Iterator[np.ndarray]:
         np.maximum.at(size, body, np.linalg.norm(turn, axis=1))
         return np.asarray(turn / np.where(size > 0, size, 1.0)[body][:, None])
 
-    return ahead(field, range(3 if dim == 2 else 6))
+    return map(field, range(3 if dim == 2 else 6))
 
 
 def support_resistance(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Aggregates of nodes, by PyAMG, and the prolongation from their rigid motions."""
 
 import numpy as np
-from scipy.sparse import bsr_matrix, csr_matrix
+from scipy.sparse import bsr_matrix, csr_matrix, diags
 
 from ...system.compiled import compiled, part_of_compiled, worthwhile
 from .products import in_pieces, share_rows
@@ -60,13 +60,9 @@ def _fitted(aggregates: csr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np
 
 def _along_lines(graph: csr_matrix) -> csr_matrix:
     """The graph with neighbours of neighbours along lines: three nodes are few for six motions."""
-    few = np.flatnonzero(np.diff(graph.indptr) <= _LINE)
-    lines = graph[few][:, few].tocoo()
-    if not lines.nnz:
-        return graph
-    about = lines.data, (few[lines.row], few[lines.col])
-    both = csr_matrix(about, shape=graph.shape)
-    return (graph + both @ both).tocsr()
+    few = diags((np.diff(graph.indptr) <= _LINE).astype(float))
+    lines = few @ graph @ few
+    return (graph + lines @ lines).tocsr() if lines.nnz else graph
 
 
 def _graph(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[csr_matrix, Near | None]:
