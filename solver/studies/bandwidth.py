@@ -81,7 +81,7 @@ def moved(
 @contextmanager
 def counted() -> Iterator[Parts]:
     """Seconds and bytes of the products within, by what they are for."""
-    from ..mechanics.linear import multigrid, products
+    from ..mechanics.linear import hierarchy, multigrid, products
     from ..mechanics.linear.stiffened import Stiffened
 
     parts: Parts = {}
@@ -133,6 +133,7 @@ def counted() -> Iterator[Parts]:
 
     with ExitStack() as stack:
         for owner, name, work in (
+            (hierarchy, "multiply", product(products.multiply)),
             (multigrid, "multiply", product(products.multiply)),
             (multigrid, "multiply_transposed", product(transposed)),
             (SymmetricBlocks, "multiply", product(SymmetricBlocks.multiply)),

@@ -9,8 +9,9 @@ from ...system.errors import SolveError
 from .backends import BACKENDS
 from .condensed_matrix import Symmetric
 from .direct import Factor, factorise, wanted
+from .hierarchy import Shared
 from .krylov import EPSILON
-from .multigrid import Multigrid, Shared
+from .multigrid import Multigrid
 from .nodal_matrix import NodalMatrix
 from .stiffened import Stiffened, StiffenedMatrix
 from .unknowns import Unknowns

@@ -18,8 +18,8 @@ from ...system.errors import SolveError
 from .choice import LinearSolver, prepare
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise_indefinite
+from .hierarchy import Shared
 from .krylov import EPSILON, ROUGH
-from .multigrid import Shared
 from .stiffened import StiffenedMatrix, Stiffness
 from .unknowns import Unknowns
 

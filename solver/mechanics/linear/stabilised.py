@@ -13,8 +13,8 @@ from scipy import sparse
 
 from .choice import LinearSolver
 from .condensation import CondensedSystem, condense
+from .hierarchy import Shared
 from .krylov import EPSILON
-from .multigrid import Shared
 from .stiffened import Stiffness
 from .unknowns import Unknowns
 

@@ -23,8 +23,9 @@ from scipy.sparse import csr_matrix, diags
 
 from ...system.errors import SolveError
 from .condensed_matrix import Symmetric
+from .hierarchy import Shared
 from .krylov import EPSILON, conjugate_residuals
-from .multigrid import MAX_ITERATIONS, Multigrid, Shared
+from .multigrid import MAX_ITERATIONS, Multigrid
 from .nodal_matrix import NodalMatrix
 from .unknowns import Unknowns
 

@@ -16,8 +16,8 @@ from .augmented import augment
 from .choice import LinearSolver, against_condensation
 from .condensation import ConstrainedSystem, condense, saddle_point
 from .direct import Factor
+from .hierarchy import Shared
 from .krylov import EPSILON
-from .multigrid import Shared
 from .stabilised import Compliance, stabilise
 from .stiffened import Stiffness, part_of
 from .unknowns import Unknowns

@@ -10,7 +10,8 @@ from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.contact_levels import Correction, correction_of
 from solver.mechanics.linear.direct import force_solver
-from solver.mechanics.linear.multigrid import Hierarchy, Multigrid
+from solver.mechanics.linear.hierarchy import Hierarchy, Level
+from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.symmetric_blocks import halved
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
@@ -100,7 +101,7 @@ def test_where_all_is_beside_contact_nothing_is_left_to_smooth(count):
     way = bsr_matrix(np.kron(np.ones((4, 1)), np.eye(3, 6)), blocksize=(3, 6), dtype=np.float32)
     whole = halved(bsr_matrix(matrix, blocksize=(3, 3), dtype=np.float32))
     nothing = Correction(np.arange(count), csr_matrix((count, count), dtype=np.float32))
-    level = multigrid.Level(whole, np.float32(2.0), way).corrected(nothing, most=np.inf)
+    level = Level(whole, np.float32(2.0), way).corrected(nothing, most=np.inf)
     _, left = level.interface.before(np.ones(12, np.float32))
     assert level.all_beside == (count == 12) == bool(np.abs(left).max() < 1e-5)
 
@@ -124,7 +125,7 @@ def test_bound_by_hand(changed, expected):
     node = np.full((3, 3), -0.5) + 1.5 * np.eye(3)
     matrix = bsr_matrix(block_diag([node] * 4), blocksize=(3, 3)).astype(np.float32)
     change = csr_matrix(changed * (np.ones((3, 3)) - np.eye(3)), dtype=np.float32)
-    level = multigrid.Level(halved(matrix), np.float32(1.05 * 1.5), matrix)
+    level = Level(halved(matrix), np.float32(1.05 * 1.5), matrix)
     found = level.corrected(Correction(np.arange(3), change), most=0)
     assert found.bound == pytest.approx(1.05 * expected, rel=1e-6)
 

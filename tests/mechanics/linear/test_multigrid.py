@@ -8,12 +8,13 @@ import pytest
 from scipy.sparse import block_array, block_diag, bsr_matrix, csr_matrix, eye
 
 from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
-from solver.mechanics.linear import choice, condensed_matrix, multigrid, products
+from solver.mechanics.linear import choice, condensed_matrix, hierarchy, products
 from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear.hierarchy import Shared
 from solver.mechanics.linear.krylov import ROUGH, two_steps
-from solver.mechanics.linear.multigrid import Multigrid, Shared
+from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.nodal_matrix import NodalMatrix
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
@@ -183,7 +184,7 @@ def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
         raise AssertionError("the coarse level is formed")
 
     matrix, unknowns = tied_to_one_node(14)
-    monkeypatch.setattr(multigrid, "coarse", untouched)
+    monkeypatch.setattr(hierarchy, "coarse", untouched)
     with pytest.raises(SolveError, match=r"its coarse levels would fill in, to \d+ neighbours"):
         Multigrid(matrix, unknowns)
     with force_solver("multigrid"):
@@ -195,7 +196,7 @@ def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
 @pytest.mark.parametrize("slow", [False, True])
 def test_threads_change_no_digit(monkeypatch, slow):
     monkeypatch.setattr(products, "_LEAST", 1000)
-    monkeypatch.setattr(multigrid, "COARSEST", 60)
+    monkeypatch.setattr(hierarchy, "COARSEST", 60)
     matrix, unknowns = two_blocks(8)
     right = np.random.default_rng(5).standard_normal(matrix.shape[0])
     found = []

@@ -7,6 +7,7 @@ from scipy import sparse
 from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.contact_levels import Interface
 from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear.hierarchy import Level
 from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.stabilised import Compliance, StabilisedSystem, stabilise
 from solver.system.errors import SolveError
@@ -116,7 +117,7 @@ def test_springs_missing_beside_contact_cost_iterations(monkeypatch):
     iterations = []
     for springs in (True, False):
         if not springs:
-            monkeypatch.setattr(multigrid.Level, "corrected", without_springs)
+            monkeypatch.setattr(Level, "corrected", without_springs)
         system = system_of(8, 6, 1e2, "multigrid")[0]
         solver = system.factor._solver
         assert isinstance(solver, Multigrid)
@@ -129,7 +130,7 @@ def test_springs_missing_beside_contact_cost_iterations(monkeypatch):
     assert iterations[1] > 2 * iterations[0]
 
 
-corrected = multigrid.Level.corrected
+corrected = Level.corrected
 
 
 def without_springs(self, correction, most, beside=None):

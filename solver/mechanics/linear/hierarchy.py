@@ -1,0 +1,241 @@
+"""The levels of multigrid: those of the bodies alone, and what contact changes in each.
+
+Nodes are gathered into aggregates, whose rigid motions are the unknowns of the next level (Vanek,
+Mandel, Brezina, Computing 56 (1996) 179). Quadratic cells have a level of linear cells on their
+vertices first. Every level is scaled to a diagonal of at most one and kept in single precision; the
+smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer. Linear Algebra Appl. 30 (2023)
+e2518): products with the matrix alone.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.sparse import bsr_matrix, csr_matrix
+
+from ...system.errors import SolveError
+from .aggregation import aggregate
+from .condensed_matrix import Symmetric, in_blocks
+from .contact_levels import Correction, Interface
+from .galerkin import coarse, smoothed
+from .krylov import eigenvalue_bound
+from .nodal_matrix import NodalMatrix
+from .products import multiply, pattern, scale_blocks, sums_of_sizes
+from .slender import smoothed_along
+from .symmetric_blocks import SymmetricBlocks, halved
+from .unknowns import LevelNodes, Unknowns, nodes_at, places
+
+COARSEST = 600
+"""The hierarchy ends at so many unknowns; that level is inverted as a dense matrix."""
+LARGEST_DENSE = 4_000
+"""Largest level that is inverted where nothing coarsens further; beyond it multigrid is refused."""
+MOST_NEIGHBOURS = 100
+"""Largest mean number of neighbouring aggregates (20–35 is typical, 80 where cells are slender)."""
+# Lottes' optimised weights of the polynomial of degree two.
+_FIRST, _SECOND = 1.02387287570313, 1.26408905371085
+_SMOOTHED = 4 / 3
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level: scaled matrix, bound of its eigenvalues, and the way up from the next.
+
+    `correction` and `weight` (r,): what contact changes in r rows of matrix and smoother;
+    `interface`: the exact solve beside it, if these unknowns are not too many.
+    """
+
+    matrix: SymmetricBlocks
+    bound: np.float32
+    prolongation: bsr_matrix
+    correction: Correction | None = None
+    weight: np.ndarray | None = None
+    interface: Interface | None = None
+
+    @property
+    def all_beside(self) -> bool:
+        """Whether all of its unknowns are beside contact: the exact solve leaves nothing to smooth.
+
+        Levels below still serve motions so soft that the round-off of its factor hides them.
+        """
+        return self.interface is not None and self.interface.everything
+
+    def smooth(self, residual: np.ndarray, onto: np.ndarray | None = None) -> np.ndarray:
+        """`onto` (n,) plus the correction for a residual (n,): the Chebyshev polynomial of it.
+
+        The polynomial is `_SECOND` 12/5 / bound · (1 − A S) + (`_FIRST` + `_SECOND` / 5) S with
+        S = 4/3 / bound · W; the weights W are one but beside contact, where they are on both sides.
+        """
+        first, factor = 4 / 3 / float(self.bound), _SECOND * 12 / 5 / float(self.bound)
+        own = (_FIRST + _SECOND / 5) * first
+        numbers = -factor * first, 1.0, factor + own
+        if self.correction is None:
+            return self.matrix.multiply(residual, onto, *numbers)
+        rows = self.correction.rows
+        given = residual[rows]
+        near = self.weight * given
+        residual[rows] = near
+        found = self.matrix.multiply(residual, onto, *numbers)
+        residual[rows] = given
+        before = 0 if onto is None else onto[rows]
+        left = found[rows] - before - numbers[2] * near + factor * given
+        left -= factor * first * (self.correction.parts @ near)
+        found[rows] = before + self.weight * left + own * near
+        return found
+
+    def remaining(
+        self, residual: np.ndarray, change: np.ndarray, out: np.ndarray | None = None
+    ) -> np.ndarray:
+        """The residual (n,) after a change; into `out` (n,), if given, which is neither."""
+        left = self.matrix.multiply(change, residual, -1.0, out=out)
+        if self.correction is not None:
+            self.correction.subtract_product(left, change)
+        return left
+
+    def product(self, x: np.ndarray) -> np.ndarray:
+        """The product of its matrix with x (n,), contact included."""
+        found = self.matrix.multiply(x)
+        if self.correction is not None:
+            found[self.correction.rows] += self.correction.parts @ x[self.correction.rows]
+        return found
+
+    def corrected(
+        self, correction: Correction, most: float, beside: Correction | None = None
+    ) -> "Level":
+        """The level under contact, with an exact solve of up to `most` unknowns beside it.
+
+        Where there are springs, this solve is the one of the correction `beside`, which has them.
+        """
+        own = self.matrix.chosen_rows(correction.rows)
+        rows = correction.corrected_rows(own)
+        weight, interface = correction.weights(own, rows), None
+        if beside is not None:
+            own = self.matrix.chosen_rows(beside.rows)
+            interface = Interface(beside, beside.corrected_rows(own))
+        elif len(correction.rows) <= most:
+            interface = Interface(correction, rows)
+        near, half = rows[:, correction.rows], np.sqrt(weight)
+
+        def symmetric(x: np.ndarray, base: np.ndarray) -> np.ndarray:
+            return base + half * (near @ (half * x))
+
+        # A motion with the largest eigenvalue is either within the bodies or beside contact.
+        bound = max(self.bound, eigenvalue_bound(symmetric, len(half)))
+        return replace(self, bound=bound, correction=correction, weight=weight, interface=interface)
+
+
+class Hierarchy:
+    """The levels of the bodies alone, each free to move.
+
+    `scale` (n,) of the unknowns and their rows `place` (n,) of `size` in the first level; the
+    matrix `last` of the last level.
+    """
+
+    def __init__(self, matrix: Symmetric, unknowns: Unknowns):
+        """Set up for a symmetric `matrix` (n, n); raises SolveError as `Multigrid`."""
+        diagonal = matrix.diagonal()
+        if not (diagonal > 0).all():
+            raise SolveError("the matrix is not positive definite: its diagonal is not positive")
+        self.scale = 1 / np.sqrt(diagonal)
+        blocks, self.place = in_blocks(matrix, self.scale, unknowns)
+        self.size = blocks.shape[0]
+        nodes = nodes_at(unknowns, self.place, self.size, self.scale)
+        blocks, motions, scale = _scaled(blocks, nodes.motions)
+        self.scale = self.scale * scale[self.place]
+        if isinstance(matrix, NodalMatrix):
+            matrix.now_scaled(self.scale)
+        self.levels: list[Level] = []
+        nodes = replace(nodes, motions=motions)
+        if unknowns.quadratic and self.size > COARSEST:
+            blocks, nodes = self._add_linear(blocks, unknowns)
+        while blocks.shape[0] > COARSEST:
+            bound = _bound_of(blocks)
+            tentative, coarse_nodes, near = aggregate(blocks, nodes)
+            if tentative.nnz == 0 or 2 * tentative.shape[1] > blocks.shape[0]:
+                break
+            if near is None:
+                way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
+            else:
+                about = nodes.motions, _SMOOTHED, float(bound)
+                way = smoothed_along(blocks, tentative, near, *about)
+            _refuse_fill(way)
+            blocks, nodes = self._add(blocks, bound, way, coarse_nodes)
+        if blocks.shape[0] > LARGEST_DENSE:
+            size = blocks.shape[0]
+            raise SolveError(f"its levels end at {size} unknowns: nothing coarsens further")
+        self.last = blocks
+        if isinstance(matrix, NodalMatrix) and self.levels:
+            matrix.halve(self.levels[0].matrix)
+
+    def _add_linear(self, matrix: bsr_matrix, unknowns: Unknowns) -> tuple[bsr_matrix, LevelNodes]:
+        """Add the level of quadratic cells; return matrix and nodes of the linear ones."""
+        assert unknowns.linear is not None
+        vertices = unknowns.of_vertices()
+        place, size = places(vertices)
+        way, nodes = unknowns.linear.tocoo(), nodes_at(vertices, place, size)
+        entries = (way.data / self.scale[way.row]).astype(np.float32)
+        where = self.place[way.row], place[way.col]
+        prolongation = csr_matrix((entries, where), shape=(self.size, size)).tobsr((3, 3))
+        return self._add(matrix, _bound_of(matrix), prolongation, nodes)
+
+    def _add(
+        self, matrix: bsr_matrix, bound: np.float32, prolongation: bsr_matrix, nodes: LevelNodes
+    ) -> tuple[bsr_matrix, LevelNodes]:
+        """Add a level; return matrix and nodes of the next."""
+        below, motions, scale = _scaled(coarse(matrix, prolongation), nodes.motions)
+        left = np.ones(prolongation.shape[0], dtype=np.float32)
+        scale_blocks(prolongation, left, scale.astype(np.float32))
+        self.levels.append(Level(halved(matrix), bound, prolongation))
+        return below, replace(nodes, motions=motions)
+
+
+class Shared:
+    """The hierarchy of one stiffness matrix, set up once for all contact statuses.
+
+    `slow`: whether iterations were so slow that coarse levels take two steps each from then on.
+    """
+
+    def __init__(self) -> None:
+        """Nothing is set up yet."""
+        self._hierarchy: Hierarchy | None = None
+        self.slow = False
+
+    def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
+        """The hierarchy of `matrix`, the same at each call until it is closed."""
+        if self._hierarchy is None:
+            self._hierarchy = Hierarchy(matrix, unknowns)
+        return self._hierarchy
+
+    def close(self) -> None:
+        """Release its memory."""
+        self._hierarchy = None
+
+
+def _bound_of(matrix: bsr_matrix) -> np.float32:
+    return eigenvalue_bound(partial(multiply, matrix), matrix.shape[0])
+
+
+def _refuse_fill(prolongation: bsr_matrix) -> None:
+    """Raise SolveError where the next level will have too many neighbours, before it is formed."""
+    felt = pattern(prolongation)
+    near = (felt.T @ felt).nnz / felt.shape[1]
+    if near > MOST_NEIGHBOURS:
+        raise SolveError(f"its coarse levels would fill in, to {near:.0f} neighbours or more")
+
+
+def _scaled(matrix: bsr_matrix, motions: np.ndarray) -> tuple[bsr_matrix, np.ndarray, np.ndarray]:
+    """Matrix and motions scaled to a diagonal of at most one, in place, and the scale (n,).
+
+    Rows whose entries add up to more than the typical sum are scaled down further: otherwise the
+    few at a contact surface would set the eigenvalue bound for all. Zero rows, which have no
+    unknown, stay zero.
+    """
+    diagonal = matrix.diagonal().astype(float)
+    there = diagonal > 0
+    scale = np.where(there, 1 / np.sqrt(np.where(there, diagonal, 1.0)), 0.0)
+    sums = scale * sums_of_sizes(matrix, scale.astype(np.float32))
+    scale /= np.sqrt(np.maximum(1.0, sums / np.median(sums[there])))
+    single = scale.astype(np.float32)
+    scale_blocks(matrix, single, single)
+    scale = single.astype(float)
+    motions *= np.where(there, 1 / np.where(there, scale, 1.0), 0.0)[:, None]
+    return matrix, motions, scale
