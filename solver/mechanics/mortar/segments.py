@@ -14,10 +14,12 @@ segments; Abbas et al. (2018), §4.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Self
 
 import numpy as np
 
+from ...system.threads import ahead
 from ..fem import mortar_degree, shape_functions, simplex_rule
 from ..fem.faces import circumference
 from ..fem.small_matrices import invert
@@ -140,13 +142,14 @@ def intersect(
     """
     pairs = face_pairs(slaves, index, masters, reach, among)
     hidden, nearer = hidden_pairs(pairs)
-    found: list[Segments] = []
-    for start in range(0, len(pairs.i), _PAIRS_AT_ONCE):
+
+    def part(start: int) -> list[Segments]:
         end = start + _PAIRS_AT_ONCE
         low, high = np.searchsorted(hidden, [start, end])
         behind = hidden[low:high] - start, pairs.j[nearer[low:high]]
-        found += _segments(pairs.of(slice(start, end)), behind, reach, more)
-    return found
+        return list(_segments(pairs.of(slice(start, end)), behind, reach, more))
+
+    return list(chain.from_iterable(ahead(part, range(0, len(pairs.i), _PAIRS_AT_ONCE))))
 
 
 # Pieces of slave faces: pair numbers (s,), places (s, q, dim − 1), weights (s, q)

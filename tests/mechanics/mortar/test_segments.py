@@ -7,12 +7,15 @@ import pytest
 
 from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.gauss import gauss_rule
+from solver.mechanics.mortar import segments
 from solver.mechanics.mortar.facets import facets, measured
 from solver.mechanics.mortar.fans import quadrature
 from solver.mechanics.mortar.operator import LAC, gap_operator
+from solver.mechanics.mortar.pairing import face_pairs, hidden_pairs
 from solver.mechanics.mortar.regions import Regions, clip_to_face, without_face
 from solver.mechanics.mortar.segments import intersect
 from solver.mesh.catalogue import BY_NAME
+from solver.system import threads
 
 RAW = replace(LAC, closure=False)
 
@@ -279,3 +282,41 @@ def test_faces_of_a_sphere_are_covered(kind):
     master = facets(points, square, np.arange(n, len(points))[None], np.array([0]))
     surface = gap_operator([slave], [master], 1, len(points), 9.0).surface
     assert surface.covered == pytest.approx(surface.area, rel=1e-6)
+
+
+def wavy(count, height):
+    """Points and QUAD4 of a square of edge 1 in count² faces, their height a function of x, y."""
+    x, y = np.meshgrid(*[np.linspace(0, 1, count + 1)] * 2, indexing="ij")
+    points = np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3)
+    corner = np.arange((count + 1) ** 2).reshape(count + 1, -1)
+    ends = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+    return points, np.stack([end.ravel() for end in ends], axis=1)
+
+
+def test_parts_and_threads_change_no_segment(monkeypatch):
+    """Where an upper part of the master hides the lower one in a few of the parts."""
+    below, slave_faces = wavy(6, lambda x, y: 0.02 * np.sin(4 * x) * y)
+    above, master_faces = wavy(5, lambda x, y: 0.05 + 0.03 * np.cos(3 * y))
+    roof, roof_faces = wavy(3, lambda x, y: 0.2 + 0.01 * x)
+    points = np.concatenate([below, above, 0.5 * roof + 0.1])
+    kind = BY_NAME["QUAD4"]
+    upper = np.concatenate([master_faces, len(above) + roof_faces])[:, ::-1] + len(below)
+    slave = facets(points, kind, slave_faces, np.arange(len(slave_faces)))
+    master = facets(points, kind, upper, np.arange(len(upper)))
+
+    def found():
+        operator = gap_operator([slave], [master], len(slave_faces), len(points), 9.0)
+        return operator.segments, operator.matrix.data, operator.initial, operator.covered
+
+    whole = found()
+    hidden, _ = hidden_pairs(face_pairs([slave], 0, [master], 9.0))
+    assert len(hidden) > 9
+    monkeypatch.setattr(segments, "_PAIRS_AT_ONCE", 7)
+    parts = []
+    for count in (1, 2, 5):
+        monkeypatch.setattr(threads, "workers", lambda n=count: n)
+        parts.append(found())
+    for values in zip(*parts, whole, strict=True):
+        for other in values[1:3]:
+            np.testing.assert_array_equal(other, values[0])
+        np.testing.assert_allclose(values[0], values[3], rtol=1e-12, atol=1e-15)
