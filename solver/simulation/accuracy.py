@@ -142,8 +142,10 @@ def roughness(scene: Scene) -> Roughness:
         entries = scene.free.basis.tocoo()
         node = entries.row[np.bincount(entries.col)[entries.col] > 1] // dim
         turned[node] = scene.rounding * around[node]
-    strain = scene.rounding * steepest(points, scene.blocks)
-    return Roughness(strain, tilt, turned, steep if turned.any() else [])
+        largest = float(around.max())
+    else:
+        largest = steepest(points, scene.blocks)
+    return Roughness(scene.rounding * largest, tilt, turned, steep if turned.any() else [])
 
 
 def _tilts(points: np.ndarray, faces: FaceBlock, noise: float) -> np.ndarray:

@@ -35,9 +35,9 @@ class Correction:
         """The `matrix`, for products."""
         return InParts(self.matrix)
 
-    def subtract_product(self, left: np.ndarray, x: np.ndarray) -> None:
-        """Subtract C x from what is `left` (n,)."""
-        left[self.rows] -= self.parts @ x[self.rows]
+    def product(self, x: np.ndarray) -> np.ndarray:
+        """The entries (r,) of C x in its rows, x (n,)."""
+        return self.parts @ x[self.rows]
 
     def coarser(self, prolongation: bsr_matrix) -> "Correction":
         """PᵀCP."""

@@ -88,14 +88,14 @@ class Level:
         """The residual (n,) after a change; into `out` (n,), if given, which is neither."""
         left = self.matrix.multiply(change, residual, -1.0, out=out)
         if self.correction is not None:
-            self.correction.subtract_product(left, change)
+            left[self.correction.rows] -= self.correction.product(change)
         return left
 
     def product(self, x: np.ndarray) -> np.ndarray:
         """The product of its matrix with x (n,), contact included."""
         found = self.matrix.multiply(x)
         if self.correction is not None:
-            found[self.correction.rows] += self.correction.parts @ x[self.correction.rows]
+            found[self.correction.rows] += self.correction.product(x)
         return found
 
     def corrected(

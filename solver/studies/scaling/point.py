@@ -2,9 +2,9 @@
 
 The solve is what a user types: `python -m solver solve`, from a mesh file to a result file, in a
 process of its own that is pinned to its cores; a process in which Numba compiled functions is not
-measured, but the next one. Its verdict has the cost of each stage; the
-operating system reports processor time and peak memory of the whole process. Beside the keys of
-`studies.points` the record has:
+measured, but the next one. Its verdict has the cost of each stage; the operating system reports
+processor time and peak memory of the whole process. Beside the keys of `studies.points` the record
+has:
 
     series cells size divisions            what it is of
     dofs macro_elements faces matrix_entries       faces: of both sides of the interface
