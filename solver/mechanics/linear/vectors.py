@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...system.compiled import compiled
+from ...system.compiled import compiled, part_of_compiled
 from ...system.threads import ahead, workers
 
 _PART = 1 << 13  # of a vector
@@ -59,19 +59,25 @@ def _shared(kernel: Callable[..., None], *about: Any) -> None:
         pass
 
 
+@part_of_compiled
+def _inner(low, high, x, y):  # type: ignore[no-untyped-def]
+    """The product of entries from `low` to `high`, in four sums that do not wait for each other."""
+    a = b = c = d = 0.0
+    for i in range(low, high - 3, 4):
+        a += x[i] * y[i]
+        b += x[i + 1] * y[i + 1]
+        c += x[i + 2] * y[i + 2]
+        d += x[i + 3] * y[i + 3]
+    for i in range(high - (high - low) % 4, high):
+        a += x[i] * y[i]
+    return (a + b) + (c + d)
+
+
 @compiled
 def _multiply(first, last, size, x, y, found):  # type: ignore[no-untyped-def]
     for part in range(first, last):
-        a = b = c = d = 0.0
         low, high = part * size, min((part + 1) * size, len(x))
-        for i in range(low, high - 3, 4):
-            a += x[i] * y[i]
-            b += x[i + 1] * y[i + 1]
-            c += x[i + 2] * y[i + 2]
-            d += x[i + 3] * y[i + 3]
-        for i in range(high - (high - low) % 4, high):
-            a += x[i] * y[i]
-        found[part, 0] = (a + b) + (c + d)
+        found[part, 0] = _inner(low, high, x, y)
 
 
 @compiled
@@ -83,15 +89,7 @@ def _advance(  # type: ignore[no-untyped-def]
         for i in range(low, high):
             solution[i] += step * direction[i]
             residual[i] -= step * image[i]
-        a = b = c = d = 0.0
-        for i in range(low, high - 3, 4):
-            a += residual[i] * residual[i]
-            b += residual[i + 1] * residual[i + 1]
-            c += residual[i + 2] * residual[i + 2]
-            d += residual[i + 3] * residual[i + 3]
-        for i in range(high - (high - low) % 4, high):
-            a += residual[i] * residual[i]
-        found[part, 0] = (a + b) + (c + d)
+        found[part, 0] = _inner(low, high, residual, residual)
 
 
 @compiled
