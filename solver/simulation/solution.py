@@ -263,7 +263,9 @@ class Validity:
 
     `strain` (principal) and `rotation` (radians), in the middle of the cells; `slip` of closed
     contact, a mean over the macro-element, by the size of that; `pushed_past`: the number of cells
-    inside another body; `partly_covered`: of closed macro-elements under the end of the master.
+    inside another body; `partly_covered`: of closed macro-elements under the end of the master;
+    `unpaired`: the largest share of a macro-element that lies opposite the master and yet has no
+    partner, of those that are closed or not covered at all.
     """
 
     strain: float = float("nan")
@@ -271,6 +273,7 @@ class Validity:
     slip: float = float("nan")
     pushed_past: int = 0
     partly_covered: int = 0
+    unpaired: float = 0.0
 
 
 @dataclass

@@ -24,6 +24,8 @@ from .solution import Line, Validity
 _NOTED_STRAIN, _SMALL_STRAIN = 1e-2, 1e-1
 # The same for a slip, a share of the size of the macro-element.
 _NOTED_SLIP, _SMALL_SLIP = 0.1, 1.0
+# The same for a share of a macro-element that should have a partner.
+_NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
 
 
 def validity(scene: Scene, states: Sequence[Equilibrium]) -> Validity:
@@ -44,6 +46,7 @@ def validity(scene: Scene, states: Sequence[Equilibrium]) -> Validity:
             slip=max(slips),
             pushed_past=max(found.pushed_past, past),
             partly_covered=max(found.partly_covered, partly),
+            unpaired=max([found.unpaired, *(_unpaired(zone, closed) for zone in scene.zones)]),
         )
     return found
 
@@ -101,6 +104,14 @@ def _partly_covered(zone: ZoneScene, closed: np.ndarray) -> int:
     return int((pressed & (share > MIN_COVERAGE) & (share < 1 - MIN_COVERAGE)).sum())
 
 
+def _unpaired(zone: ZoneScene, closed: np.ndarray) -> float:
+    """The largest share of a macro-element that lost its partner, closed or not covered at all."""
+    surface = zone.operator.surface
+    pressed = zone.by_macro_element(closed.astype(float)) > 0
+    bare = surface.covered <= MIN_COVERAGE * surface.area
+    return float(np.max((surface.lost / surface.area)[pressed | bare], initial=0.0))
+
+
 def remarks(found: Validity) -> Iterator[Line]:
     """Lines of the plan for what is not small, or not as a user may expect."""
     if max(found.strain, found.rotation) > _NOTED_STRAIN:
@@ -112,6 +123,9 @@ def remarks(found: Validity) -> Iterator[Line]:
     if found.partly_covered:
         what = f"the master ends inside {found.partly_covered} macro-elements in contact"
         yield Line(what, "their pressure is the mean over the part that it covers")
+    if found.unpaired > _NOTED_UNPAIRED:
+        what = f"{found.unpaired:.1%} of a macro-element lies opposite the master without a partner"
+        yield Line(what, "the master has a step there, or turns away too far")
 
 
 def limits_passed(case: Case, found: Validity) -> list[str]:
@@ -119,9 +133,14 @@ def limits_passed(case: Case, found: Validity) -> list[str]:
 
     A case that names an exact solution asks for one of linear theory, whatever the size.
     """
-    if case.solution is not None:
-        return []
     reasons = []
+    if found.unpaired > _UNPAIRED:
+        reasons.append(
+            f"{found.unpaired:.2g} of a macro-element lies opposite the master but has no partner: "
+            "refine the slave at steps of the master, or its surface where it turns away"
+        )
+    if case.solution is not None:
+        return reasons
     if max(found.strain, found.rotation) > _SMALL_STRAIN:
         reasons.append(
             f"strain {found.strain:.2g} with rotation {found.rotation:.2g} is beyond small strain: "

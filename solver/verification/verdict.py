@@ -170,7 +170,7 @@ class Verdict:
     `closest_to_tolerance` the one nearest to its tolerance or furthest past it. Pairs are minimum
     and maximum over all zones; `seconds` has wall times by stage and their `total`.
     `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
-    reconstruction. `strain` to `partly_covered`: see `solver.simulation.solution.Validity`.
+    reconstruction. `strain` to `unpaired`: see `solver.simulation.solution.Validity`.
     `transient`: the machine is the reason (memory, disk, a kill), so that the same solve may
     succeed another time.
 
@@ -213,6 +213,7 @@ class Verdict:
     slip: float | None = None
     pushed_past: int | None = None
     partly_covered: int | None = None
+    unpaired: float | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float | None = None

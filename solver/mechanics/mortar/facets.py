@@ -28,7 +28,8 @@ class Facets:
     `centre` (n, dim); `radius` (n,); `normal` (n, dim) outward at the centre; `tangents`
     (n, dim − 1, dim) completing it to a right-handed frame; `flat` (n,): planar; `straight` (n,):
     planar with straight edges; `affine` (n,): straight, and the image of the reference face under
-    an affine map; `directions` (n, n_nodes, dim): the unit normals along which a slave face meets
+    an affine map; `turn` (n,): the largest angle between `normal` and the normal at a vertex;
+    `directions` (n, n_nodes, dim): the unit normals along which a slave face meets
     its master, at its nodes. None: those of the face itself. `axisymmetric`: they are sections of
     rings about the axis x = 0, and integrals over them are those over the rings.
     """
@@ -44,6 +45,7 @@ class Facets:
     flat: np.ndarray
     straight: np.ndarray
     affine: np.ndarray
+    turn: np.ndarray
     directions: np.ndarray | None = None
     axisymmetric: bool = False
 
@@ -107,8 +109,20 @@ def facets(
         flat=flat,
         straight=straight,
         affine=affine,
+        turn=np.where(straight, 0.0, _turn(kind, points, nodes, normal)),
         axisymmetric=axisymmetric,
     )
+
+
+def _turn(
+    kind: CellType, points: np.ndarray, nodes: np.ndarray, normal: np.ndarray
+) -> np.ndarray:
+    """The largest angle (n,) between the normal at the centre and those at the vertices."""
+    slopes = shape_functions(kind.name).gradients(kind.nodes[: kind.n_vertices])
+    vectors = area_vectors(points, nodes, slopes)
+    size = np.linalg.norm(vectors, axis=2)
+    cosine = np.einsum("fqd,fd->fq", vectors, normal) / np.where(size > 0, size, 1.0)
+    return np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
 
 
 def tangents_of(normal: np.ndarray) -> np.ndarray:

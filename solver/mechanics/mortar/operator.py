@@ -20,22 +20,15 @@ from .multipliers import (
     Space,
     constants,
 )
+from .partners import on_one_surface, uncovered, without_partner
 from .recovery import Asked, Recovery, recovery
 from .segments import Segments, intersect
 from .surface_points import Samples, Surface, face_samples
 
 # Slave-side entries of nodal multipliers below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
-# A slave face that misses more than this share of its area is looked at again, farther away.
-_MISSED = 1e-6
 # The distance within which such faces are looked for grows by this factor at a time.
 _WIDER = 8.0
-# Surfaces come into contact where they are no farther apart, beyond their smallest distance, than
-# this share of the extent of the slave surface: displacements are small.
-_REACH = 0.5
-# The distance of one continuous surface changes, over a macro-element, by no more than its slope
-# times the size of the macro-element and this share of that size, for what bends.
-_BEND = 0.1
 
 Meet = Callable[..., list[Segments]]
 
@@ -98,7 +91,8 @@ class Scheme:
     """How the gap is integrated: which points, which multipliers, and whether closure is due.
 
     `sample` gives points that measure whole slave faces, `meet` those where the surfaces meet,
-    `space` the multipliers. `nearest`: of several parts of the master surface the nearest counts.
+    `space` the multipliers. `nearest`: the
+    master has faces, of which a macro-element meets the nearest surface.
     """
 
     sample: Callable[[list[Facets]], list[Samples]] = face_samples
@@ -124,7 +118,7 @@ def gap_operator(
 
     `search` is the largest distance (a length) at which surfaces are looked for, by default the
     extent of both. They are first looked for nearby, and farther away only for sub-faces that found
-    no partner there. What is out of reach of contact does not count as covered. Faces that meet
+    no partner there. Beside a step of the master the nearer side alone counts. Faces that meet
     along directions other than their own normals have no closure. `asked`: how the pressure is
     recovered, for the multipliers of macro-elements alone.
 
@@ -143,7 +137,8 @@ def gap_operator(
     samples = scheme.sample(slaves)
     reach = _extent([*slaves, *masters]) if search is None else search
     found = _search(slaves, samples, masters, reach, scheme.meet)
-    found = _in_reach(found, slaves, n_macro) if scheme.nearest else found
+    if scheme.nearest:
+        found = on_one_surface(found, slaves, n_macro)
     data = InterfaceData(slaves=slaves, samples=samples, found=found, n_macro=n_macro)
     space = scheme.space(data)
     parts = [integrals(space, segments) for segments in found]
@@ -153,7 +148,10 @@ def gap_operator(
     for part in parts:
         np.add.at(initial, part.number, part.gap)
         np.add.at(covered, part.number, part.weight)
-    surface = _surface(data)
+    lost = np.zeros(n_macro)
+    if scheme.nearest:
+        lost = without_partner(slaves, masters, samples, found, reach, n_macro)
+    surface = _surface(data, lost)
     averages = space.averages(samples, [block.number for block in slaves], n_macro)
     return GapOperator(
         matrix=(master - (slave if space.nodes is None else _diagonal(slave))).tocsr(),
@@ -191,11 +189,11 @@ def _search(
     near, *farther = _reaches([*slaves, *masters], search)
     found = meet(slaves, samples, masters, near)
     for reach in farther:
-        lonely = _lonely(samples, found)
-        if not any(len(faces) for faces in lonely):
+        bare = uncovered(samples, found)
+        if not any(len(faces) for faces in bare):
             break
-        kept = [s.of(~np.isin(s.slave.face, lonely[s.slave.index])) for s in found]
-        found = kept + meet(slaves, samples, masters, reach, lonely)
+        kept = [s.of(~np.isin(s.slave.face, bare[s.slave.index])) for s in found]
+        found = kept + meet(slaves, samples, masters, reach, bare)
     return found
 
 
@@ -213,46 +211,6 @@ def _reaches(faces: list[Facets], search: float) -> list[float]:
     while reaches[0] > _WIDER * usual:
         reaches.insert(0, reaches[0] / _WIDER)
     return [reach for reach in reaches if reach < search] + [search]
-
-
-def _lonely(samples: list[Samples], found: list[Segments]) -> list[np.ndarray]:
-    """By block, the slave faces that segments do not cover whole."""
-    lonely = []
-    for a, sample in enumerate(samples):
-        whole = sample.weight.sum(axis=1)
-        covered = np.zeros(len(whole))
-        for segments in found:
-            if segments.slave.index == a:
-                np.add.at(covered, segments.slave.face, segments.area)
-        lonely.append(np.flatnonzero(covered < (1 - _MISSED) * whole))
-    return lonely
-
-
-def _in_reach(found: list[Segments], slaves: list[Facets], n_macro: int) -> list[Segments]:
-    """The segments that contact may reach: of the master surface that is nearest to each slave.
-
-    Left out are those farther away, on a macro-element, than a continuous surface could be that is
-    as near as its nearest segment; and those beyond the reach of contact in the zone.
-    """
-    if not found:
-        return found
-    distance = [np.abs(segments.gap).min(axis=1) for segments in found]
-    nearest, slope, size = np.full(n_macro, np.inf), np.zeros(n_macro), np.zeros(n_macro)
-    for segments, far in zip(found, distance, strict=True):
-        cosine = np.abs(np.einsum("sd,sd->s", *(s.faces.normal[s.face] for s in segments.sides)))
-        np.minimum.at(nearest, segments.macro, far)
-        np.maximum.at(slope, segments.macro, np.sqrt(np.maximum(cosine**-2 - 1, 0.0)))
-    corners = np.concatenate([block.corner.reshape(-1, block.corner.shape[2]) for block in slaves])
-    macro = np.concatenate([np.repeat(b.number, b.corner.shape[1]) for b in slaves])
-    low, high = (np.full((n_macro, corners.shape[1]), x) for x in (np.inf, -np.inf))
-    np.minimum.at(low, macro, corners)
-    np.maximum.at(high, macro, corners)
-    size = np.linalg.norm(high - low, axis=1)
-    limit = nearest + (slope + _BEND) * size
-    extent = np.linalg.norm(np.ptp(corners, axis=0))
-    limit = np.minimum(limit, nearest.min() + _REACH * extent)
-    kept = [s.of(far <= limit[s.macro]) for s, far in zip(found, distance, strict=True)]
-    return [segments for segments in kept if len(segments.gap)]
 
 
 def _assembled(
@@ -292,7 +250,7 @@ def _diagonal(slave: sparse.csr_matrix) -> sparse.csr_matrix:
     return slave
 
 
-def _surface(data: InterfaceData) -> Surface:
+def _surface(data: InterfaceData, lost: np.ndarray) -> Surface:
     n_macro, dim = data.n_macro, data.slaves[0].centre.shape[1]
     area, covered = np.zeros(n_macro), np.zeros(n_macro)
     centre, normal = np.zeros((n_macro, dim)), np.zeros((n_macro, dim))
@@ -306,4 +264,5 @@ def _surface(data: InterfaceData) -> Surface:
     for segments in data.found:
         covered += np.bincount(segments.macro, segments.area, minlength=n_macro)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    return Surface(area=area, covered=covered, centre=centre / area[:, None], normal=normal)
+    centre /= area[:, None]
+    return Surface(area=area, covered=covered, lost=lost, centre=centre, normal=normal)

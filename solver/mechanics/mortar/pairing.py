@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ...mesh.catalogue import CellType
 from .clipping import clip, triangles
-from .facets import Facets
+from .facets import Facets, project_along
 
 # Master faces overlap, one behind the other, by more than this share of the slave face's radius.
 _OVERLAP = 1e-9
@@ -20,8 +20,11 @@ _OVERLAP = 1e-9
 _ONE_PLANE = 1e-9
 # More than what rounding makes of a distance, as a share of it.
 _ROUNDING = 1e-9
-# A master face may meet a slave face only where their normals oppose at least this much.
-_FACING = 0.2
+# A face is seen from behind where the cosine of the angle between the normals is above this.
+_BACK = 1e-3
+# A master face may meet a slave face only where their normals are farther apart than this angle,
+# somewhere on the faces.
+_FACING = np.arccos(-0.2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +34,7 @@ class Outlines:
     `corner` (m, v, dim); `bulge` (m, v, dim): the offset of each edge's middle node from the middle
     of its chord (among quadrangles, a triangle has a first edge of no length); `vertices` (m, v)
     their nodes; `block`, `face` (m,): where they are from; `centre`, `normal` (m, dim), `radius`,
-    `affine` (m,) as in Facets.
+    `affine`, `turn` (m,) as in Facets.
     """
 
     corner: np.ndarray
@@ -43,6 +46,7 @@ class Outlines:
     normal: np.ndarray
     radius: np.ndarray
     affine: np.ndarray
+    turn: np.ndarray
 
 
 def outlines(blocks: Sequence[Facets], reverse: bool = False) -> Outlines:
@@ -75,6 +79,7 @@ def outlines(blocks: Sequence[Facets], reverse: bool = False) -> Outlines:
         normal=np.concatenate([block.normal for block in blocks]),
         radius=np.concatenate([block.radius for block in blocks]),
         affine=np.concatenate([block.affine for block in blocks]),
+        turn=np.concatenate([block.turn for block in blocks]),
     )
 
 
@@ -118,12 +123,19 @@ class Pairs:
         return seen_along(corner, tangents), seen_along(outline.bulge[j], tangents)
 
     def distance(self, place: np.ndarray) -> np.ndarray:
-        """How far (p,) the planes of the master faces are from places (p, dim − 1), at most."""
+        """How far (p,) the master faces are along the slave's normal from places (p, dim − 1)."""
         origin = self.slave.centre[self.i]
         origin = origin + np.einsum("pt,ptd->pd", place, self.slave.tangents[self.i])
-        normal = self.outline.normal[self.j]
+        normal, along = self.outline.normal[self.j], self.slave.normal[self.i]
         height = np.einsum("pd,pd->p", self.outline.centre[self.j] - origin, normal)
-        return np.abs(height / np.einsum("pd,pd->p", self.slave.normal[self.i], normal))
+        height /= np.einsum("pd,pd->p", along, normal)
+        for index, master in enumerate(self.masters):
+            mine = (self.outline.block[self.j] == index) & (self.outline.turn[self.j] > 0)
+            corner = master.corner[self.outline.face[self.j[mine]]]
+            target, direction = origin[mine][:, None], along[mine][:, None]
+            _, gap = project_along(master.type, corner, target, direction, outline=True)
+            height[mine] = gap[:, 0]
+        return height
 
 
 def face_pairs(
@@ -144,7 +156,7 @@ def face_pairs(
     slave, master = slaves[index], outlines(masters, reverse=True)
     i, j = facing_pairs(slave, master, reach, among)
     near = _above_each_other(slave, master, i, j)
-    return Pairs(
+    pairs = Pairs(
         slave=slave,
         index=index,
         own=outlines([slave]),
@@ -153,6 +165,54 @@ def face_pairs(
         i=i[near],
         j=j[near],
     )
+    return pairs.of(~_through_a_body(pairs))
+
+
+def _through_a_body(pairs: Pairs) -> np.ndarray:
+    """Which pairs (p,) meet, behind the slave face, the far side of a body of the master.
+
+    A line from the slave face inwards then passes another master face first, and from behind. So it
+    is where whole skins of bodies are the surfaces of a zone.
+    """
+    slave, outline = pairs.slave, pairs.outline
+    found, centre = np.zeros(len(pairs.i), dtype=bool), outline.centre[pairs.j]
+    tangents = slave.tangents[pairs.i]
+    place = np.einsum("ptd,pd->pt", tangents, centre - slave.centre[pairs.i])
+    depth = -np.einsum("pd,pd->p", slave.normal[pairs.i], centre - slave.centre[pairs.i])
+    deep = np.flatnonzero(depth > _ROUNDING * (slave.radius[pairs.i] + outline.radius[pairs.j]))
+    if not len(deep):
+        return found
+    behind = -outline.normal
+    some = np.unique(pairs.i[deep])
+    i, blocker = candidate_pairs(
+        slave.centre[some], slave.radius[some], outline.centre, outline.radius, depth.max()
+    )
+    i = some[i]
+    backs = np.einsum("pd,pd->p", slave.normal[i], behind[blocker]) < -_BACK
+    i, blocker = i[backs], blocker[backs]
+    first = np.searchsorted(i, pairs.i[deep], side="left")
+    last = np.searchsorted(i, pairs.i[deep], side="right")
+    which = np.repeat(np.arange(len(deep)), last - first)
+    blocker = blocker[np.arange(len(which)) - np.repeat(np.cumsum(last - first) - last, last - first)]
+    which = deep[which]
+    corner = np.einsum(
+        "ptd,pvd->pvt", tangents[which], outline.corner[blocker] - slave.centre[pairs.i[which], None]
+    )
+    between = _holds(corner, place[which])
+    back = replace(pairs, i=pairs.i[which], j=blocker)
+    height = -back.distance(place[which])
+    between &= (height < depth[which]) & (height > -_ROUNDING * slave.radius[pairs.i[which]])
+    found[which[between]] = True
+    return found
+
+
+def _holds(corner: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Which convex polygons (p, v, 2), or intervals (p, 2, 1), hold their places."""
+    if corner.shape[2] == 1:
+        return (corner[..., 0].min(axis=1) <= place[:, 0]) & (place[:, 0] <= corner[..., 0].max(axis=1))
+    chord, offset = np.roll(corner, -1, axis=1) - corner, place[:, None] - corner
+    side = chord[..., 0] * offset[..., 1] - chord[..., 1] * offset[..., 0]
+    return (side >= 0).all(axis=1) | (side <= 0).all(axis=1)
 
 
 def facing_pairs(
@@ -160,7 +220,7 @@ def facing_pairs(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs (slave number, master number) of faces within `reach` that look at each other.
 
-    `among`: the slave faces that are looked at, all of them by default.
+    Curved faces do so if they may anywhere, by how far their normals turn. `among`: the slave faces that are looked at, all of them by default.
 
     >>> [pair.tolist() for pair in facing_pairs(slave, master, 0.1)]
     [[0, 0], [0, 1]]
@@ -172,7 +232,8 @@ def facing_pairs(
         slave.centre[some], slave.radius[some], master.centre, master.radius, reach
     )
     i = some[i]
-    facing = np.einsum("pd,pd->p", slave.normal[i], master.normal[j]) < -_FACING
+    apart = np.clip(np.einsum("pd,pd->p", slave.normal[i], master.normal[j]), -1.0, 1.0)
+    facing = np.arccos(apart) + slave.turn[i] + master.turn[j] > _FACING
     return i[facing], j[facing]
 
 
@@ -271,7 +332,8 @@ def hidden_pairs(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
         area, middle = _shared(own[first], corner[first], corner[second])
         large = area > shared[first, 0] * pairs.slave.radius[pairs.i[first]]
         first, second, middle = first[large], second[large], middle[large]
-    behind = pairs.of(first).distance(middle) > pairs.of(second).distance(middle)
+    one, other = (np.abs(pairs.of(some).distance(middle)) for some in (first, second))
+    behind = one > other
     hidden, nearer = np.where(behind, first, second), np.where(behind, second, first)
     order = np.argsort(hidden, kind="stable")
     return hidden[order], nearer[order]

@@ -22,7 +22,7 @@ from ..fem.faces import nodal_normals
 from ..fem.gauss import gauss_rule
 from .facets import Facets, project_along
 from .multipliers import InterfaceData, Multipliers, of_nodes
-from .pairing import facing_pairs
+from .pairing import candidate_pairs, facing_pairs
 from .segments import Segments, Side
 from .surface_points import Samples, face_samples, sampled
 
@@ -99,7 +99,10 @@ def meet_at_points(
     found = []
     for a, (slave, sample) in enumerate(zip(slaves, samples, strict=True)):
         some = None if among is None else among[a]
-        hits = [_hits(slave, sample, master, reach, beyond, some) for master in masters]
+        hits = [
+            _hits(slave, sample, master, reach, beyond, facing_pairs(slave, master, reach, some))
+            for master in masters
+        ]
         block = np.repeat(np.arange(len(masters)), [len(hit.point) for hit in hits])
         chosen = _nearest(hits)
         for b, (master, hit) in enumerate(zip(masters, hits, strict=True)):
@@ -107,6 +110,47 @@ def meet_at_points(
             if len(mine.point):
                 found.append(_segments((slave, a), (master, b), sample, mine))
     return found
+
+
+def all_hits(
+    slave: Facets,
+    sample: Samples,
+    masters: Sequence[Facets],
+    reach: float,
+    among: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points of slave faces `among` (a,) that see a master face, and its distance, both (h,).
+
+    Points are counted face by face. Each looks both ways along its normal, and sees the first
+    master face there if that one looks back at it. No face is left out for how it lies as a whole.
+
+    >>> point, gap = all_hits(slave, gauss([slave], 1)[0], [master], 1.0, np.array([0]))
+    >>> point.tolist(), gap.tolist()
+    ([0], [0.5])
+    """
+    normals = sample.normal.reshape(-1, sample.normal.shape[2])
+    points, gaps, looks = [], [], []
+    for master in masters:
+        i, j = candidate_pairs(
+            slave.centre[among], slave.radius[among], master.centre, master.radius, reach
+        )
+        hit = _hits(slave, sample, master, reach, _EDGE, (among[i], j))
+        slopes = shape_functions(master.type.name).gradients(hit.place)
+        corner = master.corner[hit.face]
+        tangents = np.einsum("had,hat->htd", corner - corner[:, :1], slopes)
+        if corner.shape[2] == 2:
+            across = np.stack([tangents[:, 0, 1], -tangents[:, 0, 0]], axis=1)
+        else:
+            across = np.cross(tangents[:, 0], tangents[:, 1])
+        points.append(hit.point)
+        gaps.append(hit.gap)
+        looks.append(np.einsum("hd,hd->h", across, normals[hit.point]) < 0)
+    point, gap, look = (np.concatenate(part) for part in (points, gaps, looks))
+    order = np.lexsort((~look, np.abs(gap), gap < 0, point))
+    side = 2 * point[order] + (gap[order] < 0)
+    first = order[np.flatnonzero(np.diff(side, prepend=-1))]
+    first = first[look[first]]
+    return point[first], gap[first]
 
 
 @dataclass(frozen=True)
@@ -133,13 +177,16 @@ def _hits(
     master: Facets,
     reach: float,
     beyond: float,
-    among: np.ndarray | None,
+    pairs: tuple[np.ndarray, np.ndarray],
 ) -> _Hits:
-    """Every meeting of a point's normal with a face, within `reach` and `beyond` its edges."""
+    """Every meeting of a point's normal with a face of the pairs.
+
+    Within `reach`, and `beyond` the edges of the face.
+    """
     places = np.einsum("qa,fad->fqd", sample.values, slave.corner)
     count = places.shape[1]
     step = max(1, _CHUNK // count)
-    i, j = facing_pairs(slave, master, reach, among)
+    i, j = pairs
     parts = []
     for start in range(0, len(i), step):
         pair = slice(start, start + step)

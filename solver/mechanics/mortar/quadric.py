@@ -141,6 +141,7 @@ def frame(points: np.ndarray, nodes: np.ndarray) -> Facets:
         flat=one,
         straight=one,
         affine=one,
+        turn=np.zeros(1),
     )
 
 

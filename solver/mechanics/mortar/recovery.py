@@ -45,7 +45,7 @@ def moments(found: Sequence[Segments], surface: Surface) -> Moments:
 
     >>> found = meet_in_segments([slave], [], [master], 1.0, degree=1)
     >>> at = Surface(area=np.array([2.0]), covered=np.array([2.0]), centre=np.array([[1.0, 0.0]]),
-    ...              normal=np.array([[0.0, 1.0]]))
+    ...              normal=np.array([[0.0, 1.0]]), lost=np.zeros(1))
     >>> moments(found, at).spread[0, 0, 0].round(12)
     np.float64(0.333333333333)
     """
@@ -105,7 +105,7 @@ def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes:
 
     >>> found = meet_in_segments([slave], [], [master], 1.0, degree=1)
     >>> at = Surface(area=np.array([2.0]), covered=np.array([2.0]), centre=np.array([[1.0, 0.0]]),
-    ...              normal=np.array([[0.0, 1.0]]))
+    ...              normal=np.array([[0.0, 1.0]]), lost=np.zeros(1))
     >>> alone = Asked(FORMS["linear"], sparse.eye_array(1, dtype=bool).tocsr(), np.zeros(1))
     >>> one = recovery(alone, found, at, len(points))
     >>> one.loads.toarray().reshape(5, 2)[:, 1].round(4).tolist(), one.products.round(4).tolist()

@@ -64,7 +64,7 @@ def stabilisation(
 
     >>> found = meet_in_segments([slave], [], [master], 1.0, degree=1)
     >>> at = Surface(area=np.array([2.0]), covered=np.array([2.0]), centre=np.array([[1.0, 0.0]]),
-    ...              normal=np.array([[0.0, 1.0]]))
+    ...              normal=np.array([[0.0, 1.0]]), lost=np.zeros(1))
     >>> soft, alone = (np.array([0.5]), np.full(2, 0.25)), sparse.eye_array(1, dtype=bool).tocsr()
     >>> stabilisation(found, moments(found, at), alone, at.covered, soft).weight.round(12)
     array([0.9])

@@ -13,13 +13,15 @@ from .facets import Facets, measured
 class Surface:
     """The m macro-elements of a slave surface.
 
-    `area`, `covered` (m,): whole and intersected area; `centre`, `normal` (m, dim).
+    `area`, `covered` (m,): whole and intersected area; `lost` (m,): opposite the master, but
+    without a partner; `centre`, `normal` (m, dim).
     """
 
     area: np.ndarray
     covered: np.ndarray
     centre: np.ndarray
     normal: np.ndarray
+    lost: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)

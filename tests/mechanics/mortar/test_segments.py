@@ -7,6 +7,7 @@ import pytest
 
 from solver.mechanics.fem import shape_functions
 from solver.mechanics.fem.gauss import gauss_rule
+from solver.mechanics.mortar import operator as operator_module
 from solver.mechanics.mortar import segments
 from solver.mechanics.mortar.facets import facets, measured
 from solver.mechanics.mortar.fans import quadrature
@@ -202,12 +203,71 @@ def test_the_lower_side_of_a_step_is_not_in_contact(depth):
     assert operator.initial == pytest.approx([0.0, 0.0], abs=1e-15)
 
 
-def test_a_face_beyond_the_reach_of_contact_covers_nothing():
-    """The reach is half the extent of the slave surface, here 1.5."""
-    for depth, covered in ((1.4, 1.0), (1.6, 0.0)):
-        points, slave, master = edges([0, 1, 2, 3], [(0, 2, 0.0), (2, 4, depth)])
-        operator = gap_operator(slave, master, 3, len(points), 60.0)
-        assert operator.covered == pytest.approx([1.0, 1.0, covered])
+def test_surfaces_far_apart_are_paired():
+    """A macro-element that sees one surface alone meets it, however far away."""
+    points, slave, master = edges([0, 1, 2, 3], [(0, 2, 0.0), (2, 4, 50.0)])
+    operator = gap_operator(slave, master, 3, len(points), 60.0)
+    assert operator.covered == pytest.approx([1.0, 1.0, 1.0])
+    assert operator.initial == pytest.approx([0.0, 0.0, 50.0])
+
+
+@pytest.mark.parametrize("parts", [1, 2, 7])
+def test_blocks_at_an_angle_stay_whole(parts):
+    """A master at 45°, in one body or in parts that share no node; the last edge faces nothing."""
+    points = np.array([[x, 0.0] for x in range(6)])
+    ends = np.linspace(0, 4, parts + 1)
+    above = np.array([[x, x] for pair in zip(ends, ends[1:], strict=False) for x in pair])
+    kind, count = BY_NAME["SEG2"], len(points)
+    slave = facets(points, kind, np.array([[i + 1, i] for i in range(5)]), np.arange(5))
+    points = np.concatenate([points, above])
+    pairs = count + np.arange(2 * parts).reshape(-1, 2)
+    operator = gap_operator([slave], [facets(points, kind, pairs, np.arange(parts))], 5, len(points))
+    assert operator.covered == pytest.approx([1.0, 1.0, 1.0, 1.0, 0.0])
+    assert operator.initial == pytest.approx([0.5, 1.5, 2.5, 3.5, 0.0])
+    assert operator.surface.lost.tolist() == [0.0] * 5
+
+
+def skins(width, lower, upper):
+    """Two blocks, one on the other, whose whole boundaries are slave (the upper one) and master."""
+    corner = np.array([(0, 0), (width, 0), (width, 1), (0, 1)])
+    points = np.concatenate([corner * [1, upper], corner * [1, lower] - [0, lower]])
+    around, kind = np.array([[0, 1], [1, 2], [2, 3], [3, 0]]), BY_NAME["SEG2"]
+    slave = facets(points, kind, around, np.arange(4))
+    return points, slave, facets(points, kind, around + 4, np.arange(4))
+
+
+@pytest.mark.parametrize("width", [0.5, 3.0, 100.0])
+def test_a_surface_is_not_seen_through_a_body(width):
+    """The upper side of the upper block faces the lower side of the lower one, 3 behind it."""
+    points, slave, master = skins(width, 2.0, 1.0)
+    operator = gap_operator([slave], [master], 4, len(points))
+    assert operator.covered == pytest.approx([width, 0.0, 0.0, 0.0])
+    assert operator.surface.lost.tolist() == [0.0] * 4
+
+
+def test_lost_segments_are_missed(monkeypatch):
+    """A fault in the choice of segments: what they covered is opposite the master."""
+    points, slave, master = edges([0, 1, 2], [(0, 0.5, 0.0), (0.5, 1.5, 0.2)])
+
+    def lost(fault):
+        monkeypatch.setattr(operator_module, "on_one_surface", fault)
+        return gap_operator(slave, master, 2, len(points)).surface.lost
+
+    assert lost(lambda found, *_: found) == pytest.approx([0.0, 0.0])
+    assert lost(lambda found, *_: [s.of(s.macro == 1) for s in found]) == pytest.approx([1.0, 0.0])
+    half = lost(lambda found, *_: [s.of(s.gap.max(axis=1) < 0.1) for s in found])
+    assert half[0] == pytest.approx(0.5)
+    # The edge of the master is known to one of the points, of weight 0.326.
+    assert half[1] == pytest.approx(0.5 - 0.326, abs=1e-3)
+
+
+def test_the_lower_side_of_a_shallow_step_is_reported():
+    points, slave, master = edges([0, 1], [(0, 0.7, 0.0), (0.7, 1.0, 0.3)])
+    surface = gap_operator(slave, master, 1, len(points)).surface
+    assert surface.covered == pytest.approx([0.7])
+    assert surface.lost == pytest.approx([0.3])
+    points, slave, master = edges([0, 1], [(0, 0.7, 0.0), (0.7, 1.0, 3.0)])
+    assert gap_operator(slave, master, 1, len(points)).surface.lost == pytest.approx([0.0])
 
 
 def test_sloping_surfaces_stay_whole():
