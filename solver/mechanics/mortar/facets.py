@@ -114,9 +114,7 @@ def facets(
     )
 
 
-def _turn(
-    kind: CellType, points: np.ndarray, nodes: np.ndarray, normal: np.ndarray
-) -> np.ndarray:
+def _turn(kind: CellType, points: np.ndarray, nodes: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """The largest angle (n,) between the normal at the centre and those at the vertices."""
     slopes = shape_functions(kind.name).gradients(kind.nodes[: kind.n_vertices])
     vectors = area_vectors(points, nodes, slopes)

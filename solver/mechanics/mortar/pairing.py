@@ -193,10 +193,14 @@ def _through_a_body(pairs: Pairs) -> np.ndarray:
     first = np.searchsorted(i, pairs.i[deep], side="left")
     last = np.searchsorted(i, pairs.i[deep], side="right")
     which = np.repeat(np.arange(len(deep)), last - first)
-    blocker = blocker[np.arange(len(which)) - np.repeat(np.cumsum(last - first) - last, last - first)]
+    blocker = blocker[
+        np.arange(len(which)) - np.repeat(np.cumsum(last - first) - last, last - first)
+    ]
     which = deep[which]
     corner = np.einsum(
-        "ptd,pvd->pvt", tangents[which], outline.corner[blocker] - slave.centre[pairs.i[which], None]
+        "ptd,pvd->pvt",
+        tangents[which],
+        outline.corner[blocker] - slave.centre[pairs.i[which], None],
     )
     between = _holds(corner, place[which])
     back = replace(pairs, i=pairs.i[which], j=blocker)
@@ -209,7 +213,9 @@ def _through_a_body(pairs: Pairs) -> np.ndarray:
 def _holds(corner: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Which convex polygons (p, v, 2), or intervals (p, 2, 1), hold their places."""
     if corner.shape[2] == 1:
-        return (corner[..., 0].min(axis=1) <= place[:, 0]) & (place[:, 0] <= corner[..., 0].max(axis=1))
+        return (corner[..., 0].min(axis=1) <= place[:, 0]) & (
+            place[:, 0] <= corner[..., 0].max(axis=1)
+        )
     chord, offset = np.roll(corner, -1, axis=1) - corner, place[:, None] - corner
     side = chord[..., 0] * offset[..., 1] - chord[..., 1] * offset[..., 0]
     return (side >= 0).all(axis=1) | (side <= 0).all(axis=1)

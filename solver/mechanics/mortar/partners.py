@@ -50,9 +50,7 @@ def _missed(samples: Sequence[Samples], found: Sequence[Segments]) -> list[np.nd
     return missed
 
 
-def on_one_surface(
-    found: list[Segments], slaves: Sequence[Facets], n_macro: int
-) -> list[Segments]:
+def on_one_surface(found: list[Segments], slaves: Sequence[Facets], n_macro: int) -> list[Segments]:
     """The segments of the surface that each macro-element meets first.
 
     Master faces that a macro-element sees are one surface if they share a node, or if their

@@ -267,11 +267,16 @@ def _fit(
         system = np.concatenate([system, own], axis=1)
     size = np.linalg.norm(system, axis=1)
     some = size > _NOTHING * size.max(axis=1, keepdims=True)
-    system *= np.where(some, 1 / np.where(some, size, 1.0), 0.0)[:, None]
+    size = np.where(some, size, 1.0)
+    system *= np.where(some, 1 / size, 0.0)[:, None]
     squares, vectors = np.linalg.eigh(system.swapaxes(1, 2) @ system)
-    solved = squares[:, 0] > _RANK**2 * squares[:, -1]
+    # Neighbours in a line say nothing of what is across it.
+    known = squares > _NOTHING * squares[:, -1:]
+    solved = known[:, -1] & (~known | (squares > _RANK**2 * squares[:, -1:])).all(axis=1)
+    solved &= known.sum(axis=1) >= min(b.shape[-1], 1 + (not form.keeps_means))
     v, scaled = vectors[solved], system[solved, : other.shape[1]]
-    inverse = v / squares[solved][:, None] @ v.swapaxes(1, 2) / size[solved][:, :, None]
+    shares = np.where(known, 1 / np.where(known, squares, 1.0), 0.0)[solved]
+    inverse = v * shares[:, None] @ v.swapaxes(1, 2) / size[solved][:, :, None]
     by_neighbour = inverse @ scaled.swapaxes(1, 2) * weight[solved][:, None]
     values = np.concatenate([by_neighbour, -by_neighbour.sum(axis=2, keepdims=True)], axis=2)
     columns = np.concatenate([other[solved], chosen[solved][:, None]], axis=1)

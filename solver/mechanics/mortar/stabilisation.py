@@ -9,10 +9,11 @@ R p the linear least squares fit to neighbours (the form `none` of `reconstructi
 for a linear pressure, so that the patch test stays exact, and small for smooth ones. D is the area
 of the macro-element times a displacement per pressure,
 
-    D = |T| ((1 + (H / h)⁴) H / Eₘ + 4 h / Eₛ) / 10,
+    D = |T| ((1 + (H / h)⁴) H / Eₘ + 4 s³ h / Eₛ) / 10,
 
 with the sizes H, h and Young's moduli E of master and slave. The fourth power: the scatter has the
-wavelength H of the facets, of which I − R leaves a part of (h / H)².
+wavelength H of the facets, of which I − R leaves a part of (h / H)². s: half of the aspect ratio of
+stretched faces, whose inner node hardly moves; else 1. In H / h their h is larger by √s.
 Source: the form of the stabilisation is that of P. Bochev, C. Dohrmann, M. Gunzburger, SIAM J.
 Numer. Anal. 44 (2006) 82–101: pressures less their projection.
 """
@@ -29,6 +30,8 @@ from .segments import Segments
 _SHARE = 0.1
 # A master face counts as at most so many slave faces wide.
 _COARSEST = 8.0
+# Faces that are longer than wide by more than the first factor are stretched, by the second at most.
+_STRETCHED, _LONGEST = 2.0, 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +48,18 @@ class Stabilisation:
         found = reconstruct(self.moments, self.near, closed, form)
         k = form.count(self.moments.local.centre.shape[1])
         return found.matrix[k - 1 :: k][closed][:, closed].tocsr()
+
+
+def _stretch(spread: np.ndarray) -> np.ndarray:
+    """The aspect ratio of macro-elements (m,) over that from which they are stretched; at least 1.
+
+    `spread` (m, d, d): see `Moments`. The inner node of a stretched face hardly moves, since the
+    long edges beside it hold it, and the pressure scatters along the face as it does without cut.
+    """
+    if spread.shape[1] == 2:
+        return np.ones(len(spread))
+    narrow, long = np.sqrt(np.maximum(np.linalg.eigvalsh(spread)[:, 1:], 0.0)).T
+    return np.clip(long / np.where(narrow > 0, _STRETCHED * narrow, np.inf), 1.0, _LONGEST)
 
 
 def stabilisation(
@@ -81,6 +96,8 @@ def stabilisation(
         np.add.at(soft, segments.macro, segments.area * size * compliant)
     covered = np.where(covered > 0, covered, 1.0)
     own = 1 / np.linalg.norm(moments.local.axes[:, 0], axis=1)
-    ratio = np.clip(sizes / covered / own, 1.0, _COARSEST)
-    weight = _SHARE * area * ((1 + ratio**4) * soft / covered + 4 * own * softness[0])
+    stretch = _stretch(moments.spread)
+    ratio = np.clip(sizes / covered / (own * np.sqrt(stretch)), 1.0, _COARSEST)
+    slave = 4 * own * stretch**3 * softness[0]
+    weight = _SHARE * area * ((1 + ratio**4) * soft / covered + slave)
     return Stabilisation(weight=weight, moments=moments, near=near)

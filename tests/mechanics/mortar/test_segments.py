@@ -221,7 +221,9 @@ def test_blocks_at_an_angle_stay_whole(parts):
     slave = facets(points, kind, np.array([[i + 1, i] for i in range(5)]), np.arange(5))
     points = np.concatenate([points, above])
     pairs = count + np.arange(2 * parts).reshape(-1, 2)
-    operator = gap_operator([slave], [facets(points, kind, pairs, np.arange(parts))], 5, len(points))
+    operator = gap_operator(
+        [slave], [facets(points, kind, pairs, np.arange(parts))], 5, len(points)
+    )
     assert operator.covered == pytest.approx([1.0, 1.0, 1.0, 1.0, 0.0])
     assert operator.initial == pytest.approx([0.5, 1.5, 2.5, 3.5, 0.0])
     assert operator.surface.lost.tolist() == [0.0] * 5
