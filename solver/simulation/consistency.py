@@ -40,8 +40,13 @@ def _all(solution: Solution) -> Iterator[str]:
     known = [solution.length, solution.load_scale, *solution.balance.values()]
     known += solution.seconds.values()
     yield from _values("the solve's own numbers", np.array(known), (len(known),))
-    if {zone.name for zone in solution.zones} != {zone.name for zone in solution.case.zones}:
+    names = [zone.name for zone in solution.zones]
+    if set(names) != {zone.name for zone in solution.case.zones}:
         yield "the contact zones differ from the case's"
+    balanced = {name.rpartition(": ")[0] for name in solution.balance}
+    for name in (*(f"zone {name}" for name in names), "reactions and loads", "free nodes"):
+        if name not in balanced:
+            yield f"no balance of {name}"
     if solution.strain_energy is not None:
         yield from _values("strain energy", np.array([solution.strain_energy]), (1,))
     if solution.reaction is not None:

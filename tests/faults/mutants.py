@@ -49,6 +49,7 @@ from tests.faults.patches import (
     one_dropped,
     rolled_sub_faces,
     shared_nodes_free,
+    springs_counted,
     stays_closed,
     template_off_by_one,
     template_piece_lost,
@@ -70,6 +71,7 @@ TUBES = "axisymmetric/compound-tube"
 MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
 RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
+CURVED, CUP = "rigid/curved-face", "rigid/hollow-sphere"
 DIE, SHAFT, LINES = "rigid/tilted-die", "rigid/shaft-in-tube", "rigid/lines-of-the-mesh"
 STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
@@ -205,6 +207,20 @@ MUTANTS = (
            "solver.simulation.selections:_within", changed(np.ones_like)),
     Mutant("spring-weight", "an elastic foundation is 1 % too stiff", FOUNDATION,
            "solver.simulation.relations:foundation", changed(lambda k: 1.01 * k)),
+    Mutant("spring-energy", "the energy in springs counts as strain energy", FOUNDATION,
+           "solver.simulation.simulate:strain_energy", springs_counted),
+    Mutant("initial-energy", "the energy of initial strain has the wrong sign", HEATED,
+           "solver.simulation.simulate:strain_energy", given(
+               lambda scene, state: (replace(scene, initial=replace(
+                   scene.initial, energy=-scene.initial.energy)), state))),
+    Mutant("axial-balance", "axisymmetric bodies have no balance along the axis", DISC,
+           "solver.simulation.balance:_both", changed(lambda _: {})),
+    Mutant("hollow-side", "a hollow sphere is a full one", CUP,
+           "solver.mechanics.mortar.quadric:_round",
+           lambda true: lambda point, across, radius, hollow: true(point, across, radius, False)),
+    Mutant("segments-lost", "segments farther away than half a slave face are lost", CURVED,
+           "solver.mechanics.mortar.operator:on_one_surface",
+           changed(lambda found: [s.of(np.abs(s.gap).max(axis=1) < 0.22) for s in found])),
     Mutant("spring-reaction", "the balance of forces leaves out springs", FOUNDATION,
            "solver.simulation.balance:_of_springs", changed(np.zeros_like)),
     Mutant("initial-stress", "stress is not reduced by initial strain", HEATED,

@@ -185,3 +185,12 @@ def more_covered(operator: Any) -> Any:
     at = operator.surface
     more = np.where(at.covered < 0.999 * at.area, 1.001, 1.0) * at.covered
     return replace(operator, covered=more, surface=replace(at, covered=more))
+
+
+def springs_counted(true: Wrapped) -> Wrapped:
+    """The strain energy with that of springs."""
+
+    def energy(scene: Any, state: Any) -> float:
+        return float(true(scene, state) + (state.displacement * state.iterate.springs).sum() / 2)
+
+    return energy

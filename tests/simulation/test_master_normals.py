@@ -90,3 +90,35 @@ def test_refused_on_a_master_with_an_edge():
 def test_refused_with_treatments_that_have_normals_of_their_own():
     with pytest.raises(InputError, match="has normals of its own; allowed: element"):
         solve_case(cylinder("master", treatment="node_to_segment"))
+
+
+@pytest.mark.parametrize(
+    "change", [{"renumber": 11}, {"scale": 0.1}, {"scale": 0.0037}, {"translate": [0.0, -13.77]}]
+)
+def test_numbers_place_and_scale_of_the_mesh_change_nothing(change):
+    """A slave node in the middle is equally near to two master faces, two are at its ends."""
+
+    def pressures(transform):
+        case = {
+            "name": "tie",
+            "mesh": {
+                "recipe": "wavy", "shape": "arc", "height": 0.195,
+                "bottom": {"cells": "TRIA3", "divisions": [5, 4]},
+                "top": {"cells": "TRIA3", "divisions": [4, 2]},
+            },
+            "transform": transform,
+            "plane": "stress",
+            "materials": {
+                "bottom": {"young": 70000.0, "poisson": 0.3},
+                "top": {"young": 2000.0, "poisson": 0.25},
+            },
+            "supports": [
+                {"group": "symx", "fix": ["normal"]},
+                {"group": "press", "fix": {"normal": -0.0018 * transform.get("scale", 1.0)}},
+                {"group": "base", "fix": ["normal"]},
+            ],
+            "contact": [{"slave": "bottom_contact", "master": "top_contact", "normal": "master"}],
+        }  # fmt: skip
+        return np.sort(solve_case(case).pressure)
+
+    assert pressures(change) == pytest.approx(pressures({"scale": 1.0}), rel=1e-9)

@@ -15,6 +15,10 @@ from ..fem import shape_functions
 from ..fem.faces import nodal_normals
 from .facets import FLAT, Facets, project_along
 
+# Points of the master are equally near if their distances differ by less than this share of the
+# size of its faces.
+_EQUALLY = 1e-9
+
 
 def with_master_normals(
     slaves: list[Facets], masters: Sequence[Facets], points: np.ndarray
@@ -75,27 +79,36 @@ def sharpest(masters: Sequence[Facets], points: np.ndarray) -> tuple[float, np.n
 def _nearest_normals(
     places: np.ndarray, masters: Sequence[Facets], normals: np.ndarray
 ) -> np.ndarray:
-    """The interpolated unit normals (n, dim) of the master at the points nearest to `places`."""
+    """The interpolated unit normals (n, dim) of the master at the points nearest to `places`.
+
+    Where several points are equally near, the mean of their normals: it does not depend on the
+    order of the faces.
+    """
     corners = np.concatenate([block.corner.reshape(-1, places.shape[1]) for block in masters])
     limit, _ = cKDTree(corners).query(places)
-    best, found = np.full(len(places), np.inf), np.zeros_like(places)
+    owner, distances, found = [], [], []
     for block in masters:
         tree = cKDTree(block.centre)
-        near = tree.query_ball_point(places, limit + block.radius.max())
+        reach = (limit + block.radius.max()) * (1 + _EQUALLY)
+        near = tree.query_ball_point(places, reach)
         i = np.repeat(np.arange(len(places)), [len(faces) for faces in near])
         j = np.concatenate([np.asarray(faces, dtype=int) for faces in near])
         target, direction = places[i][:, None], block.normal[j][:, None]
         place, _ = project_along(block.type, block.corner[j], target, direction, outline=True)
         values = shape_functions(block.type.name).values(_inside(block.type, place))
         point = np.einsum("pqa,pad->pd", values, block.corner[j])
-        distance = np.linalg.norm(point - places[i], axis=1)
-        order = np.lexsort((distance, i))
-        first = order[np.flatnonzero(np.diff(i[order], prepend=-1))]
-        first = first[distance[first] < best[i[first]]]
-        best[i[first]] = distance[first]
-        normal = np.einsum("pqa,pad->pd", values[first], normals[block.nodes[j[first]]])
-        found[i[first]] = normal / np.linalg.norm(normal, axis=1)[:, None]
-    return found
+        normal = np.einsum("pqa,pad->pd", values, normals[block.nodes[j]])
+        owner.append(i)
+        distances.append(np.linalg.norm(point - places[i], axis=1))
+        found.append(normal / np.linalg.norm(normal, axis=1)[:, None])
+    i, distance, normal = (np.concatenate(part) for part in (owner, distances, found))
+    nearest = np.full(len(places), np.inf)
+    np.minimum.at(nearest, i, distance)
+    size = limit + max(block.radius.max() for block in masters)
+    equal = distance <= nearest[i] + _EQUALLY * size[i]
+    total = np.zeros_like(places)
+    np.add.at(total, i[equal], normal[equal])
+    return total / np.linalg.norm(total, axis=1)[:, None]
 
 
 def _inside(kind: CellType, place: np.ndarray) -> np.ndarray:

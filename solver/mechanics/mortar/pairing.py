@@ -226,7 +226,8 @@ def facing_pairs(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs (slave number, master number) of faces within `reach` that look at each other.
 
-    Curved faces do so if they may anywhere, by how far their normals turn. `among`: the slave faces that are looked at, all of them by default.
+    Curved faces do so if they may anywhere, by how far their normals turn. `among`: the slave faces
+    that are looked at, all of them by default.
 
     >>> [pair.tolist() for pair in facing_pairs(slave, master, 0.1)]
     [[0, 0], [0, 1]]

@@ -265,18 +265,15 @@ def _fit(
         own = np.zeros((len(chosen), 1, b.shape[-1]))
         own[..., -1] = 1.0
         system = np.concatenate([system, own], axis=1)
+    if form.degree == 1 and at.local.centre.shape[1] == 3:
+        system = np.concatenate([system, _across(system)], axis=1)
     size = np.linalg.norm(system, axis=1)
     some = size > _NOTHING * size.max(axis=1, keepdims=True)
-    size = np.where(some, size, 1.0)
-    system *= np.where(some, 1 / size, 0.0)[:, None]
+    system *= np.where(some, 1 / np.where(some, size, 1.0), 0.0)[:, None]
     squares, vectors = np.linalg.eigh(system.swapaxes(1, 2) @ system)
-    # Neighbours in a line say nothing of what is across it.
-    known = squares > _NOTHING * squares[:, -1:]
-    solved = known[:, -1] & (~known | (squares > _RANK**2 * squares[:, -1:])).all(axis=1)
-    solved &= known.sum(axis=1) >= min(b.shape[-1], 1 + (not form.keeps_means))
+    solved = squares[:, 0] > _RANK**2 * squares[:, -1]
     v, scaled = vectors[solved], system[solved, : other.shape[1]]
-    shares = np.where(known, 1 / np.where(known, squares, 1.0), 0.0)[solved]
-    inverse = v * shares[:, None] @ v.swapaxes(1, 2) / size[solved][:, :, None]
+    inverse = v / squares[solved][:, None] @ v.swapaxes(1, 2) / size[solved][:, :, None]
     by_neighbour = inverse @ scaled.swapaxes(1, 2) * weight[solved][:, None]
     values = np.concatenate([by_neighbour, -by_neighbour.sum(axis=2, keepdims=True)], axis=2)
     columns = np.concatenate([other[solved], chosen[solved][:, None]], axis=1)
@@ -288,6 +285,16 @@ def _fit(
         rows[:, :, None], columns[:, None], values[:, shape < k]
     )
     return solved, (row.ravel(), column.ravel(), value.ravel())
+
+
+def _across(system: np.ndarray) -> np.ndarray:
+    """Rows (n, 1, k) by which a linear fit does not vary across neighbours that lie in a line."""
+    slopes = system[..., :2]
+    squares, vectors = np.linalg.eigh(slopes.swapaxes(1, 2) @ slopes)
+    in_line = (squares[:, 0] < _NOTHING * squares[:, 1]) & (squares[:, 1] > 0)
+    rows = np.zeros((len(system), 1, system.shape[2]))
+    rows[:, 0, :2] = np.where(in_line[:, None], np.sqrt(squares[:, 1:]) * vectors[:, :, 0], 0.0)
+    return rows
 
 
 def _neighbours(ring: sparse.csr_matrix, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -30,7 +30,7 @@ from .segments import Segments
 _SHARE = 0.1
 # A master face counts as at most so many slave faces wide.
 _COARSEST = 8.0
-# Faces that are longer than wide by more than the first factor are stretched, by the second at most.
+# Faces longer than wide by more than the first factor are stretched, by the second at most.
 _STRETCHED, _LONGEST = 2.0, 4.0
 
 

@@ -1,6 +1,7 @@
 """Segments against areas and distances known by hand: bent edges, steps, faces behind others."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -216,7 +217,7 @@ def test_blocks_at_an_angle_stay_whole(parts):
     """A master at 45°, in one body or in parts that share no node; the last edge faces nothing."""
     points = np.array([[x, 0.0] for x in range(6)])
     ends = np.linspace(0, 4, parts + 1)
-    above = np.array([[x, x] for pair in zip(ends, ends[1:], strict=False) for x in pair])
+    above = np.array([[x, x] for pair in pairwise(ends) for x in pair])
     kind, count = BY_NAME["SEG2"], len(points)
     slave = facets(points, kind, np.array([[i + 1, i] for i in range(5)]), np.arange(5))
     points = np.concatenate([points, above])
