@@ -16,6 +16,7 @@ ERRORS: dict[str, str] = {
     "pressure_l2": "contact_pressure",
     "pressure_max": "contact_pressure",
     "pressure_means": "contact_pressure",
+    "pressure_total": "contact_pressure",
     "pressure_oscillation": "contact_pressure",
     "pressure_inner": "contact_pressure",
     "half_width": "half_width",

@@ -46,6 +46,7 @@ NORMS = {
     "pressure_l2": "pressure, L2",
     "pressure_max": "pressure, maximum",
     "pressure_means": "pressure, macro-element means",
+    "pressure_total": "pressure, its integral",
     "pressure_oscillation": "pressure, second difference",
     "pressure_inner": "pressure, two macro-elements inside",
     "half_width": "half-width of contact",

@@ -22,7 +22,7 @@ else:
     ]  # fmt: skip
     ErrorName = Literal[
         "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2",
-        "pressure_max", "pressure_means", "pressure_oscillation", "pressure_inner",
+        "pressure_max", "pressure_means", "pressure_total", "pressure_oscillation", "pressure_inner",
         "half_width", "peak",
     ]  # fmt: skip
     Degree = Literal["linear", "quadratic"]

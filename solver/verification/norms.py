@@ -11,6 +11,7 @@ in cells in mixed form):
                                                              weighted by each element's coverage
     pressure_max          largest |p_h − p| / largest p      where p is smooth
     pressure_means        |p_h − p̄| / |p̄|                    p̄: mean of p over each macro-element
+    pressure_total        |∫ p_h − ∫ p| / ∫ p            over all zones
     pressure_oscillation  largest |e₋ − 2 e + e₊| / largest p   e = p_h − p̄ of neighbours where p is
                                                              smooth; of nodal multipliers p_h − p
                                                              at nodes (see `oscillation`)
@@ -158,7 +159,7 @@ def _integral(weight: np.ndarray, values: np.ndarray) -> float:
 
 
 def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, float]:
-    squares, means = np.zeros(2), np.zeros(2)
+    squares, means, total = np.zeros(2), np.zeros(2), np.zeros(2)
     largest, highest, second, inner = 0.0, 0.0, 0.0, 0.0
     for zone in solution.zones:
         integrals, most, peak = zip(*_pressures(solution, zone, exact), strict=True)
@@ -167,6 +168,7 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
         mean = ExactValues(solution, exact).pressure(zone)
         weight = zone.area * zone.coverage
         means += _integral(weight, zone.multiplier - mean), _integral(weight, mean)
+        total += weight @ (zone.multiplier - mean), weight @ np.abs(mean)
         second = max(second, oscillation(solution.mesh.points, zone, exact, mean))
         inside = ~grown(macro_neighbours(zone), mean <= 0, 2) & (zone.coverage > 0)
         inner = max(inner, np.abs(zone.multiplier - mean)[inside].max(initial=0.0))
@@ -174,6 +176,7 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
         "pressure_l2": _root(*squares),
         "pressure_max": _over(largest, highest),
         "pressure_means": _root(*means),
+        "pressure_total": _over(abs(total[0]), total[1]),
         "pressure_oscillation": _over(second, highest),
         "pressure_inner": _over(inner, highest),
     }

@@ -64,7 +64,7 @@ def test_the_exact_state_has_none(handmade):
     assert found.keys() == {
         *("displacement_l2", "displacement_h1", "stress_l2", "stress_max"),
         *("pressure_l2", "pressure_max", "pressure_means", "pressure_oscillation"),
-        "pressure_inner",
+        *("pressure_inner", "pressure_total"),
     }
     assert max(found.values()) < 1e-14
 
@@ -86,7 +86,7 @@ def test_a_share_too_much_is_that_share(handmade):
     found = errors(handmade)
     expected = dict.fromkeys(("displacement_l2", "displacement_h1", "stress_l2"), 0.02)
     expected |= dict.fromkeys(
-        ("pressure_l2", "pressure_max", "pressure_means", "pressure_inner"), 0.03
+        ("pressure_l2", "pressure_max", "pressure_means", "pressure_inner", "pressure_total"), 0.03
     )
     expected |= {"stress_max": 0.01, "pressure_oscillation": 0.0}
     for name, value in expected.items():
@@ -101,6 +101,7 @@ def test_a_macro_element_counts_as_far_as_it_is_covered(handmade):
     assert found["pressure_l2"] == pytest.approx(np.sqrt(0.25 * 5**2 / (1.25 * 25**2)))
     assert found["pressure_means"] == pytest.approx(found["pressure_l2"])
     assert found["pressure_max"] == pytest.approx(0.2)
+    assert found["pressure_total"] == pytest.approx(0.25 * 5 / (1.25 * 25))
     zone.coverage = np.array([0.0, 1.0])
     assert max(errors(handmade)[name] for name in ("pressure_l2", "pressure_max")) < 1e-14
 
