@@ -1,7 +1,8 @@
 """The accuracy of a solve by its own estimate: digits lost to rounding.
 
 Each term of `Accuracy` is a size at which something is rounded, times the unit of rounding, turned
-into a pressure by what it acts on; it is relative to the largest pressure:
+into a pressure by what it acts on; it is relative to the largest pressure. Where no force acts, so
+that this is rounding itself, it is relative to the stress that strains and motions could cause:
 
     forces       terms of opposite sign cancel where internal forces are summed (stretched cells,
                  nearly incompressible material), and what the solve leaves unbalanced
@@ -189,16 +190,19 @@ def estimate(
     scene, constraints, closed = iterate.scene, iterate.constraints, iterate.closed
     forces, unit = _rounding_of_forces(iterate), _unit(iterate)
     scale = float(np.abs(pressure).max(initial=0.0))
+    moved = iterate.displacement.total.reshape(scene.points.shape)
     if scale == 0:
+        if not scene.force.any():
+            caused = stress_of_motion(scene, moved) * scene.length ** (scene.space - 1)
+            force_scale = max(force_scale, caused)
         return Accuracy({"forces": float(forces.max()) / force_scale})
     noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
     moving = constraints.moving[closed]
-    moved = iterate.displacement.total.reshape(scene.points.shape)
     pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
     mean_stress = scene.mean.cancellation(iterate.mean_stress)[1]
-    causes = {
+    errors = {
         "forces": pressure_of_forces(moving, noise),
         "gap": pressure_of_gaps(moving, _rounding_of_gaps(iterate)[closed], diagonal),
         "coordinates": tilted + rough.stress(scene.blocks, moved),
@@ -206,7 +210,16 @@ def estimate(
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
-    return Accuracy({name: error / scale for name, error in causes.items()})
+    if max(errors.values()) >= scale and not scene.force.any():
+        # The pressure is rounding: no force acts. The measure is what strains and motions would be.
+        scale = max(scale, iterate.sizes.highest, stress_of_motion(scene, moved))
+    return Accuracy({name: error / scale for name, error in errors.items()})
+
+
+def stress_of_motion(scene: Scene, displacement: np.ndarray) -> float:
+    """The stress that a displacement (n, dim) would cause as a strain over the model's length."""
+    young = max(material.young for material in scene.case.materials.values())
+    return young * float(np.abs(displacement).max(initial=0.0)) / scene.length
 
 
 def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) -> Trial:

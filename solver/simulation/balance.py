@@ -6,6 +6,7 @@ from scipy import sparse
 from ..mechanics.fem.faces import face_integrals
 from ..mechanics.fem.supports import DEPENDENT
 from ..mechanics.linear.direct import factorise
+from .accuracy import stress_of_motion
 from .problem import Equilibrium
 from .scene import Scene, ZoneScene
 from .solution import Reaction, RigidMotion
@@ -20,8 +21,9 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     """Relative imbalances by name.
 
     Forces are divided by the sum of the sizes of the nodal forces at work (loads, or contact forces
-    where there is no load), moments by that times the length of the model. Of axisymmetric bodies
-    only forces along the axis have a resultant.
+    where there is no load, and at least the force that the displacement could cause), moments by
+    that times the length of the model. Of axisymmetric bodies only forces along the axis have a
+    resultant.
     """
     points, around = scene.points, scene.case.axisymmetric
     contact = np.zeros_like(points)
@@ -30,7 +32,10 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         forces = (zone.operator.matrix.T @ state.pressure[zone.numbers]).reshape(points.shape)
         by_zone[zone.zone.name] = forces
         contact += forces
-    scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2) or 1.0
+    scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
+    if not state.force.any():
+        caused = stress_of_motion(scene, state.displacement) * scene.length ** (scene.space - 1)
+        scale = max(scale, caused) or 1.0
     result: dict[str, float] = {}
     if state.correction.any():
         by_zone["correction of the pressure"] = state.correction

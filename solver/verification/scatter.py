@@ -47,6 +47,8 @@ _SAME_SIDE = np.cos(np.radians(30))
 _RANK, _CENTRED = 0.03, 0.3
 # Neighbours in a line have no part across it, up to rounding.
 _IN_LINE = 1e-9
+# Pressures below this share of the stress that the displacement could cause are rounding.
+_ROUNDING = 1e-13
 # A macro-element that is covered by less than this has a mean of another place.
 _COVERED = 0.99
 
@@ -58,8 +60,9 @@ def oscillating(solution: Solution) -> str:
     """
     tolerance = solution.case.tolerance
     limit = max([LIMIT, *(tolerance[check] for check in _ALLOWED if check in tolerance)])
+    rounding = _ROUNDING * _stress_of_motion(solution)
     for zone in solution.zones:
-        if zone.nodal is not None or not zone.multiplier.any():
+        if zone.nodal is not None or zone.multiplier.max(initial=0.0) <= rounding:
             continue
         found = scatter(solution.mesh.points, zone)
         if found.averaged > limit:
@@ -78,6 +81,12 @@ def oscillating(solution: Solution) -> str:
             "`stabilised: true`, or refine the master"
         )
     return ""
+
+
+def _stress_of_motion(solution: Solution) -> float:
+    """The stress of the displacement as a strain over the model's length, at its largest."""
+    young = max(material.young for material in solution.case.materials.values())
+    return young * float(np.abs(solution.displacement).max(initial=0.0)) / solution.length
 
 
 class Scatter(NamedTuple):

@@ -8,6 +8,8 @@ from .pairing import candidate_pairs
 
 # Cells that are looked at together.
 _AT_ONCE = 1 << 14
+# A place is inside a cell from this share of the depth of the cell's own middle on.
+_DEEP = 1e-3
 
 
 def inside_others(points: np.ndarray, cells: dict[str, np.ndarray], body: np.ndarray) -> int:
@@ -75,8 +77,12 @@ def _ball(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _contained(
     points: np.ndarray, kind: CellType, nodes: np.ndarray, place: np.ndarray
 ) -> np.ndarray:
-    """Which places (n, dim) are inside their cell (n, n_nodes): behind all of its faces."""
+    """Which places (n, dim) are inside their cell (n, n_nodes): behind all of its faces.
+
+    By more than rounding, as a share of the depth of its own middle.
+    """
     inside = np.ones(len(nodes), dtype=bool)
+    middle = points[nodes[:, : kind.n_vertices]].mean(axis=1)
     for face in kind.faces:
         corner = points[nodes[:, face.nodes[: cell_type(face.type).n_vertices]]]
         a, b, *rest = np.moveaxis(corner, 1, 0)
@@ -86,5 +92,8 @@ def _contained(
             # of a quadrangle, the angle of its diagonals
             one, other = (b - a, rest[0] - a) if len(rest) == 1 else (rest[0] - a, rest[1] - b)
             normal = np.cross(one, other)
-        inside &= np.einsum("nd,nd->n", place - corner.mean(axis=1), normal) < 0
+        depth, own = (
+            np.einsum("nd,nd->n", at - corner.mean(axis=1), normal) for at in (place, middle)
+        )
+        inside &= depth < _DEEP * own
     return inside
