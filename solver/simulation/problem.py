@@ -192,7 +192,7 @@ class ContactProblem:
             first = rest = self._at_rest(closed, step, correction)
             if rough and self._constrained(closed).factor.iterative:
                 known, trial = self._roughly(rest, known)
-                if (eligible & (trial.offence(closed) > 1)).any():
+                if (eligible & (trial.violation(closed) > 1)).any():
                     return trial
                 first = known
             latest[:] = [self._solve_closed(first, correction, _force_scale(rest))]
@@ -267,7 +267,7 @@ class ContactProblem:
     ) -> tuple[ContactIterate, Trial]:
         """An approximate solution, from the one `known` of another status, and its trial.
 
-        What it leaves undecided counts as no offence: a solve to round-off then judges.
+        What it leaves undecided counts as no violation: a solve to round-off then judges.
         """
         accuracy = _ROUGH_CHANGE if known else _ROUGH_STATUS
         start = known.with_closed(start.closed) if known else start
@@ -366,7 +366,7 @@ class ContactProblem:
         largest = np.abs(loads).max(initial=0.0)
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")
-        system, area = self._systems.closed(eligible), self.constraints.covered[eligible]
+        system, area = self._systems.factored(eligible), self.constraints.covered[eligible]
         found, size = np.zeros((len(area), len(area))), self.matrix.shape[0]
         for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
             imposed = np.zeros((len(area), len(some)))

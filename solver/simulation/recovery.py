@@ -86,7 +86,7 @@ def recovered(
     for _ in range(_ROUNDS):
         zones = [_zone(zone, found.status.closed) for zone in given]
         found, read, forces = _corrected(problem, found, zones)
-        wrong = found.trial.offence(found.status.closed) > 1
+        wrong = found.trial.violation(found.status.closed) > 1
         if not (wrong & problem.constraints.eligible).any():
             return found, {
                 zone.zone.name: RecoveredZone(

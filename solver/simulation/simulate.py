@@ -158,7 +158,7 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
         start = states[-1].status.closed if states else None
         before = case.steps[len(states) - 1] if states else None
         state = problem.solve(step, start, before=before)
-        if (state.trial.offence(state.iterate.closed) > 1).any():
+        if (state.trial.violation(state.iterate.closed) > 1).any():
             raise SolveError(f"{_called(step, factor)}: contact bears tension or surfaces overlap")
         state, field = recovered(problem, state, step)
         states.append(state)

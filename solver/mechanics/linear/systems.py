@@ -22,6 +22,9 @@ from .stabilised import Compliance, stabilise
 from .stiffened import Stiffness, part_of
 from .unknowns import Unknowns
 
+_MANY = "a factor serves many right-hand sides at once"
+# A factor of so many unknowns takes too much memory to be tried for that.
+_LARGEST = 300_000
 _NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
 _DEPENDENT = "constraints that nearly depend on one another: a saddle point"
 
@@ -147,6 +150,22 @@ class Systems:
             found.append((unknowns, np.flatnonzero(part.multipliers[closed]), system))
         self.latest = IndependentSystems(found, int(closed.sum()))
         return self.latest
+
+    def factored(self, closed: np.ndarray) -> ConstrainedSystem:
+        """The same by a factor, which serves for many right-hand sides at once.
+
+        Systems of `_LARGEST` unknowns and more keep their solver.
+        """
+        if self._matrix.shape[0] < _LARGEST:
+            for number, (_, system) in list(self._kept.items()):
+                if isinstance(system.factor, LinearSolver) and system.factor.iterative:
+                    self._drop(number)
+            before, self._gave_up = self._gave_up, dict.fromkeys(range(len(self._parts)), _MANY)
+            try:
+                return self.closed(closed)
+            finally:
+                self._gave_up = before
+        return self.closed(closed)
 
     def _of(self, number: int, chosen: np.ndarray | None, closed: np.ndarray) -> ConstrainedSystem:
         """The system of one part, of the `chosen` unknowns; None: of all."""

@@ -1,4 +1,4 @@
-"""Contact status by a primal–dual active set (semi-smooth Newton), with a search that must end.
+"""Contact status by a primal–dual active set (semi-smooth Newton), with guaranteed termination.
 
 ḡ ≥ 0, p ≥ 0, p ḡ = 0 for each macro-element. One iteration solves with the present closed
 macro-elements as equality constraints; a closed one then opens where p < 0, an open one closes
@@ -8,8 +8,10 @@ set strategy for non-linear multibody contact problems, CMAME 194 (2005).
 From few closed macro-elements, more would close at once than are in contact in the end, and these
 open ring by ring: an iteration closes no more than are closed already.
 
-This search may cycle, make no progress or open so much that a body moves freely. Then it is
-repeated from another start, if there is one. Where that fails too, the linear complementarity
+The search goes on while it makes progress: fewer wrong statuses than ever before, or fewer or more
+closed macro-elements. Contact that peels off opens row by row and makes progress in each step. None
+of the three can go on for ever. The search may also open so much that a body moves freely. Then it
+is repeated from another start, if there is one. Where that fails too, the linear complementarity
 problem |T| p = W ḡ + q of all macro-elements is formed on the factor that has them
 all closed, and solved by a method that ends after finitely many steps (`complementarity`). A solve
 with the set found yields accurate p and ḡ, from which q is corrected until no status is wrong.
@@ -27,10 +29,9 @@ from ..linear.complementarity import complementary
 
 _LOG = logging.getLogger(__name__)
 
-# The quick search ends where so many solves leave no fewer wrong statuses, in all, than as many
-# solves before them.
-_PATIENCE = 5
-# Up to so many may close at once, however few are closed.
+# Stop the active-set search when this many solves make no progress.
+_PATIENCE = 8
+# At most this many may close in one iteration when few are closed.
 _FEW = 50
 _MAX_CORRECTIONS = 6
 
@@ -48,8 +49,11 @@ class Trial:
     pressure_limit: np.ndarray
     gap_limit: np.ndarray
 
-    def offence(self, closed: np.ndarray) -> np.ndarray:
-        """How many times its limit each multiplier (k,) violates p ≥ 0 if closed, else ḡ ≥ 0."""
+    def violation(self, closed: np.ndarray) -> np.ndarray:
+        """Violation of each multiplier's sign condition, as a multiple of the round-off limit.
+
+        That is p ≥ 0 where `closed` (k,), else ḡ ≥ 0.
+        """
         value = np.where(closed, -self.pressure, -self.gap)
         limit = np.where(closed, self.pressure_limit, self.gap_limit)
         with np.errstate(over="ignore"):
@@ -122,37 +126,62 @@ def _quick(
     They are added to the `changes`. Raises the SolveError of a solve.
     """
     seen, single = set(), False
-    left: list[int] = []
-    while not _stuck(left):
-        offence = np.where(eligible, solve(closed).offence(closed), 0.0)
-        wrong = offence > 1
+    progress = _Progress(len(closed))
+    while not progress.ended:
+        violation = np.where(eligible, solve(closed).violation(closed), 0.0)
+        wrong = violation > 1
         _log(len(changes) + 1, closed, wrong)
         if not wrong.any():
             if not confirm:
                 return closed
             confirm = False
             continue
-        left.append(int(wrong.sum()))
+        progress.note(int(wrong.sum()), int(closed.sum()))
         seen.add(closed.tobytes())
-        following = closed ^ _first_changes(closed, wrong, offence)
+        following = closed ^ _first_changes(closed, wrong, violation)
         # A cycle is broken by changing the worst offender alone from then on.
         single = single or following.tobytes() in seen
         if single:
             following = closed.copy()
-            following[offence.argmax()] ^= True
-        if not _stuck(left):
+            following[violation.argmax()] ^= True
+        if not progress.ended:
             changes.append(int((following ^ closed).sum()))
             closed = following
     return None
 
 
-def _stuck(left: list[int]) -> bool:
-    """Whether the numbers of wrong statuses that solves `left` no longer fall."""
-    before, latest = left[-2 * _PATIENCE : -_PATIENCE], left[-_PATIENCE:]
-    return len(before) == _PATIENCE and sum(latest) >= sum(before)
+class _Progress:
+    """Records of a search among `count` multipliers: wrong statuses, fewest and most closed.
+
+    >>> progress = _Progress(100)
+    >>> for closed in range(90, 50, -1):
+    ...     progress.note(16, closed)
+    >>> progress.ended
+    False
+    >>> for _ in range(8):
+    ...     progress.note(16, 60)
+    >>> progress.ended
+    True
+    """
+
+    def __init__(self, count: int):
+        self._wrong, self._fewest, self._most = count + 1, count + 1, -1
+        self._without = 0
+
+    def note(self, wrong: int, closed: int) -> None:
+        """Note a solve with so many wrong statuses and closed multipliers."""
+        record = wrong < self._wrong or closed < self._fewest or closed > self._most
+        self._without = 0 if record else self._without + 1
+        self._wrong = min(self._wrong, wrong)
+        self._fewest, self._most = min(self._fewest, closed), max(self._most, closed)
+
+    @property
+    def ended(self) -> bool:
+        """Whether too many solves set no record."""
+        return self._without >= _PATIENCE
 
 
-def _first_changes(closed: np.ndarray, wrong: np.ndarray, offence: np.ndarray) -> np.ndarray:
+def _first_changes(closed: np.ndarray, wrong: np.ndarray, violation: np.ndarray) -> np.ndarray:
     """Those of the `wrong` (k,) that change now: all that open, and the worst of many that close.
 
     From one closed macro-element, `_FEW` more close at once:
@@ -164,7 +193,7 @@ def _first_changes(closed: np.ndarray, wrong: np.ndarray, offence: np.ndarray) -
     closing = np.flatnonzero(wrong & ~closed)
     most = max(int(closed.sum()), _FEW)
     now = wrong & closed
-    now[closing[np.argsort(offence[closing], kind="stable")[-most:]]] = True
+    now[closing[np.argsort(violation[closing], kind="stable")[-most:]]] = True
     return now
 
 
@@ -192,7 +221,7 @@ def _certain(
             trial = solve(closed)
         except SolveError as error:
             raise failure or error from None
-        wrong = eligible & (trial.offence(closed) > 1)
+        wrong = eligible & (trial.violation(closed) > 1)
         changes.append(int((closed ^ latest).sum()))
         _log(len(changes) + 1, closed, wrong)
         if not wrong.any():

@@ -213,3 +213,17 @@ def test_the_guess_starts_from_where_the_bodies_first_touch():
 
 def test_surfaces_that_touch_are_all_closed():
     assert likely_closed(np.zeros(9), np.ones(9), np.full(9, True), 1e-30, 3).all()
+
+
+def test_contact_that_peels_off_row_by_row():
+    """Each solve shows tension in the outermost closed one of 60 alone, until 3 are left."""
+
+    def solve(closed):
+        pressure = np.where(closed, 1.0, 0.0)
+        if closed.sum() > 3:
+            pressure[np.flatnonzero(closed)[-1]] = -1.0
+        return trial(pressure, np.where(closed, 0.0, 1.0))
+
+    result = searched(solve, np.full(60, True))
+    assert np.flatnonzero(result.closed).tolist() == [0, 1, 2]
+    assert result.iterations == 58
