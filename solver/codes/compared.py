@@ -21,6 +21,7 @@ from ..verification.norms import errors
 from ..verification.samples import Reference, Sample
 from ..verification.verdict import CheckResult
 from .contact import SurfaceValues, pressure_force, surfaces
+from .extent import CHECKED_BY
 from .faults import fault, summed_up
 from .model import Model
 from .own_mesh import own_solution
@@ -278,13 +279,9 @@ class Compared:
 
     def unchecked(self, ran: Sequence[str]) -> list[str]:
         """The fields that are given, and that no check of the case compares."""
-        of_field = {
-            "displacement": ("displacement", "displacement_l2", "displacement_h1"),
-            "stress": ("nodal_stress", "stress_components", "stress_max"),
-            "pressure": ("multiplier", "balance", *(n for n in ERRORS if n.startswith("press"))),
-            "gap": ("element_gap",),
-        }
-        return [name for name in self.placed if not {*of_field[name]} & {*ran}]
+        compare = {name: {*checks} for name, checks in CHECKED_BY.items()}
+        compare["pressure"].add("balance")
+        return [name for name in self.placed if not compare[name] & {*ran}]
 
     def extremes(self, name: str) -> list[float | None] | None:
         """Minimum and maximum of a quantity, over all places; None where it is not given."""

@@ -15,6 +15,7 @@ from ..system.errors import InputError, SolveError
 from ..system.process import run_apart
 from ..verification.verdict import CRASHED, FAILED, REFUSED, Verdict, write_verdict
 from .deck import Deck, UnsupportedError, deck_of
+from .extent import CHECKED_BY
 from .foreign import ForeignResult
 from .registry import Code
 from .verdicts import LOG, VERDICT, store, without_foreign
@@ -77,7 +78,9 @@ def run_case(
             deck = deck_of(case, mesh, code.layer)
             found = run_code(code, deck, Path(scratch), limits or Limits())
             found = replace(_thin(found) if case.thin else found, version=version)
-            return store(case, found, folder, mesh)
+            # What a code does not write is no fault of the result.
+            only = [name for name in CHECKED_BY if getattr(found, name) is not None]
+            return store(case, found, folder, mesh, only or None)
         except Exception as error:  # noqa: BLE001 -- a user's own class may raise anything
             known = [word for kind, word in _WORDS.items() if isinstance(error, kind)]
             verdict = without_foreign(

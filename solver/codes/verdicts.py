@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,8 +19,9 @@ from ..system.files import seal, write_text
 from ..verification.checks import run_checks
 from ..verification.judge import judge, without_result
 from ..verification.run import mesh_of
-from ..verification.verdict import FAILED, Verdict, write_verdict
+from ..verification.verdict import FAILED, PARTIAL, PASSED, SOLVED, Verdict, write_verdict
 from .compared import Compared
+from .extent import CHECKED_BY, Extent, extents
 
 if TYPE_CHECKING:
     import meshio
@@ -28,17 +29,26 @@ if TYPE_CHECKING:
     from ..case.model import Case
     from .foreign import ForeignResult
 
+NEEDED = ("displacement", "stress", "pressure")
+"""The fields that a result needs to pass, as far as the case has a reference for them."""
 VERDICT, RESULT, PRESSURE, LOG = "verdict.json", "result.vtkhdf", "pressure.csv", "log"
 
 
-def check_foreign(case: Case, foreign: ForeignResult, mesh: meshio.Mesh | None = None) -> Verdict:
+def check_foreign(
+    case: Case,
+    foreign: ForeignResult,
+    mesh: meshio.Mesh | None = None,
+    only: Sequence[str] | None = None,
+) -> Verdict:
     """The verdict of another code's result: our checks of each quantity that it gives.
 
     `case` as it was solved (`Case.as_solved`); `mesh` is its mesh, made where it is not given. What
-    the result does not give is listed in the verdict's `not_given`. Raises InputError where the
+    the result does not give is listed in the verdict's `not_given`; where a field that the case has
+    a reference for is missing, or has values at a part of the places, the verdict is `partial`.
+    `only`: the fields to compare, a part on purpose. Raises InputError where the
     result does not belong to the case: another unit of length, mirrored, turned, shifted.
     """
-    return _judged(Compared.of(case, foreign, mesh or mesh_of(case)))
+    return _judged(Compared.of(case, foreign, mesh or mesh_of(case)), only)
 
 
 def folder_of(results: Path, case: Case, code: str) -> Path:
@@ -48,14 +58,18 @@ def folder_of(results: Path, case: Case, code: str) -> Path:
 
 
 def store(
-    case: Case, foreign: ForeignResult, folder: Path, mesh: meshio.Mesh | None = None
+    case: Case,
+    foreign: ForeignResult,
+    folder: Path,
+    mesh: meshio.Mesh | None = None,
+    only: Sequence[str] | None = None,
 ) -> Verdict:
     """Check a result and write verdict, fields and pressures into `folder`; the verdict.
 
     Raises InputError as `check_foreign` does; then nothing is written.
     """
     compared = Compared.of(case, foreign, mesh or mesh_of(case))
-    verdict = _judged(compared)
+    verdict = _judged(compared, only)
     folder.mkdir(parents=True, exist_ok=True)
     if foreign.mesh is not None:
         _write_fields(folder / RESULT, foreign)
@@ -97,11 +111,23 @@ def _named(verdict: Verdict, code: str, version: str, settings: Mapping[str, str
     )
 
 
-def _judged(compared: Compared) -> Verdict:
+def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
     foreign, solution = compared.foreign, compared.solution
-    checks = run_checks(solution, samplers=compared.samplers, allow=compared.tolerance)
+    samplers = compared.samplers
+    if only is not None:
+        asked = {"balance", *(check for name in only for check in CHECKED_BY[name])}
+        samplers = {name: sampler for name, sampler in samplers.items() if name in asked}
+    checks = run_checks(solution, samplers=samplers, allow=compared.tolerance)
     ran = [check.name for check in checks]
     verdict = judge(solution, checks)
+    where, missing = extents(compared), compared.not_given(ran)
+    wanted = [name for name in NEEDED if {*CHECKED_BY[name]} & {*missing, *ran}]
+    if verdict.verdict == PASSED or (verdict.verdict == SOLVED and wanted):
+        asked_for = wanted if only is None else [name for name in wanted if name in only]
+        less = [name for name in asked_for if name not in where or not where[name].whole]
+        if less or not asked_for:
+            verdict = replace(verdict, verdict=PARTIAL, passed=False, judged="")
+            verdict = replace(verdict, reason=_incomplete(where, less))
     cause = compared.faults([check for check in checks if not check.passed])
     if cause and verdict.verdict == FAILED:
         verdict = replace(verdict, reason=f"{cause} ({verdict.reason})")
@@ -109,7 +135,9 @@ def _judged(compared: Compared) -> Verdict:
     return replace(
         named,
         printed_digits=foreign.digits,
-        not_given=compared.not_given(ran),
+        not_given=missing,
+        only=[name for name in wanted if name in only] if only and {*wanted} - {*only} else [],
+        compared={name: str(extent) for name, extent in where.items()},
         plan=[[name, "given; the case has no check of it"] for name in compared.unchecked(ran)],
         pressure=compared.extremes("pressure"),
         gap=compared.extremes("gap"),
@@ -126,6 +154,14 @@ def _judged(compared: Compared) -> Verdict:
         cpu_seconds=foreign.cpu_seconds,
         peak_memory_mb=foreign.peak_memory_mb,
     )
+
+
+def _incomplete(where: Mapping[str, Extent], less: Sequence[str]) -> str:
+    """What was compared and what was not, in words."""
+    given = [f"{name} at {extent}" for name, extent in where.items()]
+    absent = [name for name in less if name not in where]
+    text = f"compared: {', '.join(given) or 'nothing'}"
+    return f"{text}; not given: {', '.join(absent)}" if absent else text
 
 
 def _write_fields(path: Path, foreign: ForeignResult) -> None:

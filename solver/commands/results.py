@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..system.errors import InputError
 from .options import FAILED, PASSED, add_command, print_checks
 
 
@@ -22,6 +23,9 @@ def add_commands(commands: Any) -> None:
     )
     command.add_argument("--map", type=Path, metavar="MAP.yaml", help="names, signs and units")
     command.add_argument("--code", default="", metavar="NAME", help="the name of the code")
+    command.add_argument(
+        "--only", metavar="FIELDS", help="compare these alone: displacement, stress, pressure, gap"
+    )
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
     command.add_argument("--mesh", type=Path, help="the case's mesh, written by `mesh`")
     command.add_argument(
@@ -44,14 +48,27 @@ def _check_result(options: argparse.Namespace) -> int:
     mapping = ResultMap()
     if options.map:
         mapping = read_as(ResultMap, read_mapping(options.map), options.map)
+    only = _fields(options.only)
     foreign = read_result_files(options.results, mapping, options.map, options.code)
     mesh = read_mesh(options.mesh) if options.mesh else None
     if options.output:
-        verdict = store(case, foreign, folder_of(options.output, case, foreign.code), mesh)
+        verdict = store(case, foreign, folder_of(options.output, case, foreign.code), mesh, only)
     else:
-        verdict = check_foreign(case, foreign, mesh)
+        verdict = check_foreign(case, foreign, mesh, only)
     if options.json:
         print(to_json(verdict.plain()))
     else:
         print_checks(verdict)
     return PASSED if verdict.sound else FAILED
+
+
+def _fields(given: str | None) -> list[str] | None:
+    """The fields of `--only`, between commas."""
+    from ..codes.extent import CHECKED_BY
+
+    if given is None:
+        return None
+    names = [name.strip() for name in given.split(",")]
+    if unknown := [name for name in names if name not in CHECKED_BY]:
+        raise InputError("command line", "--only", unknown[0], f"allowed: {', '.join(CHECKED_BY)}")
+    return names

@@ -62,7 +62,8 @@ def oscillating(solution: Solution) -> str:
     limit = max([LIMIT, *(tolerance[check] for check in _ALLOWED if check in tolerance)])
     rounding = _ROUNDING * _stress_of_motion(solution)
     for zone in solution.zones:
-        if zone.nodal is not None or zone.multiplier.max(initial=0.0) <= rounding:
+        peak = zone.multiplier[zone.closed].max(initial=0.0)
+        if zone.nodal is not None or not peak > rounding:
             continue
         found = scatter(solution.mesh.points, zone)
         if found.averaged > limit:

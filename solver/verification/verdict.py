@@ -22,11 +22,11 @@ from ..system.errors import InputError
 from ..system.files import seal_of, write_text
 
 PASSED, SOLVED, FAILED, UNRELIABLE = "passed", "solved", "failed", "unreliable"
-REFUSED, CRASHED = "refused", "crashed"
+REFUSED, CRASHED, PARTIAL = "refused", "crashed", "partial"
 # How strictly a solve that passed was judged.
 EXACT, EXPECTED, STATED = "exact", "expected error", "stated tolerance"
 # The worst first, as in every table.
-WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, SOLVED, PASSED)
+WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, PARTIAL, SOLVED, PASSED)
 T = TypeVar("T")
 _DIGEST = "digest"
 # An estimate of the pressure's error below this one is not worth a word.
@@ -176,7 +176,8 @@ class Verdict:
 
     Of the result of another code: `code`, its version and `settings`; `printed_digits` are the
     significant ones of its values, where a file has fewer than a number; `not_given` are the checks
-    that it has no values for; `recorded` has date and source of values that were not computed here.
+    that it has no values for; `only` the fields that were to be compared, where that is a part of
+    what the case asks for on purpose, and `compared` at how many places each was; `recorded` has date and source of values that were not computed here.
     """
 
     case: str = ""
@@ -241,6 +242,8 @@ class Verdict:
     settings: dict[str, str] = field(default_factory=dict)
     printed_digits: int | None = None
     not_given: list[str] = field(default_factory=list)
+    only: list[str] = field(default_factory=list)
+    compared: dict[str, str] = field(default_factory=dict)
     recorded: dict[str, str] = field(default_factory=dict)
     transient: bool = False
 
@@ -253,6 +256,7 @@ class Verdict:
     def summary(self) -> str:
         """One line: job, word, reason or worst error, time."""
         line = f"{self.job}: {self.verdict}"
+        line += f" ({', '.join(self.only)} only)" if self.only else ""
         if self.reason:
             return f"{line}: {self.reason}"
         error = f", worst error {self.worst.error:.1e} ({self.worst.name})" if self.worst else ""

@@ -255,7 +255,7 @@ def test_a_layer_that_moves_across_the_plane_is_refused(tmp_path, capsys):
     mesh, case = results.mesh_and_case("ssnp170/a")
     given = Field(places=answer.points, values=moved, nodes=np.arange(len(moved)))
     thin = check_foreign(
-        replace(case, plane="stress"), foreign(displacement=given, mesh=mesh), mesh
+        replace(case, plane="stress"), foreign(displacement=given, mesh=mesh), mesh, ["displacement"]
     )
     assert [c.name for c in thin.checks] == ["displacement"]
     assert thin.passed
@@ -303,7 +303,8 @@ def test_results_with_cell_data(tmp_path, capsys):
     points = np.pad(answer.points, ((0, 0), (0, 1)))
     full = meshio.Mesh(points, [*answer.cells, ("line", faces)], cell_data=data)
     meshio.vtu.write(tmp_path / "cells.vtu", full)
-    assert main(["check-result", CASE, str(tmp_path / "cells.vtu")]) == 0
+    only = ["--only", "stress,pressure"]
+    assert main(["check-result", CASE, str(tmp_path / "cells.vtu"), *only]) == 0
     assert "multiplier" in capsys.readouterr().out
 
 
@@ -317,3 +318,69 @@ def test_a_ring_presses_with_all_of_its_circumference():
     pressure = Field(places=slave, values=np.full(len(slave), 25.0))
     checks = {c.name: c for c in check_foreign(case, foreign(pressure=pressure), mesh).checks}
     assert checks["balance"].error < 1e-12
+
+
+ALL = ("displacement", "stress", "pressure")
+
+
+def parts(answer):
+    """Parts of an exact answer, as another code may give by mistake."""
+    points, low = answer.points, answer.points[:, 1] < 0
+    everywhere = np.arange(len(points))
+    slave = np.flatnonzero(answer.pressure > 0)
+    fields = {
+        name: Field(places=points, values=getattr(answer, name), nodes=everywhere)
+        for name in ("displacement", "stress")
+    }
+    fields["pressure"] = Field(places=points[slave], values=answer.pressure[slave])
+
+    def at(name, chosen):
+        given = fields[name]
+        return Field(places=given.places[chosen], values=given.values[chosen])
+
+    return {
+        "displacement alone": {"displacement": fields["displacement"]},
+        "pressure alone": {"pressure": fields["pressure"]},
+        "no stress": {name: fields[name] for name in ("displacement", "pressure")},
+        "one row of nodes": {**fields, "stress": at("stress", points[:, 1] == points[:, 1].max())},
+        "one body": {**fields, "displacement": at("displacement", low)},
+        "half of the interface": {
+            **fields, "pressure": at("pressure", np.argsort(points[slave, 0])[: len(slave) // 2])
+        },
+    }, fields  # fmt: skip
+
+
+@pytest.mark.parametrize("which", range(6))
+def test_a_part_of_a_result_is_no_verification(which):
+    """Right values where they are given; what is not compared keeps the verdict from `passed`."""
+    answer = results.patch()
+    mesh, case = results.mesh_and_case("ssnp170/a")
+    some, whole = parts(answer)
+    name, fields = list(some.items())[which]
+    try:
+        found = check_foreign(case, foreign(**fields), mesh)
+    except InputError as error:
+        assert name in ("one row of nodes", "one body", "half of the interface"), error
+        return
+    assert (found.verdict, found.passed) == ("partial", False), name
+    assert found.reason.startswith("compared: ")
+    assert not found.sound
+    assert check_foreign(case, foreign(**whole), mesh).verdict == "passed"
+
+
+def test_a_part_may_be_asked_for():
+    mesh, case = results.mesh_and_case("ssnp170/a")
+    _, whole = parts(results.patch())
+    found = check_foreign(case, foreign(displacement=whole["displacement"]), mesh, ["displacement"])
+    assert (found.verdict, found.only) == ("passed", ["displacement"])
+    assert "passed (displacement only)" in found.summary
+    assert found.compared == {"displacement": f"{len(mesh.points)} of {len(mesh.points)} nodes"}
+    lacking = check_foreign(case, foreign(displacement=whole["displacement"]), mesh, ALL)
+    assert lacking.verdict == "partial"
+    assert "not given: stress, pressure" in lacking.reason
+
+
+def test_only_names_fields(check):
+    status, said = check(results.patch(), "--only", "velocity")
+    assert status == 2
+    assert "allowed: displacement, stress, pressure, gap" in said

@@ -118,7 +118,7 @@ def test_vtkhdf_of_others(answer, tmp_path, capsys):
         grid["Connectivity"], grid["Types"] = cells.ravel(), np.full(len(cells), 9, dtype=np.uint8)
         grid["Offsets"] = np.arange(len(cells) + 1) * 4
         grid["PointData/U"] = np.pad(answer.displacement, ((0, 0), (0, 1)))
-    status, said = checked(capsys, CASE, file)
+    status, said = checked(capsys, CASE, file, "--only", "displacement")
     assert status == 0, said
     assert '"name": "displacement"' in said
 
