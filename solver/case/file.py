@@ -23,7 +23,8 @@ CheckName = Literal[
     "displacement", "stress_components", "integration_stress", "balance", "counts", "observation",
     "observation_gap",
     "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2", "pressure_max",
-    "pressure_means", "pressure_total", "pressure_oscillation", "pressure_inner", "half_width", "peak",
+    "pressure_means", "pressure_total", "pressure_oscillation", "pressure_inner",
+    "half_width", "peak",
     "force", "reaction", "moment", "contact_area", "strain_energy",
     "displacement_at", "stress_at", "pressure_at",
 ]  # fmt: skip

@@ -34,24 +34,24 @@ _ALL = 0.995
 
 
 class Extent(NamedTuple):
-    """At how many of how many places a field is compared, and what these are."""
+    """At what number of how many places a field is compared, and what these are."""
 
-    count: int
+    number: int
     total: int
     what: str
 
     @property
     def whole(self) -> bool:
         """Whether nothing is left out that matters."""
-        return self.count >= _ALL * self.total
+        return self.number >= _ALL * self.total
 
     def __str__(self) -> str:
-        return f"{self.count} of {self.total} {self.what}"
+        return f"{self.number} of {self.total} {self.what}"
 
 
 def extents(compared: Compared) -> dict[str, Extent]:
     """By field that is given, where it is."""
-    found = {}
+    found: dict[str, Extent] = {}
     for name in ("displacement", "stress"):
         if name in compared.placed:
             found[name] = _in_bodies(compared, name)

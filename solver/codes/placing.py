@@ -259,10 +259,19 @@ def _listed(values: np.ndarray) -> str:
 def flattened(foreign: ForeignResult, dim: int, where: object, thin: bool) -> ForeignResult:
     """A result of a plane case that was solved as a layer of cells, in the plane.
 
-    Raises InputError if the layer moves across the plane, which it may in plane stress (`thin`).
+    In plane stress (`thin`) the layer may move across the plane, and σ_zz need not be given.
+    Raises InputError for either elsewhere.
     """
+    stress = foreign.stress
+    if stress is not None and np.isnan(stress.values[:, 2]).all():
+        if not thin:
+            problem = "its component zz is missing, which is zero in plane stress alone"
+            raise InputError(where, "stress", None, problem)
+        values = stress.values.copy()
+        values[:, 2] = 0.0
+        foreign = replace(foreign, stress=replace(stress, values=values))
     moved = foreign.displacement
-    if dim == 3 or moved is None or moved.values.shape[1] == 2:
+    if dim == 3 or moved is None or moved.values.shape[1] == 2 or np.isnan(moved.values).all():
         return foreign
     size = float(np.nanmax(np.abs(moved.values)))
     across = float(np.nanmax(np.abs(moved.values[:, 2]), initial=0.0))

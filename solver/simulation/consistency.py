@@ -40,13 +40,9 @@ def _all(solution: Solution) -> Iterator[str]:
     known = [solution.length, solution.load_scale, *solution.balance.values()]
     known += solution.seconds.values()
     yield from _values("the solve's own numbers", np.array(known), (len(known),))
-    names = [zone.name for zone in solution.zones]
-    if set(names) != {zone.name for zone in solution.case.zones}:
+    if {zone.name for zone in solution.zones} != {zone.name for zone in solution.case.zones}:
         yield "the contact zones differ from the case's"
-    balanced = {name.rpartition(": ")[0] for name in solution.balance}
-    for name in (*(f"zone {name}" for name in names), "reactions and loads", "free nodes"):
-        if name not in balanced:
-            yield f"no balance of {name}"
+    yield from _unbalanced(solution)
     if solution.strain_energy is not None:
         yield from _values("strain energy", np.array([solution.strain_energy]), (1,))
     if solution.reaction is not None:
@@ -58,6 +54,15 @@ def _all(solution: Solution) -> Iterator[str]:
             yield f"zone {zone.name}: {fault}"
     for zone in solution.zones:
         yield from _status(zone, solution)
+
+
+def _unbalanced(solution: Solution) -> Iterator[str]:
+    """What has no balance of forces."""
+    balanced = {name.rpartition(": ")[0] for name in solution.balance}
+    zones = [f"zone {zone.name}" for zone in solution.zones]
+    for name in (*zones, "reactions and loads", "free nodes"):
+        if name not in balanced:
+            yield f"no balance of {name}"
 
 
 def _by_key(solution: Solution, n: int) -> Iterator[str]:

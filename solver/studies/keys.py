@@ -22,8 +22,8 @@ else:
     ]  # fmt: skip
     ErrorName = Literal[
         "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2",
-        "pressure_max", "pressure_means", "pressure_total", "pressure_oscillation", "pressure_inner",
-        "half_width", "peak",
+        "pressure_max", "pressure_means", "pressure_total", "pressure_oscillation",
+        "pressure_inner", "half_width", "peak",
     ]  # fmt: skip
     Degree = Literal["linear", "quadratic"]
 Name = Annotated[

@@ -114,11 +114,12 @@ def scatter(points: np.ndarray, zone: ZoneResult) -> Scatter:
     inside &= ~near.any(~inside)
     # Along the rim of the slave the pressure may be singular, as at the edge of a punch.
     _, rim = macro_neighbours(zone)
-    sizes = [
+    size, averaged = (
         _oscillation(near, pressure, inside, rim) / float(zone.multiplier.max())
         for pressure in (zone.multiplier, near.averaged(zone.multiplier, shape))
-    ]
-    return Scatter(*sizes, *_spots(zone, shape.facet_area))
+    )
+    spots, in_spots = _spots(zone, shape.facet_area)
+    return Scatter(size, averaged, spots, in_spots)
 
 
 def _oscillation(near: _Near, values: np.ndarray, inside: np.ndarray, rim: np.ndarray) -> float:

@@ -177,7 +177,8 @@ class Verdict:
     Of the result of another code: `code`, its version and `settings`; `printed_digits` are the
     significant ones of its values, where a file has fewer than a number; `not_given` are the checks
     that it has no values for; `only` the fields that were to be compared, where that is a part of
-    what the case asks for on purpose, and `compared` at how many places each was; `recorded` has date and source of values that were not computed here.
+    what the case asks for on purpose, and `compared` at how many places each was; `recorded` has
+    date and source of values that were not computed here.
     """
 
     case: str = ""

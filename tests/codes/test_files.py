@@ -9,6 +9,8 @@ from scipy.io import netcdf_file
 from solver.case.typed import read_as
 from solver.codes.files.map import ResultMap
 from solver.codes.files.read import read_raw, read_result_files
+from solver.codes.placing import flattened
+from solver.codes.verdicts import check_foreign
 from solver.commands.cli import main
 from solver.system.errors import InputError
 from tests.codes import results
@@ -51,7 +53,7 @@ def test_frd(cubes, tmp_path, capsys):
     assert '"element_gap"' in said
     text = file.read_text(encoding="ascii")
     file.write_text(text.replace("SYY", "SYX"), encoding="ascii")
-    assert "xx, yy, zz and xy at least" in checked(capsys, CUBES, file)[1]
+    assert "xx, yy and xy at least" in checked(capsys, CUBES, file)[1]
     file.write_text("nothing", encoding="ascii")
     assert "not an FRD file, or a damaged one" in checked(capsys, CUBES, file)[1]
 
@@ -72,6 +74,76 @@ def test_med(answer, tmp_path, capsys):
     assert found.code == "code_aster"
     assert np.allclose(found.displacement.values, answer.displacement)
     assert np.nanmax(found.pressure.values) == 25.0
+
+
+def test_med_of_code_aster_by_its_own_names(answer, tmp_path, capsys):
+    """`RESU____DEPL` and `RESU____SIEF_NOEU`, with no map."""
+    file, components = tmp_path / "a.med", (b"SIXX", b"SIYY", b"SIZZ", b"SIXY")
+    data = {
+        "RESU____DEPL": answer.displacement, "RESU____SIEF_NOEU": answer.stress[:, :4],
+    }  # fmt: skip
+    meshio.med.write(file, meshio.Mesh(answer.points, answer.cells, point_data=data))
+    with h5py.File(file, "r+") as med:
+        for name, given in (("DEPL", (b"DX", b"DY")), ("SIEF_NOEU", components)):
+            text = b"".join(component.ljust(16) for component in given)
+            med[f"CHA/RESU____{name}"].attrs["NOM"] = np.bytes_(text)
+    status, said = checked(capsys, CASE, file, "--only", "displacement,stress")
+    assert status == 0, said
+    assert '"name": "nodal_stress"' in said
+
+
+def test_a_scalar_with_a_component_in_the_map(answer, tmp_path):
+    file = tmp_path / "a.med"
+    data = {"LAGR": answer.pressure[:, None]}
+    meshio.med.write(file, meshio.Mesh(answer.points, answer.cells, point_data=data))
+    with h5py.File(file, "r+") as med:
+        med["CHA/LAGR"].attrs["NOM"] = np.bytes_(b"LAGS_C".ljust(16))
+    names = {"fields": {"pressure": {"name": "LAGR"}}}
+    found = read_result_files([file], read_as(ResultMap, names, file), file)
+    assert found.pressure.values.max() == 25.0
+
+
+def test_a_spreadsheet_of_paraview(answer, tmp_path, capsys):
+    """Vectors by number, with their magnitude, and the number of the point in two words."""
+    head = [
+        *('"Point ID"', '"Points:0"', '"Points:1"', '"Points:2"'),
+        *('"displacement:0"', '"displacement:1"', '"displacement:Magnitude"'),
+        *(f'"stress:{i}"' for i in range(6)),
+    ]
+    count = len(answer.points)
+    size = np.linalg.norm(answer.displacement, axis=1)
+    columns = np.arange(count), answer.points, np.zeros(count), answer.displacement, size
+    rows = np.column_stack([*columns, answer.stress])
+    file = tmp_path / "a.csv"
+    np.savetxt(file, rows, delimiter=",", header=",".join(head), comments="", fmt="%.12g")
+    status, said = checked(capsys, CASE, file, "--only", "displacement,stress")
+    assert status == 0, said
+    assert '"name": "stress_components"' in said
+
+
+def test_three_components_are_those_of_plane_stress(answer, tmp_path):
+    file = tmp_path / "a.csv"
+    rows = np.column_stack([answer.points, answer.stress[:, [0, 1, 3]]])
+    np.savetxt(file, rows, delimiter=",", header="x,y,s:0,s:1,s:2", comments="", fmt="%.12g")
+    found = read_result_files([file])
+    assert np.isnan(found.stress.values[:, 2]).all()
+    assert found.stress.values[:, 3].tolist() == pytest.approx(answer.stress[:, 3].tolist())
+    assert (flattened(found, 2, "here", thin=True).stress.values[:, 2] == 0).all()
+    with pytest.raises(InputError, match="component zz is missing"):
+        flattened(found, 2, "here", thin=False)
+
+
+def test_the_slave_surface_of_a_case_in_space(tmp_path):
+    """All of its points have z = 0, and it has no cells of the bodies."""
+    mesh, case = results.mesh_and_case("ssnp170/k")
+    nodes = results.slave_nodes(mesh, case)
+    points = mesh.points[nodes]
+    assert not points[:, 2].any()
+    number = np.arange(len(nodes))[:, None]
+    surface = meshio.Mesh(points, [("vertex", number)], point_data={"pressure": 25.0 + 0 * number})
+    meshio.vtu.write(tmp_path / "a.vtu", surface)
+    found = check_foreign(case, read_result_files([tmp_path / "a.vtu"]), mesh, ["pressure"])
+    assert found.verdict == "passed", found.reason
 
 
 def write_exodus(path, points, cells, fields):
@@ -184,7 +256,7 @@ MAPS = {
     "columns: [a, b]": "columns = ['a', 'b']: must name x and y",
     "fields: {pressure: {name: q}}": "fields.pressure.name = 'q': no such field in the result",
     "fields: {displacement: {name: [s1, s2, s3, s4]}}": "there are 4 components in the result",
-    "fields: {stress: {name: s1, components: [xx]}}": "xx, yy, zz and xy at least",
+    "fields: {stress: {name: s1, components: [xx]}}": "xx, yy and xy at least",
     "length: 0": "length = 0: must be a positive number",
 }
 

@@ -46,7 +46,7 @@ class FieldsMap(Section, frozen=True):
     """The fields that are not found by their names.
 
     displacement: two or three components
-    stress: xx, yy, zz and xy at least, positive in tension
+    stress: xx, yy, zz and xy at least (in plane stress without zz), positive in tension
     pressure: of contact, positive in compression
     gap: positive when open
     """

@@ -49,10 +49,12 @@ _AXES = {"x": ("x", "1"), "y": ("y", "2"), "z": ("z", "3")}
 _DISPLACEMENT = "(?:d|u|disp|displ|displacement|displacements)"
 _STRESS = "(?:s|si|sig|sigma|stress|stresses)"
 _LAYOUTS = {
+    3: ("xx", "yy", "xy"),
     4: COMPONENTS[:4],
     6: COMPONENTS,
     9: ("xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"),
 }
+_IN_PLANE = {"xx", "yy", "xy"}
 _TURNED = {"yx": "xy", "zy": "yz", "zx": "xz"}
 
 
@@ -122,7 +124,8 @@ def layout(quantity: str, field: RawField) -> tuple[str, ...]:
 def values(found: Found, quantity: str, where: object) -> tuple[np.ndarray, RawField]:
     """The values of a quantity as the checks want them, and the field that has their places.
 
-    (k,) for scalars, (k, 2 or 3) for a displacement, (k, 6) for a stress. Raises InputError where
+    (k,) for scalars, (k, 2 or 3) for a displacement, (k, 6) for a stress, with NaN for a zz that is
+    not given. Raises InputError where
     components are missing.
     """
     first = found.fields[0]
@@ -135,9 +138,10 @@ def values(found: Found, quantity: str, where: object) -> tuple[np.ndarray, RawF
         if len(axes) < 2:
             raise _missing(where, found, quantity, names)
         return joined[:, axes], first
-    if not set(COMPONENTS[:4]) <= set(names):
+    if not set(names) >= _IN_PLANE:
         raise _missing(where, found, quantity, names)
     stress = np.zeros((len(joined), 6))
+    stress[:, 2] = np.nan
     for i, name in enumerate(COMPONENTS):
         if name in names:
             stress[:, i] = joined[:, names.index(name)]
@@ -145,7 +149,7 @@ def values(found: Found, quantity: str, where: object) -> tuple[np.ndarray, RawF
 
 
 def _missing(where: object, found: Found, quantity: str, names: Sequence[str]) -> InputError:
-    wanted = "x and y" if quantity == "displacement" else "xx, yy, zz and xy"
+    wanted = "x and y" if quantity == "displacement" else "xx, yy and xy"
     problem = f"the components of the {quantity} must be known, {wanted} at least: see --map"
     return InputError(where, found.label, ", ".join(names) or None, problem)
 
@@ -172,4 +176,10 @@ def areas(fields: Mapping[str, RawField]) -> np.ndarray | None:
 
 
 def _plain(name: str) -> str:
+    """Letters and digits of a name; that of a field of code_aster without its result's.
+
+    >>> _plain("RESU____SIEF_NOEU"), _plain("Contact pressure")
+    ('siefnoeu', 'contactpressure')
+    """
+    name = re.sub(r"^\w{8}(?=(DEPL|SIEF|SIGM|CONT)(_[A-Z]+)?$)", "", name)
     return re.sub(r"[^a-z0-9]", "", name.lower())

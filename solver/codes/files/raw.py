@@ -39,10 +39,8 @@ class Raw:
 
 
 def plain_mesh(points: np.ndarray, cells: list[tuple[str, np.ndarray]]) -> meshio.Mesh:
-    """The cells of types in the catalogue; points without a third coordinate where it is zero."""
+    """The cells of types in the catalogue on points (n, 2 or 3)."""
     points = np.asarray(points, dtype=float)
-    if points.shape[1] == 3 and not points[:, 2].any():
-        points = points[:, :2]
     return meshio.Mesh(points, [(name, data) for name, data in cells if name in BY_MESHIO])
 
 

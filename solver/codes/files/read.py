@@ -124,6 +124,8 @@ def _mapped(raw: Raw, given: FieldMap, quantity: str, where: object) -> names.Fo
     count = sum(field.values.shape[1] for field in fields)
     first = fields[0]
     components = given.components or (len(fields) == 1 and first.components) or ()
+    if quantity in names.SCALARS and count == 1:
+        components = ()
     if not components and quantity not in names.SCALARS:
         joined = np.concatenate([field.values for field in fields], axis=1)
         components = names.layout(quantity, first._replace(values=joined))
