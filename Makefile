@@ -33,6 +33,15 @@ SILENCE = $(if $(QUIET),--quiet rules progress reason host)
 SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
 
+# The last lines of a run say how many passed and where the report is, also where nothing was to be
+# done; a report of failures is a failure.
+define RUN
+@mkdir -p .snakemake && touch .snakemake/begun; $(SNAKEMAKE) $(1); status=$$?; \
+test ! -f results/report/log || test results/report/log -nt .snakemake/begun \
+  || tail -n 1 results/report/log; \
+test $$status != 0 || ! test -s results/report/failures.txt || status=1; exit $$status
+endef
+
 .PHONY: help all-cases family case report summary compare record bench orders study
 .PHONY: stability infsup scaling benchmark converge test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
@@ -45,21 +54,21 @@ help: ## list the targets
 all-cases: override CONFIG += $(CHOICE)
 all-cases: override ARGS += $(if $(FAILED),--forcerun solve)
 all-cases: environment ## mesh, solve and check what is not up to date, then report
-	@$(SNAKEMAKE) all_cases
+	$(call RUN,all_cases)
 
 family: override CONFIG += $(CHOICE)
 family: environment ## the batch of one family: make family FAMILY=ssnp170
 	@test -n "$(FAMILY)" || { echo "make family: name a folder of cases/, FAMILY=…"; exit 2; }
-	@$(SNAKEMAKE) all_cases
+	$(call RUN,all_cases)
 
 case: override CONFIG += $(CHOICE)
 case: override ARGS += --forcerun solve
 case: environment ## solve one case again, then report: make case CASE=ssnp170-e-swapped
-	@test -n "$(CASE)" || { echo "make case: name a case as the report does, CASE=…"; exit 2; }
-	@$(SNAKEMAKE) all_cases
+	@test -n "$(CASE)" || { echo "make case: set CASE to a job name from the report"; exit 2; }
+	$(call RUN,all_cases)
 
 report: environment ## write the report again from existing results
-	@$(SNAKEMAKE) report
+	$(call RUN,report)
 
 summary: ## print the last report's table, as Markdown
 	@cat results/report/summary.md 2>/dev/null \
@@ -148,12 +157,21 @@ lint: lint-environment ## check format, style and types of the sources
 environment:
 	@$(INSTALL) run
 
-code-environment: ## install another code into an environment of its own: CODE=kratos or ngsolve
-	@test -f "requirements-$(CODE).txt" && test -n "$(filter kratos ngsolve,$(CODE))" \
-	  || { echo "make code-environment: name a code that is installed by it, CODE=kratos or ngsolve"; exit 2; }
+DEBIAN_kratos =
+DEBIAN_ngsolve =
+DEBIAN_getfem = python3-getfem
+DEBIAN_calculix = calculix-ccx
+code-environment: ## install another code: CODE=kratos, ngsolve; as root on Debian getfem, calculix
+	@test -n "$(filter kratos ngsolve getfem calculix,$(CODE))" \
+	  || { echo "make code-environment: name a code, CODE=kratos, ngsolve, getfem or calculix"; exit 2; }
+ifneq ($(DEBIAN_$(CODE)),)
+	@apt-get --quiet install --yes --no-install-recommends $(DEBIAN_$(CODE)) \
+	  || { echo "make code-environment: $(CODE) is Debian's package $(DEBIAN_$(CODE)); root installs it"; exit 2; }
+else
 	@$(PYTHON) -Es -m venv --clear .venv-$(CODE)
 	@.venv-$(CODE)/bin/python -Es -m pip --disable-pip-version-check install --quiet \
 	  --require-hashes --only-binary :all: --requirement requirements-$(CODE).txt
+endif
 
 test-environment:
 	@$(INSTALL) run test

@@ -58,7 +58,7 @@ def test_arrays_of_the_patch_test():
     assert solved.stress[:, 1] == pytest.approx(-PRESSURE, rel=1e-13)
     assert list(solved.zones) == ["interface"]
     assert (solved.verdict, solved.passed, solved.reason) == ("passed", True, "")
-    assert str(solved).startswith("patch: passed, worst error ")
+    assert str(solved).startswith("patch: passed, largest checked error ")
 
 
 def test_without_contact_there_are_no_macro_elements():

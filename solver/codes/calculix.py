@@ -33,11 +33,14 @@ ELEMENTS = {
     "HEXA8": "C3D8", "HEXA20": "C3D20",
 }  # fmt: skip
 RINGS = {"TRIA3": "CAX3", "TRIA6": "CAX6", "QUAD4": "CAX4", "QUAD8": "CAX8"}
-# Pressure by overlap, over Young's modulus: the manual advises 5 to 50 for lengths in millimetres.
-STIFFNESS = 50.0
+# Pressure by overlap, over Young's modulus by the size of a slave face: results do not depend on
+# the unit of length. On curved surfaces the overlap of facets is pressure, and a softer contact is
+# the better one: the manual's advice of 5 to 50 E for millimetres.
+STIFFNESS, ON_CURVES = 2.5e4, 2e2
 # Faces that end on the axis carry no contact: a bore of this radius, over the model's extent.
 _BORE = 1e-6
 _CORRECTION = 1e-5
+_PLANE = 1e-6
 _NAME = "deck"
 
 
@@ -57,7 +60,8 @@ class CalculiX:
         """Its main settings, to be shown."""
         return {
             "contact": "SURFACE TO SURFACE, frictionless",
-            "pressure-overclosure": f"LINEAR, {self.stiffness:g} E",
+            "pressure-overclosure": f"LINEAR, {self.stiffness:g} E / face size, "
+            f"{min(self.stiffness, ON_CURVES):g} on curved surfaces",
             "curved faces": "gaps as meshed: the overlap of facets is pressure",
             "elements": f"{', '.join([*ELEMENTS.values(), *RINGS.values()])}; "
             "plane cases as one layer",
@@ -93,6 +97,10 @@ class CalculiX:
             if getattr(found, quantity) is None:
                 raise SolveError(f"{file.name}: it holds no {quantity}")
         found = replace(self._on_bodies(found, deck), step=deck.case.factors[-1])
+        printed = folder / f"{_NAME}.dat"
+        if printed.is_file():
+            forces = printed_forces(deck, printed.read_text(errors="replace"))
+            found = replace(found, forces=forces)
         # It writes zeros for gaps of points that are not in contact.
         if found.gap is not None and found.pressure is not None:
             gap = np.where(found.pressure.values > 0, found.gap.values, np.nan)
@@ -165,8 +173,27 @@ def deck_lines(deck: Deck, stiffness: float = STIFFNESS) -> Iterator[str]:
         "S",
         "*CONTACT FILE",
         "CDIS, CSTR",
-        "*END STEP",
     )
+    # Forces on sections of rings are of a small angle of them.
+    for zone in (pair.zone for pair in deck.pairs if not deck.case.axisymmetric):
+        yield from (f"*CONTACT PRINT, SLAVE={zone.slave}, MASTER={zone.master}", "CF")
+    yield "*END STEP"
+
+
+def printed_forces(deck: Deck, text: str) -> dict[str, np.ndarray]:
+    """The contact forces on slaves (dim,) by zone, the last ones that CalculiX printed.
+
+    Those of a plane case are per thickness of its layer of cells.
+    """
+    found = {}
+    thickness = float(np.ptp(deck.points[:, 2])) if deck.plane else 1.0
+    for zone in (pair.zone for pair in deck.pairs):
+        names = rf"slave set {re.escape(zone.slave)}, master set {re.escape(zone.master)} "
+        numbers = r"\s+([-+.\dE]+)" * 3
+        pattern = rf"{names}.*?total surface force.*?{numbers}"
+        if values := re.findall(pattern, text, re.IGNORECASE | re.DOTALL):
+            found[zone.name] = np.array(values[-1], dtype=float) / thickness
+    return found
 
 
 def _places(deck: Deck) -> np.ndarray:
@@ -263,11 +290,33 @@ def face_number(cell: CellType, local: int) -> int:
     return next(i for i, label in enumerate(labels, start=1) if label <= corners)
 
 
+def face_size(deck: Deck) -> float:
+    """The size of a slave face, the median: a length, or the root of an area."""
+    sizes = []
+    for block in (block for pair in deck.pairs for block in pair.slave):
+        corner = deck.points[block.nodes[:, : block.type.n_vertices]]
+        area = np.linalg.norm(np.ptp(corner, axis=1), axis=1) / np.sqrt(block.type.dim)
+        sizes.append(area)
+    return float(np.median(np.concatenate(sizes)))
+
+
+def _flat(deck: Deck) -> bool:
+    """Whether the slave surface of each pair lies in a plane."""
+    for pair in deck.pairs:
+        nodes = np.unique(np.concatenate([block.nodes.ravel() for block in pair.slave]))
+        away = deck.points[nodes] - deck.points[nodes].mean(axis=0)
+        sizes = np.linalg.svd(away, compute_uv=False)
+        if len(sizes) == away.shape[1] and sizes[-1] > _PLANE * sizes[0]:
+            return False
+    return True
+
+
 def _contact(deck: Deck, stiffness: float) -> Iterator[str]:
     if deck.pairs:
         yield "*SURFACE INTERACTION, NAME=SMOOTH"
         yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
-        yield f"{stiffness * deck.softest!r}"
+        stiffness = stiffness if _flat(deck) else min(stiffness, ON_CURVES)
+        yield f"{stiffness * deck.softest / face_size(deck)!r}"
     for zone in (pair.zone for pair in deck.pairs):
         yield "*CONTACT PAIR, INTERACTION=SMOOTH, TYPE=SURFACE TO SURFACE"
         yield f"{zone.slave}, {zone.master}"

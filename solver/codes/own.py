@@ -15,6 +15,7 @@ import importlib.util
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -85,7 +86,7 @@ class OwnCode:
     def read(self, deck: Deck, folder: Path) -> ForeignResult:
         """Its files of results, or the files of the code whose input it takes."""
         if self.file.results is None:
-            return self.base.read(deck, folder)
+            return replace(self.base.read(deck, folder), code=self.name)
         mapping = ResultMap()
         if self.file.map:
             mapping = read_as(ResultMap, read_mapping(self.file.map), self.file.map)

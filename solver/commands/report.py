@@ -68,7 +68,7 @@ def _report(options: argparse.Namespace) -> int:
         families = sorted(Path("cases").glob("*/family.yaml"))
     older = _listed(options.older) if options.older else []
     print(write_report(verdicts, options.output, families, options.processes, older))
-    return PASSED
+    return FAILED if (options.output / "failures.txt").stat().st_size else PASSED
 
 
 def _compare(options: argparse.Namespace) -> int:

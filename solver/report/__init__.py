@@ -14,13 +14,14 @@ def write_report(
 ) -> str:
     """Write the report of the verdict files into `folder`; returns what it found.
 
-    Every verdict is in every file: the main page and the page of its family, summary.json,
-    .csv, .md and junit.xml; `bench.html` where other codes have results; `matrix.html` with
-    families. `older` are the verdicts of solves that the batch did not ask for: all these files
-    show them too, but failures.txt does not. It lists what did not pass, and is empty when all
-    passed. `families` are files `family.yaml`, each in the folder of its family. Pictures are drawn
-    by so many `processes`, one for each core where None is given. Returned are the processor time
-    by family, a line for each solve that did not pass, and the outcome.
+    Every verdict is in every file: the main page and the page of its family, summary.json, .csv,
+    .md; `bench.html` where other codes have results; `matrix.html` with families. junit.xml is of
+    our own solves. `older` are the verdicts of solves that the batch did not ask for: all these
+    files show them too, but failures.txt does not. It lists what did not pass, and is empty when
+    all passed; results of other codes are no failures of a batch. `families` are files
+    `family.yaml`, each in the folder of its family. Pictures are drawn by so many `processes`, one
+    for each core where None is given. Returned are the processor time by family, a line for each
+    solve that did not pass, and the outcome.
     """
     from functools import partial
 
@@ -55,8 +56,8 @@ def write_report(
             "summary.json": tables.to_json(rows),
             "summary.csv": tables.to_csv(rows),
             "summary.md": tables.to_markdown(rows),
-            "junit.xml": to_junit(rows),
-            "failures.txt": tables.to_failures(asked),
+            "junit.xml": to_junit([row for row in rows if not row.verdict.code]),
+            "failures.txt": tables.to_failures([row for row in asked if not row.verdict.code]),
         }
     contents |= {part.page: family_page(part, folder) for part in parts}
     for name, content in contents.items():

@@ -182,7 +182,11 @@ class Bench:
         """How many cases each code passes, of those that it can express."""
         words = []
         for code in self.codes:
-            of = [cells[code].row for cells in self.cells.values() if code in cells]
+            cells_of = [cells[code] for cells in self.cells.values() if code in cells]
+            of = [cell.row for cell in cells_of]
+            if cells_of[0].recorded:
+                words.append(f"{code}: recorded values of {len(of)} cases")
+                continue
             refused = sum(row.word == REFUSED for row in of)
             passes = f"{code} passes {sum(row.sound for row in of)} of {len(of) - refused}"
             words.append(passes + (f" and cannot express {refused}" if refused else ""))

@@ -98,7 +98,7 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
 
 
 def draw_strip(rows: Sequence[Row]) -> Chart:
-    """The worst error of every solve over its tolerance, a line for each family."""
+    """The largest checked error of every solve over its tolerance, a line for each family."""
     records = [
         {
             "case": row.name,
@@ -132,7 +132,9 @@ def draw_strip(rows: Sequence[Row]) -> Chart:
     ]
     height = 22 * len({record["family"] for record in records})
     spec = {"data": {"values": records}, "width": 900, "height": height, "layer": layers}
-    return Chart("error-over-tolerance", "Worst error of every solve over tolerance", spec, 900)
+    return Chart(
+        "error-over-tolerance", "Largest checked error of every solve over tolerance", spec, 900
+    )
 
 
 def _record(row: Row) -> dict[str, Any]:

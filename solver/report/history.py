@@ -28,7 +28,7 @@ from .rows import natural
 
 PAGE = "history.html"
 _TIPS = {"solve": "solve", "revision": "revision", "date": "recorded", "verdict": "verdict"}
-_TIPS |= {"error": "worst error", "time": "time, s", "mark": "marked"}
+_TIPS |= {"error": "largest checked error", "time": "time, s", "mark": "marked"}
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ def draw(name: str, courses: Sequence[Course]) -> Chart | None:
     spec = {
         "data": {"values": records},
         "hconcat": [
-            part("error", "worst error", error, "off", labels=True),
+            part("error", "largest checked error", error, "off", labels=True),
             part("time", "processor time, s", time, "late", labels=False),
         ],
     }

@@ -48,7 +48,7 @@ class SolveRecord(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def error(self) -> float | None:
-        """The worst error as in the report; None where it is unknown."""
+        """The largest checked error as in the report; None where it is unknown."""
         return self.errors.get(self.worst)
 
 

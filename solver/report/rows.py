@@ -11,7 +11,7 @@ from typing import Any
 
 from ..mesh.catalogue import BY_NAME
 from ..system.errors import InputError
-from ..verification.verdict import CRASHED, WORDS, Body, Verdict, read_verdict, unbound
+from ..verification.verdict import CRASHED, NUMBERS, WORDS, Body, Verdict, read_verdict, unbound
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,13 @@ class Row:
         return {name: value for name, value in errors if not math.isnan(value)}
 
     def origin(self, kinds: Mapping[str, str]) -> str:
-        """The origin of the reference, with the kinds in words; empty without a reference."""
+        """The origin of the reference, with the kinds in words; empty without a reference.
+
+        Where numbers alone are compared, these numbers: they make no exact solution.
+        """
+        compared = [check for check in self.verdict.checks if check.verifies]
+        if compared and all(check.name in NUMBERS for check in compared):
+            return "; ".join(f"{c.name} compared with {c.reference:g}" for c in compared)
         kind, code = self.verdict.reference_kind or "", self.verdict.reference_code
         named = f": {code.get('name')} {code.get('version')}" if code else ""
         return f"{kinds.get(kind, kind)}{named}"

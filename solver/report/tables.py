@@ -25,7 +25,7 @@ _HEAD = (
     "gap",
     "contact",
     "coverage",
-    "worst error",
+    "largest checked error",
     "time",
     "reason",
 )

@@ -1,8 +1,7 @@
 """The result of a simulation: fields, contact state, balance and cost of one solve.
 
-Lengths, forces and stresses are in the case's own units. `n` counts the nodes of the cut mesh, `m`
-the macro-elements of a zone. Contact pressure is positive in compression, gaps are positive when
-open, stress is positive in tension.
+In the units of the case; `n` counts the nodes of the cut mesh, `m` the macro-elements of a zone.
+Contact pressure is positive in compression, a gap when open, stress in tension.
 """
 
 from __future__ import annotations
@@ -262,10 +261,9 @@ class Validity:
     """How far a solve is from what it takes for granted, the largest of all load steps.
 
     `strain` (principal) and `rotation` (radians), in the middle of the cells; `slip` of closed
-    contact, a mean over the macro-element, by the size of that; `pushed_past`: the number of cells
-    inside another body; `partly_covered`: of closed macro-elements under the end of the master;
-    `unpaired`: the largest share of a macro-element that lies opposite the master and yet has no
-    partner, of those that are closed or not covered at all.
+    contact, a mean over the macro-element, by its size; `pushed_past`: how many cells are inside
+    another body; `partly_covered`: how many closed macro-elements are under the master's end;
+    `unpaired`: the largest share of one, closed or bare, opposite the master but in no segment.
     """
 
     strain: float = float("nan")

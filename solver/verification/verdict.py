@@ -27,6 +27,11 @@ REFUSED, CRASHED, PARTIAL = "refused", "crashed", "partial"
 EXACT, EXPECTED, STATED = "exact", "expected error", "stated tolerance"
 # The worst first, as in every table.
 WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, PARTIAL, SOLVED, PASSED)
+NUMBERS = (
+    *("force", "reaction", "moment", "contact_area", "strain_energy"),
+    *("displacement_at", "stress_at", "pressure_at"),
+)
+"""The checks of single numbers."""
 T = TypeVar("T")
 _DIGEST = "digest"
 # An estimate of the pressure's error below this one is not worth a word.
@@ -255,12 +260,16 @@ class Verdict:
 
     @property
     def summary(self) -> str:
-        """One line: job, word, reason or worst error, time."""
+        """One line: job, word, reason or largest checked error, time."""
         line = f"{self.job}: {self.verdict}"
         line += f" ({', '.join(self.only)} only)" if self.only else ""
         if self.reason:
             return f"{line}: {self.reason}"
-        error = f", worst error {self.worst.error:.1e} ({self.worst.name})" if self.worst else ""
+        error = (
+            f", largest checked error {self.worst.error:.1e} ({self.worst.name})"
+            if self.worst
+            else ""
+        )
         error += ", exact" if self.judged == EXACT else ""
         worst = next((c for c in self.checks if self.worst and c.name == self.worst.name), None)
         if worst and worst.expected:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.codes import calculix
-from solver.codes.calculix import CalculiX, deck_lines
+from solver.codes.calculix import CalculiX, deck_lines, face_size, printed_forces
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.codes.run import CrashError, Limits, run_code
 from solver.mechanics.fem.faces import boundary_faces
@@ -126,8 +126,8 @@ def test_loads_and_supports_are_in_the_deck():
     held = [int(node) for node, first, *_ in blocks["*BOUNDARY, OP=NEW"] if first == "3"]
     assert sorted(held) == low.tolist()
     assert blocks["*ELASTIC"] == [["2000.0", "0.3"]]
-    # 50 E
-    assert blocks["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"] == [["100000.0"]]
+    [[stiffness]] = blocks["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
+    assert float(stiffness) == pytest.approx(2.5e4 * 2000 / face_size(deck_of(case, mesh)))
     assert list(blocks.values())[-1] == []
     pair = "*CONTACT PAIR, INTERACTION=SMOOTH, TYPE=SURFACE TO SURFACE"
     assert blocks[pair] == [["bottom_contact", "top_contact"]]
@@ -205,5 +205,34 @@ def test_calculix_solves_the_deck(cells, dim, tmp_path):
     lowest = found.displacement.values[:, dim - 1].min()
     # Two blocks of 50 mm shorten by (1 − ν²) 25/2000 in plane strain, 25/2000 in space.
     assert lowest == pytest.approx(-1.25 * (0.91 if dim == 2 else 1), rel=1e-3)
-    assert found.settings["pressure-overclosure"] == "LINEAR, 50 E"
+    assert (
+        found.settings["pressure-overclosure"]
+        == "LINEAR, 25000 E / face size, 200 on curved surfaces"
+    )
     assert found.cpu_seconds > 0
+
+
+def test_the_stiffness_of_contact_has_a_unit():
+    """Cubes with slave faces of edge 50/n: twice as large a mesh has half the stiffness."""
+    case, mesh = case_of("HEXA8", "HEXA8")
+    size = face_size(deck_of(case, mesh))
+    quads = list(boundary_faces(mesh, case.zones[0].slave))
+    assert size == pytest.approx(50 / np.sqrt(sum(len(b.nodes) for b in quads)))
+    mesh.points *= 2
+    assert face_size(deck_of(case, mesh)) == pytest.approx(2 * size)
+
+
+def test_printed_forces():
+    """The last force of the pair counts, per thickness of the layer in a plane case."""
+    case, mesh = case_of("HEXA8", "HEXA8")
+    deck = deck_of(case, mesh)
+    text = """
+ statistics for slave set BOTTOM_CONTACT, master set TOP_CONTACT and time  0.1000000E+01
+
+   total surface force (fx,fy,fz) and moment about the origin (mx,my,mz)
+
+    0.000000E+00 %s  0.000000E+00 -2.635294E+04  0.000000E+00  1.623359E+05
+"""
+    [found] = printed_forces(deck, text % "1.0E+00" + text % "-6.493436E+03").values()
+    assert found.tolist() == [0.0, -6493.436, 0.0]
+    assert printed_forces(deck, "nothing") == {}

@@ -74,7 +74,10 @@ def test_another_program_with_the_input_of_calculix(tmp_path):
     code.write(deck_of(*case_of("HEXA8", "HEXA8"), code.layer), tmp_path)
     assert (tmp_path / "deck.inp").is_file()
     assert (code.layer, code.settings["build"]) == (True, "mine")
-    assert code.settings["pressure-overclosure"] == "LINEAR, 50 E"
+    assert (
+        code.settings["pressure-overclosure"]
+        == "LINEAR, 25000 E / face size, 200 on curved surfaces"
+    )
 
 
 def test_the_plain_input_balances(tmp_path):

@@ -23,7 +23,7 @@ def test_a_folder_and_a_title_of_special_characters(tmp_path, monkeypatch):
     broken.write_text(text.replace("young: 2000.0", f'young: "{TITLE}"'), encoding="utf-8")
     bad = str(out / "broken.json")
     assert main(["solve", str(broken), "-o", str(out / "b.vtkhdf"), "--verdict", bad]) == 2
-    assert main(["report", verdict, bad, "-o", str(out / "report")]) == 0
+    assert main(["report", verdict, bad, "-o", str(out / "report")]) == 1
     for page in (out / "report").glob("*.html"):
         html = page.read_text(encoding="utf-8")
         assert "<script>alert" not in html

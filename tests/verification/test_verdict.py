@@ -174,7 +174,7 @@ def test_the_worst_error_and_the_check_closest_to_its_tolerance(tmp_path):
     solution.zones[0].multiplier[0] = 25.0
     verdict = judge(solution, run_checks(solution))
     assert verdict.closest_to_tolerance.name == "element_gap"
-    assert "worst error" in verdict.summary
+    assert "largest checked error" in verdict.summary
 
 
 @pytest.fixture
@@ -287,7 +287,7 @@ def test_the_line_of_a_verdict_has_the_expected_error(tmp_path):
     solution.zones[0].pressure_of_forces = np.array([25.0, 25.0])
     fitted = judged(solution, {"all": 1e-2, "multiplier": 1.5e-3}, {"multiplier": 1e-3})
     assert fitted.summary.startswith(
-        "two-blocks: passed, worst error 1.2e-03 (multiplier), expected 1.0e-03, "
+        "two-blocks: passed, largest checked error 1.2e-03 (multiplier), expected 1.0e-03, "
     )
     solution.zones[0].multiplier[0] = 25.0
     assert ", exact, " in judged(solution, {"all": 1e-10}).summary

@@ -180,7 +180,7 @@ def test_the_command_and_the_table_of_the_page(tmp_path, monkeypatch, capsys):
     (shown,) = re.findall(r"```\n(manufactured.*?)```", text, re.DOTALL)
     assert set(shown.splitlines()) <= set(printed.splitlines())
     (record,) = json.loads((tmp_path / "results/converge/quad4.json").read_text())
-    assert record["unknowns"] == [872, 2956, 10772]
+    assert record["unknowns"] == [1688, 5964, 22292]
     assert record["quantities"][1]["found"]["value"] == pytest.approx(17 / 1200, rel=1e-7)
     # A chart for each quantity that changes: peak pressure, contact force, strain energy.
     page = (tmp_path / "results/converge/quad4.html").read_text()
