@@ -28,6 +28,8 @@ rule solve:
         ' {SOLVER} {output:q}/benchmark solve "$@" {MEMORY_CHECK} --verbose'
         " -o {output:q}/result.vtkhdf --verdict {output:q}/verdict.json"
         " --pictures results/report/pictures > {log:q} 2>&1 || died=$?; fi;"
+        # Ctrl-C: no verdict, so that the next run solves it.
+        " test $died != 130 || exit 130;"
         " test -s {output:q}/verdict.json"
         ' || {PYTHON} -m solver crashed "$@" --status $died --refusal {params.refusal}'
         " --log {log:q} --verdict {output:q}/verdict.json >> {log:q}"
