@@ -44,8 +44,8 @@ _GOOD = ("passed", "solved")
 _BAD = ("failed", "unreliable", "refused", "crashed")
 _EVENTS = ("job_info", "job_started", "job_finished", "progress", "run_info", "resources_info")
 _ON_TERMINAL, _IN_FILE = 1.0, 60.0
-# The time left is estimated from this many jobs and seconds on.
-_LEAST_JOBS, _LEAST_SECONDS = 3, 5.0
+# A job that has run for so many seconds tells its stage.
+_LEAST_SECONDS = 5.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,6 @@ class State:
         self.running: dict[int, Running] = {}
         self.total = self.done = self.bad = 0
         self.broken: set[int] = set()
-        self.began: float | None = None
         self.word = "job"
 
     def expect(self, jobs: Mapping[str, int]) -> None:
@@ -80,8 +79,6 @@ class State:
         """A job starts, possibly again."""
         self.broken.discard(number)
         self.running[number] = Running(rule, message, log, self.clock())
-        if rule in COUNTED and self.began is None:
-            self.began = self.clock()
 
     def fail(self, number: int) -> None:
         """A job fails; it may start again."""
@@ -114,21 +111,11 @@ class State:
         """Whether a running job prints by itself."""
         return any(job.rule in TALKING for job in self.running.values())
 
-    @property
-    def left(self) -> float | None:
-        """Estimated seconds for the rest; None while unknown."""
-        if self.began is None or self.done < _LEAST_JOBS:
-            return None
-        spent = self.clock() - self.began
-        return spent / self.done * (self.total - self.done) if spent > _LEAST_SECONDS else None
-
     def text(self) -> str:
         """The state in one line."""
         parts = [f"{self.done} of {self.total} {self.word}s done"]
         parts += [f"{self.not_passed} not passed"] * bool(self.not_passed)
         parts += [f"{len(self.running)} running"] * bool(self.running)
-        if self.left is not None:
-            parts.append(f"about {duration(self.left)} left")
         return ", ".join(parts) + self._longest()
 
     def _longest(self) -> str:

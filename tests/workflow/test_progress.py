@@ -88,16 +88,6 @@ def test_a_job_that_breaks_off_may_begin_once_more(state, tmp_path):
     assert state.text() == "1 of 10 solves done"
 
 
-def test_time_left_goes_by_what_is_done(state, clock):
-    for number in range(4):
-        state.start(number, "solve", "", None)
-        clock.now += 10
-        assert state.left is None or number >= 3
-        state.end(number)
-    assert state.left == pytest.approx(60)
-    assert "about 60 s left" in state.text()
-
-
 def test_the_job_that_runs_longest_tells_its_stage(state, clock, tmp_path):
     state.start(1, "solve", "solve big", log(tmp_path, "18:43:22 solution 1: residual 1.0e-12"))
     clock.now += 2

@@ -29,8 +29,8 @@ class Facets:
     (n, dim − 1, dim) completing it to a right-handed frame; `flat` (n,): planar; `straight` (n,):
     planar with straight edges; `affine` (n,): straight, and the image of the reference face under
     an affine map; `turn` (n,): the largest angle between `normal` and the normal at a vertex;
-    `directions` (n, n_nodes, dim): the unit normals along which a slave face meets
-    its master, at its nodes. None: those of the face itself. `axisymmetric`: they are sections of
+    `directions` (n, n_nodes, dim): the unit normals along which a slave face meets its master, at
+    its nodes. None: those of the face itself. `axisymmetric`: they are sections of
     rings about the axis x = 0, and integrals over them are those over the rings.
     """
 

@@ -91,8 +91,8 @@ class Scheme:
     """How the gap is integrated: which points, which multipliers, and whether closure is due.
 
     `sample` gives points that measure whole slave faces, `meet` those where the surfaces meet,
-    `space` the multipliers. `nearest`: the
-    master has faces, of which a macro-element meets the nearest surface.
+    `space` the multipliers. `nearest`: the master has faces, and a
+    macro-element meets the nearest surface of them.
     """
 
     sample: Callable[[list[Facets]], list[Samples]] = face_samples

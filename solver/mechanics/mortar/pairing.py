@@ -20,6 +20,8 @@ _OVERLAP = 1e-9
 _ONE_PLANE = 1e-9
 # More than what rounding makes of a distance, as a share of it.
 _ROUNDING = 1e-9
+# Balls around faces, seen along a normal, are taken as larger by this factor.
+_BALLS = 1.1
 # A face is seen from behind where the cosine of the angle between the normals is above this.
 _BACK = 1e-3
 # A master face may meet a slave face only where their normals are farther apart than this angle,
@@ -235,13 +237,34 @@ def facing_pairs(
     [[], []]
     """
     some = np.arange(len(slave.number)) if among is None else among
-    i, j = candidate_pairs(
-        slave.centre[some], slave.radius[some], master.centre, master.radius, reach
-    )
-    i = some[i]
+    i, j = line_pairs(slave, master, reach, some)
     apart = np.clip(np.einsum("pd,pd->p", slave.normal[i], master.normal[j]), -1.0, 1.0)
     facing = np.arccos(apart) + slave.turn[i] + master.turn[j] > _FACING
     return i[facing], j[facing]
+
+
+def line_pairs(
+    slave: Facets, master: Outlines | Facets, reach: float, some: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of slave faces `some` (s,) and master faces that a line along a normal may join.
+
+    Within `reach`. Where all slave faces lie one way, they are looked for in the plane across: in a
+    wide surface beside its partner, every face is within reach of all others.
+
+    >>> [pair.tolist() for pair in line_pairs(slave, master, 0.1, np.array([0]))]
+    [[0, 0], [0, 1]]
+    """
+    centre, radius = slave.centre[some], slave.radius[some]
+    across = slave.tangents[0] if len(some) else np.zeros((1, centre.shape[1]))
+    one_way = slave.directions is None and not slave.turn.any()
+    if not one_way or np.abs(slave.normal - slave.normal[:1]).max(initial=0.0) > _ROUNDING:
+        i, j = candidate_pairs(centre, radius, master.centre, master.radius, reach)
+        return some[i], j
+    wide = _BALLS * radius, _BALLS * master.radius
+    i, j = candidate_pairs(centre @ across.T, wide[0], master.centre @ across.T, wide[1], 0.0)
+    apart = np.linalg.norm(centre[i] - master.centre[j], axis=1)
+    near = apart <= radius[i] + master.radius[j] + reach
+    return some[i[near]], j[near]
 
 
 def candidate_pairs(

@@ -22,7 +22,7 @@ from ..fem.faces import nodal_normals
 from ..fem.gauss import gauss_rule
 from .facets import Facets, project_along
 from .multipliers import InterfaceData, Multipliers, of_nodes
-from .pairing import candidate_pairs, facing_pairs
+from .pairing import facing_pairs, line_pairs
 from .segments import Segments, Side
 from .surface_points import Samples, face_samples, sampled
 
@@ -31,6 +31,8 @@ Among = Sequence[np.ndarray] | None
 _EDGE = 1e-9
 # A line is looked at where it passes a face's centre within this many radii.
 _MARGIN = 1.1
+# The normals of a face that is curved turn by less than this, seen from its middle.
+_STEEPEST = 1.5
 # Pairs of a point and a master face that are looked at together.
 _CHUNK = 1 << 20
 
@@ -131,10 +133,9 @@ def all_hits(
     normals = sample.normal.reshape(-1, sample.normal.shape[2])
     points, gaps, looks = [], [], []
     for master in masters:
-        i, j = candidate_pairs(
-            slave.centre[among], slave.radius[among], master.centre, master.radius, reach
-        )
-        hit = _hits(slave, sample, master, reach, _EDGE, (among[i], j))
+        i, j = line_pairs(slave, master, reach, among)
+        seen = _on_the_way(slave, master, i, j)
+        hit = _hits(slave, sample, master, reach, _EDGE, (i[seen], j[seen]))
         slopes = shape_functions(master.type.name).gradients(hit.place)
         corner = master.corner[hit.face]
         tangents = np.einsum("had,hat->htd", corner - corner[:, :1], slopes)
@@ -151,6 +152,15 @@ def all_hits(
     first = order[np.flatnonzero(np.diff(side, prepend=-1))]
     first = first[look[first]]
     return point[first], gap[first]
+
+
+def _on_the_way(slave: Facets, master: Facets, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """Which pairs (p,) a line along a normal of the slave face, which may turn, may join."""
+    between = master.centre[j] - slave.centre[i]
+    along = np.abs(np.einsum("pd,pd->p", between, slave.normal[i]))
+    beside = np.linalg.norm(np.einsum("pd,ptd->pt", between, slave.tangents[i]), axis=1)
+    spread = (along + slave.radius[i]) * np.tan(np.minimum(slave.turn[i], _STEEPEST))
+    return beside <= _MARGIN * (slave.radius[i] + master.radius[j]) + spread
 
 
 @dataclass(frozen=True)
