@@ -21,7 +21,7 @@ from ..mesh.catalogue import BY_NAME, CellType
 from ..mesh.files.abaqus import FACES
 from ..system.errors import InputError, SolveError
 from ..system.process import cores_for, run_apart
-from .deck import Deck, UnsupportedError
+from .deck import Deck, UnsupportedError, face_size
 from .files.read import read_result_files
 from .foreign import Field, ForeignResult
 from .shifted import with_layers
@@ -288,16 +288,6 @@ def face_number(cell: CellType, local: int) -> int:
     corners = set(face.nodes[: BY_NAME[face.type].n_vertices])
     labels = [{int(c) - 1 for c in text} for text in FACES[cell.name.rstrip("0123456789")]]
     return next(i for i, label in enumerate(labels, start=1) if label <= corners)
-
-
-def face_size(deck: Deck) -> float:
-    """The size of a slave face, the median: a length, or the root of an area."""
-    sizes = []
-    for block in (block for pair in deck.pairs for block in pair.slave):
-        corner = deck.points[block.nodes[:, : block.type.n_vertices]]
-        area = np.linalg.norm(np.ptp(corner, axis=1), axis=1) / np.sqrt(block.type.dim)
-        sizes.append(area)
-    return float(np.median(np.concatenate(sizes)))
 
 
 def _flat(deck: Deck) -> bool:

@@ -191,3 +191,13 @@ def _paired(case: Case, mesh: meshio.Mesh, number: int, flat: int) -> PairedFace
         nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
         gap[nodes] = evaluate(zone.clearance, mesh.points[nodes, :flat]) - zone.interference
     return PairedFaces(zone=zone, slave=slave, master=master, gap=gap)
+
+
+def face_size(deck: Deck) -> float:
+    """The size of a slave face, the median: a length, or the root of an area."""
+    sizes = []
+    for block in (block for pair in deck.pairs for block in pair.slave):
+        corner = deck.points[block.nodes[:, : block.type.n_vertices]]
+        area = np.linalg.norm(np.ptp(corner, axis=1), axis=1) / np.sqrt(block.type.dim)
+        sizes.append(area)
+    return float(np.median(np.concatenate(sizes)))

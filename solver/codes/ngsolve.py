@@ -14,15 +14,15 @@ import numpy as np
 from ..mesh.catalogue import cell_type
 from ..system.errors import SolveError
 from ..system.process import printed_by
-from .deck import Deck, UnsupportedError, refuse_rings
+from .deck import Deck, UnsupportedError, face_size, refuse_rings
 from .foreign import Field, ForeignResult
 from .plain import FILE, Plain, content
 
 PYTHON = Path(__file__).resolve().parents[2] / ".venv-ngsolve/bin/python"
 LINEAR = ("TRIA3", "QUAD4", "TETRA4", "PENTA6", "HEXA8")
 QUADRATIC = ("TRIA6", "TETRA10")
-# Pressure by overlap, over Young's modulus.
-STIFFNESS = 50.0
+# Pressure by overlap, over Young's modulus by the size of a slave face.
+STIFFNESS = 2.5e4
 # How far from the middle of its edge, over the size of the mesh, a node is still in the middle.
 _STRAIGHT = 1e-9
 _VERSION = "import importlib.metadata as m; print(m.version('ngsolve'))"
@@ -35,7 +35,8 @@ class NGSolve(Plain):
     install = "make code-environment CODE=ngsolve"
     gave_up = r"NGSolve: no convergence[^\n]*"
     settings: Mapping[str, str] = {
-        "contact": f"ContactBoundary, penalty energy, {STIFFNESS:g} E, integration of order 4",
+        "contact": f"ContactBoundary, penalty energy, {STIFFNESS:g} E / face size, "
+        "integration of order 20",
         "elements": "H1 of order 1 or 2; geometry not updated",
     }
 
@@ -46,7 +47,7 @@ class NGSolve(Plain):
     def write(self, deck: Deck, folder: Path) -> None:
         """Write `deck.json` and the script; UnsupportedError for what they lack."""
         _refuse(deck)
-        text = json.dumps(content(deck) | {"stiffness": STIFFNESS * deck.softest})
+        text = json.dumps(content(deck) | {"stiffness": STIFFNESS * deck.softest / face_size(deck)})
         (folder / FILE).write_text(text, encoding="ascii")
         shutil.copyfile(Path(__file__).with_name("ngsolve_main.py"), folder / "main.py")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver.codes import calculix
-from solver.codes.calculix import CalculiX, deck_lines, face_size, printed_forces
-from solver.codes.deck import UnsupportedError, deck_of
+from solver.codes.calculix import CalculiX, deck_lines, printed_forces
+from solver.codes.deck import UnsupportedError, deck_of, face_size
 from solver.codes.run import CrashError, Limits, run_code
 from solver.mechanics.fem.faces import boundary_faces
 from solver.system.errors import SolveError
