@@ -32,7 +32,7 @@ class GetFEM(Plain):
     settings: Mapping[str, str] = {
         "contact": "raytracing, integrals of the augmented Lagrangian, E / size of a face",
         "integration": "order 6 on 4 parts of each edge of the slave's faces",
-        "multipliers": "on the slave's faces, of the order of its cells",
+        "multipliers": "on the slave's faces, of order 1",
     }
 
     def version(self) -> str:

@@ -113,8 +113,11 @@ class Cell:
 
     @property
     def seconds(self) -> float | None:
-        """Wall time of the run; None where there was none."""
-        return None if self.row.word == REFUSED else self.row.total
+        """Wall time of the run, a whole process; None where there was none.
+
+        Ours are forks of a process that has loaded all packages, which would be no fair measure.
+        """
+        return None if self.row.word == REFUSED or self.code == OURS else self.row.total
 
     @property
     def record(self) -> dict[str, Any]:
