@@ -20,14 +20,14 @@ from solver.system.clock import Clock
 SPHERE = Path(__file__).resolve().parents[2] / "cases/hertz/sphere-hexa8.yaml"
 
 
-def sphere(slave: str, master: str) -> Scene:
+def sphere(slave: str, master: str, swapped: bool = False) -> Scene:
     """The sphere with other divisions of its blocks."""
     text = SPHERE.read_text(encoding="utf-8")
     for old, new in (("[16, 16, 12]", slave), ("[14, 14, 12]", master)):
         assert old in text
         text = text.replace(old, new)
     case = parse_case(text, SPHERE)
-    return build_scene(case, generate(case.mesh, "sphere"), LEAN, Clock())
+    return build_scene(case.as_solved(swapped), generate(case.mesh, "sphere"), LEAN, Clock())
 
 
 @pytest.fixture(scope="module")
