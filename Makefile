@@ -157,8 +157,6 @@ lint: lint-environment ## check format, style and types of the sources
 environment:
 	@$(INSTALL) run
 
-DEBIAN_kratos =
-DEBIAN_ngsolve =
 DEBIAN_getfem = python3-getfem
 DEBIAN_calculix = calculix-ccx
 code-environment: ## install another code: CODE=kratos, ngsolve; as root on Debian getfem, calculix

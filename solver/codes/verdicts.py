@@ -126,8 +126,8 @@ def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
         asked_for = wanted if only is None else [name for name in wanted if name in only]
         less = [name for name in asked_for if name not in where or not where[name].whole]
         if less or not asked_for:
-            verdict = replace(verdict, verdict=PARTIAL, passed=False, judged="")
-            verdict = replace(verdict, reason=_incomplete(where, less))
+            why = _incomplete(where, less)
+            verdict = replace(verdict, verdict=PARTIAL, passed=False, judged="", reason=why)
     cause = compared.faults([check for check in checks if not check.passed])
     if cause and verdict.verdict == FAILED:
         verdict = replace(verdict, reason=f"{cause} ({verdict.reason})")

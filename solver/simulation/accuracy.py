@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from ..case.model import Case
 from ..mechanics.fem import shape_functions
 from ..mechanics.fem.cell_sizes import steepest, steepness
 from ..mechanics.fem.elasticity import Block
@@ -193,7 +194,9 @@ def estimate(
     moved = iterate.displacement.total.reshape(scene.points.shape)
     if scale == 0:
         if not scene.force.any():
-            caused = stress_of_motion(scene, moved) * scene.length ** (scene.space - 1)
+            caused = stress_of_motion(scene.case, scene.length, moved) * scene.length ** (
+                scene.space - 1
+            )
             force_scale = max(force_scale, caused)
         return Accuracy({"forces": float(forces.max()) / force_scale})
     noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
@@ -212,14 +215,14 @@ def estimate(
     }
     if max(errors.values()) >= scale and not scene.force.any():
         # The pressure is rounding: no force acts. The measure is what strains and motions would be.
-        scale = max(scale, iterate.sizes.highest, stress_of_motion(scene, moved))
+        scale = max(scale, iterate.sizes.highest, stress_of_motion(scene.case, scene.length, moved))
     return Accuracy({name: error / scale for name, error in errors.items()})
 
 
-def stress_of_motion(scene: Scene, displacement: np.ndarray) -> float:
+def stress_of_motion(case: Case, length: float, displacement: np.ndarray) -> float:
     """The stress that a displacement (n, dim) would cause as a strain over the model's length."""
-    young = max(material.young for material in scene.case.materials.values())
-    return young * float(np.abs(displacement).max(initial=0.0)) / scene.length
+    young = max(material.young for material in case.materials.values())
+    return young * float(np.abs(displacement).max(initial=0.0)) / length
 
 
 def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) -> Trial:

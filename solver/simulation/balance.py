@@ -34,8 +34,8 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
     if not state.force.any():
-        caused = stress_of_motion(scene, state.displacement) * scene.length ** (scene.space - 1)
-        scale = max(scale, caused) or 1.0
+        stress = stress_of_motion(scene.case, scene.length, state.displacement)
+        scale = max(scale, stress * scene.length ** (scene.space - 1)) or 1.0
     result: dict[str, float] = {}
     if state.correction.any():
         by_zone["correction of the pressure"] = state.correction

@@ -22,6 +22,7 @@ from scipy.spatial import cKDTree
 from ..mechanics.mortar.facets import tangents_of
 from ..mechanics.mortar.reconstruction import vertex_neighbours
 from ..mesh.catalogue import cell_type
+from ..simulation.accuracy import stress_of_motion
 from ..simulation.solution import Solution, ZoneResult
 from .oscillation import macro_neighbours
 
@@ -60,7 +61,8 @@ def oscillating(solution: Solution) -> str:
     """
     tolerance = solution.case.tolerance
     limit = max([LIMIT, *(tolerance[check] for check in _ALLOWED if check in tolerance)])
-    rounding = _ROUNDING * _stress_of_motion(solution)
+    moved = solution.displacement
+    rounding = _ROUNDING * stress_of_motion(solution.case, solution.length, moved)
     for zone in solution.zones:
         peak = zone.multiplier[zone.closed].max(initial=0.0)
         if zone.nodal is not None or not peak > rounding:
@@ -82,12 +84,6 @@ def oscillating(solution: Solution) -> str:
             "`stabilised: true`, or refine the master"
         )
     return ""
-
-
-def _stress_of_motion(solution: Solution) -> float:
-    """The stress of the displacement as a strain over the model's length, at its largest."""
-    young = max(material.young for material in solution.case.materials.values())
-    return young * float(np.abs(solution.displacement).max(initial=0.0)) / solution.length
 
 
 class Scatter(NamedTuple):

@@ -35,7 +35,10 @@ def uncovered(samples: Sequence[Samples], found: Sequence[Segments]) -> list[np.
     >>> [faces.tolist() for faces in (*uncovered(samples, found), *uncovered(samples, found[1:]))]
     [[], [0]]
     """
-    missed = _missed(samples, found)
+    return _bare(samples, _missed(samples, found))
+
+
+def _bare(samples: Sequence[Samples], missed: Sequence[np.ndarray]) -> list[np.ndarray]:
     return [
         np.flatnonzero(area > _MISSED * sample.weight.sum(axis=1))
         for area, sample in zip(missed, samples, strict=True)
@@ -159,7 +162,8 @@ def without_partner(
     [[0.0], [1.0]]
     """
     lost = np.zeros(n_macro)
-    bare = uncovered(samples, found)
+    missed = _missed(samples, found)
+    bare = _bare(samples, missed)
     if not any(len(faces) for faces in bare):
         return lost
     low, high = np.full(n_macro, np.inf), np.full(n_macro, -np.inf)
@@ -168,7 +172,6 @@ def without_partner(
         np.maximum.at(high, segments.macro, segments.gap.max(axis=1))
     size = _sizes(slaves, n_macro)
     low, high = (np.where(high < low, sign * reach, x) for x, sign in ((low, -1), (high, 1)))
-    missed = _missed(samples, found)
     for a, (block, faces) in enumerate(zip(slaves, bare, strict=True)):
         if not len(faces):
             continue

@@ -23,7 +23,7 @@ from ..fem.gauss import gauss_rule
 from .facets import Facets, project_along
 from .multipliers import InterfaceData, Multipliers, of_nodes
 from .pairing import facing_pairs, line_pairs
-from .segments import Segments, Side
+from .segments import Segments, Side, area_vectors_at
 from .surface_points import Samples, face_samples, sampled
 
 Among = Sequence[np.ndarray] | None
@@ -137,12 +137,7 @@ def all_hits(
         seen = _on_the_way(slave, master, i, j)
         hit = _hits(slave, sample, master, reach, _EDGE, (i[seen], j[seen]))
         slopes = shape_functions(master.type.name).gradients(hit.place)
-        corner = master.corner[hit.face]
-        tangents = np.einsum("had,hat->htd", corner - corner[:, :1], slopes)
-        if corner.shape[2] == 2:
-            across = np.stack([tangents[:, 0, 1], -tangents[:, 0, 0]], axis=1)
-        else:
-            across = np.cross(tangents[:, 0], tangents[:, 1])
+        across = area_vectors_at(master.corner[hit.face], slopes[:, None])[:, 0]
         points.append(hit.point)
         gaps.append(hit.gap)
         looks.append(np.einsum("hd,hd->h", across, normals[hit.point]) < 0)

@@ -315,7 +315,7 @@ def _with_master(pairs: Pairs, pieces: Pieces, reach: float, curved: bool) -> It
         place = points
         values, slopes = shape_functions(kind.name).both(place)
         points = np.einsum("sqa,sad->sqd", values, corner)
-        vectors = _area_vectors(corner, slopes)
+        vectors = area_vectors_at(corner, slopes)
         stretch = np.linalg.norm(vectors, axis=-1)
         normal, weight = vectors / stretch[..., None], weight * stretch
     else:
@@ -350,8 +350,14 @@ def _with_master(pairs: Pairs, pieces: Pieces, reach: float, curved: bool) -> It
             )
 
 
-def _area_vectors(corner: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Normal × surface measure (s, q, dim) of faces (s, n_nodes, dim) at points of their own."""
+def area_vectors_at(corner: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Normal × surface measure (s, q, dim) of faces (s, n_nodes, dim) at points of their own.
+
+    `slopes` (s, q, n_nodes, dim − 1): the gradients of their shape functions there.
+
+    >>> area_vectors_at(slave.corner, np.array([[[[-1.0], [1.0]]]])).tolist()
+    [[[0.0, 2.0]]]
+    """
     tangent = np.einsum("sad,sqat->sqtd", corner, slopes)
     if corner.shape[2] == 2:
         return np.stack([tangent[:, :, 0, 1], -tangent[:, :, 0, 0]], axis=-1)
