@@ -41,25 +41,30 @@ _BUG = 70
 def serve(listener: socket.socket) -> None:
     """Run the commands of all clients, each in a fork, until standard input ends.
 
-    Forks that are at work then come to their end; Ctrl-C is for them, not for their server.
+    Forks that are at work then come to their end. Ctrl-C is for them, not for their server, which
+    passes on what a client heard before its fork existed.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     load()
     ended = _watch_forks()
     asking: set[socket.socket] = set()
     running: dict[int, socket.socket] = {}
+    undisturbed: dict[socket.socket, int] = {}
     while True:
-        waiting: list[int | socket.socket] = [_INPUT, ended, listener, *asking]
+        waiting: list[int | socket.socket] = [_INPUT, ended, listener, *asking, *undisturbed]
         ready = select.select(waiting, [], [])[0]
+        for client in [client for client in undisturbed if client in ready]:
+            os.kill(undisturbed.pop(client), signal.SIGINT)
         if ended in ready:
             os.read(ended, LIMIT)
             _report_ends(running, os.WNOHANG)
+            undisturbed = {c: process for c, process in undisturbed.items() if process in running}
         if _INPUT in ready:
             break
         for client in asking.intersection(ready):
             asking.remove(client)
             if process := _start(client, [listener, *asking, *running.values()]):
-                running[process] = client
+                running[process], undisturbed[client] = client, process
             else:
                 client.close()
         if listener in ready:
@@ -143,7 +148,8 @@ def _run(command: Sequence[str], streams: Sequence[int]) -> int:
     """Run a command as `python -m solver` does; its exit status."""
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, _interrupted)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     nothing = os.open(os.devnull, os.O_RDONLY)
     for number, stream in enumerate((nothing, *streams)):
         os.dup2(stream, number)
@@ -157,12 +163,20 @@ def _run(command: Sequence[str], streams: Sequence[int]) -> int:
     return 0
 
 
+def _interrupted(*_: object) -> NoReturn:
+    """The first Ctrl-C: the terminal and the server both send it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
 def _end(run: Callable[[], int]) -> NoReturn:
     """Run and end this fork without the exit handlers of its parent."""
     status = _BUG
     try:
         status = run()
         sys.stdout.flush()
+    except KeyboardInterrupt:
+        status = 128 + signal.SIGINT
     finally:
         sys.stderr.flush()
         os._exit(status)

@@ -33,12 +33,12 @@ PATIENCE = 30.0
 
 def main(benchmark: str, command: list[str]) -> int:
     """The exit status of the command, as in a shell."""
-    # The command handles Ctrl-C; this process waits for its end.
-    _signal.signal(_signal.SIGINT, lambda *_: None)
     started = time.monotonic()
     place = os.environ.get(SOCKET)
     ended = _warm(place, command) if place else b""
     if not ended:
+        # The command handles Ctrl-C; this process waits for its end.
+        _signal.signal(_signal.SIGINT, lambda *_: None)
         cold = [sys.executable, "-Es", "-m", PACKAGE, *command]
         process = os.spawnv(os.P_NOWAIT, sys.executable, cold)
         ended = answer(*os.wait4(process, 0)[1:])
@@ -54,7 +54,8 @@ def _warm(place: str, command: list[str]) -> bytes:
     """How the command ended in a fork, as `answer` writes it; empty without an answer.
 
     A server that does not greet in time hangs. Its socket is removed, so that no later client asks
-    it. It never runs the command, which is sent after the greeting.
+    it. It never runs the command, which is sent after the greeting. Ctrl-C shuts the connection for
+    writing; the server passes it on to the fork, also where that did not exist yet.
     """
     connection = _socket.socket(_socket.AF_UNIX)
     try:
@@ -63,6 +64,7 @@ def _warm(place: str, command: list[str]) -> bytes:
         if connection.recv(len(GREETING)) != GREETING:
             return b""
         connection.settimeout(None)
+        _signal.signal(_signal.SIGINT, lambda *_: _interrupt(connection))
         streams = b"".join(number.to_bytes(4, sys.byteorder) for number in (1, 2))
         rights = _socket.SOL_SOCKET, _socket.SCM_RIGHTS, streams
         connection.sendmsg([request(os.environ.get(THREADS, ""), command)], [rights])
@@ -74,6 +76,13 @@ def _warm(place: str, command: list[str]) -> bytes:
     finally:
         connection.close()
     return b""
+
+
+def _interrupt(connection: "_socket.socket") -> None:
+    try:  # noqa: SIM105 -- contextlib is long to import
+        connection.shutdown(_socket.SHUT_WR)
+    except OSError:
+        pass
 
 
 def _forget(place: str) -> None:

@@ -72,6 +72,7 @@ MIXED, NODAL_NORMALS = "bending/quad9-mixed", "lame/normal-nodal"
 RATIO, SIDES = "lame/ratio-quad8", "opening/changing-sides"
 BENDING, UNCOVERED = "bending/quad8-tria6", "uncovered/quad8-quad4"
 CURVED, CUP = "rigid/curved-face", "rigid/hollow-sphere"
+ROLLER = "rigid/cylinder"
 DIE, SHAFT, LINES = "rigid/tilted-die", "rigid/shaft-in-tube", "rigid/lines-of-the-mesh"
 STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
@@ -218,6 +219,9 @@ MUTANTS = (
     Mutant("hollow-side", "a hollow sphere is a full one", CUP,
            "solver.mechanics.mortar.quadric:_round",
            lambda true: lambda point, across, radius, hollow: true(point, across, radius, False)),
+    Mutant("cylinder-axis", "a cylinder is curved along its axis too", ROLLER,
+           "solver.mechanics.mortar.quadric:_round",
+           lambda true: lambda point, across, *rest: true(point, np.eye(len(across)), *rest)),
     Mutant("segments-lost", "segments farther away than half a slave face are lost", CURVED,
            "solver.mechanics.mortar.operator:on_one_surface",
            changed(lambda found: [s.of(np.abs(s.gap).max(axis=1) < 0.22) for s in found])),

@@ -1,9 +1,18 @@
-"""A sample of the kills that `make kills` does by the hundred.
+"""A sample of the kills that `make kills` does by the hundred, and Ctrl-C.
 
 A whole batch is killed in `test_workflow`.
 """
 
-from tests.workflow.kills import kill_at_random
+import json
+import os
+import signal
+import subprocess
+import time
+
+import pytest
+
+from tests.workflow.kills import SNAKEMAKE, kill_at_random
+from tests.workflow.projects import new_project
 
 
 def test_what_is_killed_recovers(tmp_path):
@@ -11,3 +20,26 @@ def test_what_is_killed_recovers(tmp_path):
     failures, struck = kill_at_random(tmp_path / "project", len(targets), 1, targets)
     assert failures == []
     assert struck.total() == len(targets)
+
+
+@pytest.mark.parametrize("stage", ["", "assembly"])
+def test_ctrl_c_leaves_no_verdict_and_nothing_runs_on(tmp_path, stage):
+    project = new_project(tmp_path / "project")
+    case = project / "cases" / "tiny" / "tiny-a.yaml"
+    long = case.read_text().replace("[2, 2]", "[400, 300]").replace("[3, 2]", "[500, 200]")
+    case.write_text(long)
+    log = project / "results" / "tiny" / "tiny-a" / "log"
+    with (tmp_path / "output").open("w") as output:
+        run = subprocess.Popen(
+            SNAKEMAKE, cwd=project, stdout=output, stderr=output, start_new_session=True
+        )
+        while not (log.exists() and stage in log.read_text()):
+            assert run.poll() is None, (tmp_path / "output").read_text()
+            time.sleep(0.05)
+        os.killpg(run.pid, signal.SIGINT)
+        assert run.wait(timeout=60) != 0
+    verdicts = [json.loads(f.read_text()) for f in project.glob("results/tiny/*/verdict.json")]
+    time.sleep(1)
+    assert not list(log.parent.glob("*.vtkhdf*"))
+    assert {verdict["verdict"] for verdict in verdicts} <= {"passed"}
+    assert "crashed:" not in (tmp_path / "output").read_text()

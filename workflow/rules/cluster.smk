@@ -101,5 +101,10 @@ def report_failures():
         os.utime("results/report/failures.txt", (1, 1))
 
 
+# Whether somebody has pressed Ctrl-C.
+INTERRUPTED = []
+
+
 onerror:
-    report_failures()
+    if not INTERRUPTED:
+        report_failures()

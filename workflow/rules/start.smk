@@ -72,6 +72,13 @@ def survive_termination():
     """
     ending = workflow.scheduler.exit_gracefully
     signal.signal(signal.SIGTERM, lambda *_: Thread(target=ending).start())
+    signal.signal(signal.SIGINT, note_interruption)
+
+
+def note_interruption(*_):
+    """Ctrl-C: what has no verdict then has not failed."""
+    INTERRUPTED.append(True)
+    raise KeyboardInterrupt
 
 
 def report_progress():
