@@ -1,12 +1,10 @@
 # Everything is run from here: `make help` lists the targets.
-# Settings: CORES=4 (all), CASES=folder (case files of yours join the batch), MKL=no (without Intel
-# MKL), QUIET=yes (failures and the outcome alone), PYTHON=python3.12; what to run: FAMILY='hertz*',
+# Settings: CORES=4 (all), CASES=folder (case files of yours join the batch), QUIET=yes (failures and the outcome alone), PYTHON=python3.12; what to run: FAMILY='hertz*',
 # CASE='ssnp170-e*', FAILED=yes (what has not passed, once more); for Snakemake:
 # CONFIG='variants=true', ARGS='--dry-run'.
 
 PYTHON ?= python3
 CORES ?= all
-MKL ?=
 ARGS =
 CONFIG =
 QUIET =
@@ -22,7 +20,7 @@ export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
 export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
 ALONE := .venv/bin/python -I -m
 OURS := .venv/bin/python -Es -m
-INSTALL := $(PYTHON) -Es workflow/install --mkl "$(MKL)"
+INSTALL := $(PYTHON) -Es workflow/install
 # A folder is taken from where make was called, also with `make -C`; quotes keep names that look like
 # numbers, and spaces.
 FROM = $(if $(filter-out $(CURDIR),$(PWD)),$(if $(filter /% ~%,$(CASES)),,$(PWD)/))
@@ -204,7 +202,7 @@ lock: ## lock the packages of pyproject.toml again: make lock ARGS=--upgrade
 	  --output-file requirements.txt
 	@for code in kratos ngsolve; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$code --output-file requirements-$$code.txt || exit; done
-	@for group in build mkl slurm test lint docs bill lock; do \
+	@for group in build slurm test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 

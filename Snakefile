@@ -2,7 +2,6 @@
 
 from snakemake.utils import min_version
 
-# Tried with this version; pyproject.toml has the upper bound, for what is set in its internals.
 min_version("9.27")
 
 

@@ -224,7 +224,7 @@ def numbers_of(case, folder, threads):
     """All numbers of a solve's fields, in a new process with so many threads."""
     import h5py
 
-    environment = os.environ | {"OMP_NUM_THREADS": str(threads), "MKL_NUM_THREADS": str(threads)}
+    environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
     done = run(solve(case, folder), env=environment)
     assert done.returncode == 0, done.stderr
     told = without_times(json.loads((folder / "v.json").read_text()))

@@ -12,7 +12,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -149,7 +149,6 @@ def _add_cases(commands: Any) -> None:
     command.add_argument(
         "--everything", action="store_true", help="also do the work that the case does not need"
     )
-    command.add_argument("--free", action="store_true", help="with free software alone: not MKL")
     command.add_argument(
         "--no-memory-check", action="store_true", help="start even if memory cannot suffice"
     )
@@ -238,15 +237,13 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from ..mechanics.linear.backends import free_software_alone
     from ..system.progress import details, saying
     from ..verification.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
-    packages = free_software_alone() if options.free else nullcontext()
-    with details(options.verbose, options.quiet), saying(log), packages:
+    with details(options.verbose, options.quiet), saying(log):
         draw = partial(_draw, options.pictures, options.output.parent) if options.pictures else None
         verdict = solve(job, options.output, options.verdict, draw)
     return PASSED if verdict.sound else FAILED

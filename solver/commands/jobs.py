@@ -10,7 +10,7 @@ import argparse
 import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +24,10 @@ if TYPE_CHECKING:
 
 # Files of these names describe a folder of cases.
 DESCRIPTIONS = ("family.yaml", "orders.yaml")
-# What a name of a job may hold; the schema of case files allows no more.
-_ODD = re.compile(r"[^A-Za-z0-9_.-]")
+# Names of folders and files become paths of results and patterns of the workflow.
+_PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+# Folders of results that are no family's.
+_RESERVED = ["report", "meshes", "orders", "study", "stability", "scaling", "benchmark", "docs"]
 
 
 @dataclass(frozen=True)
@@ -60,12 +62,28 @@ def case_files(folder: Path) -> list[Path]:
     return sorted(f for f in found if f.name not in DESCRIPTIONS)
 
 
+def check_names(folder: Path) -> None:
+    """Raise InputError where a folder of cases, or a case file, has a name that is not plain."""
+    family = folder.resolve().name
+    if family in _RESERVED:
+        raise InputError(folder, "folder", family, "is a folder of results: choose another name")
+    if set(str(folder)) & set("{}\n"):
+        raise InputError(folder, "folder", None, "must be without braces and line ends")
+    for path, name in [(folder, family), *((f, f.stem) for f in case_files(folder))]:
+        if not _PLAIN.fullmatch(name):
+            must = "must be letters, digits, `_`, `-` and `.`, 64 at most, a letter or digit first"
+            raise InputError(path, "name", name, must)
+
+
 def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Listed]:
     """The jobs of all case files in the folders, file by file.
 
     `variants`: where there may be hexahedra, once more with the other cut. A file that
-    names its case as another file of the family does is refused, under a free name.
+    names its case as another file of the family does is refused, under a free name. Raises
+    InputError for a folder or a file with an odd name.
     """
+    for folder in folders:
+        check_names(folder)
     listed = [list(jobs_of(file, variants)) for folder in folders for file in case_files(folder)]
     taken: dict[tuple[str, str], str] = {}
     jobs: list[Listed] = []
@@ -82,15 +100,9 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[Listed]:
     """The jobs of one case file."""
     from ..case.reader import load_case
 
-    family, plain = file.resolve().parent.name or "cases", _ODD.sub("_", file.stem)[:64]
-    alone = Listed(_printable(family), plain, plain, str(file), mesh=())
+    alone = Listed(file.resolve().parent.name, file.stem, file.stem, str(file), mesh=())
     try:
-        _printable(str(file), strict=True)
         case = load_case(file)
-    except UnicodeError:
-        refusal = f"{_printable(str(file))}: file: its path must be UTF-8"
-        yield replace(alone, file=_printable(str(file)), refusal=refusal)
-        return
     except Exception:  # noqa: BLE001 -- whatever it is, the solve meets it again and reports it
         yield alone
         return
@@ -112,7 +124,7 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[Listed]:
 
 def _second(job: Listed, owner: str, taken: dict[tuple[str, str], str]) -> Listed:
     """The refused job of a file whose case has the name of another file's."""
-    stem = _ODD.sub("_", Path(job.file).stem)[:60]
+    stem = Path(job.file).stem[:60]
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
     name = next(name for name in names if (job.family, name) not in taken)
     refusal = (
@@ -147,11 +159,6 @@ def _size(case: Case) -> Size:
 
     path = case.mesh.get("path")
     return of_mesh({"file": str(path)} if path else case.mesh, Path())
-
-
-def _printable(text: str, strict: bool = False) -> str:
-    """Text without the bytes that are no UTF-8; UnicodeError for them where `strict`."""
-    return text.encode("utf-8", "strict" if strict else "backslashreplace").decode("utf-8")
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:

@@ -1,6 +1,6 @@
 """The size of a solve, estimated before meshing: unknowns, seconds, memory.
 
-Memory was measured as the peak of solves of all cell types, 547 of them with a factor by PARDISO
+Memory was measured as the peak of solves of all cell types, 547 of them with a factor
 and 20,000 to 640,000 unknowns: 100 MB for the program, then for each unknown (nodes times
 dimensions) 1.9 to 7.4 kB in 2D and 4.4 to 16 kB in 3D, less for more elongated bodies. With
 multigrid the program takes 200 MB, and an unknown 1.9 kB (HEXA8, 2,100,000 unknowns), 2.1 kB

@@ -209,7 +209,7 @@ def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | N
     known = state.force + state.correction
     forces = rows @ (state.iterate.internal - known).astype(float).ravel()
     matrix = integrals.T @ integrals + sparse.diags_array((size == 0).astype(float))
-    pressure = factorise(matrix, dim=scene.points.shape[1]).solve(integrals.T @ forces) * scale
+    pressure = factorise(matrix).solve(integrals.T @ forces) * scale
     return list(np.split(pressure, np.cumsum([zone.count for zone in scene.zones])[:-1]))
 
 

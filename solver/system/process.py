@@ -14,7 +14,7 @@ from threading import Event, Timer
 from .clock import now, processor_time
 from .memory import peak_mb
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """The variables that set the number of threads of the libraries."""
 
 

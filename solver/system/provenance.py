@@ -17,7 +17,7 @@ from .package import PROJECT, in_project, project_version
 from .threads import cores
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "gmsh")
-_THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:

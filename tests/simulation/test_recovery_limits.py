@@ -95,7 +95,7 @@ def test_multigrid_in_place_of_a_factor(monkeypatch):
         return solved(case)
 
     factored = found()
-    monkeypatch.setattr(choice, "multigrid_from", lambda: 0)
+    monkeypatch.setattr(choice, "MULTIGRID_FROM", 0)
     iterated = found()
     assert factored.linear_solver != iterated.linear_solver
     one, other = factored.zones[0].recovered, iterated.zones[0].recovered

@@ -1,14 +1,9 @@
 """Batches on a machine that fails: the report says why, and the next run does what is missing."""
 
-import os
 import re
 import shutil
-import subprocess
-import sys
-import time
 
-from tests.machine import obeying_permissions
-from tests.workflow.projects import jobs, new_project, snakemake, summary, write_case
+from tests.workflow.projects import new_project, snakemake, summary, write_case
 
 # In each process of the solver, as long as there is a file `fault`.
 FAULTS = """\
@@ -58,30 +53,3 @@ def test_what_the_machine_kept_from_is_done_by_the_next_run(tmp_path):
     assert all(verdict["passed"] for verdict in summary(project).values())
     done = set(re.findall(r"^(\S+): passed, .*$", again.stdout, re.MULTILINE))
     assert done == {"hungry", "meshless", "own"}
-
-
-def test_a_clock_that_went_back_hides_no_change(tmp_path):
-    project = new_project(tmp_path / "project")
-    (project / "cases" / "tiny" / "tiny-a.yaml").unlink()
-    assert snakemake(project).returncode == 0
-    tomorrow = time.time() + 86400
-    for file in (project / "results").rglob("*"):
-        os.utime(file, (tomorrow, tomorrow))
-    case = project / "cases" / "tiny" / "tiny-b.yaml"
-    case.write_text(case.read_text().replace("contact_pressure: 25.0", "contact_pressure: 26.0"))
-    assert "solve tiny-b" in jobs(project)
-    os.utime(case, (tomorrow, tomorrow))
-    run = snakemake(project)
-    assert "tiny-b: failed: multiplier interface: 25" in run.stdout
-    assert summary(project)["tiny-b"]["verdict"] == "failed"
-
-
-def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path):
-    project = new_project(tmp_path / "project")
-    (project / "results").mkdir(mode=0o555)
-    command = obeying_permissions([sys.executable, "-m", "snakemake"])
-    refused = subprocess.run(command, cwd=project, capture_output=True, text=True)
-    assert refused.returncode != 0
-    assert "results: nothing can be written into this folder" in refused.stderr
-    assert "Traceback" not in refused.stderr
-    assert list((project / "results").iterdir()) == []

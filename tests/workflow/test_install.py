@@ -86,48 +86,37 @@ def test_licences_of_all_packages_needed_are_compatible():
         assert "Proprietary" not in stated, name
 
 
-def test_software_that_is_not_free_is_in_a_lock_of_its_own():
-    for lock in LOCKS:
-        assert ("mkl" in pins(lock)) == (lock.name == "requirements-mkl.txt")
-
-
 @pytest.fixture
 def project(tmp_path, monkeypatch):
     """An empty project with two lock files and an environment that looks made."""
     monkeypatch.setattr(environment, "ROOT", tmp_path)
     monkeypatch.setattr(environment, "STAMP", tmp_path / "installed.json")
     monkeypatch.setattr(environment, "PYTHON", Path(sys.executable))
-    for group in ("", "-build", "-mkl", "-test"):
+    for group in ("", "-build", "-test"):
         (tmp_path / f"requirements{group}.txt").write_text(f"content{group}")
     return tmp_path
 
 
 def test_stamp_holds_until_a_lock_changes(project):
-    groups = environment.wanted(["run"], "")
-    assert set(groups) == {"build", "run", "mkl"}
+    groups = environment.wanted(["run"])
+    assert set(groups) == {"build", "run"}
     assert not environment.current(groups)
     environment.stamp(groups)
-    assert environment.current(environment.wanted(["run"], ""))
-    assert not environment.current(environment.wanted(["test"], ""))
+    assert environment.current(environment.wanted(["run"]))
+    assert not environment.current(environment.wanted(["test"]))
     (project / "requirements.txt").write_text("changed")
-    assert not environment.current(environment.wanted(["run"], ""))
+    assert not environment.current(environment.wanted(["run"]))
 
 
 def test_stamp_of_another_interpreter_is_stale(project, monkeypatch):
-    environment.stamp(environment.wanted(["run"], ""))
+    environment.stamp(environment.wanted(["run"]))
     monkeypatch.setattr(environment, "interpreter", lambda: "another one")
-    assert not environment.current(environment.wanted(["run"], ""))
-
-
-def test_choice_against_mkl_is_remembered(project):
-    environment.stamp(environment.wanted(["run"], "no"))
-    assert set(environment.wanted(["test"], "")) == {"build", "run", "test"}
-    assert "mkl" in environment.wanted(["run"], "yes")
+    assert not environment.current(environment.wanted(["run"]))
 
 
 def test_unknown_group_is_refused(project):
     with pytest.raises(InstallError, match=r"requirements-nonsense\.txt is not in"):
-        environment.wanted(["nonsense"], "")
+        environment.wanted(["nonsense"])
 
 
 def test_python_without_venv_is_told_what_to_install(monkeypatch):

@@ -1,4 +1,4 @@
-"""Install what the project needs into `.venv`: `python3 workflow/install [--mkl yes|no] GROUP…`.
+"""Install what the project needs into `.venv`: `python3 workflow/install GROUP…`.
 
 A group is one lock file: `run` is requirements.txt, `test` is requirements-test.txt, and so on.
 Only the standard library is used, and this file has to be readable by any Python 3, so that an
@@ -25,15 +25,9 @@ def main() -> None:
     """Bring `.venv` up to date with the lock files of the groups on the command line."""
     parser = argparse.ArgumentParser(prog="python3 workflow/install", description=__doc__)
     parser.add_argument("groups", nargs="+", metavar="GROUP", help="run, test, lint, lock …")
-    parser.add_argument(
-        "--mkl",
-        choices=["", "yes", "no"],
-        default="",
-        help="with Intel MKL's sparse solver or without; remembered (at first: yes)",
-    )
     arguments = parser.parse_args()
     try:
-        groups = environment.wanted(arguments.groups, arguments.mkl)
+        groups = environment.wanted(arguments.groups)
         if not environment.current(groups):
             environment.install(groups)
             environment.stamp(groups)

@@ -32,13 +32,13 @@ def digest(group: str) -> str:
 
 
 def installed() -> dict:
-    """Return what the stamp says: the interpreter, the groups with their hashes, the MKL choice."""
+    """Return what the stamp says: the interpreter, the groups with their hashes."""
     try:
         stamp = json.loads(STAMP.read_text())
     except (OSError, ValueError):
-        return {"groups": {}, "mkl": ""}
+        return {"groups": {}}
     same = stamp.get("python") == interpreter() and PYTHON.exists()
-    return stamp if same else {"groups": {}, "mkl": stamp.get("mkl", "")}
+    return stamp if same else {"groups": {}}
 
 
 def interpreter() -> str:
@@ -46,14 +46,10 @@ def interpreter() -> str:
     return f"{platform.python_implementation()} {platform.python_version()} {sys.platform}"
 
 
-def wanted(groups: list[str], mkl: str) -> dict[str, str]:
-    """Hashes of the groups to have: those asked for, those there already, and MKL's if wanted."""
-    before = installed()
-    names = dict.fromkeys(["build", "run", *groups, *before["groups"]])
-    names.pop("mkl", None)
-    if (mkl or before["mkl"] or "yes") == "yes":
-        names["mkl"] = None
-    return {name: digest(name) for name in names}
+def wanted(groups: list[str]) -> dict[str, str]:
+    """Hashes of the groups to have: those asked for, and those there already that still exist."""
+    kept = [name for name in installed()["groups"] if (ROOT / f"requirements-{name}.txt").is_file()]
+    return {name: digest(name) for name in ("build", "run", *groups, *kept)}
 
 
 def current(groups: dict[str, str]) -> bool:
@@ -130,6 +126,5 @@ def keep_scripts() -> None:
 
 def stamp(groups: dict[str, str], complete: bool = False) -> None:
     """Write down what has been installed, when it has been."""
-    mkl = "yes" if "mkl" in groups else "no"
-    content = {"python": interpreter(), "mkl": mkl, "groups": groups, "complete": complete}
+    content = {"python": interpreter(), "groups": groups, "complete": complete}
     STAMP.write_text(json.dumps(content, indent=1) + "\n")

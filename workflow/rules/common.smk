@@ -8,13 +8,11 @@ import re
 import shlex
 import subprocess
 import sys
-import time
 from collections import namedtuple
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-import snakemake.dag
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
 
@@ -24,11 +22,9 @@ for package in ("solver", "workflow.progress"):
     import_module(package)
 sys.path.sort(key=lambda folder: Path(folder) == Path(workflow.basedir))
 
-# One solve, as `python -m solver jobs` lists it. `folder`: of its family's results.
-FIELDS = "family case name file mesh swap hexahedra points dim refusal folder"
+# One solve, as `python -m solver jobs` lists it.
+FIELDS = "family case name file mesh swap hexahedra points dim refusal"
 Job = namedtuple("Job", FIELDS)
-# Folders of results that are no family's.
-RESERVED = "report meshes orders study stability scaling benchmark docs".split()
 
 
 def refuse(line):
@@ -115,21 +111,11 @@ MESH_CONTENT = contents(*MESH_SOURCES)
 
 
 def watched(*files):
-    """The user's files as inputs of a job. Their content is among its parameters and counts.
+    """The user's files as inputs of a job, without missing ones, which the solver reports.
 
-    Their dates do not count: a clock may be wrong. Left out are files that are missing or
-    unreadable, which the solver reports, files dated in the future, and files whose names
-    Snakemake reads as patterns.
+    Their content is among the job's parameters and counts; their dates do not.
     """
-    found = [f for f in files if os.path.isfile(f) and not re.search(r"[{}\n]", f)]
-    found = [f for f in found if os.access(f, os.R_OK)]
-    return [ancient(f) for f in found if os.stat(f).st_mtime <= time.time()]
-
-
-def folder_of(family):
-    """The folder of a family's results: its name without characters of Snakemake's patterns."""
-    plain = re.sub(r"[{}\x00-\x1f/]", "_", family)
-    return f"{plain}_" if plain in RESERVED else plain
+    return [ancient(f) for f in files if os.path.isfile(f)]
 
 
 def listed_cold(folders):
@@ -142,7 +128,7 @@ def listed_cold(folders):
 
 
 def find_jobs():
-    """All jobs by folder and name: ours, a folder a family, and those of the configured folders."""
+    """All jobs by family and name: ours, and those of the configured folders."""
     # Folders of studies contain descriptions and templates, no cases of the batch.
     measured = {Path("cases/study"), Path("cases/scaling")}
     ours = sorted({f.parent for f in Path("cases").glob("*/*.yaml")} - measured)
@@ -150,11 +136,8 @@ def find_jobs():
     if not folders:
         refuse("cases: no folder with case files (*.yaml) in it")
     what = [*map(str, folders), *["--variants"] * VARIANTS]
-    jobs = [
-        Job(**of, folder=folder_of(of["family"]))
-        for of in json.loads(listed_warm(what) or listed_cold(what))
-    ]
-    return {(job.folder, job.name): job for job in jobs}
+    jobs = [Job(**of) for of in json.loads(listed_warm(what) or listed_cold(what))]
+    return {(job.family, job.name): job for job in jobs}
 
 
 def chosen(key, known):
@@ -183,7 +166,7 @@ def choose_jobs():
 
 
 def results_of(job):
-    return f"results/{job.folder}/{job.name}"
+    return f"results/{job.family}/{job.name}"
 
 
 def verdict_of(job):
@@ -237,15 +220,8 @@ def again(folder, kept=is_kept):
     return [AGAIN] if os.path.isdir(folder) and (LOST or not kept(folder)) else []
 
 
-# The wildcards match names that exist: no recursion is to be detected in a name that ends in
-# twenty zeros. This is for such names alone, not for time.
-snakemake.dag.PeriodicityDetector = lambda: type(
-    "Never", (), {"is_periodic": lambda *_: None}
-)()
-
-
 wildcard_constraints:
-    family=f"(?!(?:{'|'.join(RESERVED)})/)[^/]+",
+    family="(?!(?:report|meshes|orders|study|stability|scaling|benchmark|docs)/)[^/]+",
     case="[^/]+",
     job="[^/@]+",
 
@@ -257,7 +233,7 @@ def has_mesh(folder):
 
 def mesh_folder(job):
     """The folder of a recipe's mesh, in a list; empty for a mesh of the user."""
-    return [f"results/meshes/{job.folder}/{job.case}"] if job.mesh is None else []
+    return [f"results/meshes/{job.family}/{job.case}"] if job.mesh is None else []
 
 
 def mesh_file(job):
@@ -301,9 +277,9 @@ def ladders():
             for one in jobs_of(ladder.case):
                 name = ladder.folder(one.swap)
                 of = {**vars(one), "name": name, "hexahedra": ladder.hexahedra}
-                job = Job(**of, folder=folder_of(family.name))
+                job = Job(**of | {"family": family.name})
                 options = f" --recovery {ladder.recovery}" if ladder.recovery else ""
-                found[job.folder, job.name] = job, ladder.levels, options
+                found[job.family, job.name] = job, ladder.levels, options
     return found
 
 

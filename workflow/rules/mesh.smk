@@ -1,4 +1,4 @@
-RECIPES = {(j.folder, j.case): j for j in BATCH.values() if j.mesh is None}
+RECIPES = {(j.family, j.case): j for j in BATCH.values() if j.mesh is None}
 
 
 # The mesh of a recipe, one for all directions and variants of a case. If it cannot be made, the

@@ -4,7 +4,6 @@ import atexit
 import fcntl
 import logging
 import signal
-from threading import Thread
 
 from snakemake.settings.enums import Quietness
 
@@ -35,44 +34,6 @@ def take_lock():
 
 # The lock, as long as this process lives.
 HELD = []
-
-
-def date_now():
-    """Give results dated in the future the present date: Snakemake compares dates."""
-    now = time.time()
-    for file in Path("results").rglob("*"):
-        if (
-            not file.is_symlink()
-            and file.stat().st_mtime > now
-            and os.access(file, os.W_OK)
-        ):
-            os.utime(file)
-
-
-def check_writable():
-    """Refuse a folder that cannot be written, which Snakemake would only meet during its work."""
-    parents = {
-        folder
-        for job in workflow.dag.needrun_jobs()
-        for f in job.output
-        for folder in Path(f).parents
-    }
-    for folder in sorted({Path(".snakemake"), *parents} - {Path()}):
-        if folder.exists() and not os.access(folder, os.W_OK | os.X_OK):
-            refuse(
-                f"{folder}: nothing can be written into this folder: "
-                "give yourself the permission, or work in a copy of the project"
-            )
-
-
-def survive_termination():
-    """Let Snakemake end on SIGTERM: its handler takes a lock that the interrupted code may hold.
-
-    In a separate thread the handler gets that lock as soon as it is free.
-    """
-    ending = workflow.scheduler.exit_gracefully
-    signal.signal(signal.SIGTERM, lambda *_: Thread(target=ending).start())
-    signal.signal(signal.SIGINT, note_interruption)
 
 
 def note_interruption(*_):
@@ -134,16 +95,10 @@ def announce():
 # Not in a dry run, which changes nothing.
 onstart:
     if workflow.is_main_process:
-        check_writable()
         HELD.append(take_lock())
-        date_now()
         list_verdicts()
-        survive_termination()
+        signal.signal(signal.SIGINT, note_interruption)
         announce()
-        if workflow.local_exec:
-            # Each search for jobs to start sets a timer for another one, so their number grows.
-            # Without them the batch takes 3.4 s of Snakemake's own processor time, else 9.5 s.
-            workflow.scheduler.job_rate_limiter = None
         keep_warm()
 
 

@@ -118,7 +118,7 @@ def augment(
     if not size.all():
         raise SolveError("a constraint holds no unknown")
     scaled = (sparse.diags(1 / size) @ constraints).tocsr()
-    gram = factorise(scaled @ sparse.diags(compliance) @ scaled.T, dim=2, least=_LEAST)
+    gram = factorise(scaled @ sparse.diags(compliance) @ scaled.T, least=_LEAST)
     factor = prepare(_augmented(matrix, scaled), unknowns, gave_up, shared)
     if factor.doubt:
         raise SolveError(factor.doubt)

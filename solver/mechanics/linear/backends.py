@@ -6,15 +6,11 @@ raises `BreakdownError` at a pivot that it cannot use. The solve takes and retur
 the factor's memory is released with the last reference to the solve.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from importlib.util import find_spec
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags
-
-from . import pardiso
 
 Solve = Callable[[np.ndarray], np.ndarray]
 
@@ -25,24 +21,10 @@ class BreakdownError(Exception):
 
 @dataclass(frozen=True)
 class Backend:
-    """One library; `single`: a float32 triangle gives a factor in single precision."""
+    """One library."""
 
     name: str
-    single: bool
-    available: Callable[[], bool]
     factor: Callable[[csr_matrix, bool], Solve]
-
-
-def _pardiso(upper: csr_matrix, definite: bool) -> Solve:
-    kind = pardiso.POSITIVE_DEFINITE if definite else pardiso.INDEFINITE
-    try:
-        return pardiso.Pardiso(upper, kind).solve
-    except pardiso.PardisoError as error:
-        if error.code in (pardiso.ZERO_PIVOT, pardiso.SINGULAR_DIAGONAL):
-            raise BreakdownError from error
-        if error.code == pardiso.NO_MEMORY:
-            raise MemoryError("no room for the factor of the stiffness matrix") from error
-        raise
 
 
 def _cholmod(upper: csr_matrix, definite: bool) -> Solve:
@@ -83,19 +65,4 @@ def _superlu(upper: csr_matrix, definite: bool) -> Solve:
     return factor.solve
 
 
-BACKENDS = {
-    "pardiso": Backend("PARDISO (MKL)", True, pardiso.available, _pardiso),
-    "cholmod": Backend("CHOLMOD", False, lambda: find_spec("cvxopt") is not None, _cholmod),
-    "superlu": Backend("SuperLU", False, lambda: True, _superlu),
-}
-
-
-@contextmanager
-def free_software_alone() -> Iterator[None]:
-    """Within, systems are solved as where MKL is not installed: it is no free software."""
-    installed = BACKENDS["pardiso"]
-    BACKENDS["pardiso"] = replace(installed, available=lambda: False)
-    try:
-        yield
-    finally:
-        BACKENDS["pardiso"] = installed
+BACKENDS = {"cholmod": Backend("CHOLMOD", _cholmod), "superlu": Backend("SuperLU", _superlu)}

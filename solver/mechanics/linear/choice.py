@@ -3,16 +3,14 @@
 import logging
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import diags
 
 from ...system.errors import SolveError
-from .backends import BACKENDS
 from .condensed_matrix import Symmetric
 from .direct import Factor, factorise, wanted
 from .hierarchy import Shared
 from .krylov import EPSILON
 from .multigrid import Multigrid
-from .nodal_matrix import NodalMatrix
 from .stiffened import Stiffened, StiffenedMatrix
 from .unknowns import Unknowns
 
@@ -23,20 +21,12 @@ MULTIGRID = "multigrid"
 _SHIFTS = 0.0, 1e-15, 1e-14
 _SOFT = "displacements along the softest motions are not determined"
 _ASKED = "as asked for"
-# Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory, by
-# whether PARDISO makes the factor. In graded meshes it takes less from about 100,000.
-_MULTIGRID_FROM = {True: 60_000, False: 20_000}
+# Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory. In
+# graded meshes it takes less from about 100,000.
+MULTIGRID_FROM = 20_000
 # The same where some cells are nearly incompressible, by whether displacements see all pressures:
 # with three times the iterations, and with twenty times.
 _STIFFENED_FROM = {True: 100_000, False: 250_000}
-# Condensing is slower than a saddle point if it adds more entries than this share of the matrix;
-# up to the second number of entries it costs nothing.
-_FILL, _LEAST_FILL = 1.0, 1_000_000
-
-
-def multigrid_from() -> int:
-    """Unknowns in 3D from which multigrid is quicker, with the libraries installed here."""
-    return _MULTIGRID_FROM[BACKENDS["pardiso"].available()]
 
 
 class LinearSolver:
@@ -48,11 +38,9 @@ class LinearSolver:
     round-off: what it solves is a solution only if refinement converges.
     """
 
-    def __init__(
-        self, matrix: Symmetric, dim: int, solver: Factor | Multigrid | Stiffened | None, why: str
-    ):
+    def __init__(self, matrix: Symmetric, solver: Factor | Multigrid | Stiffened | None, why: str):
         """Without a `solver` the matrix is factored."""
-        self._matrix, self._dim, self._why = matrix, dim, why
+        self._matrix, self._why = matrix, why
         self.gave_up = self.doubt = ""
         self._solver = self._factor() if solver is None else solver
 
@@ -95,13 +83,13 @@ class LinearSolver:
     def _factor(self) -> Factor:
         matrix = self._matrix.tocsr()
         try:
-            return factorise(matrix, dim=self._dim)
+            return factorise(matrix)
         except SolveError as error:
             self.doubt = str(error)
         for shift in _SHIFTS:
             try:
                 shifted = matrix + shift * diags(matrix.diagonal())
-                return factorise(shifted, dim=self._dim, least=0.0)
+                return factorise(shifted, least=0.0)
             except SolveError:
                 continue
         raise SolveError(self.doubt)
@@ -121,21 +109,20 @@ def prepare(
     A singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
     """
     if unknowns is None:
-        return LinearSolver(matrix, 3, None, "what multigrid asks for is not known")
-    dim, size = unknowns.dim, matrix.shape[0]
+        return LinearSolver(matrix, None, "what multigrid asks for is not known")
+    size = matrix.shape[0]
     against = gave_up or against_multigrid(size, unknowns) or _against_stiffened(matrix)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
-        least = multigrid_from()
-        why = f"{least} unknowns or more in 3D: faster and smaller than a factor"
+        why = f"{MULTIGRID_FROM} unknowns or more in 3D: faster and smaller than a factor"
         try:
             solver = _iterative(matrix, unknowns, shared)
-            return LinearSolver(matrix, dim, solver, why if wanted() == "auto" else _ASKED)
+            return LinearSolver(matrix, solver, why if wanted() == "auto" else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
             against = gave_up = _instead(error)
             _LOG.info("%s", against)
-    chosen = LinearSolver(matrix, dim, None, against)
+    chosen = LinearSolver(matrix, None, against)
     chosen.gave_up = gave_up
     return chosen
 
@@ -154,8 +141,8 @@ def against_multigrid(size: int, unknowns: Unknowns) -> str:
         return "" if wanted() == MULTIGRID else _ASKED
     if unknowns.dim == 2:
         return "a factor is small in 2D"
-    least = multigrid_from()
-    return f"fewer than {least} unknowns: a factor is faster than multigrid" * (size < least)
+    few = size < MULTIGRID_FROM
+    return f"fewer than {MULTIGRID_FROM} unknowns: a factor is faster than multigrid" * few
 
 
 def _against_stiffened(matrix: Symmetric) -> str:
@@ -167,22 +154,6 @@ def _against_stiffened(matrix: Symmetric) -> str:
     least, kind = _STIFFENED_FROM[matrix.stable], "" if matrix.stable else "linear "
     few = f"fewer than {least} unknowns, some of nearly incompressible {kind}cells"
     return f"{few}: a factor is faster than multigrid" * (matrix.shape[0] < least)
-
-
-def against_condensation(
-    matrix: csr_matrix | NodalMatrix | StiffenedMatrix, constraints: csr_matrix
-) -> str:
-    """Why `matrix` (n, n) should not be condensed by `constraints` (m, n); empty if it should.
-
-    A constraint over w unknowns leaves a block of w² entries in the condensed
-    system. Only PARDISO factors 3D saddle points well.
-    """
-    widths = np.diff(constraints.indptr).astype(float)
-    filled = float((widths**2).sum())
-    few = filled <= max(_FILL * matrix.nnz, _LEAST_FILL)
-    if few or wanted() != "auto" or not BACKENDS["pardiso"].available():
-        return ""
-    return f"a condensed system would fill in: one constraint holds {widths.max():.0f} unknowns"
 
 
 def _instead(error: SolveError) -> str:

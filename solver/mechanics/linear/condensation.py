@@ -134,8 +134,7 @@ class SaddlePoint:
     """The system with the multipliers as unknowns.
 
     `scaled` are the constraints with rows of unit size; the matrix is K + `weight` Ĝᵀ Ĝ, which
-    changes no solution. With a weight it is positive definite, and filled in by wide constraints;
-    without, it is K alone, singular where contact holds a body.
+    changes no solution and is positive definite: any order of elimination takes it.
     """
 
     constraints: sparse.csr_matrix
@@ -167,16 +166,13 @@ class SaddlePoint:
 
 
 def saddle_point(
-    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, why: str, weighted: bool = True
+    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, why: str
 ) -> SaddlePoint:
-    """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular.
-
-    `weighted`: K made definite by the constraints, which any order of elimination takes.
-    """
+    """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular."""
     size = np.sqrt(np.asarray(constraints.multiply(constraints).sum(axis=1)).ravel())
     scaled = (sparse.diags(1 / size) @ constraints).tocsr()
-    weight = float(matrix.diagonal().max(initial=0.0)) if weighted else 0.0
-    upper = matrix + weight * (scaled.T @ scaled) if weighted else matrix
+    weight = float(matrix.diagonal().max(initial=0.0))
+    upper = matrix + weight * (scaled.T @ scaled)
     factor = factorise_indefinite(sparse.bmat([[upper, -scaled.T], [-scaled, None]], format="csr"))
     return SaddlePoint(constraints, scaled, size, weight, factor, why)
 

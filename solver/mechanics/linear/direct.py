@@ -1,19 +1,13 @@
-"""Sparse direct solution of symmetric systems, by the best library that is installed.
+"""Sparse direct solution of symmetric systems: CHOLMOD, and SuperLU for saddle points.
 
 The matrix is first scaled symmetrically to a diagonal near one, by powers of two, which rounds
 nothing. The rest does not depend on units, and a pivot or an eigenvalue of the scaled matrix can be
 compared with the machine precision.
-
-A large positive definite matrix is factored in single precision, which halves memory and time;
-conjugate gradients in double precision, preconditioned by that factor, take the solution to
-round-off in about three iterations (Carson and Higham, SIAM J. Sci. Comput. 40 (2018) A817, use
-iterative refinement in the same way).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import partial
 from typing import Self
 
 import numpy as np
@@ -21,20 +15,12 @@ from scipy.sparse import csr_matrix, sparray, spmatrix
 
 from ...system.errors import SolveError
 from .backends import BACKENDS, Backend, BreakdownError, Solve
-from .krylov import EPSILON, conjugate_gradients, in_single
+from .krylov import EPSILON
 
-LIGHT = 150_000
-"""Stored entries up to which CHOLMOD takes least processor time in 3D (in 2D it always does)."""
-SINGLE_FROM = 20_000
-"""Unknowns in 3D from which a factor in single precision pays for its iterations."""
 SINGULAR = 4 * EPSILON
 """A scaled matrix (largest entry 1) whose smallest eigenvalue is not larger counts as singular."""
 SINGULAR_INDEFINITE = 1e-12
-"""The same for an indefinite matrix: PARDISO replaces pivots below 1e-13."""
-TRUSTED_SINGLE = 1e-6
-"""The same for a factor in single precision; below it the factor is made in double precision."""
-MAX_ITERATIONS = 50
-Iterative = Callable[[np.ndarray, float], tuple[np.ndarray, int]]
+"""The same for an indefinite matrix."""
 _auto: ContextVar[str] = ContextVar("auto", default="auto")
 
 
@@ -42,7 +28,7 @@ _auto: ContextVar[str] = ContextVar("auto", default="auto")
 def force_solver(kind: str) -> Iterator[None]:
     """Within the block `auto` means `kind`: the name of a solver, or `multigrid`.
 
-    Raises SolveError there for a solver that is not installed, or not for that kind of matrix.
+    Raises SolveError there for a solver that is not for that kind of matrix.
     """
     token = _auto.set(kind)
     try:
@@ -57,33 +43,27 @@ def wanted() -> str:
 
 
 class Factor:
-    """A matrix factored by the library `name`; closing or dropping it releases the memory.
-
-    `iterations`: the most of one solution so far, 0 where the factor alone is accurate enough.
-    """
+    """A matrix factored by the library `name`; closing or dropping it releases the memory."""
 
     iterative = False
+    iterations = 0
 
-    def __init__(self, name: str, solve: Iterative, scale: np.ndarray):
-        """`solve` takes columns (n, k) and an accuracy, and returns the iterations too."""
+    def __init__(self, name: str, solve: Solve, scale: np.ndarray):
+        """`solve` takes columns (n, k) of the system scaled by `scale` (n,)."""
         self.name = name
-        self.iterations = 0
         self._scale = scale
-        self._solve: Iterative | None = solve
+        self._solve: Solve | None = solve
 
-    def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:
+    def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:  # noqa: ARG002
         """Solve A x = `right`, of shape (n,) or (n, k); the result has the same shape.
 
-        Where that is quicker, to a residual of `accuracy` times the right-hand side only. Raises
-        SolveError where the solution is not finite or the iterations do not converge.
+        A factor has the full `accuracy`. Raises SolveError where the solution is not finite.
         """
         if self._solve is None:
             raise ValueError("the factor is closed")
         right = np.asarray(right, dtype=float)
         columns = right if right.ndim == 2 else right[:, None]
-        solution, iterations = self._solve(self._scale[:, None] * columns, accuracy)
-        self.iterations = max(self.iterations, iterations)
-        solution = self._scale[:, None] * solution
+        solution = self._scale[:, None] * self._solve(self._scale[:, None] * columns)
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         return solution.reshape(right.shape)
@@ -102,22 +82,18 @@ class Factor:
 def factorise(
     matrix: spmatrix | sparray,
     kind: str = "auto",
-    precision: str = "auto",
-    dim: int = 3,
     least: float = SINGULAR,
 ) -> Factor:
     """Factor a symmetric positive definite `matrix` (n, n), of which the upper triangle is read.
 
-    `kind`: auto, pardiso, cholmod or superlu. `precision` of the factor: auto, double or single
-    (pardiso alone); solutions have double precision either way. `dim`, the dimension
-    of the mesh behind the matrix, guides the choice for auto.
+    `kind`: auto, cholmod or superlu.
 
     Raises SolveError where the matrix is not positive definite, or singular to working precision:
     the smallest eigenvalue of the matrix scaled to a diagonal near one is at most `least`.
     """
     upper = _upper_triangle(matrix)
     if upper.shape[0] == 0:
-        return Factor("nothing to solve", lambda right, _: (right, 0), np.ones(0))
+        return Factor("nothing to solve", lambda right: right, np.ones(0))
     diagonal = upper.diagonal()
     if not (diagonal > 0).all():
         worst = int(np.argmin(np.where(np.isnan(diagonal), -np.inf, diagonal)))
@@ -126,63 +102,49 @@ def factorise(
         )
     scale = _power_of_two(1 / np.sqrt(diagonal))
     upper = _scaled(upper, scale)
-    light = dim == 2 or upper.nnz <= LIGHT
-    backend = _choose(kind, ("cholmod", "pardiso") if light else ("pardiso", "cholmod"))
-    if precision == "auto":
-        precision = "single" if dim == 3 and upper.shape[0] >= SINGLE_FROM else "double"
-    if precision == "single" and backend.single:
-        factor = _factorise_single(backend, upper, scale)
-        if factor is not None:
-            return factor
-    return _factorise_double(backend, upper, scale, definite=True, limit=least)
+    return _factorise(upper, scale, kind, definite=True, limit=least)
 
 
 def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Factor:
     """Factor a symmetric indefinite `matrix` (n, n), a saddle point; see `factorise`.
 
-    `kind`: auto, pardiso or superlu. Here the scaled matrix has its largest entry in each
-    row near one.
+    `kind`: auto or superlu. Here the scaled matrix has its largest entry in each row near one.
     """
     upper = _upper_triangle(matrix)
     scale = np.ones(upper.shape[0])
     for _ in range(3):
         scale *= _power_of_two(1 / np.sqrt(_largest_in_row(_scaled(upper, scale))))
     upper = _scaled(upper, scale)
-    backend = _choose(kind, ("pardiso",))
-    return _factorise_double(backend, upper, scale, definite=False, limit=SINGULAR_INDEFINITE)
+    return _factorise(upper, scale, kind, definite=False, limit=SINGULAR_INDEFINITE)
 
 
 def factorise_roughly(matrix: csr_matrix) -> Solve:
     """Factor a positive definite `matrix` (n, n) with a diagonal near one, for a preconditioner.
 
-    The solve takes columns (n, k), in the precision of the library. Raises SolveError where a pivot
-    fails.
+    The solve takes columns (n, k). Raises SolveError where a pivot fails.
     """
-    backend, upper = _choose("auto", ("pardiso", "cholmod")), _upper_triangle(matrix)
+    backend = _choose("auto", definite=True)
     try:
-        return backend.factor(upper.astype(np.float32) if backend.single else upper, True)
+        return backend.factor(_upper_triangle(matrix), True)
     except BreakdownError:
         raise SolveError(
             f"a part of the matrix is not positive definite ({backend.name})"
         ) from None
 
 
-def _choose(kind: str, order: tuple[str, ...]) -> Backend:
-    if kind != "auto":
-        return BACKENDS[kind]
+def _choose(kind: str, definite: bool) -> Backend:
     # Multigrid makes no factor: where one is needed all the same, take the best.
-    if (asked := wanted()) in BACKENDS:
-        if asked not in (*order, "superlu"):
-            raise SolveError(f"{BACKENDS[asked].name} factors positive definite matrices only")
-        if not BACKENDS[asked].available():
-            raise SolveError(f"{BACKENDS[asked].name} is not installed")
-        return BACKENDS[asked]
-    return next(BACKENDS[name] for name in (*order, "superlu") if BACKENDS[name].available())
+    if kind == "auto" and (kind := wanted()) not in BACKENDS:
+        kind = "cholmod" if definite else "superlu"
+    if kind == "cholmod" and not definite:
+        raise SolveError("CHOLMOD factors positive definite matrices only")
+    return BACKENDS[kind]
 
 
-def _factorise_double(
-    backend: Backend, upper: csr_matrix, scale: np.ndarray, definite: bool, limit: float
+def _factorise(
+    upper: csr_matrix, scale: np.ndarray, kind: str, definite: bool, limit: float
 ) -> Factor:
+    backend = _choose(kind, definite)
     try:
         solve = backend.factor(upper, definite)
     except BreakdownError:
@@ -194,26 +156,7 @@ def _factorise_double(
             f"the matrix is singular to working precision: scaled to a largest entry of 1, its "
             f"smallest eigenvalue is about {smallest:.0e} (more than {limit:.0e} is needed)"
         )
-    return Factor(backend.name, lambda right, _: (solve(right), 0), scale)
-
-
-def _factorise_single(backend: Backend, upper: csr_matrix, scale: np.ndarray) -> Factor | None:
-    """The factor in single precision; None where it cannot be trusted."""
-    try:
-        arrays = upper.data.astype(np.float32), upper.indices, upper.indptr
-        rough = backend.factor(csr_matrix(arrays, shape=upper.shape), True)
-    except BreakdownError:
-        return None
-
-    precondition = in_single(rough)
-    if not _smallest_eigenvalue(precondition, upper.shape[0]) > TRUSTED_SINGLE:
-        return None
-
-    def solve(right: np.ndarray, accuracy: float) -> tuple[np.ndarray, int]:
-        multiply = partial(_multiply, upper)
-        return conjugate_gradients(multiply, precondition, right, accuracy, MAX_ITERATIONS)
-
-    return Factor(f"{backend.name}, single precision in conjugate gradients", solve, scale)
+    return Factor(backend.name, solve, scale)
 
 
 def _smallest_eigenvalue(solve: Solve, size: int) -> float:
@@ -231,10 +174,6 @@ def _smallest_eigenvalue(solve: Solve, size: int) -> float:
         if not 0 < growth < np.inf:
             return 0.0
     return 1 / growth
-
-
-def _multiply(upper: csr_matrix, columns: np.ndarray) -> np.ndarray:
-    return upper @ columns + upper.T @ columns - upper.diagonal()[:, None] * columns
 
 
 def _upper_triangle(matrix: spmatrix | sparray) -> csr_matrix:

@@ -13,7 +13,7 @@ from scipy import sparse
 from ...system.errors import SolveError
 from ..fem.bodies import joined_bodies
 from .augmented import augment
-from .choice import LinearSolver, against_condensation
+from .choice import LinearSolver
 from .condensation import ConstrainedSystem, condense, saddle_point
 from .direct import Factor
 from .hierarchy import Shared
@@ -190,11 +190,6 @@ class Systems:
             return _augmented(matrix, constraints, unknowns, *known)
         if self._compliance is not None and len((soft := self._compliance(closed)).weight):
             return stabilise(matrix, constraints, own, soft, unknowns, *known)
-        if why := against_condensation(matrix, constraints):
-            try:
-                return saddle_point(matrix.tocsr(), constraints, why, weighted=False)
-            except SolveError:
-                pass  # pivots that no order of elimination avoids: condensation needs none of them
         return condense(matrix, constraints, own, unknowns, *known)
 
 

@@ -12,7 +12,6 @@ repetitions: 1            # after the first solve, in one process; 0: the first 
 ways:
 - {title: as chosen}
 - {title: CHOLMOD, solver: cholmod}        # the linear solver
-- {title: without MKL, free: true}         # free software alone
 - {title: not cut, treatment: uncut}       # of the interface
 - {title: no cures, cures: false}          # see `solver.simulation.options`
 - {title: nothing left out, everything: true}   # see `solver.simulation.options`
@@ -37,8 +36,7 @@ class Way(Section, frozen=True):
     """One way to solve; see the module's text."""
 
     title: Text
-    solver: Literal["auto", "multigrid", "pardiso", "cholmod", "superlu"] = "auto"
-    free: bool = False
+    solver: Literal["auto", "multigrid", "cholmod", "superlu"] = "auto"
     treatment: Text = "lac"
     cures: bool = True
     everything: bool = False

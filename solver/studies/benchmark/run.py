@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import replace
 from math import floor, log10
 from pathlib import Path
@@ -149,7 +148,6 @@ def resolution(pressure: float) -> float:
 def solve_way(job: Mapping[str, Any]) -> dict[str, Any]:
     """One mesh solved in one way: the process up to the first solve's end, and warm repetitions."""
     from ...case.reader import load_case
-    from ...mechanics.linear.backends import free_software_alone
     from ...mechanics.linear.direct import force_solver
     from ...mesh import read_mesh
     from ...simulation.options import Options, Safeguards, Shortcuts
@@ -164,12 +162,12 @@ def solve_way(job: Mapping[str, Any]) -> dict[str, Any]:
         Shortcuts.none() if job["everything"] else Shortcuts(),
         Safeguards() if job["cures"] else Safeguards.none(),
     )
-    first, packages = Clock(), free_software_alone() if job["free"] else nullcontext()
+    first = Clock()
 
     def run(clock: Clock) -> Any:
         return simulate(case, mesh, options=options, clock=clock)
 
-    with force_solver(job["solver"]), packages:
+    with force_solver(job["solver"]):
         solution = run(first)
         process = used_since(job["started"])
         times = repeated(run, job["repetitions"]) if job["repetitions"] else {}

@@ -31,7 +31,7 @@ def inf_sup_constant(scene: Scene) -> float:
     weight = 1 / np.sqrt(size * area)
     scaled = (sparse.diags(weight) @ gaps).tocsr()
     # For as many right-hand sides as macro-elements double precision is quicker.
-    with factorise(scene.free.reduced(energy.tocsr()), precision="double") as factor:
+    with factorise(scene.free.reduced(energy.tocsr())) as factor:
         response = factor.solve(scaled.T.toarray())
     # Round-off may put an eigenvalue of zero below it.
     return float(np.sqrt(max(np.linalg.eigvalsh(scaled @ response)[0], 0.0)))

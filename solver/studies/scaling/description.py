@@ -13,7 +13,6 @@
         slab: false                    # blocks as thick as the finer one's cells are wide
         fit: [1.0e+4, 1.0e+5]          # of this series, where it is another
         threads: 1                     # of this series, to compare with the same on more
-        free: true                     # with free software alone, to compare with the same on MKL
         sizes: [1.0e+4, 1.0e+5]        # unknowns that a mesh has at least
     goals:                        # numbers to reach, shown beside those measured
       - {title: …, series: hexa8, size: 1.0e+5, what: cpu, most: 12, unit: s, others: {…: 56}}
@@ -91,7 +90,6 @@ class SizeSeries(Section, frozen=True, dict=True):
     slab: bool = False
     fit: SizeRange = (0, 0)
     threads: Count | None = None
-    free: bool = False
 
     @cached_property
     def template(self) -> dict[str, Any]:
@@ -100,7 +98,7 @@ class SizeSeries(Section, frozen=True, dict=True):
 
     @property
     def problem(self) -> tuple[Any, ...]:
-        """What its meshes are of: series of the same differ in sizes, threads and packages."""
+        """What its meshes are of: series of the same differ in sizes and threads."""
         return self.case, self.cells, self.divisions, self.slab
 
     @property
@@ -140,12 +138,12 @@ class ScalingPoint:
 
     @property
     def counts_bytes(self) -> bool:
-        """Whether a further solve counts bytes: that of the largest mesh in 3D, by any packages.
+        """Whether a further solve counts bytes: that of the largest mesh in 3D.
 
         Not where it would take minutes: of flat blocks and of ten million unknowns.
         """
         largest = self.size == max(self.series.sizes) and self.size <= _LARGEST_COUNTED
-        return self.series.dim == 3 and largest and not (self.series.free or self.series.slab)
+        return self.series.dim == 3 and largest and not self.series.slab
 
     @property
     def seconds(self) -> float:

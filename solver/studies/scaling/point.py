@@ -92,7 +92,7 @@ def _solve(
     if meshed.status != 0:
         return found | ended(FAILED, f"no mesh: {meshed.reason}")
     command = [*COMMAND, "solve", str(case), "--mesh", str(mesh), "-o", str(folder / "r.vtkhdf")]
-    command += ["--verdict", str(verdict), *["--free"] * point.series.free]
+    command += ["--verdict", str(verdict)]
     done = run_compiled(lambda: command, cores, limit, memory)
     found["process"] = done.used
     if not verdict.is_file():

@@ -110,7 +110,7 @@ class SeriesSolves:
 
 @dataclass(frozen=True)
 class SolvedTwice:
-    """The same mesh solved in two ways: `one` on few threads or free software, and the `other`."""
+    """The same mesh solved in two ways: `one` on few threads, and the `other`."""
 
     one: ScaledSolve
     other: ScaledSolve
@@ -125,22 +125,11 @@ class SolvedTwice:
         """Of the one and of the other."""
         return self.one.record["threads"], self.other.record["threads"]
 
-    @property
-    def free(self) -> tuple[bool, bool]:
-        """Whether the one and the other are by free software alone."""
-        return self.one.point.series.free, self.other.point.series.free
-
 
 def speed_ups(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:
     """Solved points of series that differ in their threads alone, few threads first."""
-    pairs = [(pair, *pair.threads) for pair in _solved_twice(lines) if len({*pair.free}) == 1]
+    pairs = [(pair, *pair.threads) for pair in _solved_twice(lines)]
     return [pair for pair, few, many in pairs if few < many]
-
-
-def by_free_software(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:
-    """Solved points of series that differ in their packages alone, free software first."""
-    pairs = [pair for pair in _solved_twice(lines) if len({*pair.threads}) == 1]
-    return [pair for pair in pairs if pair.free == (True, False)]
 
 
 def _solved_twice(lines: Sequence[SeriesSolves]) -> list[SolvedTwice]:

@@ -184,7 +184,7 @@ class _SolverChoice(Section, frozen=True):
     problem: Name
     pair: Pair
     treatment: Name
-    solvers: Annotated[tuple[Literal["pardiso", "cholmod", "superlu"], ...], ONCE]
+    solvers: Annotated[tuple[Literal["cholmod", "superlu"], ...], ONCE]
 
 
 class _QuickStudy(Section, frozen=True):

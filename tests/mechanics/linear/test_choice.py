@@ -1,23 +1,11 @@
 """Which way a constrained system is solved, and that every way gives the same answer."""
 
-import subprocess
-import sys
-from dataclasses import replace
-
 import numpy as np
-import pytest
 from scipy import sparse
 
-from solver.mechanics.linear.backends import BACKENDS
-from solver.mechanics.linear.choice import against_condensation
 from solver.mechanics.linear.condensation import condense, saddle_point
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
-from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.unknowns import Unknowns
-
-needs_pardiso = pytest.mark.skipif(
-    not BACKENDS["pardiso"].available(), reason="MKL PARDISO is not installed"
-)
 
 
 def chain_over_floor(count):
@@ -34,57 +22,17 @@ def stands_for(matrix, dim=3):
     return Unknowns(dim, np.arange(n), lambda: np.ones((n, 6)), np.zeros(n, dtype=int))
 
 
-@needs_pardiso
-@pytest.mark.parametrize("weighted", [True, False])
-def test_a_saddle_point_and_the_condensed_system_agree(weighted):
+def test_a_saddle_point_and_the_condensed_system_agree():
     matrix, constraints = chain_over_floor(30)
     force, violation = np.random.default_rng(0).standard_normal(31), np.array([0.2])
     own = np.arange(31) == 0
     condensed = condense(matrix, constraints, own, stands_for(matrix))
-    saddle = saddle_point(matrix, constraints, "tried", weighted)
+    saddle = saddle_point(matrix, constraints, "tried")
     found = [system.correction(force, violation) for system in (condensed, saddle)]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(constraints @ found[1], violation, rtol=1e-12)
     left = force - matrix @ found[1]
     np.testing.assert_allclose(condensed.multiplier(left), saddle.multiplier(left), rtol=1e-9)
-
-
-@needs_pardiso
-def test_wide_constraints_are_not_condensed():
-    matrix, constraints = chain_over_floor(1200)
-    why = against_condensation(matrix, constraints)
-    assert why == "a condensed system would fill in: one constraint holds 1201 unknowns"
-    with force_solver("cholmod"):
-        assert not against_condensation(matrix, constraints)
-
-
-def test_narrow_constraints_are_condensed():
-    matrix, constraints = chain_over_floor(900)
-    assert not against_condensation(matrix, constraints)
-
-
-def test_without_pardiso_all_is_condensed(monkeypatch):
-    missing = replace(BACKENDS["pardiso"], available=lambda: False)
-    monkeypatch.setitem(BACKENDS, "pardiso", missing)
-    matrix, constraints = chain_over_floor(1200)
-    assert not against_condensation(matrix, constraints)
-
-
-@needs_pardiso
-@pytest.mark.parametrize("before", ["", "import gmsh"])
-def test_pardiso_has_the_same_threads_whatever_was_loaded_before(before):
-    """Else the last digits of a result depend on whether its mesh was made in the same process."""
-    script = f"""{before}
-import numpy as np
-from scipy.sparse import csr_matrix
-from solver.mechanics.linear.pardiso import Pardiso
-Pardiso(csr_matrix(np.eye(3))).solve(np.ones((3, 1)))
-print(open("/proc/self/maps").read())
-"""
-    command = [sys.executable, "-c", script]
-    loaded = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert "libmkl_intel_thread" in loaded
-    assert "libmkl_gnu_thread" not in loaded
 
 
 def between_two_chains(count):

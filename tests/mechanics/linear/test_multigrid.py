@@ -9,7 +9,6 @@ from scipy.sparse import block_array, block_diag, bsr_matrix, csr_matrix, eye
 
 from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
 from solver.mechanics.linear import choice, condensed_matrix, hierarchy, products
-from solver.mechanics.linear.backends import BACKENDS
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.hierarchy import Shared
@@ -155,14 +154,14 @@ def test_right_hand_side_that_is_no_number():
 
 def test_choice_by_size_and_dimension(monkeypatch):
     matrix, unknowns = clamped(6)
-    monkeypatch.setattr(choice, "multigrid_from", lambda: matrix.shape[0])
+    monkeypatch.setattr(choice, "MULTIGRID_FROM", matrix.shape[0])
     large = choice.prepare(matrix, unknowns)
     assert "multigrid" in large.name
     assert "unknowns or more in 3D" in large.why
     plane = choice.prepare(matrix, replace(unknowns, dim=2))
     assert "multigrid" not in plane.name
     assert "2D" in plane.why
-    monkeypatch.setattr(choice, "multigrid_from", lambda: matrix.shape[0] + 1)
+    monkeypatch.setattr(choice, "MULTIGRID_FROM", matrix.shape[0] + 1)
     small = choice.prepare(matrix, unknowns)
     assert "multigrid" not in small.name
     assert "fewer than" in small.why
@@ -274,15 +273,6 @@ def test_nodal_blocks_give_the_solution_of_the_entries(tied):
     assert "multigrid" in systems[1].factor.name
     np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-12 * np.abs(found[0]).max())
     assert systems[1].factor.iterations <= systems[0].factor.iterations + 3
-
-
-def test_pardiso_puts_multigrid_off(monkeypatch):
-    def size(pardiso):
-        there = replace(BACKENDS["pardiso"], available=lambda: pardiso)
-        monkeypatch.setitem(BACKENDS, "pardiso", there)
-        return choice.multigrid_from()
-
-    assert size(False) < size(True)
 
 
 def test_choice_as_asked_for():

@@ -26,7 +26,7 @@ def content():
         {"title": "no cures", "cures": False},
         {"title": "everything", "everything": True},
         {"title": "odd", "treatment": "no-such-treatment"},
-        {"title": "solver", "solver": "superlu", "free": True},
+        {"title": "solver", "solver": "superlu"},
     ]
     one = {"title": "Ways", "series": "quad4", "size": 500, "repetitions": 1, "ways": ways}
     content["comparisons"] = [one]

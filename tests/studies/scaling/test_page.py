@@ -12,7 +12,6 @@ from solver.studies.scaling.description import read_scaling
 from solver.studies.scaling.page import write_scaling
 from solver.studies.scaling.records import (
     OTHER,
-    by_free_software,
     failures,
     reached,
     read_series,
@@ -171,31 +170,6 @@ def test_speed_up_is_wall_time_on_few_threads_over_that_on_many(scaling, results
     assert "<td class=n>10.00</td>" in page
     write_scaling(scaling, results, tmp_path / "page")
     assert "Speed-up" not in (tmp_path / "page" / "scaling.html").read_text()
-
-
-def test_free_software_alone_is_compared_with_all_packages(scaling, results, tmp_path):
-    """A series on one thread and with free software has no counterpart, the others one."""
-    hexa = next(s for s in scaling.series if s.name == "hexa8")
-    free = structs.replace(hexa, name="hexa8-free", free=True, sizes=(10_000,))
-    slow = structs.replace(free, name="free-one", threads=1)
-    both = replace(scaling, series=(*scaling.series, free, slow))
-    for series in (free, slow):
-        [point] = [p for p in both.points if p.series is series]
-        found = record(point, threads=series.threads or 2) | {"linear_solver": "a free one"}
-        found["process"] = found["process"] | {"wall": 1.25, "peak_memory_mb": 300.0}
-        (results / series.name).mkdir()
-        (results / f"{point.name}.json").write_text(json.dumps(found))
-    lines = read_series(both, results)
-    [pair] = by_free_software(lines)
-    assert (pair.one.point.name, pair.other.point.name) == ("hexa8-free/10000", "hexa8/10000")
-    # On threads it is the other way round: of two by free software.
-    [pair] = speed_ups(lines)
-    assert (pair.one.point.series.name, pair.other.point.series.name) == ("free-one", "hexa8-free")
-    write_scaling(both, results, tmp_path / "page")
-    page = (tmp_path / "page" / "scaling.html").read_text()
-    assert "Free software alone" in page
-    for words in ("a free one", "×1.25", "0.30 GB</td><td class=n>×3.00"):
-        assert words in page
 
 
 def test_points_whose_checks_fail_are_listed(scaling, results):

@@ -50,19 +50,11 @@ def test_a_series_may_have_threads_of_its_own(scaling, tmp_path, monkeypatch):
     assert asked == [1, 3]
 
 
-@pytest.mark.parametrize("free", [False, True])
-def test_a_series_may_be_of_free_software_alone(scaling, tmp_path, instead, free):
-    instead('case "$*" in *" --free"*) exit 7;; *) exit 8;; esac')
-    some = replace(scaling, series=(structs.replace(scaling.series[0], free=free),))
-    found, _ = record(some, some.points[0].name, tmp_path)
-    assert f"exit status {7 if free else 8}" in found["reason"]
-
-
 def test_bytes_are_counted_once_for_a_mesh():
-    """On the largest mesh of a series in 3D, but not by free software too."""
+    """On the largest mesh of a series in 3D."""
     counted = [p.name for p in read_scaling(FILE).points if p.counts_bytes]
     assert {"hexa8/1000000", "hexa8-one/1000000", "tetra10/1000000"} < set(counted)
-    assert not [name for name in counted if name.startswith(("hexa8-free", "quad", "tria"))]
+    assert not [name for name in counted if name.startswith(("quad", "tria"))]
 
 
 def test_a_point_that_ends_well(scaling, tmp_path):

@@ -91,7 +91,7 @@ def test_the_quick_study_is_a_part_of_the_whole(file):
         ("patch-3d.yaml", "patch-4d.yaml", r"problems\[1\].case = 'patch-4d.yaml': no such file"),
         ("name: cubes", "name: lac", r"treatments\[1\].name = 'lac': the name is given twice"),
         ("problem: plane", "problem: plain", "did you mean plane"),
-        ("[cholmod, superlu]", "[cholmod, mumps]", "must be pardiso, cholmod or superlu"),
+        ("[cholmod, superlu]", "[cholmod, mumps]", "must be cholmod or superlu"),
         ("pairs: {space", "pairs: {spice", "did you mean space"),
     ],
 )
