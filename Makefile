@@ -40,7 +40,7 @@ test ! -f results/report/log || test results/report/log -nt .snakemake/begun \
 test $$status != 0 || ! test -s results/report/failures.txt || status=1; exit $$status
 endef
 
-.PHONY: help all-cases family case report summary compare record bench orders study
+.PHONY: help all-cases family case report summary compare bench orders study
 .PHONY: stability infsup scaling benchmark converge test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment code-environment test-environment lint-environment docs-environment
@@ -75,9 +75,6 @@ summary: ## print the last report's table, as Markdown
 compare: environment ## compare with another batch: make compare BASE=folder [THIS=folder]
 	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
 	@$(OURS) solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
-
-record: environment ## record the last batch, show all records: HISTORY=folder keeps them there
-	@$(OURS) solver record $(if $(HISTORY),--history "$(HISTORY)")
 
 bench: override CONFIG += $(CHOICE) $(if $(CODES),"codes=$(CODES)")
 bench: environment ## run other codes on the cases: all installed, or CODES=calculix,kratos

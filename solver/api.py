@@ -32,7 +32,7 @@ from .mesh.tidy import tidy
 from .simulation.options import Options
 from .simulation.solution import Solution, ZoneResult
 from .system.errors import InputError, key_path
-from .system.progress import saying
+from .system.progress import report_outcomes
 from .system.provenance import gather
 from .verification.judge import judge
 from .verification.results import write_result
@@ -85,7 +85,7 @@ def solve_case(
     made = mesh_of(given) if mesh is None else _mesh(mesh)
     accepted = mesh is None and given.path.is_file()
     options = Options.everything() if everything else Options()
-    with saying(log):
+    with report_outcomes(log):
         if memory_check:
             check_memory(len(made.points), made.points.shape[1], given.path)
         solution, checks = solve_checked(given, made, options, accepted)

@@ -16,7 +16,7 @@ from solver.mesh.size import Size, check_memory
 from solver.system.errors import MachineError
 from solver.system.files import replacing
 from solver.system.memory import available, peak_mb
-from solver.system.progress import saying
+from solver.system.progress import report_outcomes
 from solver.verification.run import mesh_of
 from tests.machine import obeying_permissions, small_disk
 from tests.workflow.projects import CASE, ROOT, without_times
@@ -123,14 +123,14 @@ def test_memory_needed_is_below_what_was_measured():
 
 def test_what_cannot_fit_is_refused_and_what_may_not_is_warned_of():
     told = []
-    with saying(told.append), pytest.raises(MachineError) as refused:
+    with report_outcomes(told.append), pytest.raises(MachineError) as refused:
         check_memory(2_200_000, 3, "big.yaml", free=7 * GIGABYTE)
     line = str(refused.value)
     assert line.startswith("big.yaml: memory = '6600000 unknowns': needs at least 7.4 GB, 7 GB are")
     assert "coarser mesh" in line
     assert "--no-memory-check" in line
     assert told == []
-    with saying(told.append):
+    with report_outcomes(told.append):
         check_memory(1_000_000, 3, "big.yaml", free=5 * GIGABYTE)
         check_memory(1_000_000, 2, "big.yaml", free=8 * GIGABYTE)
     assert told == ["memory may run out: about 5.7 GB of 5 GB free"]

@@ -26,7 +26,7 @@ COUNTED = {
     "scaling_point": "point",
 }
 # Rules whose jobs print by themselves: the last line is left to them while they run.
-TALKING = (
+VERBOSE_RULES = (
     *("report", "orders_page", "stability_page", "infsup_page"),
     *("study", "study_point", "scaling", "scaling_point"),
 )
@@ -109,7 +109,7 @@ class State:
     @property
     def talking(self) -> bool:
         """Whether a running job prints by itself."""
-        return any(job.rule in TALKING for job in self.running.values())
+        return any(job.rule in VERBOSE_RULES for job in self.running.values())
 
     def text(self) -> str:
         """The state in one line."""

@@ -102,7 +102,7 @@ def _file_beside(where: str | Path, kind: type, value: object) -> Path:
     return file
 
 
-def refuse_twins(key: str, items: Iterable[Any]) -> None:
+def refuse_duplicates(key: str, items: Iterable[Any]) -> None:
     """Raise `FieldError` for the first name in a list, under `key`, that occurs twice."""
     seen: set[str] = set()
     for i, item in enumerate(items):

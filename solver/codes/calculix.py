@@ -20,7 +20,7 @@ from ..mechanics.fem.faces import FaceBlock
 from ..mesh.catalogue import BY_NAME, CellType
 from ..mesh.files.abaqus import FACES
 from ..system.errors import InputError, SolveError
-from ..system.process import cores_for, run_apart
+from ..system.process import cores_for, run_in_subprocess
 from .deck import Deck, UnsupportedError, face_size
 from .files.read import read_result_files
 from .foreign import Field, ForeignResult
@@ -73,7 +73,9 @@ class CalculiX:
             return ""
         # It leaves files wherever it runs.
         with TemporaryDirectory() as folder:
-            output = run_apart([PROGRAM, "-v"], cores_for(1), 10.0, folder=Path(folder)).output
+            output = run_in_subprocess(
+                [PROGRAM, "-v"], cores_for(1), 10.0, folder=Path(folder)
+            ).output
         found = re.search(r"Version (\S+)", output)
         return found[1] if found else "unknown"
 

@@ -21,7 +21,6 @@ from ..verification.norms import errors
 from ..verification.samples import Reference, Sample
 from ..verification.verdict import CheckResult
 from .contact import SurfaceValues, pressure_force, surfaces
-from .extent import CHECKED_BY
 from .faults import fault, summed_up
 from .model import Model
 from .own_mesh import own_solution
@@ -36,6 +35,21 @@ if TYPE_CHECKING:
 # Forces agree within this share: between nodes a pressure is interpolated.
 FORCES = 0.05
 _STEP = 1e-6
+
+
+CHECKED_BY = {
+    "displacement": ("displacement", "displacement_l2", "displacement_h1"),
+    "stress": (
+        *("nodal_stress", "stress_components", "surface_stress_slave", "surface_stress_master"),
+        *("stress_max", "stress_l2"),
+    ),
+    "pressure": (
+        *("multiplier", "pressure_l2", "pressure_max", "pressure_means", "pressure_total"),
+        *("pressure_oscillation", "pressure_inner", "half_width", "peak"),
+    ),
+    "gap": ("element_gap",),
+}
+"""The checks that compare each field."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +155,7 @@ class Compared:
 
     @cached_property
     def samplers(self) -> dict[str, samples.Sampler]:
-        """By check, what samples it; checks of what is not given are missing."""
+        """Sampler of each check; checks without data are omitted."""
         found: dict[str, samples.Sampler] = {}
         if "displacement" in self.placed:
             found["displacement"] = self._components("displacement", "xyz"[: self.model.dim])

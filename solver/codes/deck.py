@@ -11,7 +11,8 @@ from ..case.material import Material
 from ..case.model import Case, Load, Zone
 from ..mechanics.fem.faces import FaceBlock, volume_cells
 from ..mechanics.mortar.cut import cut
-from ..simulation.attributes import Attributes, faces_of
+from ..simulation.attributes import Attributes
+from ..simulation.cut_groups import faces_of
 from ..simulation.groups import check_groups, named_parts
 from ..simulation.selections import with_groups
 from .layer import as_layer

@@ -1,32 +1,15 @@
 """At how many of the places of its case a foreign result has values: what a verdict speaks of."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..mesh.catalogue import BY_MESHIO
+from .compared import Compared
+from .contact import SurfaceValues
 from .placing import NEAR
 
-if TYPE_CHECKING:
-    from .compared import Compared
-    from .contact import SurfaceValues
-
-CHECKED_BY = {
-    "displacement": ("displacement", "displacement_l2", "displacement_h1"),
-    "stress": (
-        *("nodal_stress", "stress_components", "surface_stress_slave", "surface_stress_master"),
-        *("stress_max", "stress_l2"),
-    ),
-    "pressure": (
-        *("multiplier", "pressure_l2", "pressure_max", "pressure_means", "pressure_total"),
-        *("pressure_oscillation", "pressure_inner", "half_width", "peak"),
-    ),
-    "gap": ("element_gap",),
-}
-"""The checks that compare each field."""
 # A macro-element has a value where one is no farther than so many times the distance of values.
 _BESIDE = 1.5
 # Values at this share of all places are values everywhere: files leave out a node at times.

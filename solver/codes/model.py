@@ -64,7 +64,7 @@ class Model:
 
     @cached_property
     def solution(self) -> Solution:
-        """The frame of a solution on this mesh: geometry and scales, and not one value."""
+        """Empty solution on this mesh: geometry and scales only."""
         volumes = [i for i, block in enumerate(self.mesh.cells) if block.dim == self.dim]
         sets = {name: [of[i] for i in volumes] for name, of in self.mesh.cell_sets.items()}
         cells = [(self.mesh.cells[i].type, self.mesh.cells[i].data) for i in volumes]

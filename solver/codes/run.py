@@ -12,10 +12,10 @@ import meshio
 from ..case.model import Case
 from ..system.clock import now
 from ..system.errors import InputError, SolveError
-from ..system.process import run_apart
+from ..system.process import run_in_subprocess
 from ..verification.verdict import CRASHED, FAILED, REFUSED, Verdict, write_verdict
+from .compared import CHECKED_BY
 from .deck import Deck, UnsupportedError, deck_of
-from .extent import CHECKED_BY
 from .foreign import ForeignResult
 from .registry import Code
 from .verdicts import LOG, VERDICT, store, without_foreign
@@ -43,8 +43,8 @@ def run_code(code: Code, deck: Deck, folder: Path, limits: Limits) -> ForeignRes
     """
     code.write(deck, folder)
     command = code.command(folder)
-    ended = run_apart(command, limits.cores, limits.seconds, limits.memory, folder)
-    said = ended.output + ended.complaint
+    ended = run_in_subprocess(command, limits.cores, limits.seconds, limits.memory, folder)
+    said = ended.output + ended.problem
     (folder / LOG).write_text(said, encoding="utf-8")
     if ended.status is None:
         raise CrashError(ended.reason)

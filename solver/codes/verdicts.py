@@ -20,8 +20,8 @@ from ..verification.checks import run_checks
 from ..verification.judge import judge, without_result
 from ..verification.run import mesh_of
 from ..verification.verdict import FAILED, PARTIAL, PASSED, SOLVED, Verdict, write_verdict
-from .compared import Compared
-from .extent import CHECKED_BY, Extent, extents
+from .compared import CHECKED_BY, Compared
+from .extent import Extent, extents
 
 if TYPE_CHECKING:
     import meshio

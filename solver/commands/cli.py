@@ -19,9 +19,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError, SolveError, hint, of_machine
-from ..system.imports import defer
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import codes, completion, history, jobs, look, report, results, studies
+from . import codes, completion, jobs, look, report, results, studies
 from .options import (
     BUG,
     FAILED,
@@ -52,7 +51,6 @@ Batches and studies are targets of make: make help."""
 
 def run() -> int:
     """Run the command of this process; its exit status."""
-    defer()
     # Lines leave as they are written, so that the last line of a log is what was said last.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
@@ -113,10 +111,9 @@ def parser() -> argparse.ArgumentParser:
     codes.add_commands(commands)
     report.add_commands(commands)
     _add_batch(commands)
-    history.add_commands(commands)
     jobs.add_commands(commands)
     studies.add_commands(commands)
-    completion.add_commands(commands)
+    completion.add_commands(commands, parser)
     return parser
 
 
@@ -237,13 +234,13 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from ..system.progress import details, saying
+    from ..system.progress import details, report_outcomes
     from ..verification.run import solve
 
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
-    with details(options.verbose, options.quiet), saying(log):
+    with details(options.verbose, options.quiet), report_outcomes(log):
         draw = partial(_draw, options.pictures, options.output.parent) if options.pictures else None
         verdict = solve(job, options.output, options.verdict, draw)
     return PASSED if verdict.sound else FAILED

@@ -11,17 +11,16 @@ from .options import PASSED, add_command
 SHELLS = ("bash", "zsh", "tcsh")
 
 
-def add_commands(commands: Any) -> None:
+def add_commands(commands: Any, parser: argparse.ArgumentParser) -> None:
     """Add `completion`."""
     purpose = "print a script that completes commands in a shell"
     command = add_command(commands, "completion", _completion, purpose)
     command.add_argument("shell", choices=SHELLS)
+    command.set_defaults(parser=parser)
 
 
 def _completion(options: argparse.Namespace) -> int:
-    from .cli import parser
-
-    print(script(parser(), options.shell))
+    print(script(options.parser, options.shell))
     return PASSED
 
 

@@ -31,7 +31,7 @@ _RESERVED = ["report", "meshes", "orders", "study", "stability", "scaling", "ben
 
 
 @dataclass(frozen=True)
-class Listed:
+class ListedJob:
     """One job: the family, the case's name, its own name, its file, how it is solved.
 
     `mesh` holds the files of the user's own mesh, the one named in the case first, then those it
@@ -75,7 +75,7 @@ def check_names(folder: Path) -> None:
             raise InputError(path, "name", name, must)
 
 
-def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Listed]:
+def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[ListedJob]:
     """The jobs of all case files in the folders, file by file.
 
     `variants`: where there may be hexahedra, once more with the other cut. A file that
@@ -86,7 +86,7 @@ def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Listed]:
         check_names(folder)
     listed = [list(jobs_of(file, variants)) for folder in folders for file in case_files(folder)]
     taken: dict[tuple[str, str], str] = {}
-    jobs: list[Listed] = []
+    jobs: list[ListedJob] = []
     # A file that is called as its case goes before one that took a copied name.
     for found in sorted(listed, key=lambda found: found[0].case != Path(found[0].file).stem):
         owner = next((taken[job.key] for job in found if job.key in taken), None)
@@ -96,11 +96,11 @@ def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Listed]:
     return jobs
 
 
-def jobs_of(file: Path, variants: bool = False) -> Iterator[Listed]:
+def jobs_of(file: Path, variants: bool = False) -> Iterator[ListedJob]:
     """The jobs of one case file."""
     from ..case.reader import load_case
 
-    alone = Listed(file.resolve().parent.name, file.stem, file.stem, str(file), mesh=())
+    alone = ListedJob(file.resolve().parent.name, file.stem, file.stem, str(file), mesh=())
     try:
         case = load_case(file)
     except Exception:  # noqa: BLE001 -- whatever it is, the solve meets it again and reports it
@@ -109,7 +109,7 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[Listed]:
     mesh, size = _mesh_files(case), _size(case)
     for cut in [None, _other_cut(case)] if variants and _may_hold_hexahedra(case) else [None]:
         for swap in [False, True] if case.directions == "both" else [False]:
-            yield Listed(
+            yield ListedJob(
                 family=alone.family,
                 case=case.name,
                 name=job_name(case.name, swap, cut),
@@ -122,7 +122,7 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[Listed]:
             )
 
 
-def _second(job: Listed, owner: str, taken: dict[tuple[str, str], str]) -> Listed:
+def _second(job: ListedJob, owner: str, taken: dict[tuple[str, str], str]) -> ListedJob:
     """The refused job of a file whose case has the name of another file's."""
     stem = Path(job.file).stem[:60]
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
@@ -131,7 +131,7 @@ def _second(job: Listed, owner: str, taken: dict[tuple[str, str], str]) -> Liste
         f"{job.file}: name = {job.case!r}: already taken by {owner}; "
         "each case of a family needs a name of its own"
     )
-    return Listed(job.family, name, name, job.file, mesh=(), refusal=refusal)
+    return ListedJob(job.family, name, name, job.file, mesh=(), refusal=refusal)
 
 
 def _may_hold_hexahedra(case: Case) -> bool:

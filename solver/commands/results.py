@@ -64,7 +64,7 @@ def _check_result(options: argparse.Namespace) -> int:
 
 def _fields(given: str | None) -> list[str] | None:
     """The fields of `--only`, between commas."""
-    from ..codes.extent import CHECKED_BY
+    from ..codes.compared import CHECKED_BY
 
     if given is None:
         return None

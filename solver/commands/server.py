@@ -22,7 +22,6 @@ from typing import NoReturn
 
 from ..system.package import PACKAGE
 from ..system.provenance import gather
-from .cli import parser
 from .warm import GREETING, LIMIT, THREADS, answer, words
 
 # Modules that the solver imports late. The command itself reports a missing one.
@@ -126,7 +125,7 @@ def _report_ends(running: dict[int, socket.socket], options: int = 0) -> None:
 
 
 def load() -> None:
-    """Do once what every fork would: import the solver, find versions, declare the command line.
+    """Do once what every fork would: import the solver, find versions.
 
     All of it is excluded from garbage collection, so that forks share it.
     """
@@ -139,7 +138,6 @@ def load() -> None:
             with suppress(ImportError, OSError):
                 importlib.import_module(name)
     gather(Path(), None)
-    parser()
     gc.collect()
     gc.freeze()
 

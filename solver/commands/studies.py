@@ -12,7 +12,7 @@ from typing import Any
 
 from ..studies import FULL, LARGE, QUICK, SIZES
 from ..system.errors import InputError
-from ..system.progress import saying
+from ..system.progress import report_outcomes
 from .options import add_command, add_threads
 
 RECORD, FOLDER = "RECORD.json", "DIR"
@@ -222,7 +222,7 @@ def _benchmark(options: argparse.Namespace) -> int:
     from ..studies.benchmark.run import run_benchmark
 
     benchmark = read_benchmark(options.benchmark, QUICK if options.quick else FULL)
-    with saying(partial(print, file=sys.stderr, flush=True)):
+    with report_outcomes(partial(print, file=sys.stderr, flush=True)):
         record = run_benchmark(options.benchmark, benchmark)
     page = write_benchmark(record, options.output)
     print(f"{as_text(record)}\n\nPage: {page}")
@@ -281,7 +281,7 @@ def _add_infsup(commands: Any) -> None:
 def _infsup(options: argparse.Namespace) -> int:
     from ..studies.infsup.point import measure
 
-    with saying(partial(print, flush=True)):
+    with report_outcomes(partial(print, flush=True)):
         measure(options.ladders, options.output, options.quick)
     return 0
 

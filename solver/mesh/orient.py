@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..system.threads import ahead
+from ..system.threads import prefetch
 from .catalogue import CellType
 
 # Below this share of the product of the edges that span it, a corner counts as flat.
@@ -65,7 +65,7 @@ def right_side_out(
         flat = (np.abs(jacobian) <= _FLAT).any(axis=1)
         return [mirrored, flat | ((jacobian < 0).any(axis=1) & ~mirrored)]
 
-    parts = list(ahead(judged, range(0, max(1, len(cells)), _AT_ONCE)))
+    parts = list(prefetch(judged, range(0, max(1, len(cells)), _AT_ONCE)))
     mirrored, bad = (np.concatenate(masks) for masks in zip(*parts, strict=True))
     if not mirrored.any():
         return cells, bad

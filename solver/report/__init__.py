@@ -64,13 +64,13 @@ def write_report(
         write_text(folder / name, content)
     write_script(folder)
     write_viewer(folder)
-    complaints = "".join(f"{c}\n" for part in parts if (c := part.family.complaint))
+    problems = "".join(f"{c}\n" for part in parts if (c := part.family.refusal))
     said = tables.outcome(asked)
     if older:
         rest = tables.outcome([row for row in rows if row.folder in earlier])
         said = f"Older results in the report, not of this run: {rest}\nThis run: {said}"
     outcome = f"{said} Report: {folder / PAGE}"
-    return f"{complaints}{_costs(parts)}\n{contents['failures.txt']}{outcome}"
+    return f"{problems}{_costs(parts)}\n{contents['failures.txt']}{outcome}"
 
 
 def _costs(sections: Sequence[Any]) -> str:

@@ -32,7 +32,7 @@ from ..system.errors import InputError
 FILE_NAME = "family.yaml"
 # Pages of the report that are no family's, also with a dash and more (`study-quick`): a family of
 # such a name has its page under another.
-_TAKEN = {"index", "summary", "matrix", "bench", "compare", "history", "workflow"} | {
+_TAKEN = {"index", "summary", "matrix", "bench", "compare", "workflow"} | {
     *("orders", "study", "stability", "infsup", "scaling", "benchmark"),
 }
 
@@ -75,10 +75,10 @@ class FamilyFile(Section, frozen=True):
 
 
 class Family(FamilyFile, frozen=True, kw_only=True):
-    """A family as its page shows it; `complaint` says why its file is refused."""
+    """A family as its page shows it; `refusal` says why its file is refused."""
 
     name: str
-    complaint: str = ""
+    refusal: str = ""
 
     @property
     def place(self) -> float:
@@ -97,7 +97,7 @@ def read_family(file: Path) -> Family:
             if figure.along:
                 Expression(figure.along, where=str(file), key=f"figures[{i}].along")
     except InputError as error:
-        return Family(name, name=name, complaint=str(error))
+        return Family(name, name=name, refusal=str(error))
     return Family(**structs.asdict(content), name=name)
 
 

@@ -64,7 +64,7 @@ def _mean(normals: np.ndarray, upward: np.ndarray) -> np.ndarray:
 
 
 def ways_apart(solution: Solution) -> np.ndarray:
-    """Where each body goes when they are moved apart, (bodies, dim): a master away from its slave.
+    """Displacement of each body in the exploded view, (bodies, dim): a master away from its slave.
 
     A body that is master and slave takes its own masters along.
     """

@@ -23,7 +23,6 @@ _PAGES = {
     "infsup": "inf-sup test",
     "bench": "other codes on the same cases",
     "compare": "comparison with another batch",
-    "history": "past batches",
 }
 _TABLES = {"JSON": "summary.json", "CSV": "summary.csv", "Markdown": "summary.md"}
 # Where `make docs` writes the documentation, from the folder of a report.

@@ -265,10 +265,10 @@ class Arc:
         """Faces one after another, from an end of the interface or, on a ring, from any face."""
         pairs = np.concatenate([nodes[:, :2] for _, nodes, _ in zone.faces])
         after = {int(a): i for i, (a, _) in enumerate(pairs)}
-        firsts = [*(after.keys() - set(pairs[:, 1].tolist())), *after]
+        start_points = [*(after.keys() - set(pairs[:, 1].tolist())), *after]
         chain: list[int] = []
         seen: set[int] = set()
-        for first in firsts:
+        for first in start_points:
             node = first
             while (face := after.get(node)) is not None and face not in seen:
                 seen.add(face)

@@ -26,8 +26,8 @@ from scipy import sparse
 
 from ..case.model import Case
 from ..mechanics.fem import shape_functions
+from ..mechanics.fem.block import Block
 from ..mechanics.fem.cell_sizes import steepest, steepness
-from ..mechanics.fem.elasticity import Block
 from ..mechanics.fem.faces import FaceBlock, area_vectors
 from ..mechanics.mortar.facets import FLAT
 from ..mechanics.mortar.status import Trial

@@ -1,27 +1,23 @@
 """Materials, supports and loads of a case on the groups of the cut mesh."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
-import meshio
 import numpy as np
 
-from ..case.expressions import evaluate
 from ..case.material import Material
-from ..case.model import Case, Exact, Load, Scalar
+from ..case.model import Exact, Load
 from ..case.solutions.base import ExactSolution
 from ..mechanics.fem import has_straight_edges
-from ..mechanics.fem.bodies import body_numbers
-from ..mechanics.fem.elasticity import Block, lame_parameters
+from ..mechanics.fem.block import Block
+from ..mechanics.fem.elasticity import lame_parameters
 from ..mechanics.fem.faces import (
     FaceBlock,
-    FaceError,
-    boundary_faces,
     nodal_normals,
     volume_cells,
 )
-from ..mechanics.fem.loads import Field, body_forces, face_forces, stress_forces
+from ..mechanics.fem.loads import body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
 from ..mechanics.fem.supports import (
     CopyError,
@@ -34,126 +30,18 @@ from ..mechanics.fem.supports import (
     released,
     tied,
 )
-from ..mechanics.mortar.cut import CutMesh, SubFaces
-from ..mesh.catalogue import BY_MESHIO, BY_NAME
+from ..mesh.catalogue import BY_NAME
 from ..system.errors import InputError
 from . import rigid
+from .cut_groups import CutGroups
 from .exact import node_parts
 from .groups import ALL
 from .relations import copies_of, ties_of
 from .rigid import Frame
 
 
-@dataclass(frozen=True)
-class CutZone:
-    """A contact zone: its slave faces as meshed, and their sub-faces after the cut.
-
-    Macro-elements of sub-faces are counted within the zone.
-    """
-
-    slave_faces: list[FaceBlock]
-    sub_faces: list[SubFaces]
-
-    @property
-    def count(self) -> int:
-        """How many macro-elements there are."""
-        return sum(len(block.nodes) for block in self.slave_faces)
-
-
-def faces_of(mesh: meshio.Mesh, group: str, case: Case, key: str) -> list[FaceBlock]:
-    """The faces of a group that the case names under `key`; refuses those not on a boundary."""
-    try:
-        return boundary_faces(mesh, group)
-    except FaceError as error:
-        raise InputError(case.path, key, group, str(error)) from None
-
-
-class Attributes:
-    """The groups of the mesh file carried over to the cut mesh, and what the case gives them.
-
-    Points are counted from `origin` (dim,), as in the scene.
-    """
-
-    def __init__(
-        self,
-        case: Case,
-        mesh: meshio.Mesh,
-        cut_mesh: CutMesh,
-        zones: Sequence[CutZone],
-        origin: np.ndarray,
-    ):
-        self.case, self.mesh, self.cut = case, mesh, cut_mesh
-        self.points, self.origin, self.zones = cut_mesh.points, origin, zones
-        self.axisymmetric = case.axisymmetric
-
-    def whole_cell_mask(self, group: str) -> dict[str, np.ndarray]:
-        """Which volume cells (n,) of each type, as meshed, belong to a group."""
-        whole = {name: np.zeros(len(c), bool) for name, c in volume_cells(self.mesh).items()}
-        for block, members in zip(self.mesh.cells, self.mesh.cell_sets.get(group, []), strict=True):
-            name = _type_name(block.type)
-            if name in whole and members is not None:
-                whole[name][np.asarray(members, dtype=int)] = True
-        return whole
-
-    def cell_mask(self, group: str) -> dict[str, np.ndarray]:
-        """Which cells (n,) of each type of the cut mesh belong to a group of volume cells."""
-        whole = self.whole_cell_mask(group)
-        return {name: self.cut.members(name, whole) for name in self.cut.cells}
-
-    def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
-        """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
-        blocks = self.as_cut(faces_of(self.mesh, group, self.case, key))
-        return [(block.type.name, block.nodes) for block in blocks]
-
-    def as_cut(self, faces: Sequence[FaceBlock]) -> list[FaceBlock]:
-        """The faces as meshed, slave faces replaced by their sub-faces."""
-        found: list[FaceBlock] = []
-        for block in faces:
-            whole = np.ones(len(block.nodes), dtype=bool)
-            for zone in self.zones:
-                for slave in zone.slave_faces:
-                    mine, theirs = block.common(slave)
-                    if len(mine):
-                        whole[mine] = False
-                        number = np.full(zone.count, -1)
-                        number[slave.number[theirs]] = mine
-                        found += [_part(block, sub, number) for sub in zone.sub_faces]
-            found.append(block.of(whole))
-        return [block for block in found if len(block.nodes)]
-
-    def nodes(self, group: str, key: str) -> np.ndarray:
-        """All nodes of a group: of its volume cells, faces, edges and points."""
-        dim = self.points.shape[1]
-        if group == ALL:
-            return np.arange(len(self.points))
-        parts = [np.asarray(self.mesh.point_sets.get(group, []), dtype=int)]
-        if group in self.mesh.cell_sets:
-            mask = self.cell_mask(group)
-            parts += [self.cut.cells[name][mask[name]].ravel() for name in mask]
-            dims = set()
-            for block, members in zip(self.mesh.cells, self.mesh.cell_sets[group], strict=True):
-                if members is not None and len(members):
-                    dims.add(BY_NAME[_type_name(block.type)].dim)
-                    parts.append(block.data[np.asarray(members, dtype=int)].ravel())
-            if dim - 1 in dims:
-                parts += [nodes.ravel() for _, nodes in self.faces(group, key)]
-        return np.unique(np.concatenate(parts))
-
-    def field(self, values: Scalar | tuple[Scalar, ...]) -> Field:
-        """A case's number, expression or vector as a function of the local coordinates."""
-
-        def value(local: np.ndarray) -> np.ndarray:
-            place = local + self.origin
-            if isinstance(values, tuple):
-                return np.stack([evaluate(v, place) for v in values], axis=1)
-            return evaluate(values, place)
-
-        return value
-
-    @cached_property
-    def body(self) -> np.ndarray:
-        """The body (n,) of each node."""
-        return body_numbers(len(self.points), self.cut.cells)
+class Attributes(CutGroups):
+    """What the case gives the groups: materials, supports and loads."""
 
     @cached_property
     def exact_part(self) -> np.ndarray:
@@ -184,7 +72,7 @@ class Attributes:
         young = self.by_material(lambda m: m.young, 1.0)
         poisson = self.by_material(lambda m: m.poisson, 0.0)
         mixed = self.by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
-        moving = rigid.moving_nodes(self)
+        moving = rigid.moving_nodes(self, self.frames)
         blocks = [
             Block(
                 BY_NAME[name],
@@ -252,12 +140,12 @@ class Attributes:
     def fixed(self) -> dict[str, Fixed]:
         """What the axis, supports and rigid bodies hold, by the key of the case file."""
         fixed = dict(self._fixed())
-        rigid.refuse_moved(self, fixed)
+        rigid.refuse_moved(self.case, self.frames, fixed)
         dim = self.points.shape[1]
         on_axis = np.flatnonzero(self.points[:, 0] == 0) if self.axisymmetric else np.empty(0, int)
         # The circles of points on the axis have no radius, and keep it.
         held = Fixed(on_axis, np.tile(np.eye(dim)[0], (len(on_axis), 1)), np.zeros(len(on_axis)))
-        return {"plane": held, **fixed, **rigid.held(self)}
+        return {"plane": held, **fixed, **rigid.held(self.case, self.frames)}
 
     def supports(self) -> FreeMotion:
         """The motion that supports and rigid bodies leave free."""
@@ -265,7 +153,7 @@ class Attributes:
         try:
             free = free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
             free = tied(copied(free, list(copies.values())), list(ties.values()))
-            return released(free, rigid.free_motions(self))
+            return released(free, rigid.free_motions(self, self.frames))
         except CopyError as error:
             key = list(copies)[error.number]
             raise InputError(self.case.path, key, None, str(error)) from None
@@ -301,7 +189,7 @@ class Attributes:
 
     def forces(self) -> np.ndarray:
         """Nodal forces (n, dim) of all loads but initial strains, at load factor 1."""
-        total = rigid.forces(self)
+        total = rigid.forces(self, self.frames)
         for i, load in enumerate(self.case.loads):
             total += self._force(load, f"loads[{i}].group")
         return total
@@ -319,7 +207,7 @@ class Attributes:
             key: replace(f, values=f.values * key.startswith(tuple(mine)))
             for key, f in self.fixed.items()
         }
-        force = rigid.forces(self, name)
+        force = rigid.forces(self, self.frames, name)
         for i, load in enumerate(self.case.loads):
             if load.name == name:
                 force += self._force(load, f"loads[{i}].group")
@@ -382,13 +270,3 @@ class Attributes:
         return stress_forces(
             *at, lambda x: exact.stress(x + origin, part), pressure, self.axisymmetric
         )
-
-
-def _part(block: FaceBlock, sub: SubFaces, number: np.ndarray) -> FaceBlock:
-    """The sub-faces of a block's faces, which `number` (m,) gives by macro-element, or −1."""
-    face = number[sub.macro]
-    return replace(block.of(face[face >= 0]), type=sub.type, nodes=sub.nodes[face >= 0])
-
-
-def _type_name(meshio_name: str) -> str:
-    return BY_MESHIO[meshio_name].name

@@ -103,7 +103,7 @@ class ContactIterate:
         move = self.scene.free.spread(change)
         stress = self.mean_stress + self.scene.mean.change(move, self.defect)
         moved = replace(self, displacement=self.displacement.moved(move), mean_stress=stress)
-        return moved._knowing(self, "sizes")
+        return moved._with_cached(self, "sizes")
 
     def under(self, force: np.ndarray) -> "ContactIterate":
         """The same displacement under another force (n, dim), a correction of this one.
@@ -111,13 +111,13 @@ class ContactIterate:
         What does not depend on the force is not computed anew, and the sizes of stresses stay those
         that they were, also after the iterates that follow: they scale round-off alone.
         """
-        return replace(self, force=force)._knowing(self, *_OF_DISPLACEMENT)
+        return replace(self, force=force)._with_cached(self, *_OF_DISPLACEMENT)
 
     def with_closed(self, closed: np.ndarray) -> "ContactIterate":
         """The same displacement with other multipliers closed (k,)."""
-        return replace(self, closed=closed)._knowing(self, *_OF_DISPLACEMENT)
+        return replace(self, closed=closed)._with_cached(self, *_OF_DISPLACEMENT)
 
-    def _knowing(self, other: "ContactIterate", *names: str) -> "ContactIterate":
+    def _with_cached(self, other: "ContactIterate", *names: str) -> "ContactIterate":
         known = vars(other)
         vars(self).update({name: known[name] for name in names if name in known})
         return self

@@ -15,12 +15,13 @@ from ..mechanics.mortar.operator import GapOperator, Scheme, gap_operator
 from ..mechanics.mortar.points import gauss
 from ..mechanics.mortar.quadric import Quadric, frame, meet_quadric
 from ..mechanics.mortar.reconstruction import form_of, vertex_neighbours
-from ..mechanics.mortar.recovery import Asked
+from ..mechanics.mortar.recovery import RecoveryRequest
 from ..mechanics.mortar.surface_points import face_samples
 from ..mechanics.mortar.treatments import scheme_of
 from ..mesh.catalogue import BY_NAME
 from ..system.errors import InputError
-from .attributes import Attributes, CutZone
+from .attributes import Attributes
+from .cut_groups import CutZone
 from .options import Options
 from .rigid import quadric_of
 
@@ -81,7 +82,7 @@ def _refuse_sharp(groups: Attributes, zone: Zone, masters: list[Facets]) -> None
         raise InputError(groups.case.path, key, zone.normal, allowed)
 
 
-def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> Asked:
+def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> RecoveryRequest:
     """How a zone's pressure is recovered, and which of its macro-elements may be neighbours."""
     count = sum(len(block.nodes) for block in slave_faces)
     order = min(block.owner_type.order for block in slave_faces)
@@ -96,7 +97,7 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> A
     softness = None
     if zone.stabilised:
         softness = np.array([1 / m.young for m in groups.case.materials.values()] + [0.0])
-    return Asked(form, vertex_neighbours(vertices, count), material, softness)
+    return RecoveryRequest(form, vertex_neighbours(vertices, count), material, softness)
 
 
 def _as_bent(block: Facets) -> Facets:

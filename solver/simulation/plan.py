@@ -84,7 +84,7 @@ def _zone(zone: ZoneScene, scene: Scene, inactive: np.ndarray) -> Iterator[Line]
         yield Line(f"{name}: {held} multipliers left out", why)
 
 
-def noted(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Line]:
+def plan_notes(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Line]:
     """The lines of the solve: work that was not needed, and the linear solver."""
     scene = problem.scene
     if scene.zones and len(states) > 1:
@@ -113,7 +113,7 @@ def estimated(solution: Solution) -> Iterator[Line]:
             yield Line(what, "too few closed neighbours to recover it from")
 
 
-def yielding(solution: Solution) -> Iterator[Line]:
+def softness_notes(solution: Solution) -> Iterator[Line]:
     """A note where contact gives way to pressures that scatter."""
     for given, zone in zip(solution.case.zones, solution.zones, strict=True):
         if given.stabilised:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -14,16 +13,14 @@ from ..mechanics.fem.loads import Field
 from ..mechanics.fem.springs import at_nodes, foundation
 from ..mechanics.fem.supports import Copies
 from ..system.errors import InputError
+from .cut_groups import CutGroups
 from .groups import ALL
-
-if TYPE_CHECKING:
-    from .attributes import Attributes
 
 # Nodes are copies where they are nearer to the image than this share of the model's extent.
 _NEAR = 1e-6
 
 
-def ties_of(groups: Attributes) -> dict[str, np.ndarray]:
+def ties_of(groups: CutGroups) -> dict[str, np.ndarray]:
     """The degrees of freedom (n,) of nodes that move as one, by key of the case file."""
     found: dict[str, np.ndarray] = {}
     dim = groups.points.shape[1]
@@ -40,7 +37,7 @@ def ties_of(groups: Attributes) -> dict[str, np.ndarray]:
     return found
 
 
-def copies_of(groups: Attributes) -> dict[str, Copies]:
+def copies_of(groups: CutGroups) -> dict[str, Copies]:
     """Nodes that move as another side's nodes do, by key of the case file."""
     found: dict[str, Copies] = {}
     points, dim = groups.points + groups.origin, groups.points.shape[1]
@@ -76,7 +73,7 @@ def _turn(dim: int, degrees: float, axis: Sequence[float]) -> np.ndarray:
     return whole[:dim, :dim]
 
 
-def springs_of(groups: Attributes) -> sparse.csr_matrix:
+def springs_of(groups: CutGroups) -> sparse.csr_matrix:
     """The stiffness (n_dofs, n_dofs) of springs and foundations."""
     total = sparse.csr_matrix((groups.points.size, groups.points.size))
     for i, support in enumerate(groups.case.supports):
@@ -88,7 +85,7 @@ def springs_of(groups: Attributes) -> sparse.csr_matrix:
 
 
 def _spring(
-    groups: Attributes, group: str, direction: str, value: Scalar, key: str
+    groups: CutGroups, group: str, direction: str, value: Scalar, key: str
 ) -> sparse.csr_matrix:
     points, axis, stiffness = groups.points, "xyz".find(direction), _stiffness(groups, value, key)
     if group == ALL or group in groups.mesh.point_sets:
@@ -101,7 +98,7 @@ def _spring(
     )
 
 
-def _stiffness(groups: Attributes, value: Scalar, key: str) -> Field:
+def _stiffness(groups: CutGroups, value: Scalar, key: str) -> Field:
     """A stiffness as a field; refused where it is not positive."""
     field = groups.field(value)
 

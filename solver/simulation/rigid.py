@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import meshio
 import numpy as np
@@ -17,9 +16,7 @@ from ..mechanics.fem.supports import SAME, Fixed
 from ..mechanics.mortar.quadric import Quadric, ball, cylinder, parabola, plane
 from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
-
-if TYPE_CHECKING:
-    from .attributes import Attributes
+from .cut_groups import CutGroups
 
 _SHAPES: dict[str, Callable[..., Quadric]] = {
     "plane": plane,
@@ -246,12 +243,12 @@ class Frame:
         return dict(zip(self.motions, found.tolist(), strict=True))
 
 
-def frames_of(groups: Attributes) -> dict[str, Frame]:
+def frames_of(groups: CutGroups) -> dict[str, Frame]:
     """The rigid bodies of a case by name."""
     return {name: _frame(groups, name) for name in sorted(groups.case.rigid)}
 
 
-def _frame(groups: Attributes, name: str) -> Frame:
+def _frame(groups: CutGroups, name: str) -> Frame:
     body, nodes = groups.case.rigid[name], groups.nodes(name, f"bodies.{name}")
     places = groups.points[nodes]
     if body.reference is not None:
@@ -273,59 +270,61 @@ def _frame(groups: Attributes, name: str) -> Frame:
     return Frame(nodes, point, motions)
 
 
-def held(groups: Attributes) -> dict[str, Fixed]:
+def held(case: Case, frames: Mapping[str, Frame]) -> dict[str, Fixed]:
     """What rigid bodies hold, by key: all of their nodes, moved as the case imposes it."""
     found = {}
-    for name, frame in groups.frames.items():
-        moved = frame.displacement(groups.case.rigid[name].move)
+    for name, frame in frames.items():
+        moved = frame.displacement(case.rigid[name].move)
         for i, axis in enumerate(np.eye(moved.shape[1])):
             directions = np.tile(axis, (len(moved), 1))
             found[f"bodies.{name}.{'xyz'[i]}"] = Fixed(frame.nodes, directions, moved[:, i])
     return found
 
 
-def refuse_moved(groups: Attributes, fixed: Mapping[str, Fixed]) -> None:
+def refuse_moved(case: Case, frames: Mapping[str, Frame], fixed: Mapping[str, Fixed]) -> None:
     """Refuse displacements given to rigid bodies, and supports of those that move."""
     largest = max((float(np.abs(f.values).max(initial=0)) for f in fixed.values()), default=0.0)
-    for (name, frame), (key, support) in product(groups.frames.items(), fixed.items()):
+    for (name, frame), (key, support) in product(frames.items(), fixed.items()):
         given = support.values[np.isin(support.nodes, frame.nodes)]
-        if len(given) and groups.case.rigid[name].moves:
+        if len(given) and case.rigid[name].moves:
             allowed = f"{len(given)} of its nodes belong to the rigid body {name}, which moves by "
             allowed += f"`move` and `force` of bodies.{name} alone"
-            raise InputError(groups.case.path, key, None, allowed)
+            raise InputError(case.path, key, None, allowed)
         if (np.abs(given) > SAME * largest).any():
             allowed = (
                 f"given to {len(given)} nodes of the rigid body {name}, which is fixed; "
                 f"allowed there: 0 (move the other body instead, or this one by bodies.{name}.move)"
             )
             value = float(given[np.abs(given).argmax()])
-            raise InputError(groups.case.path, key, value, allowed)
+            raise InputError(case.path, key, value, allowed)
 
 
-def free_motions(groups: Attributes) -> list[tuple[np.ndarray, np.ndarray]]:
+def free_motions(
+    groups: CutGroups, frames: Mapping[str, Frame]
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """The motions that rigid bodies are free in: degrees of freedom (m,), columns (m, k)."""
     dim, found = groups.points.shape[1], []
-    for name, frame in groups.frames.items():
+    for name, frame in frames.items():
         if free := groups.case.rigid[name].force:
             dofs = dim * frame.nodes[:, None] + np.arange(dim)
             found.append((dofs.ravel(), frame.columns(free)))
     return found
 
 
-def forces(groups: Attributes, name: str | None = None) -> np.ndarray:
+def forces(groups: CutGroups, frames: Mapping[str, Frame], name: str | None = None) -> np.ndarray:
     """Nodal forces (n, dim) of the forces and moments on rigid bodies, or of the named ones."""
     total = np.zeros_like(groups.points)
-    for group, frame in groups.frames.items():
+    for group, frame in frames.items():
         body = groups.case.rigid[group]
         if body.force and name in (None, body.name):
             total[frame.nodes] += frame.forces(body.force)
     return total
 
 
-def moving_nodes(groups: Attributes) -> np.ndarray:
+def moving_nodes(groups: CutGroups, frames: Mapping[str, Frame]) -> np.ndarray:
     """Which nodes (n,) belong to rigid bodies that move."""
     found = np.zeros(len(groups.points), dtype=bool)
-    for name, frame in groups.frames.items():
+    for name, frame in frames.items():
         if groups.case.rigid[name].moves:
             found[frame.nodes] = True
     return found

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from ..case.model import Case, Step, Zone
-from ..mechanics.fem.elasticity import Block
+from ..mechanics.fem.block import Block
 from ..mechanics.fem.faces import FaceBlock, volume_cells
 from ..mechanics.fem.initial import StrainLoads
 from ..mechanics.fem.mixed import MeanStress
@@ -20,7 +20,8 @@ from ..mechanics.mortar.operator import GapOperator
 from ..mechanics.mortar.treatments import TREATMENTS, Treatment
 from ..system.clock import Clock
 from ..system.progress import stage
-from .attributes import Attributes, CutZone
+from .attributes import Attributes
+from .cut_groups import CutZone
 from .groups import ON_AXIS, check_groups, named_parts
 from .initial import strain_factors, strain_loads_of
 from .operators import operator_of
@@ -85,7 +86,7 @@ class GivenMesh:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rest:
+class Unloaded:
     """What nothing moves (see `solver.simulation.unloaded`).
 
     `unloaded_bodies` (b,) and `unloaded_multipliers` (k,) are left out of the solve, and the cells
@@ -132,7 +133,7 @@ class Scene:
     acted: dict[str, np.ndarray]
     histories: dict[str, tuple[np.ndarray, np.ndarray]]
     zones: list[ZoneScene]
-    rest: Rest
+    rest: Unloaded
 
     def acting(self, step: Step) -> tuple[np.ndarray, np.ndarray]:
         """Forces (n, dim) and imposed displacements (n_dofs,) of a step."""
@@ -226,7 +227,7 @@ def build_scene(
         acted={key: groups.nodes(group, key) for key, group in case.acting.items()},
         histories=groups.histories(),
         zones=zones,
-        rest=Rest(
+        rest=Unloaded(
             unloaded_bodies=np.zeros(n_bodies, dtype=bool),
             fixed_bodies=np.zeros(n_bodies, dtype=bool),
             unloaded_multipliers=np.zeros(n_multipliers, dtype=bool),

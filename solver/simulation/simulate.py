@@ -29,7 +29,7 @@ from .consistency import inconsistency
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
-from .plan import decided, estimated, noted, yielding
+from .plan import decided, estimated, plan_notes, softness_notes
 from .probes import probed
 from .problem import ContactProblem, Equilibrium
 from .recovery import Recovered, RecoveredZone, recovered
@@ -89,11 +89,11 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
         _LOG.info("plan: %s (%s)", line.what, line.why)
     with stage(clock, "solve"):
         states, fields = _walk(problem)
-    plan += noted(problem, states)
+    plan += plan_notes(problem, states)
     with stage(clock, "recovery"):
         solution = _recover(problem, states, fields, plan)
     _log_forces(solution)
-    solution.plan += [*estimated(solution), *remarks(solution.validity), *yielding(solution)]
+    solution.plan += [*estimated(solution), *remarks(solution.validity), *softness_notes(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")

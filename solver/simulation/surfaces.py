@@ -8,7 +8,7 @@ from ..case.model import Case, Zone
 from ..mechanics.fem.faces import FaceBlock
 from ..mechanics.mortar.treatments import TREATMENTS
 from ..system.errors import InputError
-from .attributes import faces_of
+from .cut_groups import faces_of
 
 # Slave and master faces of each zone.
 Surfaces: TypeAlias = list[tuple[list[FaceBlock], list[FaceBlock]]]

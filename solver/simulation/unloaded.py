@@ -21,7 +21,7 @@ from ..mechanics.fem.bodies import (
 )
 from ..mechanics.fem.supports import FreeMotion
 from .constraints import unit_springs
-from .scene import Rest, Scene
+from .scene import Scene, Unloaded
 
 
 def without_unloaded(scene: Scene) -> Scene:
@@ -46,7 +46,7 @@ def without_unloaded(scene: Scene) -> Scene:
     blocks = (block.of(~out[block.cells[:, 0]]) for block in scene.blocks)
     return replace(
         scene,
-        rest=Rest(
+        rest=Unloaded(
             unloaded_bodies=unloaded,
             fixed_bodies=fixed,
             unloaded_multipliers=np.asarray(abs(acting) @ (~kept).astype(float)) > 0,

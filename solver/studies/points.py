@@ -22,7 +22,7 @@ from typing import Any
 
 from ..system.clock import now
 from ..system.errors import InputError, SolveError, hint
-from ..system.process import Ended, run_apart
+from ..system.process import FinishedProcess, run_in_subprocess
 from . import FULL
 
 SOLVED, REFUSED, FAILED, CRASHED, MISSING = "solved", "refused", "failed", "crashed", "missing"
@@ -110,14 +110,14 @@ def run_compiled(
     cores: Sequence[int],
     limit: float,
     memory: float = float("inf"),
-) -> Ended:
-    """What `run_apart` returns of a command in which Numba compiles nothing.
+) -> FinishedProcess:
+    """What `run_in_subprocess` returns of a command in which Numba compiles nothing.
 
     If Numba compiled functions, as the first large solve of an installation does, these are kept
     and the command runs a second time. `command` is called before each run.
     """
     for _ in range(2):
-        done = run_apart(command(), cores, limit, memory, environment=_NUMBA)
+        done = run_in_subprocess(command(), cores, limit, memory, environment=_NUMBA)
         lines = done.output.splitlines(keepends=True)
         if done.status != 0 or not any(line.startswith(_COMPILED) for line in lines):
             break

@@ -19,16 +19,16 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 @dataclass(frozen=True)
-class Ended:
+class FinishedProcess:
     """How a process ended: exit status (negative: by that signal), None if stopped after `limit` s.
 
-    `output` and `complaint` are its standard output and error; `wall` and `cpu` are seconds,
+    `output` and `problem` are its standard output and error; `wall` and `cpu` are seconds,
     children included; `peak_memory_mb` is the largest resident memory of any of them.
     """
 
     status: int | None
     output: str
-    complaint: str
+    problem: str
     wall: float
     cpu: float
     peak_memory_mb: float
@@ -47,7 +47,7 @@ class Ended:
         """
         if self.status is None:
             return f"no end within {self.limit:g} s"
-        lines = (self.complaint.strip() or self.output.strip()).splitlines()
+        lines = (self.problem.strip() or self.output.strip()).splitlines()
         last = lines[-1].strip() if lines else "no word"
         return f"the process died with exit status {self.status}: {last}"
 
@@ -73,17 +73,17 @@ def printed_by(python: Path, option: str, program: str) -> str:
     """What a program prints in another Python, started with `option`; empty without this Python."""
     if not python.is_file():
         return ""
-    return run_apart([str(python), option, "-c", program], None, 60.0).output.strip()
+    return run_in_subprocess([str(python), option, "-c", program], None, 60.0).output.strip()
 
 
-def run_apart(
+def run_in_subprocess(
     command: Sequence[str],
     cores: Sequence[int] | None,
     limit: float,
     memory: float = float("inf"),
     folder: Path | None = None,
     environment: Mapping[str, str] = {},
-) -> Ended:
+) -> FinishedProcess:
     """Run a command on `cores`, its libraries with as many threads, for `limit` seconds at most.
 
     Without `cores` it has one thread, on any of them. `memory` (bytes) is the most that it may ask
@@ -98,7 +98,7 @@ def run_apart(
             resource.setrlimit(resource.RLIMIT_DATA, (int(memory), int(memory)))
 
     threads = dict.fromkeys(THREADS, str(1 if cores is None else len(cores)))
-    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as complaint:
+    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as problem:
         started = now()
         process = subprocess.Popen(
             command,
@@ -106,7 +106,7 @@ def run_apart(
             env={**os.environ, **environment, **threads},
             stdin=subprocess.DEVNULL,
             stdout=output,
-            stderr=complaint,
+            stderr=problem,
             preexec_fn=prepare,  # noqa: PLW1509 -- it calls the system alone
             process_group=0,
         )
@@ -126,11 +126,11 @@ def run_apart(
         wall = now() - started
         process.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)
-        complaint.seek(0)
-        said, complained = (s.read().decode(errors="replace") for s in (output, complaint))
+        problem.seek(0)
+        said, complained = (s.read().decode(errors="replace") for s in (output, problem))
     cpu = used.ru_utime + used.ru_stime
     ending = None if over.is_set() else process.returncode
-    return Ended(ending, said, complained, wall, cpu, peak_mb(used), limit)
+    return FinishedProcess(ending, said, complained, wall, cpu, peak_mb(used), limit)
 
 
 def _kill_group(leader: int) -> None:

@@ -1,9 +1,9 @@
 """The progress of a solve, by the standard library's logging.
 
-Modules log to the logger of their own name: outcomes at the level `OUTCOME`, which `saying` hands
-to a function, and details (each stage, each solution and its residual) as information, which
-`details` writes with the time. Without either nothing is written, unless the program that uses the
-solver listens to the package's logger, `solver` or `mortarcheck`.
+Modules log to the logger of their own name: outcomes at the level `OUTCOME`, which
+`report_outcomes` hands to a function, and details (each stage, each solution and its residual) as
+information, which `details` writes with the time. Without either nothing is written, unless the
+program that uses the solver listens to the package's logger, `solver` or `mortarcheck`.
 """
 
 import logging
@@ -45,7 +45,7 @@ class _Saying(logging.Handler):
 
 
 @contextmanager
-def saying(say: Callable[[str], object]) -> Iterator[None]:
+def report_outcomes(say: Callable[[str], object]) -> Iterator[None]:
     """Hand each outcome that is logged to a function, such as `print`."""
     logger, handler = logging.getLogger(PACKAGE), _Saying(say)
     before = logger.level

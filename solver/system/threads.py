@@ -10,7 +10,7 @@ from typing import TypeVar
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
-_NAME = "ahead"
+_NAME = "prefetch"
 
 
 def cores() -> int:
@@ -26,7 +26,7 @@ def workers() -> int:
     return min(cores(), int(asked)) if asked.isdigit() and int(asked) else cores()
 
 
-def ahead(function: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:
+def prefetch(function: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:
     """`function` of each part, in the order of the parts; threads compute the next few ahead.
 
     A sum of the results thus has the same digits for any number of threads. An exception comes in

@@ -233,7 +233,7 @@ def _worst(checks: Sequence[CheckResult]) -> CheckError | None:
 
 
 def _size(check: CheckError) -> float:
-    """The error, infinite where it is not a number: no error is worse."""
+    """The error, infinite where it is not a number: NaN counts as the largest error."""
     return math.inf if math.isnan(check.error) else check.error
 
 

@@ -45,7 +45,7 @@ from ..mechanics.fem.gauss import gauss_rule
 from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues, computed_pressure
 from ..simulation.solution import Solution, ZoneResult
-from ..system.threads import ahead
+from ..system.threads import prefetch
 from .oscillation import grown, macro_neighbours, oscillation
 
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.
@@ -92,7 +92,7 @@ def _squares(solution: Solution, exact: ElasticSolution) -> Iterator[np.ndarray]
         chosen = np.flatnonzero(moving[block.data].all(axis=1))
         step = max(1, _CHUNK // (len(rule[1]) * kind.n_nodes * kind.dim))
         chunks = [chosen[start : start + step] for start in range(0, len(chosen), step)]
-        yield from ahead(partial(_squares_in, solution, exact, part, block, rule), chunks)
+        yield from prefetch(partial(_squares_in, solution, exact, part, block, rule), chunks)
 
 
 def _squares_in(
@@ -110,7 +110,7 @@ def _squares_in(
     part, place = parts[cells[:, 0]], (values @ points[cells]).reshape(-1, kind.dim)
     at = np.repeat(part, len(weights))
     u, gradient = exact.displacement(place, at), exact.gradient(place, at)
-    if kind.dim == 3 and mixed is None and cell_loops.pay(len(points)):
+    if kind.dim == 3 and mixed is None and cell_loops.is_worthwhile(len(points)):
         lame, shear = np.array([lame_of(material) for material in exact.materials])[part].T
         moved = solution.displacement
         return cell_loops.squares(points, kind, cells, moved, rule, (lame, shear), (u, gradient))
@@ -200,7 +200,7 @@ def _pressures(
         integrals = np.array([_integral(weight, error), _integral(weight, pressure)])
         return integrals, float(np.abs(error[covered]).max(initial=0.0)), float(pressure.max())
 
-    return ahead(within, pieces(zone.faces))
+    return prefetch(within, pieces(zone.faces))
 
 
 def _ellipse_errors(solution: Solution, exact: ExactSolution) -> dict[str, float]:

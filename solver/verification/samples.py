@@ -29,7 +29,7 @@ from ..simulation.groups import ALL
 from ..simulation.initial import strain_at
 from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
-from ..system.threads import ahead
+from ..system.threads import prefetch
 
 Reference = Any
 # Pressures and gaps below this share of load and length are zero.
@@ -254,7 +254,7 @@ def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
         chosen = np.flatnonzero(moving[block.data].all(axis=1))
         step = max(1, _CHUNK // (len(volume_rule(kind.name)[1]) * kind.n_nodes * kind.dim))
         parts = [chosen[start : start + step] for start in range(0, len(chosen), step)]
-        yield from ahead(partial(_hooke_in, solution, i, elastic, first), parts)
+        yield from prefetch(partial(_hooke_in, solution, i, elastic, first), parts)
         first += len(block.data)
 
 

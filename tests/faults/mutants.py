@@ -167,7 +167,7 @@ MUTANTS = (
     Mutant("node-order", "the first two nodes of every cell are exchanged", PLANE,
            "solver.mechanics.fem.elasticity:shapes_in", changed(first_nodes_exchanged)),
     Mutant("quadrature-weight", "one quadrature weight of the cells is 10 % off", BENT,
-           "solver.mechanics.fem.elasticity:volume_rule",
+           "solver.mechanics.fem.block:volume_rule",
            changed(lambda rule: (rule[0], first_scaled(rule[1], 1.1)))),
     Mutant("compiled-cell-lost", "the compiled loop for stress at nodes leaves out a cell", SOLID,
            "solver.mechanics.fem.nodal_stress:cell_loops", last_cell_lost),

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from solver.mechanics.fem.elasticity import Block, element_matrices
+from solver.mechanics.fem.block import Block
+from solver.mechanics.fem.elasticity import element_matrices
 from solver.mechanics.fem.loads import body_forces
 from solver.mechanics.linear.direct import factorise
 from solver.mechanics.mortar.facets import project_along

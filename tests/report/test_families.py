@@ -62,7 +62,7 @@ def test_a_family_as_its_file_tells_it(file):
     assert family.reference == "It is uniform."
     assert [figure.job for figure in family.figures] == ["two-blocks", "not-solved"]
     assert family.figures[0].expression(np.array([[3.0, 0.0]])) == 6.0
-    assert family.complaint == ""
+    assert family.refusal == ""
 
 
 def test_paragraphs_that_are_indented_are_formulas(file):
@@ -80,7 +80,7 @@ def test_paragraphs_that_are_indented_are_formulas(file):
 
 def test_a_family_without_a_file_has_its_folder_s_name(tmp_path):
     family = read_family(tmp_path / "mine" / FILE_NAME)
-    assert (family.name, family.title, family.complaint) == ("mine", "mine", "")
+    assert (family.name, family.title, family.refusal) == ("mine", "mine", "")
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_a_file_that_is_refused_is_told_and_the_report_is_written(
     file, tmp_path, old, new, message
 ):
     file.write_text(FAMILY.replace(old, new, 1))
-    assert message in read_family(file).complaint
+    assert message in read_family(file).refusal
     logged = report(tmp_path, [verdict("a", "passed", family="blocks")], file)
     assert message in logged
     assert str(file) in Page(tmp_path / "blocks.html").text
@@ -111,7 +111,7 @@ OURS = sorted(Path("cases").glob("*/family.yaml"))
 @pytest.mark.parametrize("file", OURS, ids=lambda file: file.parent.name)
 def test_every_family_of_ours_tells_problem_and_reference_and_draws_solves_it_has(file):
     family = read_family(file)
-    assert family.complaint == ""
+    assert family.refusal == ""
     assert all(text.strip() for text in (family.description, family.problem, family.reference))
     jobs = set()
     for path in set(file.parent.glob("*.yaml")) - {file, file.with_name("orders.yaml")}:
@@ -331,7 +331,7 @@ CASES = Path(__file__).parents[2] / "cases"
 @pytest.mark.parametrize("file", sorted(CASES.glob(f"*/{FILE_NAME}")), ids=lambda f: f.parent.name)
 def test_each_family_says_what_its_tolerances_are_made_of(file):
     family = read_family(file)
-    assert not family.complaint
+    assert not family.refusal
     assert family.tolerance or "tolerance" in family.reference
 
 

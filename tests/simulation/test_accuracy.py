@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from solver.case.reader import load_case
+from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.cell_sizes import largest_strain
-from solver.mechanics.fem.elasticity import Block
 from solver.mesh import generate, transform
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.accuracy import Accuracy

@@ -5,11 +5,11 @@ import time
 
 import pytest
 
-from solver.system.process import cores_for, run_apart
+from solver.system.process import cores_for, run_in_subprocess
 
 
 def python(text, limit=60.0, **options):
-    return run_apart([sys.executable, "-c", text], cores_for(1), limit, **options)
+    return run_in_subprocess([sys.executable, "-c", text], cores_for(1), limit, **options)
 
 
 def test_what_a_process_took():

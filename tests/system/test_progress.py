@@ -74,7 +74,7 @@ def test_what_was_held_back_is_told_once_it_takes_long(capsys, monkeypatch):
 def test_outcomes_of_a_thread_go_to_its_function():
     said, log = [], logging.getLogger("solver.any")
     before = logging.getLogger("solver").level
-    with progress.saying(said.append):
+    with progress.report_outcomes(said.append):
         log.log(progress.OUTCOME, "%d unknowns", 3)
         log.info("a detail")
         other = Thread(target=log.log, args=(progress.OUTCOME, "of another solve"))

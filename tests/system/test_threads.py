@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.system import threads
-from solver.system.threads import ahead, workers
+from solver.system.threads import prefetch, workers
 
 
 @pytest.fixture(params=[1, 2, 5])
@@ -18,12 +18,12 @@ def count(request, monkeypatch):
 @pytest.mark.parametrize("parts", [0, 1, 3, 100])
 def test_results_come_in_the_order_of_the_parts(count, parts):
     values = np.random.default_rng(0).random(parts)
-    assert list(ahead(lambda i: 2 * values[i], range(parts))) == (2 * values).tolist()
+    assert list(prefetch(lambda i: 2 * values[i], range(parts))) == (2 * values).tolist()
 
 
 def test_few_results_wait(count):
     begun = []
-    results = ahead(lambda i: begun.append(i) or i, range(1000))
+    results = prefetch(lambda i: begun.append(i) or i, range(1000))
     for _ in range(10):
         next(results)
     assert len(begun) <= 10 + 3 * count + 1
@@ -35,7 +35,7 @@ def test_an_exception_comes_in_its_place(count):
             raise ValueError("three")
         return i
 
-    results = ahead(refuse, range(50))
+    results = prefetch(refuse, range(50))
     assert [next(results) for _ in range(3)] == [0, 1, 2]
     with pytest.raises(ValueError, match="three"):
         next(results)
@@ -44,12 +44,12 @@ def test_an_exception_comes_in_its_place(count):
 def test_threads_compute_together(monkeypatch):
     monkeypatch.setattr(threads, "workers", lambda: 2)
     both = threading.Barrier(2, timeout=10)
-    assert len(set(ahead(lambda _: both.wait(), range(2)))) == 2
+    assert len(set(prefetch(lambda _: both.wait(), range(2)))) == 2
 
 
 def test_a_single_part_needs_no_thread(monkeypatch):
     monkeypatch.setattr(threads, "workers", lambda: 4)
-    assert list(ahead(lambda _: threading.current_thread(), [0])) == [threading.current_thread()]
+    assert list(prefetch(lambda _: threading.current_thread(), [0])) == [threading.current_thread()]
 
 
 @pytest.mark.parametrize(

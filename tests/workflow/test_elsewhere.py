@@ -75,3 +75,9 @@ def test_the_environment_of_conda_has_the_packages_of_the_project():
     names = {OF_CONDA.get(name, name) for name in project["dependencies"]}
     assert set(others) == names | {"pip", "setuptools"}
     assert (content["name"], content["channels"][0]) == (project["name"], "conda-forge")
+
+
+def test_the_settings_are_those_of_the_schema():
+    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+    rows = re.findall(r"^\| (`.*?`) \|", (ROOT / "config/README.md").read_text(), re.MULTILINE)
+    assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} == {*schema["properties"]}

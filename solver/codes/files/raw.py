@@ -1,4 +1,4 @@
-"""What a file of results holds: places, and fields by the names that the code gave them."""
+"""Contents of a result file: locations, and fields under their original names."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from scipy import sparse
 
-from ...system.threads import ahead
+from ...system.threads import prefetch
 
 # Nodes whose neighbours are found at once.
 _NODES_AT_ONCE = 1 << 16
@@ -49,7 +49,7 @@ class CellSum:
             # In the precision of the sum: NumPy adds mixed ones four times slower.
             return entries.ravel(), values.astype(self._data.dtype, copy=False).ravel()
 
-        for entries, values in ahead(placed, parts):
+        for entries, values in prefetch(placed, parts):
             np.add.at(self._data.reshape(-1), entries, values)
 
     def _places(self, cells: np.ndarray) -> np.ndarray:
@@ -106,7 +106,7 @@ def _neighbours(cells: Sequence[np.ndarray], n_nodes: int) -> sparse.csr_matrix:
         found.sort_indices()
         return found.indices.astype(np.int32, copy=False), np.diff(found.indptr)
 
-    parts = list(ahead(near, range(0, n_nodes, _NODES_AT_ONCE)))
+    parts = list(prefetch(near, range(0, n_nodes, _NODES_AT_ONCE)))
     columns = np.concatenate([np.empty(0, np.int32), *(indices for indices, _ in parts)])
     counts = np.concatenate([[0], *(count for _, count in parts)])
     arrays = np.arange(len(columns), dtype=np.int32), columns, np.cumsum(counts, dtype=np.int32)

@@ -6,35 +6,32 @@ nodes of a thread are a slab of the mesh: few cells have nodes of two threads.
 """
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...mesh.catalogue import CellType
 from ...system.compiled import available
 from ...system.errors import SolveError
-from ...system.threads import ahead, workers
+from ...system.threads import prefetch, workers
 from . import cell_kernels, shape_functions
-
-if TYPE_CHECKING:
-    from .elasticity import Block
+from .block import Block
 
 # Nodes from which these loops pay for loading Numba: 60,000 unknowns.
 _LEAST = 20_000
 
 
-def pay(n_nodes: int) -> bool:
+def is_worthwhile(n_nodes: int) -> bool:
     """Whether a mesh is large enough to load Numba, and Numba is installed."""
     return available() and n_nodes >= _LEAST
 
 
-def serve(n_nodes: int, blocks: Sequence["Block"]) -> bool:
+def serve(n_nodes: int, blocks: Sequence[Block]) -> bool:
     """Whether these loops serve a mesh: a large one of solid cells."""
-    return pay(n_nodes) and all(block.type.dim == 3 for block in blocks)
+    return is_worthwhile(n_nodes) and all(block.type.dim == 3 for block in blocks)
 
 
 def add_stiffness(
-    points: np.ndarray, block: "Block", starts: np.ndarray, columns: np.ndarray, out: np.ndarray
+    points: np.ndarray, block: Block, starts: np.ndarray, columns: np.ndarray, out: np.ndarray
 ) -> None:
     """Add the stiffness of a block's cells to the blocks `out` (nnz, 3, 3) of a sum.
 
@@ -44,9 +41,7 @@ def add_stiffness(
     _shared(cell_kernels.stiffness_rows, points, block, starts, columns, out)
 
 
-def add_forces(
-    points: np.ndarray, block: "Block", displacement: np.ndarray, out: np.ndarray
-) -> None:
+def add_forces(points: np.ndarray, block: Block, displacement: np.ndarray, out: np.ndarray) -> None:
     """Add the internal forces of a block's cells to `out` (n_nodes, 3).
 
     `displacement` (parts, n_nodes, 3); see `elasticity.internal_force`.
@@ -55,7 +50,7 @@ def add_forces(
 
 
 def add_nodal_stress(
-    points: np.ndarray, block: "Block", displacement: np.ndarray, fit: np.ndarray, out: np.ndarray
+    points: np.ndarray, block: Block, displacement: np.ndarray, fit: np.ndarray, out: np.ndarray
 ) -> None:
     """Add the stress at the nodes of a block's cells, seen from each cell, to `out` (n_nodes, 6).
 
@@ -66,7 +61,7 @@ def add_nodal_stress(
 
 def add_sizes(
     points: np.ndarray,
-    block: "Block",
+    block: Block,
     displacement: np.ndarray,
     force: np.ndarray,
     most: np.ndarray,
@@ -81,7 +76,7 @@ def add_sizes(
 
 
 def largest_strain(
-    points: np.ndarray, block: "Block", displacement: np.ndarray
+    points: np.ndarray, block: Block, displacement: np.ndarray
 ) -> tuple[float, float]:
     """The largest principal strain and rotation in a block; see `cell_sizes.largest_strain`."""
     largest = np.zeros((workers(), 2))
@@ -89,7 +84,7 @@ def largest_strain(
     return float(largest[:, 0].max()), float(largest[:, 1].max())
 
 
-def steepest(points: np.ndarray, block: "Block") -> float:
+def steepest(points: np.ndarray, block: Block) -> float:
     """The largest sum of the sizes of the gradients in a block; see `cell_sizes.steepest`."""
     largest = np.zeros(workers())
     _shared(cell_kernels.steep_rows, points, block, largest, middle=True)
@@ -123,7 +118,7 @@ def squares(
 def _shared(
     loop: Callable[..., None],
     points: np.ndarray,
-    block: "Block",
+    block: Block,
     *more: object,
     middle: bool = False,
 ) -> None:
@@ -140,7 +135,7 @@ def _shared(
         owner = np.searchsorted(cuts, along, side="right").astype(np.int32)
     known = points, block.cells, block.lame, block.shear, on_reference, weights
     about = [np.ascontiguousarray(array) for array in known]
-    for _ in ahead(lambda mine: loop(mine, owner, bad, *about, *more), range(count)):
+    for _ in prefetch(lambda mine: loop(mine, owner, bad, *about, *more), range(count)):
         pass
     _refuse_if(bad, block.type)
 

@@ -7,7 +7,8 @@ from functools import partial
 import numpy as np
 
 from . import cell_loops
-from .elasticity import Block, Found, Shapes, by_part, shapes_in, stress_in
+from .block import Block
+from .elasticity import Found, Shapes, by_part, shapes_in, stress_in
 
 
 @dataclass(frozen=True, kw_only=True)

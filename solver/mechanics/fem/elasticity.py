@@ -7,7 +7,7 @@ Source: Bathe, Finite Element Procedures, §5.3. Works on arrays alone.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TypeVar
 
@@ -16,9 +16,10 @@ from scipy import sparse
 
 from ...mesh.catalogue import CellType
 from ...system.errors import SolveError
-from ...system.threads import ahead
-from . import cell_loops, shape_functions, volume_rule
+from ...system.threads import prefetch
+from . import cell_loops, shape_functions
 from .assembly import CellSum
+from .block import Block
 from .faces import circumference
 from .small_matrices import invert
 
@@ -27,41 +28,6 @@ _CHUNK_BYTES, _MATRIX_BYTES = 1 << 20, 3 << 20
 _ALL = slice(None)
 
 Found = TypeVar("Found")
-
-
-@dataclass(frozen=True)
-class Block:
-    """Cells of one type with their material.
-
-    `cells` (n, n_nodes) node numbers; `lame` and `shear` (n,) Lamé's λ and μ, in units of stress
-    (plane strain in 2D); `straight`: all their edges are; `axisymmetric`: sections of rings; `rows`
-    (n,): their places among all cells of the type, where it matters.
-    """
-
-    type: CellType
-    cells: np.ndarray
-    lame: np.ndarray
-    shear: np.ndarray
-    straight: bool = True
-    axisymmetric: bool = False
-    rows: np.ndarray | None = None
-
-    @property
-    def rule(self) -> tuple[np.ndarray, np.ndarray]:
-        """The quadrature points (q, dim) and weights (q,) of the block."""
-        return volume_rule(self.type.name, self.straight)
-
-    @property
-    def middle(self) -> tuple[np.ndarray, np.ndarray]:
-        """The point (1, dim) in the middle of its cells, with all the weight (1,) of the rule."""
-        reference, weights = self.rule
-        return (weights @ reference / weights.sum())[None], weights.sum()[None]
-
-    def of(self, chosen: np.ndarray | slice) -> "Block":
-        """The chosen (n,) of its cells."""
-        cells, lame, shear = self.cells[chosen], self.lame[chosen], self.shear[chosen]
-        rows = None if self.rows is None else self.rows[chosen]
-        return replace(self, cells=cells, lame=lame, shear=shear, rows=rows)
 
 
 def lame_parameters(young: np.ndarray, poisson: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -186,7 +152,7 @@ def by_part(
     block: Block, dim: int, found: Callable[[slice], Found]
 ) -> Iterator[tuple[slice, Found]]:
     """The `chunks` of a block, and what is `found` for each, in their order; threads find it."""
-    return ahead(lambda part: (part, found(part)), chunks(block, dim))
+    return prefetch(lambda part: (part, found(part)), chunks(block, dim))
 
 
 def _parts(block: Block, size: int, together: int) -> Iterator[slice]:

@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 
 from ...mesh.catalogue import BY_MESHIO, CellType, cell_type
-from ...system.threads import ahead
+from ...system.threads import prefetch
 from . import face_rule, shape_functions
 from .gauss import gauss_rule
 
@@ -296,7 +296,7 @@ def means_on_faces(
         found = np.vstack([values(at.place), np.ones(len(at.place))]) * at.weight
         return found.reshape(len(found), len(piece[2]), -1).sum(axis=2)
 
-    by_face = np.concatenate(list(ahead(integrals, pieces(faces))), axis=1)
+    by_face = np.concatenate(list(prefetch(integrals, pieces(faces))), axis=1)
     owner = np.concatenate([owner for _, _, owner in faces])
     *total, area = (np.bincount(owner, row) for row in by_face)
     return np.stack(total) / area

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .elasticity import Block, chunks, shapes_in
+from .block import Block
+from .elasticity import chunks, shapes_in
 from .mixed import MeanStress
 from .nodal_stress import extrapolation
 

@@ -28,7 +28,8 @@ from scipy import sparse
 
 from . import shape_functions
 from .assembly import degrees_of_freedom
-from .elasticity import Block, chunks, shapes_in
+from .block import Block
+from .elasticity import chunks, shapes_in
 
 AUTOMATIC_ABOVE = 0.499
 """Poisson's ratio above which the mixed form is taken where a case does not choose."""

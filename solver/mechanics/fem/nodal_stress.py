@@ -6,7 +6,8 @@ import numpy as np
 
 from ...mesh.catalogue import CellType
 from . import cell_loops, shape_functions
-from .elasticity import Block, by_part, in_precision, shapes_in, stress_in
+from .block import Block
+from .elasticity import by_part, in_precision, shapes_in, stress_in
 
 
 def nodal_stress(

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from .elasticity import Block
+from .block import Block
 
 # Half-edges at a node differ by more than this where cells are slender. Between 3 and 5 the
 # iterations differ by a tenth.

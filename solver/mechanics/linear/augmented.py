@@ -50,9 +50,9 @@ class AugmentedSystem:
         return f"{self.reason}; {self.factor.why}"
 
     @property
-    def doubt(self) -> str:
+    def warning(self) -> str:
         """See `LinearSolver`."""
-        return self.factor.doubt
+        return self.factor.warning
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
@@ -120,8 +120,8 @@ def augment(
     scaled = (sparse.diags(1 / size) @ constraints).tocsr()
     gram = factorise(scaled @ sparse.diags(compliance) @ scaled.T, least=_LEAST)
     factor = prepare(_augmented(matrix, scaled), unknowns, gave_up, shared)
-    if factor.doubt:
-        raise SolveError(factor.doubt)
+    if factor.warning:
+        raise SolveError(factor.warning)
     return AugmentedSystem(scaled, size, factor, compliance, gram, why)
 
 

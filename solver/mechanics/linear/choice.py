@@ -34,20 +34,20 @@ class LinearSolver:
 
     Multigrid is replaced by a factor when it does not converge (thin cells, nearly incompressible
     material); `gave_up` then says why and is empty otherwise. Where the matrix is singular to
-    working precision, which `doubt` then says, the factor is that of a matrix that differs by
+    working precision, which `warning` then says, the factor is that of a matrix that differs by
     round-off: what it solves is a solution only if refinement converges.
     """
 
     def __init__(self, matrix: Symmetric, solver: Factor | Multigrid | Stiffened | None, why: str):
         """Without a `solver` the matrix is factored."""
         self._matrix, self._why = matrix, why
-        self.gave_up = self.doubt = ""
+        self.gave_up = self.warning = ""
         self._solver = self._factor() if solver is None else solver
 
     @property
     def why(self) -> str:
         """Why it was chosen, and what to mind."""
-        return f"{self._why}; nearly singular: {_SOFT}" if self.doubt else self._why
+        return f"{self._why}; nearly singular: {_SOFT}" if self.warning else self._why
 
     @property
     def name(self) -> str:
@@ -74,7 +74,7 @@ class LinearSolver:
         except SolveError as error:
             if isinstance(self._solver, Factor):
                 raise
-            self._why = self.gave_up = _instead(error)
+            self._why = self.gave_up = _fallback_reason(error)
             _LOG.info("%s", self.why)
         self._solver.close()
         self._solver = self._factor()
@@ -85,14 +85,14 @@ class LinearSolver:
         try:
             return factorise(matrix)
         except SolveError as error:
-            self.doubt = str(error)
+            self.warning = str(error)
         for shift in _SHIFTS:
             try:
                 shifted = matrix + shift * diags(matrix.diagonal())
                 return factorise(shifted, least=0.0)
             except SolveError:
                 continue
-        raise SolveError(self.doubt)
+        raise SolveError(self.warning)
 
 
 def prepare(
@@ -105,7 +105,7 @@ def prepare(
 
     Without `unknowns`, which multigrid asks for, the matrix is factored. `shared`: see `Multigrid`.
     `gave_up`: why multigrid failed on a similar matrix; it is then not tried again. Raises
-    SolveError where the matrix is not positive definite beyond round-off; see `LinearSolver.doubt`.
+    SolveError where the matrix is not positive definite beyond round-off; see `LinearSolver`.
     A singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
     """
     if unknowns is None:
@@ -120,7 +120,7 @@ def prepare(
             return LinearSolver(matrix, solver, why if wanted() == "auto" else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
-            against = gave_up = _instead(error)
+            against = gave_up = _fallback_reason(error)
             _LOG.info("%s", against)
     chosen = LinearSolver(matrix, None, against)
     chosen.gave_up = gave_up
@@ -156,5 +156,5 @@ def _against_stiffened(matrix: Symmetric) -> str:
     return f"{few}: a factor is faster than multigrid" * (matrix.shape[0] < least)
 
 
-def _instead(error: SolveError) -> str:
+def _fallback_reason(error: SolveError) -> str:
     return f"multigrid does not serve here: {error}"

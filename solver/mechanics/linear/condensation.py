@@ -56,7 +56,7 @@ class ConstrainedSystem(Protocol):
         """Why it was chosen."""
 
     @property
-    def doubt(self) -> str:
+    def warning(self) -> str:
         """Why a residual that stays large means no solution; empty for a sound factor."""
 
     def correction(
@@ -102,9 +102,9 @@ class CondensedSystem:
         return self.factor.why
 
     @property
-    def doubt(self) -> str:
+    def warning(self) -> str:
         """The factor of a nearly singular matrix belongs to another one."""
-        return self.factor.doubt
+        return self.factor.warning
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
@@ -143,7 +143,7 @@ class SaddlePoint:
     weight: float
     factor: Factor
     why: str
-    doubt: str = ""
+    warning: str = ""
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
@@ -327,6 +327,6 @@ def solve(
             break
         # No more than it takes from here to well below round-off.
         accuracy = min(max(_WELL_BELOW * round_off / last, ROUGH), _LEAST_GAIN)
-    if system.doubt and last > _CONVERGED:
-        raise SolveError(system.doubt)
+    if system.warning and last > _CONVERGED:
+        raise SolveError(system.warning)
     return iterate, system.multiplier(force), last

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.compiled import compiled, worthwhile
-from ...system.threads import ahead
+from ...system.threads import prefetch
 from .products import pattern, ranges, rows_of, share_rows
 
 _PARTS = 8  # of a product that SciPy forms in parts
@@ -47,7 +47,7 @@ def coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
             )
             return (fine.T @ (some @ prolongation)).tobsr((width, width))
 
-        return sum(ahead(part, range(step, count, step)), part(0))
+        return sum(prefetch(part, range(step, count, step)), part(0))
     ways = pattern(prolongation)
     near, felt = pattern(matrix), ways.T.tocsr()
     total = _empty(lambda some: felt[some] @ near @ ways, felt.indptr, prolongation, width)
@@ -75,7 +75,7 @@ def _empty(
         found.sort_indices()
         return found.indices.astype(np.int32, copy=False), np.diff(found.indptr)
 
-    parts = list(ahead(part, ranges(starts, _MARKS, _PARTS)))
+    parts = list(prefetch(part, ranges(starts, _MARKS, _PARTS)))
     indices = np.concatenate([columns for columns, _ in parts])
     counts = np.concatenate([[0], *(lengths for _, lengths in parts)])
     size = like.blocksize if height is None else (height, like.blocksize[1])

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...system.compiled import worthwhile
 from ...system.errors import SolveError
-from ...system.threads import ahead
+from ...system.threads import prefetch
 from . import vectors
 
 _LOG = logging.getLogger(__name__)
@@ -200,7 +200,7 @@ def _total(found: Callable[[slice], Any], size: int) -> np.ndarray:
 def _in_parts(work: Callable[[slice], Any], size: int) -> list[Any]:
     """What `work` returns for some rows at a time, in their order; threads do it."""
     parts = (slice(first, first + _ROWS) for first in range(0, size, _ROWS))
-    return list(ahead(work, parts))
+    return list(prefetch(work, parts))
 
 
 def by_columns(function: Operator, x: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...system.errors import SolveError
-from ...system.threads import ahead
+from ...system.threads import prefetch
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .contact_levels import Correction, correction_of
 from .hierarchy import Hierarchy, Level, Shared
@@ -95,7 +95,7 @@ class Multigrid:
             partial(finest.corrected, correction, most, beside),
             below,
         ]
-        first, (others, last) = ahead(lambda task: task(), tasks)
+        first, (others, last) = prefetch(lambda task: task(), tasks)
         self._levels = [first, *others]
         return last
 

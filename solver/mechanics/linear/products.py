@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.compiled import compiled, worthwhile
-from ...system.threads import ahead, workers
+from ...system.threads import prefetch, workers
 
 _LEAST = 200_000  # multiplications from which another thread pays for its start
 _PARTS = 16  # of a transposed product
@@ -72,7 +72,7 @@ def multiply_transposed(matrix: bsr_matrix, x: np.ndarray) -> np.ndarray:
         kernel(*some, *arrays, x, out)
         return out
 
-    parts = ahead(part, ranges(matrix.indptr, matrix.data[:1].size, _PARTS))
+    parts = prefetch(part, ranges(matrix.indptr, matrix.data[:1].size, _PARTS))
     total = next(parts)
     for other in parts:
         total += other
@@ -101,7 +101,7 @@ class InParts:
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """The product (m,) with x (n,)."""
-        return np.concatenate(list(ahead(lambda part: part @ x, self._parts)))
+        return np.concatenate(list(prefetch(lambda part: part @ x, self._parts)))
 
 
 def chosen_rows(matrix: bsr_matrix, rows: np.ndarray) -> csr_matrix:
@@ -187,13 +187,15 @@ def ranges(starts: np.ndarray, weight: int, most: int) -> list[tuple[int, int]]:
 
 def share_rows(work: Callable[[int, int], None], starts: np.ndarray, weight: int = 1) -> None:
     """Call `work` on a range of rows in each thread; see `ranges`."""
-    for _ in ahead(lambda some: work(*some), ranges(starts, weight, workers())):
+    for _ in prefetch(lambda some: work(*some), ranges(starts, weight, workers())):
         pass
 
 
 def in_pieces(work: Callable[[int, int], None], matrix: bsr_matrix) -> None:
     """Call `work` on ranges of rows of blocks so small that its own arrays stay small."""
-    for _ in ahead(lambda some: work(*some), ranges(matrix.indptr, matrix.data[:1].size, 1 << 30)):
+    for _ in prefetch(
+        lambda some: work(*some), ranges(matrix.indptr, matrix.data[:1].size, 1 << 30)
+    ):
         pass
 
 

@@ -48,9 +48,9 @@ class StabilisedSystem:
         return self.condensed.why
 
     @property
-    def doubt(self) -> str:
+    def warning(self) -> str:
         """See `CondensedSystem`."""
-        return self.condensed.doubt
+        return self.condensed.warning
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...system.compiled import compiled, worthwhile
-from ...system.threads import ahead
+from ...system.threads import prefetch
 from .products import chosen_rows, multiply, pattern, ranges
 
 _SLABS = 8  # the most threads that share a product
@@ -144,7 +144,7 @@ def _on_slabs(
     kernel: Callable[..., None], slabs: Iterable[tuple[int, int]], *about: object
 ) -> None:
     """Call a kernel for each slab of rows; threads do it."""
-    for _ in ahead(lambda some: kernel(*some, *about), slabs):
+    for _ in prefetch(lambda some: kernel(*some, *about), slabs):
         pass
 
 

@@ -75,9 +75,9 @@ class IndependentSystems:
         return f"{self._largest.why}; largest of {len(self.parts)} systems"
 
     @property
-    def doubt(self) -> str:
+    def warning(self) -> str:
         """The first of its parts."""
-        return next((system.doubt for _, _, system in self.parts if system.doubt), "")
+        return next((system.warning for _, _, system in self.parts if system.warning), "")
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ...system.threads import ahead
+from ...system.threads import prefetch
 
 _ROWS = 1 << 15  # that a thread handles at once
 
@@ -88,7 +88,7 @@ def nodes_at(
         some = slice(first, first + _ROWS)
         motions[place[some]] = given[some] / units[some, None]
 
-    for _ in ahead(fill, range(0, len(place), _ROWS)):
+    for _ in prefetch(fill, range(0, len(place), _ROWS)):
         pass
     if unknowns.points is None:
         return LevelNodes(motions, body, None)

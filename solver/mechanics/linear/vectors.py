@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...system.compiled import compiled, part_of_compiled
-from ...system.threads import ahead, workers
+from ...system.threads import prefetch, workers
 
 _PART = 1 << 13  # of a vector
 _PARTS = 8  # of them from which another thread pays for its start
@@ -55,7 +55,7 @@ def _shared(kernel: Callable[..., None], *about: Any) -> None:
     parts = -(-len(about[0]) // _PART)
     count = min(workers(), 1 + parts // _PARTS)
     cuts = [parts * k // count for k in range(count + 1)]
-    for _ in ahead(lambda mine: kernel(*mine, _PART, *about), pairwise(cuts)):
+    for _ in prefetch(lambda mine: kernel(*mine, _PART, *about), pairwise(cuts)):
         pass
 
 

@@ -21,7 +21,7 @@ from .multipliers import (
     constants,
 )
 from .partners import on_one_surface, uncovered, without_partner
-from .recovery import Asked, Recovery, recovery
+from .recovery import Recovery, RecoveryRequest, recovery
 from .segments import Segments, intersect
 from .surface_points import Samples, Surface, face_samples
 
@@ -112,7 +112,7 @@ def gap_operator(
     n_nodes: int,
     search: float | None = None,
     scheme: Scheme = LAC,
-    asked: Asked | None = None,
+    asked: RecoveryRequest | None = None,
 ) -> GapOperator:
     """Gap operator of slave sub-faces (numbered by macro-element) over master faces.
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...mesh.catalogue import CellType, cell_type
-from ...system.threads import ahead
+from ...system.threads import prefetch
 from .pairing import candidate_pairs
 
 # Cells that are looked at together.
@@ -42,7 +42,7 @@ def inside_others(points: np.ndarray, cells: dict[str, np.ndarray], body: np.nda
         for kind, nodes in blocks
         for first in range(0, len(nodes), _AT_ONCE)
     ]
-    balls = ahead(lambda nodes: _ball(points[nodes]), parts)
+    balls = prefetch(lambda nodes: _ball(points[nodes]), parts)
     middle, radius = (np.concatenate(each) for each in zip(*balls, strict=True))
     owner = np.concatenate([body[nodes[:, 0]] for _, nodes in blocks])
     inside = np.zeros(len(owner), dtype=bool)

@@ -22,7 +22,7 @@ from .surface_points import Surface
 
 
 @dataclass(frozen=True)
-class Asked:
+class RecoveryRequest:
     """The form of a recovery on m macro-elements.
 
     `near` (m, m): which share a vertex; `material` (m,): a number of that of the slave's cells. The
@@ -97,7 +97,9 @@ class Recovery:
         return scale * np.sqrt(np.maximum(square, 0.0))
 
 
-def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes: int) -> Recovery:
+def recovery(
+    asked: RecoveryRequest, found: Sequence[Segments], surface: Surface, n_nodes: int
+) -> Recovery:
     """The recovery of the pressure of macro-elements, from the segments that cover them.
 
     A slave edge from 0 to 2 under two master edges, with ψ = (1 − x) / 2: ∫ ψ N is ±1/6 at the two
@@ -106,7 +108,8 @@ def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes:
     >>> found = meet_in_segments([slave], [], [master], 1.0, degree=1)
     >>> at = Surface(area=np.array([2.0]), covered=np.array([2.0]), centre=np.array([[1.0, 0.0]]),
     ...              normal=np.array([[0.0, 1.0]]), lost=np.zeros(1))
-    >>> alone = Asked(FORMS["linear"], sparse.eye_array(1, dtype=bool).tocsr(), np.zeros(1))
+    >>> near = sparse.eye_array(1, dtype=bool).tocsr()
+    >>> alone = RecoveryRequest(FORMS["linear"], near, np.zeros(1))
     >>> one = recovery(alone, found, at, len(points))
     >>> one.loads.toarray().reshape(5, 2)[:, 1].round(4).tolist(), one.products.round(4).tolist()
     ([-0.1667, 0.1667, 0.1667, 0.0, -0.1667], [[[0.1667]]])
@@ -147,7 +150,7 @@ def recovery(asked: Asked, found: Sequence[Segments], surface: Surface, n_nodes:
     )
 
 
-def _same_materials(asked: Asked, found: Sequence[Segments]) -> sparse.csr_matrix:
+def _same_materials(asked: RecoveryRequest, found: Sequence[Segments]) -> sparse.csr_matrix:
     """Pairs of macro-elements (m, m) that share a vertex, the second between no other materials.
 
     Where the material of the master changes under a macro-element, it has neighbours on both sides,

@@ -19,7 +19,7 @@ from typing import Self
 
 import numpy as np
 
-from ...system.threads import ahead
+from ...system.threads import prefetch
 from ..fem import mortar_degree, shape_functions, simplex_rule
 from ..fem.faces import circumference
 from ..fem.small_matrices import invert
@@ -149,7 +149,7 @@ def intersect(
         behind = hidden[low:high] - start, pairs.j[nearer[low:high]]
         return list(_segments(pairs.of(slice(start, end)), behind, reach, more))
 
-    return list(chain.from_iterable(ahead(part, range(0, len(pairs.i), _PAIRS_AT_ONCE))))
+    return list(chain.from_iterable(prefetch(part, range(0, len(pairs.i), _PAIRS_AT_ONCE))))
 
 
 # Pieces of slave faces: pair numbers (s,), places (s, q, dim − 1), weights (s, q)

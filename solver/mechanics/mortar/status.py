@@ -115,7 +115,7 @@ def find_status(
             continue
         if closed is not None:
             return StatusResult(closed, len(changes) + 1 + confirm, changes)
-    return _certain(solve, eligible, area, stiffness, changes, failure)
+    return _solve_complementarity(solve, eligible, area, stiffness, changes, failure)
 
 
 def _quick(
@@ -197,7 +197,7 @@ def _first_changes(closed: np.ndarray, wrong: np.ndarray, violation: np.ndarray)
     return now
 
 
-def _certain(
+def _solve_complementarity(
     solve: Solve,
     eligible: np.ndarray,
     area: np.ndarray,

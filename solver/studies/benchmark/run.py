@@ -18,7 +18,7 @@ from ...codes.run import CrashError, Limits, run_code
 from ...system.clock import Clock, now
 from ...system.errors import SolveError
 from ...system.package import COMMAND
-from ...system.process import cores_for, run_apart, used_since
+from ...system.process import cores_for, run_in_subprocess, used_since
 from ...system.progress import OUTCOME
 from ..bandwidth import measure
 from ..points import FAILED, MISSING, SOLVED, ended, measure_apart, surroundings
@@ -83,7 +83,7 @@ def _files(point: ScalingPoint, folder: Path, cores: Sequence[int], limit: float
     """The case and mesh files of a point."""
     case, mesh = folder / "case.yaml", folder / "mesh.vtkhdf"
     case.write_text(point.source(), encoding="utf-8")
-    if run_apart([*COMMAND, "mesh", str(case), "-o", str(mesh)], cores, limit).status != 0:
+    if run_in_subprocess([*COMMAND, "mesh", str(case), "-o", str(mesh)], cores, limit).status != 0:
         raise SolveError(f"{case}: no mesh")
     return {"case": str(case), "mesh": str(mesh)}
 

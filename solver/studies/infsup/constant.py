@@ -12,7 +12,8 @@ from scipy import sparse
 
 from ...mechanics.fem import shape_functions
 from ...mechanics.fem.assembly import CellSum
-from ...mechanics.fem.elasticity import Block, physical_gradients, stiffness
+from ...mechanics.fem.block import Block
+from ...mechanics.fem.elasticity import physical_gradients, stiffness
 from ...mechanics.linear.direct import factorise
 from ...simulation.scene import Scene
 

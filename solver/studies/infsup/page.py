@@ -46,22 +46,22 @@ def sections(record: InfSupRecord) -> Markup:
 
 def write_page(record: InfSupRecord, folder: Path) -> str:
     """Write the page, its table and what does not hold into `folder`; returns that."""
-    complaints = failures(record)
+    problems = failures(record)
     page = render(
         Path(__file__).with_name("page.html.jinja"),
         charts=True,
         title="Stability of the contact pressure",
-        good=not complaints,
-        outcome=f"{len(complaints)} do not hold."
-        if complaints
+        good=not problems,
+        outcome=f"{len(problems)} do not hold."
+        if problems
         else "The method with its cut is stable on every mesh of the table.",
         sections=sections(record),
     )
     write_text(folder / PAGE, page)
     write_script(folder)
     write_text(folder / TABLE, as_csv(_rows(record[0])))
-    write_text(folder / FAILURES, "".join(f"{line}\n" for line in complaints))
-    return "\n".join([*complaints, f"Report: {folder / PAGE}"])
+    write_text(folder / FAILURES, "".join(f"{line}\n" for line in problems))
+    return "\n".join([*problems, f"Report: {folder / PAGE}"])
 
 
 def _panel(ladder: InfSupLadder) -> str:

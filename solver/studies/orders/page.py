@@ -34,7 +34,7 @@ def write_orders(families: Sequence[LadderFamily], results: Path, folder: Path) 
     """
     curves = {family.name: read_curves(family, results) for family in families}
     every = [curve for members in curves.values() for curve in members]
-    complaints = [line for curve in every for line in curve.complaints]
+    problems = [line for curve in every for line in curve.problems]
     found = [gain for members in curves.values() for gain in gains(members)]
     found.sort(key=lambda gain: (CELLS.index(gain.cells), gain.form))
     overview = render(
@@ -44,12 +44,12 @@ def write_orders(families: Sequence[LadderFamily], results: Path, folder: Path) 
         families=[_summary(family, curves[family.name]) for family in families],
         gains=found,
         outcome=outcome(every),
-        good=bool(families) and not complaints,
-        complaints=complaints,
+        good=bool(families) and not problems,
+        problems=problems,
         last=LAST,
     )
     pages = {page_of(f.name): _family_page(f, curves[f.name]) for f in families}
-    failures = "".join(f"{line}\n" for line in complaints)
+    failures = "".join(f"{line}\n" for line in problems)
     tables = {SLOPES: _slope_rows(every), POINTS: _point_rows(every), GAINS: _gain_rows(found)}
     contents = {PAGE: overview, FAILURES: failures} | pages
     contents |= {name: as_csv(rows) for name, rows in tables.items()}
@@ -111,7 +111,7 @@ def _family_page(family: LadderFamily, curves: Sequence[Curve]) -> str:
         shown = shown_errors(members)
         panels = [draw_panel(f"{family.name}-{len(parts)}", error, members) for error in shown]
         parts.append({"title": title, "curves": members, "errors": shown, "panels": panels})
-    complaints = [line for curve in curves for line in curve.complaints]
+    problems = [line for curve in curves for line in curve.problems]
     return render(
         Path(__file__).with_name("family.html.jinja"),
         charts=True,
@@ -121,8 +121,8 @@ def _family_page(family: LadderFamily, curves: Sequence[Curve]) -> str:
         groups=parts,
         below=_below(curves),
         outcome=outcome(curves),
-        good=not complaints,
-        complaints=complaints,
+        good=not problems,
+        problems=problems,
         overview=PAGE,
         names=ERRORS,
         last=LAST,

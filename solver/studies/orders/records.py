@@ -151,7 +151,7 @@ class Curve:
         return slope.value + max(2 * slope.spread, LEEWAY) < least
 
     @cached_property
-    def complaints(self) -> list[str]:
+    def problems(self) -> list[str]:
         """Levels without a result, slopes and finest errors that are not reached, one line each."""
         lines = [f"{self.family.name}/{self.name}: {line}" for line in self.missing]
         for error, what in ERRORS.items():

@@ -46,7 +46,7 @@ from ...case.typed import (
     Section,
     Text,
     read_as,
-    refuse_twins,
+    refuse_duplicates,
     refuse_unknown,
 )
 from ...case.yaml import read_mapping
@@ -223,7 +223,7 @@ class ScalingFile(Section, frozen=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        refuse_twins("series", self.series)
+        refuse_duplicates("series", self.series)
         names = {series.name for series in self.series}
         for i, goal in enumerate(self.goals):
             refuse_unknown(("goals", i, "series"), goal.series, "series", names)

@@ -26,7 +26,7 @@ from ...system.clock import now
 from ...system.files import write_text
 from ...system.memory import available
 from ...system.package import COMMAND
-from ...system.process import cores_for, run_apart
+from ...system.process import cores_for, run_in_subprocess
 from ...verification.verdict import read_verdict
 from ..bandwidth import measure
 from ..points import (
@@ -86,7 +86,7 @@ def _solve(
     """Results and cost of the processes; their files are not kept."""
     case, mesh, verdict = folder / "case.yaml", folder / "mesh.vtkhdf", folder / "verdict.json"
     case.write_text(point.source(), encoding="utf-8")
-    meshed = run_apart([*COMMAND, "mesh", str(case), "-o", str(mesh)], cores, limit, memory)
+    meshed = run_in_subprocess([*COMMAND, "mesh", str(case), "-o", str(mesh)], cores, limit, memory)
     found = {"meshing": meshed.used, "process": {}} | dict.fromkeys(_FROM_VERDICT)
     found |= {"verdict": None, "faces": None, "machine": {}}
     if meshed.status != 0:

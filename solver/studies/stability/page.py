@@ -55,7 +55,7 @@ def write_stability(
     test and the half-loaded block. Returns the failures and the outcome.
     """
     stem = "stability-quick" if quick else "stability"
-    lines = [line for record in records for line in complaints(record)]
+    lines = [line for record in records for line in problems(record)]
     lines += failures(theory) if theory else []
     contents = {
         PAGE: _to_html(records, quick, lines, theory),
@@ -68,7 +68,7 @@ def write_stability(
     return contents[FAILURES] + f"{outcome(records)} Page: {folder / stem}{PAGE}"
 
 
-def complaints(record: Record) -> list[str]:
+def problems(record: Record) -> list[str]:
     """The points of a sweep that do not hold, one line each."""
     lines = []
     for point in record["points"]:
@@ -101,7 +101,7 @@ def _to_html(
         quick=quick,
         outcome=outcome(records),
         good=bool(records) and not lines,
-        complaints=lines,
+        problems=lines,
         theory=sections(theory) if theory else "",
         table=f"stability{'-quick' * quick}{TABLE}",
         maps=[draw_map(record) for record in records],

@@ -46,7 +46,7 @@ from ...case.typed import (
     Section,
     Text,
     read_as,
-    refuse_twins,
+    refuse_duplicates,
     refuse_unknown,
 )
 from ...case.yaml import read_mapping
@@ -207,8 +207,8 @@ class StudyFile(Section, frozen=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        refuse_twins("treatments", self.treatments)
-        refuse_twins("problems", self.problems)
+        refuse_duplicates("treatments", self.treatments)
+        refuse_duplicates("problems", self.problems)
         problems, treatments = _by_name(self.problems), _by_name(self.treatments)
         for i, treatment in enumerate(self.treatments):
             for name in treatment.problems:

@@ -11,7 +11,8 @@ import solver.mechanics.fem.assembly
 import solver.mechanics.fem.elasticity
 import solver.system.threads
 from solver.mechanics.fem.assembly import CellSum, degrees_of_freedom, selected
-from solver.mechanics.fem.elasticity import Block, stiffness
+from solver.mechanics.fem.block import Block
+from solver.mechanics.fem.elasticity import stiffness
 from solver.mesh.catalogue import BY_NAME
 from tests.scenes import grid
 

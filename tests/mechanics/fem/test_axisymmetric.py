@@ -20,7 +20,7 @@ from solver.mechanics.mortar.edge import contact_edges
 from solver.mechanics.mortar.facets import facets
 from solver.mechanics.mortar.operator import gap_operator
 from solver.mechanics.mortar.reconstruction import FORMS, vertex_neighbours
-from solver.mechanics.mortar.recovery import Asked
+from solver.mechanics.mortar.recovery import RecoveryRequest
 from solver.mesh.catalogue import BY_NAME
 
 PI = np.pi
@@ -157,7 +157,7 @@ def test_mortar_integrals_over_a_disc():
     """∫ N r dr: 2/3 and 4/3 of the slave's hats, 1/6, 1 and 5/6 of the master's."""
     points, slave, master = rings_under_a_disc()
     near = vertex_neighbours([(np.array([0]), np.array([[0, 1]]))], 1)
-    asked = Asked(FORMS["linear"], near, np.zeros(1, dtype=int))
+    asked = RecoveryRequest(FORMS["linear"], near, np.zeros(1, dtype=int))
     operator = gap_operator([slave], [master], 1, len(points), 1.0, asked=asked)
     along = operator.matrix.toarray().reshape(5, 2)[:, 1]
     assert along == pytest.approx(2 * PI * np.array([-2 / 3, -4 / 3, 1 / 6, 1, 5 / 6]))

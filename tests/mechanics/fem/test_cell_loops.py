@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from solver.mechanics.fem import cell_loops
+from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepest
-from solver.mechanics.fem.elasticity import Block, internal_force, stiffness
+from solver.mechanics.fem.elasticity import internal_force, stiffness
 from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh.catalogue import BY_MESHIO, BY_NAME
 from solver.system.compiled import available

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.mechanics.fem.elasticity import Block, internal_force
+from solver.mechanics.fem.block import Block
+from solver.mechanics.fem.elasticity import internal_force
 from solver.mechanics.fem.mixed import split
 from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh import generate

@@ -31,11 +31,11 @@ def test_gradients_are_those_of_the_values(name):
     points, _ = volume_rule(name)
     shape, step = shape_functions(name), 1e-6
     for axis, direction in enumerate(np.eye(BY_NAME[name].dim)):
-        ahead, behind = (
+        prefetch, behind = (
             shape.values(points + step * direction),
             shape.values(points - step * direction),
         )
-        slope = (ahead - behind) / (2 * step)
+        slope = (prefetch - behind) / (2 * step)
         assert np.allclose(shape.gradients(points)[..., axis], slope, atol=1e-7)
 
 

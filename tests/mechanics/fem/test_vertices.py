@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from solver.mechanics.fem.elasticity import Block
+from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.vertices import from_vertices, linear_unknowns
 from solver.mesh.catalogue import BY_NAME
 

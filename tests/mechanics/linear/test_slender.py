@@ -8,7 +8,8 @@ import pytest
 from scipy.sparse import bsr_matrix
 
 from solver.mechanics.fem import vertices
-from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
+from solver.mechanics.fem.block import Block
+from solver.mechanics.fem.elasticity import lame_parameters, stiffness
 from solver.mechanics.linear import aggregation, multigrid, slender
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.multigrid import Multigrid

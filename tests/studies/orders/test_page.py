@@ -133,7 +133,7 @@ def test_nothing_is_missed_where_all_is_reached(family, results, tmp_path):
     assert swapped[0].reached("pressure_l2") is False  # it has no pressure at all
     first = read_curves(family, results)[0]
     assert first.reached("pressure_l2")  # rounding is as good as any slope
-    assert first.complaints == []
+    assert first.problems == []
 
 
 def test_errors_at_the_finest_level_are_held_against_what_is_allowed(family, results, tmp_path):
@@ -145,7 +145,7 @@ def test_errors_at_the_finest_level_are_held_against_what_is_allowed(family, res
     (curve,) = read_curves(read_ladders(tmp_path / "cases/powers/orders.yaml"), results)
     assert curve.kept("pressure_l2")
     assert curve.kept("stress_l2") is None
-    assert curve.complaints == [
+    assert curve.problems == [
         "powers/tria3: displacement, L2: 4.4e-02; at most 0.01 is asked for at the finest level",
         "powers/tria3: peak pressure: not known; at most 1 is asked for at the finest level",
     ]
