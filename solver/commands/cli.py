@@ -177,7 +177,6 @@ def _add_batch(commands: Any) -> None:
         listed=False,
     )
     command.add_argument("socket", type=int, metavar="FD", help="an open, listening socket")
-    jobs.add_folders(command, "*")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -346,11 +345,6 @@ def _serve(options: argparse.Namespace) -> int:
 
     from .server import serve
 
-    if options.folders:
-        try:
-            jobs.print_jobs(options)
-        except InputError:
-            print()  # who asked finds out why from the command `jobs`
     with socket.socket(fileno=options.socket) as listener:
         serve(listener)
     return PASSED

@@ -165,12 +165,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add the command `jobs`."""
     purpose = "list the jobs of folders of cases, as JSON"
     command = add_command(commands, "jobs", print_jobs, purpose, listed=False)
-    add_folders(command, "+")
-
-
-def add_folders(command: argparse.ArgumentParser, count: str) -> None:
-    """Let a command take the folders whose jobs `print_jobs` prints."""
-    command.add_argument("folders", type=Path, nargs=count, metavar="DIR", help="with case files")
+    command.add_argument("folders", type=Path, nargs="+", metavar="DIR", help="with case files")
     command.add_argument("--variants", action="store_true", help="with the other cut of hexahedra")
 
 

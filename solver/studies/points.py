@@ -11,9 +11,8 @@ A record is a JSON object. Every one has these keys:
 
 import json
 import os
-import statistics
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
@@ -40,7 +39,7 @@ Record = Mapping[str, Any]
 class PointStudy:
     """A study measured point by point, each on `threads` cores and for at most `limit` seconds.
 
-    Each point has a `name`, and the `seconds` that it takes, about.
+    Each point has a `name`.
     """
 
     path: Path
@@ -161,45 +160,6 @@ def _work(task: Mapping[str, Any]) -> None:
     except SolveError as error:
         found = ended(FAILED, str(error))
     Path(task["output"]).write_text(to_json(found), encoding="utf-8")
-
-
-def announcement(study: PointStudy, folder: Path, pending: Collection[str]) -> str:
-    """The number of points to be measured, and their time; records are in `folder`."""
-    model = {point.name: point.seconds for point in study.points}
-    if not pending:
-        return f"{study.title}: all {len(model)} points are measured."
-    earlier = measured_before(folder / f"{name}.json" for name in model)
-    seconds = expected(model, pending, earlier, study.limit)
-    basis = "from earlier measurements" if earlier else "from a model, not from this machine"
-    shown = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
-    return (
-        f"{study.title}: {len(pending)} of {len(model)} points to measure, one at a time, "
-        f"on {study.threads} of this machine's cores: about {shown} ({basis})."
-    )
-
-
-def expected(
-    model: Mapping[str, float], pending: Iterable[str], earlier: Mapping[str, float], limit: float
-) -> float:
-    """Seconds that the points of these names will take, each at most `limit`.
-
-    `earlier` has the seconds that points took before; the others are taken from the model, scaled
-    to fit those.
-    """
-    ratios = [earlier[name] / seconds for name, seconds in model.items() if name in earlier]
-    scale = statistics.median(ratios) if ratios else 1.0
-    return sum(min(earlier.get(name) or scale * model[name], limit) for name in pending)
-
-
-def measured_before(files: Iterable[Path]) -> dict[str, float]:
-    """The seconds that points took, by name, from the records there are."""
-    found = {}
-    for record in map(read_record, files):
-        try:
-            found[str(record["point"])] = float(record["whole"])
-        except (KeyError, TypeError, ValueError):
-            continue  # a record that cannot be read is no measurement
-    return found
 
 
 def page_name(name: str, size: str) -> str:

@@ -41,16 +41,16 @@ def folder(tmp_path_factory):
     return folder
 
 
-def start(folder, place, *listed):
-    """A server's process; it listens at `place` in the folder, and first lists jobs."""
+def start(folder, place):
+    """A server's process; it listens at `place` in the folder."""
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(str(folder / place))
         listener.listen()
         return subprocess.Popen(
-            [sys.executable, "-m", "solver", "serve", str(listener.fileno()), *listed],
+            [sys.executable, "-m", "solver", "serve", str(listener.fileno())],
             cwd=folder,
             stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE if listed else subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
             pass_fds=[listener.fileno()],
             env=ONE_THREAD,
         )
@@ -139,21 +139,6 @@ print(*(set(sys.modules) - before))
     )
     late = set(done.stdout.splitlines()[-1].split())
     assert {name for name in late if name.partition(".")[0] in PACKAGES} == set()
-
-
-def test_a_server_first_lists_jobs_as_the_command_does(folder):
-    cases = folder / "cases"
-    cases.mkdir()
-    shutil.copy(folder / "good.yaml", cases / "hexa.yaml")
-    for listed, known in (((str(cases), "--variants"), True), ((str(cases / "none"),), False)):
-        alone = client(folder, "jobs", *listed, place="nowhere")
-        assert (alone.returncode == 0) == known
-        server = start(folder, f"lists-{known}", *listed)
-        lines = [server.stdout.readline().decode().strip() for _ in range(2)]
-        assert lines == ["cold", alone.stdout.splitlines()[1] if known else ""]
-        done = client(folder, "validate", "good.yaml", place=f"lists-{known}")
-        assert done.stdout.startswith("warm")
-        server.communicate(timeout=60)
 
 
 def test_a_server_that_hangs_is_given_up_by_all(folder):

@@ -1,20 +1,17 @@
-"""The time that a study is expected to take, from what was measured before and from the model."""
+"""Points of studies: their meshes, and runs that compile."""
 
-import json
 import sys
 from math import prod
 from pathlib import Path
 
 import pytest
 
-from solver.studies.points import announcement, expected, measured_before, run_compiled
+from solver.studies.points import run_compiled
 from solver.studies.work_precision.description import read_study
 from solver.system.compiled import available
 from solver.system.process import cores_for
 
 FILE = Path(__file__).parents[2] / "cases/study/study.yaml"
-STUDY = read_study(FILE, "quick")
-MODEL = {point.name: point.seconds for point in STUDY.points}
 
 
 def test_unknowns_of_regular_grids_are_counted():
@@ -29,44 +26,6 @@ def test_unknowns_of_regular_grids_are_counted():
     ]
     nodes = [*corners, *edges]
     assert point.mesh.unknowns == 3 * sum(nodes)
-
-
-def test_what_was_measured_before_is_taken_as_it_is():
-    earlier = dict.fromkeys(MODEL, 2.0)
-    assert expected(MODEL, MODEL, earlier, 100.0) == pytest.approx(2.0 * len(STUDY.points))
-    assert expected(MODEL, list(MODEL)[:3], earlier, 100.0) == pytest.approx(6.0)
-
-
-def test_the_model_is_scaled_by_what_is_known():
-    first, *others = MODEL
-    plain = sum(MODEL[name] for name in others)
-    assert expected(MODEL, others, {}, 1e6) == pytest.approx(plain)
-    thrice = {first: 3 * MODEL[first]}
-    assert expected(MODEL, others, thrice, 1e6) == pytest.approx(3 * plain)
-
-
-def test_no_point_is_expected_to_take_more_than_its_limit():
-    name = next(iter(MODEL))
-    assert expected(MODEL, [name], {name: 1000.0}, 100.0) == 100.0
-
-
-def test_the_announcement_says_how_many_how_long_and_from_what(tmp_path):
-    one = STUDY.points[0].name
-    assert "all" in announcement(STUDY, tmp_path, [])
-    assert "from a model" in announcement(STUDY, tmp_path, [one])
-    record = tmp_path / f"{one}.json"
-    record.parent.mkdir(parents=True)
-    record.write_text(json.dumps({"point": one, "outcome": "failed", "reason": "", "whole": 40.0}))
-    text = announcement(STUDY, tmp_path, [one])
-    assert f"1 of {len(STUDY.points)} points" in text
-    assert "about 40 s (from earlier measurements)" in text
-
-
-def test_records_that_cannot_be_read_are_no_measurements(tmp_path):
-    good, bad = tmp_path / "good.json", tmp_path / "bad.json"
-    good.write_text('{"point": "a/b/c/1", "outcome": "failed", "reason": "", "whole": 3}')
-    bad.write_text("{")
-    assert measured_before([good, bad, tmp_path / "none.json"]) == {"a/b/c/1": 3.0}
 
 
 _PROGRAM = """

@@ -26,7 +26,6 @@ def test_points_are_measured_once(tmp_path):
 
     done = snakemake(project, "scaling")
     assert done.returncode == 0, done.stdout
-    assert "2 of 2 points to measure, one at a time" in done.stdout
     assert "2 of 2 points are measured" in done.stdout
     records = project / "results/scaling/full/quad4"
     assert json.loads((records / "800.json").read_text())["outcome"] == "solved"

@@ -34,7 +34,6 @@ def test_points_are_measured_once_and_the_page_lists_all(tmp_path):
 
     done = snakemake(project, "study")
     assert done.returncode == 0, done.stdout
-    assert "Tiny study: 3 of 3 points to measure, one at a time" in done.stdout
     assert "2 of 3 points are measured. 1 have no solve" in done.stdout
     records = project / "results/study/full"
     solved = json.loads((records / "half/quad4-quad4/lac/1.json").read_text())

@@ -118,8 +118,8 @@ def watched(*files):
     return [ancient(f) for f in files if os.path.isfile(f)]
 
 
-def listed_cold(folders):
-    """The list of jobs in the folders from a process of its own."""
+def list_jobs(folders):
+    """The jobs in the folders, as the solver lists them."""
     command = [sys.executable, "-Es", "-m", "solver", "jobs", *folders]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
@@ -136,7 +136,7 @@ def find_jobs():
     if not folders:
         refuse("cases: no folder with case files (*.yaml) in it")
     what = [*map(str, folders), *["--variants"] * VARIANTS]
-    jobs = [Job(**of) for of in json.loads(listed_warm(what) or listed_cold(what))]
+    jobs = [Job(**of) for of in json.loads(list_jobs(what))]
     return {(job.family, job.name): job for job in jobs}
 
 
@@ -258,6 +258,16 @@ def again_for(job):
     return again(results_of(job)) + [
         f for mesh in mesh_folder(job) for f in again(mesh, has_mesh)
     ]
+
+
+def points_of(read, file, size):
+    """The points by name that a file describes at a `size`."""
+    from solver.system.errors import InputError
+
+    try:
+        return {point.name: point for point in read(Path(file), size).points}
+    except InputError as error:
+        refuse(error)
 
 
 @cache

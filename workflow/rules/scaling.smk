@@ -10,7 +10,7 @@ SCALING_PAGE = "scaling" if SCALE == "full" else f"scaling-{SCALE}"
 def scaling():
     from solver.studies.scaling.description import read_scaling
 
-    return measured_points("scaling_point", read_scaling, SCALING_FILE, SCALE, SCALED)
+    return points_of(read_scaling, SCALING_FILE, SCALE)
 
 
 # A point always ends with a record, whatever became of it.

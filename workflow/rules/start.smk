@@ -59,47 +59,13 @@ def report_progress():
     atexit.register(progress.close)
 
 
-# For each rule of points, the function that announces those to be measured.
-ANNOUNCED = {}
-
-
-def measured_points(rule, read, file, size, folder):
-    """The points by name that a file describes at a `size`.
-
-    Those that a run will measure are announced before it begins, by their `rule`; their records
-    lie in `folder`.
-    """
-    from solver.studies.points import announcement
-    from solver.system.errors import InputError
-
-    try:
-        content = read(Path(file), size)
-    except InputError as error:
-        refuse(error)
-    ANNOUNCED[rule] = lambda due: announcement(content, Path(folder), due)
-    return {point.name: point for point in content.points}
-
-
-def announce():
-    """Report how long the points to be measured will take."""
-    for rule, text in ANNOUNCED.items():
-        due = [
-            j.wildcards.point
-            for j in workflow.dag.needrun_jobs()
-            if j.rule.name == rule
-        ]
-        if due:
-            logger.info(text(due))
-
-
 # Not in a dry run, which changes nothing.
 onstart:
     if workflow.is_main_process:
         HELD.append(take_lock())
         list_verdicts()
         signal.signal(signal.SIGINT, note_interruption)
-        announce()
-        keep_warm()
+        begin_warm()
 
 
 def forget_marker():

@@ -10,7 +10,7 @@ PAGE = "study" if SIZE == "full" else f"study-{SIZE}"
 def study():
     from solver.studies.work_precision.description import read_study
 
-    return measured_points("study_point", read_study, STUDY_FILE, SIZE, POINTS)
+    return points_of(read_study, STUDY_FILE, SIZE)
 
 
 def reference_of(w):

@@ -58,11 +58,6 @@ from ..points import PointStudy
 
 GROWTH = "growth of "
 _LARGEST_COUNTED = 2_000_000  # unknowns
-_START = 2.5  # seconds: two interpreters, libraries loaded, small mesh
-# Times as long as others: gmsh fills the blocks or several statuses are solved; most unknowns are
-# at the interface or material is nearly incompressible.
-_LONGER, _LONGEST = 2.5, 4.0
-_NEARLY_INCOMPRESSIBLE = 0.49
 Division = Annotated[int, Meta(ge=1, le=1000)]
 SizeRange = Annotated[
     tuple[Unknowns, Unknowns], Meta(description="a list of two sizes, from and to")
@@ -144,17 +139,6 @@ class ScalingPoint:
         """
         largest = self.size == max(self.series.sizes) and self.size <= _LARGEST_COUNTED
         return self.series.dim == 3 and largest and not self.series.slab
-
-    @property
-    def seconds(self) -> float:
-        """About how long the point takes."""
-        template, slow = self.series.template, 1.0
-        if self.series.cells == "TETRA4" or template["mesh"]["recipe"] == "hertz":
-            slow = _LONGER
-        poisson = max(material["poisson"] for material in template["materials"].values())
-        if self.series.slab or poisson > _NEARLY_INCOMPRESSIBLE:
-            slow = _LONGEST
-        return (1 + self.counts_bytes) * (_START + slow * self.mesh.seconds)
 
     def _divisions(self, finer: int) -> tuple[list[int], list[int]]:
         proportion, dim = self.series.divisions, self.series.dim

@@ -58,7 +58,6 @@ from ..keys import Cell, Count, Counts, ErrorName, Name, Seconds
 from ..points import PointStudy
 
 AUTO = "auto"
-_START = 1.5  # seconds: libraries loaded, mesh made, record written
 _Division = Annotated[int, Meta(ge=2, le=1024, description="a whole number from 2 to 1024")]
 Pair = Annotated[tuple[Cell, Cell], Meta(description="a list of two cell types: slave, master")]
 
@@ -140,11 +139,6 @@ class StudyPoint:
         """About the size of its mesh."""
         pairs = zip((self.slave, self.master), self.problem.divisions, strict=True)
         return of_bodies([of_body(cells, divisions, self.level) for cells, divisions in pairs])
-
-    @property
-    def seconds(self) -> float:
-        """About how long the point takes."""
-        return _START + (1 + self.repetitions) * self.mesh.seconds
 
     @property
     def pair(self) -> str:

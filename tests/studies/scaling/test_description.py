@@ -79,18 +79,16 @@ def test_a_slab_is_as_thick_as_its_fine_cells_are_wide():
     assert case.solution.base == pytest.approx(-case.mesh["size"][2])
 
 
-def test_the_quick_part_is_small_and_takes_about_a_minute():
+def test_the_quick_part_is_small():
     quick, full = read_scaling(FILE, "quick"), read_scaling(FILE)
     assert {p.name for p in quick.points} < {p.name for p in full.points}
     assert max(p.size for p in quick.points) <= 3e4
-    assert 30 < sum(p.seconds for p in quick.points) < 120
 
 
 def test_the_large_part_has_ten_million_unknowns():
     large = read_scaling(FILE, "large")
     assert [p.name for p in large.points] == ["hexa8/10000000", "tetra4/10000000"]
     assert all(1e7 <= p.mesh.unknowns < 1.1e7 for p in large.points)
-    assert sum(p.seconds for p in large.points) < large.limit
     assert not any(p.counts_bytes for p in large.points)  # it would take as long again
 
 
