@@ -92,28 +92,24 @@ CONVERGE = $(addprefix cases/,waves/tria3.yaml waves/tria6.yaml waves/quad8.yaml
 	partial-waves/quad4.yaml receding/quad8.yaml half-planes/hertz-quad4.yaml)
 converge: environment ## uncertainty by refined meshes: of cases with known answers or CASE=my-case.yaml
 	@$(OURS) solver converge $(if $(CASE),"$(CASE)",$(CONVERGE)) \
-	  $(if $(LEVELS),--levels $(LEVELS)) -o results/converge/converge.json
+	  $(if $(LEVELS),--levels $(LEVELS)) -o results/report
 
-study: override CONFIG += $(if $(LEVEL),study=$(LEVEL))
+STUDY = @$(SNAKEMAKE) $@
+study stability infsup scaling benchmark: override CONFIG += $(if $(LEVEL),level=$(LEVEL))
 study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
-	@$(SNAKEMAKE) study
+	$(STUDY)
 
-stability: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 stability: environment ## numerical stability: vary quantities until the answer breaks; some values: LEVEL=quick
-	@$(SNAKEMAKE) stability
+	$(STUDY)
 
-scaling: override CONFIG += $(if $(LEVEL),scaling=$(LEVEL))
-scaling: environment ## cost up to a million unknowns; a minute: LEVEL=quick; ten million: LEVEL=large
-	@$(SNAKEMAKE) scaling
-
-BENCHMARK = results/benchmark/benchmark$(if $(LEVEL),-$(LEVEL)).json
-benchmark: environment ## time ratios: linear solvers, cut, safeguards, CalculiX
-	@$(OURS) solver benchmark cases/scaling/benchmark.yaml -o $(BENCHMARK) \
-	  $(if $(filter quick,$(LEVEL)),--quick)
-
-infsup: override CONFIG += $(if $(LEVEL),stability=$(LEVEL))
 infsup: environment ## the inf-sup test of every cell type, and the half-loaded block
-	@$(SNAKEMAKE) infsup
+	$(STUDY)
+
+scaling: environment ## cost up to a million unknowns; a minute: LEVEL=quick; ten million: LEVEL=large
+	$(STUDY)
+
+benchmark: environment ## time ratios: linear solvers, cut, safeguards, CalculiX
+	$(STUDY)
 
 test: test-environment ## run the tests
 	@$(ALONE) pytest -n auto $(ARGS)

@@ -17,19 +17,9 @@ from typing import Any, TextIO
 from solver.system.files import last_line
 
 # The rules whose jobs are counted, with the word for one of their jobs.
-COUNTED = {
-    "solve": "solve",
-    "solve_level": "solve",
-    "sweep": "sweep",
-    "infsup_record": "test",
-    "study_point": "point",
-    "scaling_point": "point",
-}
+COUNTED = {"solve": "solve", "measure": "group"}
 # Rules whose jobs print by themselves: the last line is left to them while they run.
-VERBOSE_RULES = (
-    *("report", "orders_page", "stability_page", "infsup_page"),
-    *("study", "study_point", "scaling", "scaling_point"),
-)
+VERBOSE_RULES = ("report", "study_page")
 # Lines of Snakemake that are useless beside the jobs.
 _CHATTER = (
     *("Select jobs", "Execute ", "Using shell", "Assuming unrestricted", "Touching output"),
@@ -38,7 +28,7 @@ _CHATTER = (
 )
 # Rules that fail if a check does, and the end of their commands: they print the outcome
 # themselves.
-_GATES = ("gate", "orders", "stability", "infsup")
+_GATES = ("gate", "orders", "study", "stability", "infsup", "scaling", "benchmark")
 _GATE_MARK = "# gate"
 _GOOD = ("passed", "solved")
 _BAD = ("failed", "unreliable", "refused", "crashed")
@@ -92,10 +82,8 @@ class State:
             return None
         self.done += 1
         said = last_line(job.log)
-        if said and job.rule == "solve_level":  # its log has the name of the case alone
-            said = f"{job.message.removeprefix('solve ')}: {said.partition(': ')[2]}"
         what = said.partition(": ")[2]
-        if job.rule in ("solve", "solve_level"):  # refused or without a solution: the reason alone
+        if job.rule == "solve":  # refused or without a solution: the reason alone
             self.bad += bool(said) and not what.startswith(_GOOD)
         else:
             self.bad += what.startswith(_BAD)

@@ -26,6 +26,7 @@ include_patterns = [
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "docs/*.md",
+    "docs/design/*.md",
     "results/README.md",
 ]
 exclude_patterns = [".*", "cases", "solver", "tests", "workflow", "profiles", "results/[!R]*"]

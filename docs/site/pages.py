@@ -1,7 +1,7 @@
 """What the pages ask for when they become a site: tables, the menu, a first page.
 
 The menu is made from the lists of links on the front page, a section each. A page of docs/ that is
-in no list comes last, so that a new one is never forgotten.
+in no list comes last, so that a new one is never forgotten; the design log is in no menu.
 """
 
 import re
@@ -16,6 +16,7 @@ from tables import TABLES
 _TABLE = re.compile(r"^<!-- table: (.*) -->$", re.MULTILINE)
 _SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
 _LINK = re.compile(r"^- \[(.*)\]\((.+)\.md\)", re.MULTILINE)
+_DESIGN = "docs/design/"
 _FIRST = (
     '<!doctype html><meta charset="utf-8"><title>{0}</title>'
     '<meta http-equiv="refresh" content="0; url={1}"><a href="{1}">{0}</a>'
@@ -42,6 +43,8 @@ def _tables(_: Sphinx, page: str, source: list[str]) -> None:
 
 
 def _menu(app: Sphinx, page: str, source: list[str]) -> None:
+    if page.startswith(_DESIGN):  # outside the menu
+        source[0] = f"---\norphan: true\n---\n{source[0]}"
     if page != app.config.root_doc:
         return
     folder = page.rpartition("/")[0]
@@ -50,7 +53,8 @@ def _menu(app: Sphinx, page: str, source: list[str]) -> None:
     listed = {
         normpath(join(folder, to)) for text in sections.values() for _, to in _LINK.findall(text)
     }
-    rest = sorted(app.env.found_docs - listed - {page})
+    known = {name for name in app.env.found_docs if not name.startswith(_DESIGN)}
+    rest = sorted(known - listed - {page})
     if rest:
         links = [f"- [](/{name}.md)" for name in rest]  # a link without words has the page's title
         sections["More"] = "\n\n" + "\n".join(links) + "\n\n"

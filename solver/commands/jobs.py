@@ -27,7 +27,7 @@ DESCRIPTIONS = ("family.yaml", "orders.yaml")
 # Names of folders and files become paths of results and patterns of the workflow.
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 # Folders of results that are no family's.
-_RESERVED = ["report", "meshes", "orders", "study", "stability", "scaling", "benchmark", "docs"]
+_RESERVED = ["report", "meshes", "studies", "docs"]
 
 
 @dataclass(frozen=True)

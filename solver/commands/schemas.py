@@ -13,17 +13,12 @@ from ..system.files import write_text
 
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
-    "benchmark": "..studies.benchmark.description:Benchmark",
     "case": "..case.file:CaseFile",
     "code": "..codes.own:OwnCodeFile",
     "family": "..report.families:FamilyFile",
-    "infsup": "..studies.infsup.description:InfSupFile",
-    "ladders": "..studies.orders.description:LaddersFile",
     "map": "..codes.files.map:ResultMap",
     "recorded": "..codes.recorded:RecordedFile",
-    "scaling": "..studies.scaling.description:ScalingFile",
-    "study": "..studies.work_precision.description:StudyFile",
-    "sweep": "..studies.stability.description:SweepFile",
+    "study": "..studies.description:Study",
 }
 
 

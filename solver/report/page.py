@@ -16,11 +16,11 @@ from .tables import outcome
 # Pages beside the report that other commands write.
 _PAGES = {
     "matrix": "what is verified, by feature",
-    "orders": "orders of convergence",
     "study": "error against run time, LAC and other treatments",
     "stability": "numerical stability",
     "scaling": "scaling",
     "infsup": "inf-sup test",
+    "benchmark": "time ratios",
     "bench": "other codes on the same cases",
     "compare": "comparison with another batch",
 }

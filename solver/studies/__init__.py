@@ -1,8 +1,5 @@
-"""Studies that measure the program, each with its description, measurement and page.
+"""Studies that measure the program: cases that are varied, what is measured, and how it is shown.
 
-A study comes in two sizes: all of it, and a part that takes some minutes. Scaling has a third one,
-beyond the sizes of the others.
+`description` reads a study's file, `run` measures its points by a function of `measures`, and
+`page` shows the records by a function of `figures`.
 """
-
-SIZES = FULL, QUICK = "full", "quick"
-LARGE = "large"

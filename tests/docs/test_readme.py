@@ -1,8 +1,8 @@
 """The commands of the README and of the tutorial, run from top to bottom as a newcomer would.
 
 They run as they stand, in a copy of the project where long ones are short: `cases/` holds only the
-case that the README names, a study and a scaling family of one point each, and `tests/` a single
-test. The installation is left out: the copy borrows this environment.
+case that the README names and studies of a few points, and `tests/` a single test. The
+installation is left out: the copy borrows this environment.
 """
 
 import json
@@ -22,44 +22,26 @@ README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorial.md"
 LEFT_OUT = {".git", ".venv", ".snakemake", "cases", "results", "tests"}
 
 
-def write_study(folder: Path) -> None:
-    """The project's study with a single point in its quick part."""
-    shutil.copytree(ROOT / "cases" / "study", folder)
-    study = yaml.safe_load((folder / "study.yaml").read_text())
-    pair = study["problems"][0]["pairs"][0]
-    study["treatments"] = study["treatments"][:1]
-    study["quick"] = {
-        "repetitions": 1,
-        "levels": 1,
-        "pairs": {study["problems"][0]["name"]: [list(pair)]},
-    }
-    (folder / "study.yaml").write_text(yaml.safe_dump(study))
-
-
-def write_scaling(folder: Path) -> None:
-    """The project's scaling family with a single small point, its benchmark with one comparison."""
-    shutil.copytree(ROOT / "cases" / "scaling", folder)
-    scaling = yaml.safe_load((folder / "scaling.yaml").read_text())
-    [plane] = [series for series in scaling["series"] if series["name"] == "quad4"]
-    scaling["series"], scaling["goals"] = [plane | {"sizes": [1000]}], []
-    for part in ("quick", "large"):
-        scaling[part]["series"] = ["quad4"]
-    (folder / "scaling.yaml").write_text(yaml.safe_dump(scaling))
-    benchmark = yaml.safe_load((folder / "benchmark.yaml").read_text())
-    comparison = benchmark["comparisons"][0] | {"series": "quad4"}
-    benchmark["comparisons"] = [comparison | {"ways": comparison["ways"][:1]}]
-    (folder / "benchmark.yaml").write_text(yaml.safe_dump(benchmark))
-
-
-def write_sweep(folder: Path) -> None:
-    """One of the project's sweeps, with its base cases, and one ladder of the inf-sup test."""
-    shutil.copytree(ROOT / "cases" / "stability" / "base", folder / "base")
-    (folder / "sweeps").mkdir()
-    shutil.copy(ROOT / "cases" / "stability" / "sweeps" / "stiffness.yaml", folder / "sweeps")
-    ladders = yaml.safe_load((ROOT / "cases/stability/infsup/infsup.yaml").read_text())
-    ladders["cells"] = ladders["cells"][:1]
-    (folder / "infsup").mkdir()
-    (folder / "infsup" / "infsup.yaml").write_text(yaml.safe_dump(ladders))
+def write_studies(cases: Path) -> None:
+    """The project's studies, each with a small series of the first group of its quick part."""
+    for folder in ("study", "scaling", "stability"):
+        shutil.copytree(ROOT / "cases" / folder, cases / folder)
+    for file in (
+        cases / "study/study.yaml",
+        *cases.glob("s*ing/*.yaml"),
+        *cases.glob("st*y/*.yaml"),
+    ):
+        study = yaml.safe_load(file.read_text())
+        group = next(g for g in study["groups"] if "quick" in g and len(g["series"]) >= 1)
+        names = {axis: list(values)[:1] for axis, values in study.get("axes", {}).items()}
+        quick = group["quick"] | {axis: v for axis, v in names.items() if axis in group["vary"]}
+        quick["series"] = [group["series"][0]["name"]]
+        group["quick"] = quick
+        study["axes"] = {
+            axis: {k: {**choice, "groups": []} for k, choice in choices.items()}
+            for axis, choices in study.get("axes", {}).items()
+        }
+        file.write_text(yaml.safe_dump(study | {"groups": [group], "goals": []}))
 
 
 @pytest.fixture
@@ -73,9 +55,7 @@ def project(tmp_path: Path) -> Path:
     (tmp_path / "cases" / "ssnp170").mkdir(parents=True)
     for name in ("e.yaml", "family.yaml"):
         shutil.copy(ROOT / "cases" / "ssnp170" / name, tmp_path / "cases" / "ssnp170")
-    write_study(tmp_path / "cases" / "study")
-    write_scaling(tmp_path / "cases" / "scaling")
-    write_sweep(tmp_path / "cases" / "stability")
+    write_studies(tmp_path / "cases")
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "test_start.py").write_text(
         "def test_start():\n    import solver.commands.cli\n"

@@ -1,7 +1,6 @@
 """The page of refusals follows from the sources; and refusals that no other test meets."""
 
 import re
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -15,7 +14,6 @@ from solver.mechanics.linear.direct import factorise
 from solver.mechanics.mortar.facets import project_along
 from solver.mesh import read_mesh
 from solver.mesh.catalogue import BY_NAME
-from solver.studies.work_precision.reference import write_reference
 from solver.system.errors import InputError, SolveError
 from solver.verification.regression import accepted_values, regression_file
 from tests.faults.refusals import ROOT, page, refusals
@@ -117,9 +115,3 @@ def test_a_solve_whose_fields_are_not_sound(monkeypatch):
     monkeypatch.setattr(simulation, "normal_stress", lambda *_: np.full(3, np.nan))
     with pytest.raises(SolveError, match="the solve came to no sound end: "):
         simulation.simulate(block_case(2), mesh)
-
-
-def test_a_study_without_such_a_reference(tmp_path):
-    study = SimpleNamespace(points=[], path="study.yaml")
-    with pytest.raises(InputError, match="must be one that has a reference"):
-        write_reference(study, "none", tmp_path / "r.vtkhdf")

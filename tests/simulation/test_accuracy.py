@@ -13,14 +13,15 @@ from solver.mesh import generate, transform
 from solver.mesh.catalogue import BY_NAME
 from solver.simulation.accuracy import Accuracy
 from solver.simulation.simulate import simulate
-from solver.studies.stability.description import read_sweep
-from solver.studies.stability.states import exact_state
+from solver.studies.description import read_study
+from solver.studies.states import exact_state
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from tests.scenes import POISSON, YOUNG, block_mesh, changed_case, with_points
+from tests.studies.measured import STABILITY, point
 
 CASES = Path(__file__).parents[2] / "cases"
-SWEEPS, SPHERES = CASES / "stability/sweeps", CASES / "lame/spheres-tetra10.yaml"
+SPHERES = CASES / "lame/spheres-tetra10.yaml"
 USELESS = 1000.0  # an estimate that exceeds the error by more
 
 
@@ -44,7 +45,7 @@ def error_over_estimate(sweep, mesh, value, young=2000.0, refine=1, state="compr
 
     `young` is the modulus of the lower body, whose stress state is the upper one's.
     """
-    case = read_sweep(SWEEPS / f"{sweep}.yaml").case(mesh, value)
+    case = point(STABILITY, sweep, mesh, x=value).case
     lower = "bottom" if "bottom" in case.materials else "all"
     soft = replace(case.materials[lower], young=young)
     case = replace(
@@ -81,9 +82,10 @@ def test_warped_faces(height):
 
 @pytest.mark.parametrize("sweep", ["rotation", "tiny-pressure", "poisson", "warp"])
 def test_plain_rounding(sweep):
-    found = read_sweep(SWEEPS / f"{sweep}.yaml")
-    for value in found.values[:4]:
-        share = error_over_estimate(sweep, "2D", value, state=found.state)
+    study = read_study(STABILITY)
+    group = study.group(sweep)
+    for found in study.points(group)[:4]:
+        share = error_over_estimate(sweep, "2D", found.numbers["x"], state=group.state)
         assert 1 / USELESS < share < 1
 
 

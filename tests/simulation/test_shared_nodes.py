@@ -11,7 +11,7 @@ from solver.simulation.attributes import Attributes
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.simulation.validity import meshed
-from solver.studies.infsup.constant import inf_sup_constant
+from solver.studies.constant import inf_sup_constant
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
 from tests.faults.mutants import CASES

@@ -1,17 +1,17 @@
 """Second differences on surfaces: chequered pressures, linear ones, and the rim."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from solver.simulation.simulate import simulate
-from solver.studies.work_precision.description import read_study
+from solver.studies.description import read_study
 from solver.verification.oscillation import oscillation
 from solver.verification.run import mesh_of
+from tests.studies.measured import WORK
 
-STUDY = read_study(Path(__file__).parents[2] / "cases/study/study.yaml")
+STUDY = read_study(WORK)
 
 
 @pytest.fixture(
@@ -20,8 +20,12 @@ STUDY = read_study(Path(__file__).parents[2] / "cases/study/study.yaml")
 def solution(request):
     """The patch test on a slave surface of 6 × 6 squares."""
     treatment, _, cut = request.param.partition(":")
-    case = STUDY.point(f"patch-3d/hexa8-tetra4/{treatment}/2").case()
-    case = case.as_solved(False, cut or None)
+    of = next(
+        p
+        for p in STUDY.points(STUDY.group("patch-3d"))
+        if p.labels == {"treatment": treatment, "level": "2"}
+    )
+    case = of.case.as_solved(False, cut or None)
     return simulate(case, mesh_of(case))
 
 

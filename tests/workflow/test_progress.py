@@ -72,13 +72,6 @@ def test_a_refused_solve_prints_its_reason_and_has_not_passed(state, tmp_path):
     assert state.not_passed == 1
 
 
-def test_a_ladder_names_the_level(state, tmp_path):
-    file = log(tmp_path, "two-blocks-none: failed: element_gap: 1")
-    state.start(1, "solve_level", "solve two-blocks-none refined 3 times", file)
-    assert state.end(1) == "two-blocks-none refined 3 times: failed: element_gap: 1 [1/10]"
-    assert state.not_passed == 1
-
-
 def test_a_job_that_breaks_off_may_begin_once_more(state, tmp_path):
     state.start(1, "solve", "solve a", log(tmp_path, "a: passed, 0.25 s"))
     state.fail(1)
@@ -137,10 +130,10 @@ def test_jobs_that_print_by_themselves_have_the_terminal_alone(tmp_path):
 
 def test_a_file_gets_whole_lines(tmp_path):
     progress = Progress(io.StringIO(), io.StringIO())
-    progress.filter(record("run_info", stats={"sweep": 2}))
+    progress.filter(record("run_info", stats={"measure": 2}))
     progress._show()
     progress.close()
-    assert re.fullmatch(r"\d\d:\d\d:\d\d 0 of 2 sweeps done\n", progress.status.getvalue())
+    assert re.fullmatch(r"\d\d:\d\d:\d\d 0 of 2 groups done\n", progress.status.getvalue())
 
 
 def test_what_is_hidden():

@@ -1,7 +1,8 @@
-"""The study through real Snakemake: points measured once, failures recorded, the page written."""
+"""Studies through real Snakemake: groups measured once, failures recorded, pages and gates."""
 
 import csv
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -9,52 +10,86 @@ from tests.workflow.projects import jobs, new_project, snakemake
 
 ROOT = Path(__file__).parents[2]
 STUDY = """
+name: study
 title: Tiny study
+measure: timed
+figure: work_precision
+set: {mesh: {refine: "=level"}}
 threads: 1
 repetitions: 2
 limit: 60
-treatments:
-  - {name: lac, title: LAC, zone: {treatment: lac}}
-  - {name: odd, title: Odd, zone: {treatment: no-such-treatment}, problems: [patch]}
-problems:
-  - {name: patch, title: Patch, case: templates/patch-2d.yaml, pairs: [[TRIA3, QUAD4]], levels: [1]}
-  - name: half
-    title: Half
-    case: templates/half-loaded.yaml
-    pairs: [[QUAD4, QUAD4]]
-    levels: [1]
-    reference: {cells: QUAD8, divisions: [4, 4], uncertainty: {pressure_l2: 0.1}}
+axes:
+  treatment:
+    lac: {title: LAC, set: {contact: {treatment: lac}}}
+    odd: {title: Odd, set: {contact: {treatment: no-such-treatment}}}
+groups:
+  - name: patch
+    vary: {treatment: [lac, odd], level: [1]}
+    series: [{name: TRIA3, case: templates/patch-2d.yaml}]
+  - name: waves
+    vary: {treatment: [lac], level: [1]}
+    series: [{name: QUAD4, case: templates/waves-2d.yaml}]
 """
 
 
-def test_points_are_measured_once_and_the_page_lists_all(tmp_path):
+def test_groups_are_measured_once_and_the_page_lists_all(tmp_path):
     project = new_project(tmp_path / "project")
     shutil.copytree(ROOT / "cases/study/templates", project / "cases/study/templates")
     (project / "cases/study/study.yaml").write_text(STUDY)
 
     done = snakemake(project, "study")
     assert done.returncode == 0, done.stdout
-    assert "2 of 3 points are measured. 1 have no solve" in done.stdout
-    records = project / "results/study/full"
-    solved = json.loads((records / "half/quad4-quad4/lac/1.json").read_text())
-    assert solved["errors"]["pressure_l2"] > 0
-    assert len(solved["times"]["total"]["wall"]) == 2
-    refused = json.loads((records / "patch/tria3-quad4/odd/1.json").read_text())
-    assert refused["outcome"] == "refused"
+    assert "2 of 3 points are measured. 1 have no result" in done.stdout
+    records = project / "results/studies/study/full"
+    lac, odd = json.loads((records / "patch.json").read_text())["points"]
+    assert len(lac["times"]["total"]["wall"]) == 2
+    assert odd["outcome"] == "refused"
     with (project / "results/report/study.csv").open() as stream:
         assert len(list(csv.DictReader(stream))) == 3
     # The templates are no cases of the batch.
-    assert not any("half" in job for job in jobs(project))
+    assert not any("waves" in job for job in jobs(project))
 
-    assert jobs(project, "study") == set()
+    assert jobs(project, "study") <= {"all points hold?"}
     # As an interrupted run leaves it: what is measured is not measured again.
-    (records / "patch/tria3-quad4/lac/1.json").unlink()
-    (project / "results/report/study.html").unlink()
-    again = {"measure patch/tria3-quad4/lac/1", "error against run time"}
-    assert jobs(project, "study") == again
+    (records / "patch.json").unlink()
+    again = {"measure study/patch", "page of study", "all points hold?"}
+    assert jobs(project, "study") <= again
+    assert "measure study/patch" in jobs(project, "study")
 
 
-def test_a_wrong_size_is_refused(tmp_path):
-    refused = snakemake(new_project(tmp_path / "project"), "study", "--config", "study=huge")
+def test_a_wrong_level_is_refused(tmp_path):
+    refused = snakemake(new_project(tmp_path / "project"), "study", "--config", "level=huge")
     assert refused.returncode != 0
     assert "'huge' is not one of" in refused.stdout
+
+
+def write_ladder(project, least, levels):
+    family = project / "cases" / "ladders"
+    family.mkdir(exist_ok=True)
+    case = (ROOT / "cases" / "manufactured" / "tria3.yaml").read_text()
+    (family / "tria3.yaml").write_text(re.sub(r"divisions: \[16, \d+\]", "divisions: [4, 4]", case))
+    (family / "orders.yaml").write_text(
+        "name: orders-ladders\ntitle: Ladders\nfigure: orders\n"
+        'set: {mesh: {refine: "=level"}}\n'
+        f"least: {{linear: {{displacement_l2: {least}}}}}\n"
+        f"groups: [{{name: g, vary: {{level: {levels}}},\n"
+        "  series: [{name: T, case: tria3.yaml}]}]\n"
+    )
+
+
+def test_a_slope_that_is_not_reached_fails_the_target(tmp_path):
+    project = new_project(tmp_path / "project")
+    write_ladder(project, 1.5, [1, 2, 3])
+    done = snakemake(project, "orders")
+    assert done.returncode == 0, done.stdout
+    assert "1 of 1 slopes asked for are reached, on 1 ladders." in done.stdout
+    # The report links the page, and measures none of it anew.
+    source = project / "solver" / "mechanics" / "mortar" / "__init__.py"
+    source.write_text(source.read_text() + "# changed\n")
+    assert not any("measure" in job for job in jobs(project))
+
+    write_ladder(project, 5, [1, 2, 3])
+    short = snakemake(project, "orders")
+    assert short.returncode != 0
+    assert re.search(r"g/T: displacement, L2: .* at least 5 is asked for", short.stdout)
+    assert (project / "results" / "report" / "orders-ladders.html").is_file()

@@ -210,46 +210,6 @@ def test_a_second_run_is_refused_while_one_lives_and_after_its_kill_it_works(tmp
     assert "All 3 solves passed." in done.stdout
 
 
-ORDERS = {"orders of convergence", "all orders reached?"}
-
-
-def write_ladders(project, least, levels):
-    family = project / "cases" / "ladders"
-    family.mkdir(exist_ok=True)
-    case = (ROOT / "cases" / "manufactured" / "tria3.yaml").read_text()
-    (family / "tria3.yaml").write_text(re.sub(r"divisions: \[16, \d+\]", "divisions: [4, 4]", case))
-    (family / "orders.yaml").write_text(
-        f"levels: {levels}\nleast: {{linear: {{displacement_l2: {least}}}}}\n"
-        "ladders: [{case: tria3.yaml}]\n"
-    )
-
-
-def test_ladders_are_solved_level_by_level_and_fitted(project):
-    write_ladders(project, 1.5, [1, 2, 3])
-    done = snakemake(project, "orders")
-    assert done.returncode == 0, done.stdout
-    assert "1 of 1 slopes asked for are reached, on 1 ladders." in done.stdout
-    level = project / "results" / "orders" / "ladders" / "tria3" / "3"
-    assert json.loads((level / "verdict.json").read_text())["macro_elements"] == 12
-    assert snakemake(project, "report").returncode == 0
-    assert not any(v["family"] == "orders" for v in summary(project).values())
-    # The report links the page, and needs none of its levels anew.
-    source = project / "solver" / "mechanics" / "mortar" / "__init__.py"
-    unchanged = source.read_text()
-    append(source, "# changed\n")
-    assert not any("refined" in job for job in jobs(project))
-    source.write_text(unchanged)
-
-    write_ladders(project, 1.5, [1, 2, 3, 4])
-    assert jobs(project, "orders") == {"solve tria3 refined 4 times"} | ORDERS
-
-    write_ladders(project, 5, [1, 2, 3])
-    short = snakemake(project, "orders")
-    assert short.returncode != 0
-    assert re.search(r"ladders/tria3: displacement, L2: .* at least 5 is asked for", short.stdout)
-    assert (project / "results" / "report" / "orders.html").is_file()
-
-
 def state_of(folder):
     """All files but Snakemake's own, with content and dates."""
     files = (path for path in folder.rglob("*") if path.is_file())
@@ -388,7 +348,7 @@ NOTED = {
     "directly uses variable": "which Python runs, and settings that change no result",
     "Mixed rules and functions": "a function stays beside the one rule or hook that it serves",
     "Environment variable WARM_SOLVER": "set by the run itself, asked of nobody",
-    "No log directive": "gates print one line, points of studies keep their own record",
+    "No log directive": "gates print one line",
 }
 
 

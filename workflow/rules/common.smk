@@ -74,10 +74,12 @@ def sources(*patterns):
     return sorted(map(str, files))
 
 
-STUDY_PAGES = [
-    f"studies/**/{page}.py" for page in ("page", "figure", "records", "first", "gains")
-]
-OF_PAGES = ("report/**/*.*", "studies/**/*.jinja", *STUDY_PAGES)
+OF_PAGES = (
+    "report/**/*.*",
+    "studies/page*",
+    "studies/shown.py",
+    "studies/figures/*.py",
+)
 REPORT_SOURCES = [f for f in sources(*OF_PAGES) if not f.endswith(".pyc")]
 SOLVER_SOURCES = sorted({*sources("**/*.py", "case/schemas/*")} - {*REPORT_SOURCES})
 MESH_SOURCES = sources("case/**/*.py", "case/schemas/*", "mesh/**/*.py", "system/*.py")
@@ -221,7 +223,7 @@ def again(folder, kept=is_kept):
 
 
 wildcard_constraints:
-    family="(?!(?:report|meshes|orders|study|stability|scaling|benchmark|docs)/)[^/]+",
+    family="(?!(?:report|meshes|studies|docs)/)[^/]+",
     case="[^/]+",
     job="[^/@]+",
 
@@ -257,56 +259,4 @@ def again_for(job):
     """The result of `again` for a solve or its mesh."""
     return again(results_of(job)) + [
         f for mesh in mesh_folder(job) for f in again(mesh, has_mesh)
-    ]
-
-
-def points_of(read, file, size):
-    """The points by name that a file describes at a `size`."""
-    from solver.system.errors import InputError
-
-    try:
-        return {point.name: point for point in read(Path(file), size).points}
-    except InputError as error:
-        refuse(error)
-
-
-@cache
-def ladders():
-    """The jobs of all ladders by (family, folder), their levels, and options of a solve."""
-    from solver.commands.jobs import jobs_of
-    from solver.studies.orders.description import read_ladders
-    from solver.system.errors import InputError
-
-    found = {}
-    for file in LADDER_FILES:
-        try:
-            family = read_ladders(Path(file))
-        except InputError as error:
-            refuse(error)
-        for ladder in family.ladders:
-            for one in jobs_of(ladder.case):
-                name = ladder.folder(one.swap)
-                of = {**vars(one), "name": name, "hexahedra": ladder.hexahedra}
-                job = Job(**of | {"family": family.name})
-                options = f" --recovery {ladder.recovery}" if ladder.recovery else ""
-                found[job.family, job.name] = job, ladder.levels, options
-    return found
-
-
-def level_of(w):
-    return ladders()[w.family, w.job][0]
-
-
-def options_of_level(w):
-    """The options of the command line for a level of a ladder."""
-    job, _, options = ladders()[w.family, w.job]
-    return f"--refine {w.level} {options_of(job)}{options}"
-
-
-def level_folders():
-    """The result folders of all levels."""
-    return [
-        f"results/orders/{family}/{name}/{level}"
-        for (family, name), (_, levels, _) in ladders().items()
-        for level in levels
     ]

@@ -1,1 +1,0 @@
-"""Uncertainty of a case's results from solves on refined meshes."""

@@ -1,0 +1,136 @@
+"""Digits that are left: a point solved with all safeguards and with none, against its exact state.
+
+Errors are relative to the pressure, or, for the gap, to the size of the model. A point holds when
+its pressure and stress are within 1e-10, or twenty times their floor where that is more. Beyond the
+end of a sweep it holds as well when it is refused or fails with a reason, or when its own estimate
+of its accuracy bounds its errors: there it must only know what it does not know.
+"""
+
+import json
+from functools import lru_cache
+from typing import Any
+
+import meshio
+import numpy as np
+from scipy import sparse
+
+from ..mechanics.linear.condensation import CondensedSystem
+from ..mesh import generate, transform
+from ..simulation.accuracy import Accuracy
+from ..simulation.options import Options, Safeguards
+from ..simulation.problem import ContactProblem
+from ..simulation.scene import build_scene
+from ..simulation.simulate import solve_problem
+from ..system.clock import Clock
+from ..system.errors import InputError, SolveError
+from ..verification.verdict import FAILED, PASSED, REFUSED, UNRELIABLE
+from .floor import floor, stress_error
+from .points import Point
+from .states import State, exact_state
+
+Record = dict[str, Any]
+GOAL, FLOORS = 1e-10, 20.0
+"""A point must reach the first, or this many times its floor."""
+SMALL = 1500
+"""Unknowns up to which all eigenvalues of the system are found."""
+
+
+@lru_cache(maxsize=8)
+def _generated(recipe: str, where: str) -> meshio.Mesh:
+    """The mesh of a recipe (as JSON), made once."""
+    return generate(json.loads(recipe), where)
+
+
+def measure(point: Point) -> Record:
+    """Floor, measures with all safeguards and with none (`uncured`), whether the point holds."""
+    cured = _attempt(point, Safeguards())
+    holds = is_within(cured) or (point.is_beyond and knows_itself(cured))
+    record = cured | {"beyond": point.is_beyond, "holds": holds}
+    return record | {"uncured": _attempt(point, Safeguards.none())}
+
+
+def is_within(measured: Record) -> bool:
+    """Whether pressure and stress are as accurate as their floors allow."""
+    return measured["word"] in (PASSED, UNRELIABLE) and all(
+        measured[name] <= max(GOAL, FLOORS * measured[f"floor_{name}"])
+        for name in ("pressure", "stress")
+    )
+
+
+def knows_itself(measured: Record) -> bool:
+    """Whether the point is refused or fails, or its estimate bounds its errors."""
+    if measured["word"] in (REFUSED, FAILED):
+        return True
+    return bool(max(measured["pressure"], measured["stress"]) <= measured["attainable"])
+
+
+def _attempt(point: Point, safeguards: Safeguards) -> Record:
+    """The measures of the point, or the reason why they are missing."""
+    try:
+        return _measured(point, safeguards)
+    except InputError as error:
+        return {"word": REFUSED, "reason": f"{error.key}: {error.problem}"}
+    except SolveError as error:
+        return {"word": FAILED, "reason": str(error)}
+
+
+def _measured(point: Point, safeguards: Safeguards) -> Record:
+    case = point.case
+    raw = _generated(json.dumps(case.mesh), str(case.path))
+    mesh = transform(raw, case.transform, str(case.path)) if case.transform else raw
+    state = exact_state(case, point.group.state, raw)
+    clock = Clock()
+    scene = build_scene(case, mesh, Options(safeguards=safeguards), clock)
+    problem = ContactProblem(scene)
+    solution = solve_problem(problem, clock)
+    zones, balance = solution.zones, solution.balance
+    # Of rounding alone: a sweep's points may have strains that no real body has.
+    accuracy = Accuracy(solution.accuracy)
+    measures: Record = {
+        "word": UNRELIABLE if accuracy.reason else PASSED,
+        "reason": accuracy.reason,
+        "pressure": max(np.abs(z.multiplier / state.pressure - 1).max() for z in zones),
+        "stress": stress_error(solution.stress, scene, state),
+        "gap": max(np.abs(z.gap).max() for z in zones) / scene.length,
+        "force": max(v for k, v in balance.items() if k.endswith("force")),
+        "moment": max(v for k, v in balance.items() if k.endswith("moment")),
+        "residual": solution.steps[-1].residual,
+        "iterations": solution.iterations,
+        "dofs": solution.dofs,
+        "attainable": accuracy.estimate,
+    }
+    if safeguards == Safeguards():
+        measures |= _known(problem, raw, mesh, state)
+    return measures
+
+
+def _known(problem: ContactProblem, raw: meshio.Mesh, mesh: meshio.Mesh, state: State) -> Record:
+    """The floors of the exact answer, and properties of the system that is solved."""
+    pressure, stress = floor(problem, raw, mesh, state)
+    known: Record = {"floor_pressure": pressure, "floor_stress": stress}
+    system = problem.system
+    if isinstance(system, CondensedSystem) and problem.scene.points.shape[1] == 2:
+        known |= _spectrum(system, problem.matrix)
+    return known
+
+
+def _spectrum(system: CondensedSystem, stiffness: sparse.csr_matrix) -> Record:
+    """Condition number and inertia of the condensed system, scaled to a diagonal of one.
+
+    By all its eigenvalues where it is small, in full precision; else the inertia alone, which is
+    known from the factor: Cholesky's succeeds only where all eigenvalues are positive.
+    """
+    expansion = system.expansion
+    matrix = (expansion.T @ stiffness @ expansion).tocsr()
+    size = matrix.shape[0]
+    if size > SMALL:
+        return {"condition": None, "inertia": [size, 0, 0], "inertia_by": "factor"}
+    scale = sparse.diags(1 / np.sqrt(matrix.diagonal()))
+    values = np.linalg.eigvalsh((scale @ matrix @ scale).toarray())
+    least = size * np.finfo(float).eps * np.abs(values).max()
+    inertia = [int((values > least).sum()), int((values < -least).sum())]
+    return {
+        "condition": float(np.abs(values).max() / np.abs(values).min()),
+        "inertia": [*inertia, size - sum(inertia)],
+        "inertia_by": "eigenvalues",
+    }

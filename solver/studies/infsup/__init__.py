@@ -1,1 +1,0 @@
-"""The inf-sup test of the contact pressure."""

@@ -1,1 +1,0 @@
-"""Error against run time: which treatment reaches which accuracy, at what cost."""

@@ -1,0 +1,105 @@
+# Studies: each group of a study's file is a job with a record, each study a page and a gate.
+LEVEL = config["level"]
+SUFFIX = "" if LEVEL == "full" else f"-{LEVEL}"
+# The targets, and the files of their studies.
+TARGETS = {
+    "study": ["cases/study/study.yaml"],
+    "stability": ["cases/stability/stability.yaml", "cases/stability/infsup.yaml"],
+    "infsup": ["cases/stability/infsup.yaml"],
+    "scaling": ["cases/scaling/scaling.yaml"],
+    "benchmark": ["cases/scaling/benchmark.yaml"],
+    "orders": sorted(
+        str(f) for f in Path("cases").glob("*/orders.yaml") if f.parent.name in FAMILIES
+    ),
+}
+
+
+@cache
+def studies(target):
+    """The studies of a target by name, with their files."""
+    from solver.studies.description import read_study
+    from solver.system.errors import InputError
+
+    found = {}
+    for file in filter(os.path.isfile, TARGETS[target]):
+        try:
+            study = read_study(Path(file), LEVEL)
+        except InputError as error:
+            refuse(error)
+        found[study.name] = file, study
+    return found
+
+
+def study_of(w):
+    return next(studies(t)[w.study] for t in TARGETS if w.study in studies(t))
+
+
+def is_timed(w):
+    """Whether a group has the machine for itself."""
+    from solver.studies.run import APART
+
+    _, study = study_of(w)
+    return (study.group(w.group).measure or study.measure) in APART
+
+
+rule measure:
+    input:
+        study=lambda w: study_of(w)[0],
+        cases=lambda w: sorted(
+            {str(s.case) for s in study_of(w)[1].group(w.group).series}
+        ),
+    output:
+        record=f"results/studies/{{study}}/{LEVEL}/{{group}}.json",
+        benchmark=f"results/studies/{{study}}/{LEVEL}/{{group}}.benchmark",
+    log:
+        f"results/studies/{{study}}/{LEVEL}/{{group}}.log",
+    threads: lambda w: workflow.cores if is_timed(w) else 1
+    resources:
+        mem_mb=lambda w, attempt: 2000 * attempt,
+        runtime=lambda w, attempt: 120 * attempt,
+    params:
+        content=SOLVER_CONTENT,
+    message:
+        "measure {wildcards.study}/{wildcards.group}"
+    shell:
+        "{SOLVER} {output.benchmark:q} measure {input.study:q} {wildcards.group:q} --level {LEVEL}"
+        " -o {output.record:q} > {log:q} 2>&1"
+
+
+rule study_page:
+    input:
+        records=lambda w: [
+            f"results/studies/{w.study}/{LEVEL}/{group.name}.json"
+            for group in study_of(w)[1].groups
+        ],
+        study=lambda w: study_of(w)[0],
+    output:
+        f"results/report/{{study}}{SUFFIX}.html",
+        f"results/report/{{study}}{SUFFIX}.csv",
+        f"results/report/{{study}}{SUFFIX}-failures.txt",
+    log:
+        f"results/studies/{{study}}/{LEVEL}/page.log",
+    params:
+        content=REPORT_CONTENT,
+    message:
+        "page of {wildcards.study}"
+    shell:
+        "{PYTHON} -m solver study-page {input.study:q} --level {LEVEL}"
+        " --results results/studies/{wildcards.study}/{LEVEL} -o results/report 2>&1 | tee {log:q}"
+
+
+# The gates: each fails when something of its studies does not hold; the pages are there by then.
+for target in TARGETS:
+
+    rule:
+        name:
+            target
+        input:
+            lambda w, target=target: [
+                f"results/report/{study}{SUFFIX}-failures.txt"
+                for study in studies(target)
+            ],
+        message:
+            "all points hold?"
+        shell:
+            "if cat {input:q} | grep .; then exit 1; fi # gate"
