@@ -21,7 +21,7 @@
         large: {x: [1.0e+12]}                # a part beyond `vary`
         beyond: [1.0e+8]                     # values past the end, where a clear refusal will do
         series:
-          - {name: 2D, case: base/plane.yaml, set: {materials: {bottom: {young: "=2000*x"}}}}
+          - {name: 2D, case: stability/plane.yaml, set: {materials: {bottom: {young: "=2000*x"}}}}
 
 A group is the product of its series and of the values that it varies; a series may have its own in
 place of the group's. A point is one of these, in each direction of its case. `set` is merged into

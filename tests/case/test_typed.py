@@ -16,17 +16,12 @@ from solver.system.errors import InputError
 WHERE = Path("box.yaml")
 CASES = Path(__file__).parents[2] / "cases"
 FILES = {
-    "benchmark": "scaling/benchmark.yaml",
     "case": "ssnp170/[a-e].yaml",
     "code": "../docs/examples/toy/code.yaml",
     "family": "*/family.yaml",
-    "infsup": "stability/infsup/*.yaml",
-    "ladders": "*/orders.yaml",
     "map": "../docs/examples/map.yaml",
     "recorded": "*/recorded/*.yaml",
-    "scaling": "scaling/scaling.yaml",
-    "study": "study/study.yaml",
-    "sweep": "stability/sweeps/*.yaml",
+    "study": "studies/*.yaml",
 }
 
 

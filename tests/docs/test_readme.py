@@ -24,13 +24,8 @@ LEFT_OUT = {".git", ".venv", ".snakemake", "cases", "results", "tests"}
 
 def write_studies(cases: Path) -> None:
     """The project's studies, each with a small series of the first group of its quick part."""
-    for folder in ("study", "scaling", "stability"):
-        shutil.copytree(ROOT / "cases" / folder, cases / folder)
-    for file in (
-        cases / "study/study.yaml",
-        *cases.glob("s*ing/*.yaml"),
-        *cases.glob("st*y/*.yaml"),
-    ):
+    shutil.copytree(ROOT / "cases" / "studies", cases / "studies")
+    for file in (cases / "studies").glob("*.yaml"):
         study = yaml.safe_load(file.read_text())
         group = next(g for g in study["groups"] if "quick" in g and len(g["series"]) >= 1)
         names = {axis: list(values)[:1] for axis, values in study.get("axes", {}).items()}

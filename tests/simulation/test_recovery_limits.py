@@ -20,7 +20,7 @@ from tests.simulation.test_recovery import blocks, solved, waves
 from tests.simulation.test_resultants import hertz
 from tests.simulation.test_unloaded import SCENE, side_by_side
 
-STUDY = Path(__file__).parents[2] / "cases/study/templates"
+STUDY = Path(__file__).parents[2] / "cases/studies/study"
 FORMS = ["linear", "quadratic", "smooth"]
 
 

@@ -11,10 +11,9 @@ from solver.studies.run import identity
 from solver.studies.shown import MeasuredGroup
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
-STABILITY, INFSUP = CASES / "stability/stability.yaml", CASES / "stability/infsup.yaml"
-WORK, SCALING = CASES / "study/study.yaml", CASES / "scaling/scaling.yaml"
-OURS = [*sorted(CASES.glob("*/orders.yaml")), STABILITY, INFSUP, WORK, SCALING]
-OURS.append(CASES / "scaling/benchmark.yaml")
+STABILITY, INFSUP = CASES / "studies/stability.yaml", CASES / "studies/infsup.yaml"
+WORK, SCALING = CASES / "studies/study.yaml", CASES / "studies/scaling.yaml"
+OURS = sorted([*CASES.glob("*/orders.yaml"), *CASES.glob("studies/*.yaml")])
 
 
 def study(text: str, folder: Path = CASES / "manufactured") -> Study:

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from solver.studies.description import merged, read_study
+from solver.studies.description import read_study
+from solver.studies.points import merged
 from solver.system.errors import InputError
 from tests.studies.measured import CASES, OURS, STABILITY, WORK, point
 

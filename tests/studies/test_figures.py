@@ -340,7 +340,7 @@ def test_from_file_to_record_and_back(tmp_path):
 def test_a_timed_point_is_measured_in_a_process_of_its_own(tmp_path):
     from tests.studies.measured import CASES
 
-    file = CASES / "study" / "study.yaml"
+    file = CASES / "studies" / "study.yaml"
     quick = read_study(file, "quick")
     patch = next(g for g in quick.groups if g.name == "patch-2d")
     name = quick.points(patch)[0].name

@@ -25,17 +25,17 @@ axes:
 groups:
   - name: patch
     vary: {treatment: [lac, odd], level: [1]}
-    series: [{name: TRIA3, case: templates/patch-2d.yaml}]
+    series: [{name: TRIA3, case: study/patch-2d.yaml}]
   - name: waves
     vary: {treatment: [lac], level: [1]}
-    series: [{name: QUAD4, case: templates/waves-2d.yaml}]
+    series: [{name: QUAD4, case: study/waves-2d.yaml}]
 """
 
 
 def test_groups_are_measured_once_and_the_page_lists_all(tmp_path):
     project = new_project(tmp_path / "project")
-    shutil.copytree(ROOT / "cases/study/templates", project / "cases/study/templates")
-    (project / "cases/study/study.yaml").write_text(STUDY)
+    shutil.copytree(ROOT / "cases/studies/study", project / "cases/studies/study")
+    (project / "cases/studies/study.yaml").write_text(STUDY)
 
     done = snakemake(project, "study")
     assert done.returncode == 0, done.stdout

@@ -131,9 +131,9 @@ def list_jobs(folders):
 
 def find_jobs():
     """All jobs by family and name: ours, and those of the configured folders."""
-    # Folders of studies contain descriptions and templates, no cases of the batch.
-    measured = {Path("cases/study"), Path("cases/scaling")}
-    ours = sorted({f.parent for f in Path("cases").glob("*/*.yaml")} - measured)
+    ours = sorted(
+        {f.parent for f in Path("cases").glob("*/*.yaml")} - {Path("cases/studies")}
+    )
     folders = [*ours, *(Path(f).expanduser() for f in listed(config["cases"]))]
     if not folders:
         refuse("cases: no folder with case files (*.yaml) in it")
