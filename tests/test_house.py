@@ -6,7 +6,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SOURCES = ROOT / "solver"
-LONGEST, ENTRIES = 400, 11
+# The public package `lac` is the twelfth entry.
+LONGEST, ENTRIES = 400, 12
 
 
 def test_imports_within_the_package_are_relative():

@@ -28,7 +28,7 @@ class MachineError(InputError):
     """The input is valid, but memory or disk is short. Another run may succeed."""
 
 
-class SolveError(Exception):
+class SolveError(RuntimeError):
     """The solve failed (singular system, no convergence): one line with the reason, status 3."""
 
 

@@ -1,0 +1,298 @@
+"""LAC on scikit-fem's meshes: exact on every pair, equal to the batch, refused in one line."""
+
+import runpy
+import subprocess
+import sys
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+import skfem
+from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+from solver.lac import LocalAverageContact
+from solver.mechanics.mortar.facets import facets
+from solver.mechanics.mortar.operator import gap_operator
+from solver.mesh.catalogue import BY_NAME
+
+ROOT = Path(__file__).resolve().parents[2]
+FORM = linear_elasticity(*lame_parameters(2000.0, 0.3))
+MESHES = {
+    2: [skfem.MeshTri1, skfem.MeshTri2, skfem.MeshQuad1, skfem.MeshQuad2],
+    3: [skfem.MeshTet1, skfem.MeshTet2, skfem.MeshHex1, skfem.MeshHex2],
+}
+PAIRS = [(dim, *pair) for dim, kinds in MESHES.items() for pair in product(kinds, repeat=2)]
+
+
+def block(kind, dim, n, low, size=50.0):
+    """A block of n cells each way that stands on the height `low`, half as high as wide."""
+    axes = [np.linspace(0, size, n + 1)] * (dim - 1) + [np.linspace(low, low + size / 2, n + 1)]
+    linear = next(k for k in MESHES[dim] if issubclass(kind, k))
+    mesh = linear.init_tensor(*axes)
+    mesh = mesh if kind is linear else kind.from_mesh(mesh)
+    sides = {
+        "bottom": lambda x: np.isclose(x[-1], low),
+        "top": lambda x: np.isclose(x[-1], low + size / 2),
+    }
+    sides |= {f"side{k}": lambda x, k=k: np.isclose(x[k], 0) for k in range(dim - 1)}
+    return mesh.with_boundaries(sides)
+
+
+def basis_on(mesh):
+    return skfem.Basis(mesh, skfem.ElementVector(mesh.elem()))
+
+
+def pressed(contact, lower, dim, load=lambda x: 25.0 + 0 * x[0]):
+    """The state of two blocks, the upper one pressed by `load`, and both bases."""
+    a, b = basis_on(contact.mesh), basis_on(lower)
+    K = skfem.bmat([[FORM.assemble(a), None], [None, FORM.assemble(b)]], "csr")
+    push = skfem.LinearForm(lambda v, w: -load(w.x) * v[dim - 1])
+    f = np.concatenate([push.assemble(a.boundary("top")), b.zeros()])
+    held = [a.get_dofs(f"side{k}").all(f"u^{k + 1}") for k in range(dim - 1)]
+    held += [a.N + b.get_dofs(f"side{k}").all(f"u^{k + 1}") for k in range(dim - 1)]
+    held.append(a.N + b.get_dofs("bottom").all(f"u^{dim}"))
+    return contact.solve(K, f, contact.matrix(a, b), D=np.concatenate(held)), a, b
+
+
+@pytest.mark.parametrize(
+    ("dim", "slave", "master"), PAIRS, ids=lambda v: getattr(v, "__name__", str(v))
+)
+def test_the_patch_test_is_exact_on_every_pair(dim, slave, master):
+    lower, upper = block(master, dim, 2, 0.0), block(slave, dim, 3, 25.0)
+    contact = LocalAverageContact(slave=(upper, "bottom"), master=(lower, "top"))
+    state, a, b = pressed(contact, lower, dim)
+    assert state.pressure == pytest.approx(np.full(len(contact.area), 25.0), rel=1e-12)
+    assert state.iterations == 1
+    # Uniaxial stress; plane strain in 2D.
+    across = 25.0 * 0.3 / 2000.0 * (1.3 if dim == 2 else 1)
+    down = 25.0 / 2000.0 * (1 - 0.09 if dim == 2 else 1)
+    for basis, first in ((a, 0), (b, a.N)):
+        u = state.u[first : first + basis.N]
+        for axis in range(dim):
+            dofs = basis.get_dofs(elements=True).all([f"u^{axis + 1}"])
+            slope = -down if axis == dim - 1 else across
+            exact = slope * basis.doflocs[axis, dofs]
+            assert u[dofs] == pytest.approx(exact, abs=1e-12 * 50)
+
+
+def test_b_is_that_of_the_batch_bit_for_bit():
+    lower, upper = block(skfem.MeshTri1, 2, 2, 0.0), block(skfem.MeshTri1, 2, 3, 25.0)
+    contact = LocalAverageContact(slave=(upper, "bottom"), master=(lower, "top"))
+    n = contact.mesh.p.shape[1]
+    points = np.hstack([contact.mesh.p, lower.p]).T
+
+    def edges(mesh, name, first, owner):
+        nodes = mesh.facets[:, mesh.boundaries[name]].T.copy()
+        turned = mesh.p[0, nodes[:, 0]] > mesh.p[0, nodes[:, 1]]
+        if name == "top":  # outward: the lower body is on the left of its edges
+            turned = ~turned
+        nodes[turned] = nodes[turned][:, ::-1]
+        return facets(points, BY_NAME["SEG2"], nodes + first, owner)
+
+    middle = contact.mesh.p[0, contact.mesh.facets[:, contact.mesh.boundaries["bottom"]]].mean(
+        axis=0
+    )
+    whole = upper.p[0, upper.facets[:, upper.boundaries["bottom"]]]
+    owner = ((whole.min(axis=0) < middle[:, None]) & (middle[:, None] < whole.max(axis=0))).argmax(
+        1
+    )
+    slaves = [edges(contact.mesh, "bottom", 0, owner)]
+    masters = [edges(lower, "top", n, np.arange(2))]
+    found = gap_operator(slaves, masters, 3, len(points))
+    a, b = basis_on(contact.mesh), basis_on(lower)
+    unknowns = np.hstack([a.nodal_dofs, a.N + b.nodal_dofs]).T.ravel()
+    assert (contact.matrix(a, b)[:, unknowns] != found.matrix).nnz == 0
+
+
+def test_both_bodies_on_one_mesh():
+    lower, upper = block(skfem.MeshQuad1, 2, 2, 0.0), block(skfem.MeshQuad1, 2, 3, 25.0)
+    n = lower.p.shape[1]
+    mesh = skfem.MeshQuad(np.hstack([lower.p, upper.p]), np.hstack([lower.t, n + upper.t]))
+    outside = mesh.boundary_facets()
+    middle = mesh.p[:, mesh.facets[:, outside]].mean(axis=1)
+    cell = mesh.f2t[0, outside]
+    level = np.isclose(middle[1], 25.0)
+    mesh = mesh.with_boundaries(
+        {
+            "under": outside[level & (cell < lower.nelements)],
+            "over": outside[level & (cell >= lower.nelements)],
+            "left": outside[np.isclose(middle[0], 0)],
+            "base": outside[np.isclose(middle[1], 0)],
+            "press": outside[np.isclose(middle[1], 50)],
+        }
+    )
+    contact = LocalAverageContact(slave=(mesh, "over"), master=(mesh, "under"))
+    basis = basis_on(contact.mesh)
+    push = skfem.LinearForm(lambda v, w: -25.0 * v[1])
+    f = push.assemble(basis.boundary("press"))
+    held = basis.get_dofs("left").all("u^1"), basis.get_dofs("base").all("u^2")
+    B = contact.matrix(basis, basis)
+    state = contact.solve(FORM.assemble(basis), f, B, D=np.concatenate(held))
+    assert state.pressure == pytest.approx([25.0] * 3, rel=1e-12)
+
+
+def test_mirrored_and_renumbered_cells_change_nothing():
+    upper = block(skfem.MeshTet1, 3, 3, 25.0)
+    order = np.random.default_rng(1).permutation(upper.p.shape[1])
+    points = upper.p[:, np.argsort(order)]
+    turned = skfem.MeshTet(points, order[upper.t][[1, 0, 2, 3]], sort_t=False)
+    turned = turned.with_boundaries(
+        {name: (lambda x, n=name: _of(n, x)) for name in ("bottom", "top", "side0", "side1")}
+    )
+    lower = block(skfem.MeshHex1, 3, 2, 0.0)
+    contact = LocalAverageContact(slave=(turned, "bottom"), master=(lower, "top"))
+    state, *_ = pressed(contact, lower, 3)
+    assert state.pressure == pytest.approx(np.full(18, 25.0), rel=1e-12)
+
+
+def _of(name, x):
+    axis, value = {"bottom": (2, 25), "top": (2, 50), "side0": (0, 0), "side1": (1, 0)}[name]
+    return np.isclose(x[axis], value)
+
+
+def test_contact_opens_and_carries_the_load():
+    lower, upper = block(skfem.MeshQuad1, 2, 8, 0.0), block(skfem.MeshQuad1, 2, 12, 25.0)
+    contact = LocalAverageContact(slave=(upper, "bottom"), master=(lower, "top"))
+    state, *_ = pressed(contact, lower, 2, lambda x: 100.0 * (x[0] < 12.5))
+    assert 0 < state.closed.sum() < 12
+    assert (state.pressure >= 0).all()
+    assert (state.gap >= 0).all()
+    assert not (state.pressure * state.gap).any()
+    assert state.pressure @ contact.covered == pytest.approx(100.0 * 12.5, rel=1e-12)
+
+
+def test_a_given_gap_takes_the_place_of_the_meshed_one():
+    lower, upper = block(skfem.MeshQuad1, 2, 2, 0.0), block(skfem.MeshQuad1, 2, 3, 25.0)
+    both = (upper, "bottom"), (lower, "top")
+    assert LocalAverageContact(*both, gap=0.3).initial == pytest.approx([5.0] * 3)
+    linear = LocalAverageContact(*both, gap=lambda x: x[0] / 50)
+    middle = upper.p[0, upper.facets[:, upper.boundaries["bottom"]]].mean(axis=0)
+    assert linear.initial == pytest.approx(middle / 50 * 50 / 3)
+    assert np.abs(LocalAverageContact(*both).initial).max() < 1e-12
+
+
+def good():
+    return block(skfem.MeshTri1, 2, 2, 0.0), block(skfem.MeshTri1, 2, 3, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            lambda lo, up: ((up, "botom"), (lo, "top")),
+            "no such boundary of the mesh; there are: bot",
+        ),
+        (lambda lo, up: ((up, "bottom"), (lo, "bottom")), "no facet of 'bottom' is opposite"),
+        (lambda lo, up: ((up, "bottom"), (up, "bottom")), "must be another boundary"),
+        (
+            lambda lo, up: (
+                (up.with_boundaries({"all": np.arange(up.nfacets)}), "all"),
+                (lo, "top"),
+            ),
+            "have a cell on both sides",
+        ),
+        (
+            lambda lo, up: ((up.with_boundaries({"no": np.array([], int)}), "no"), (lo, "top")),
+            "no facet",
+        ),
+        (
+            lambda lo, up: ((up, "bottom"), (block(skfem.MeshHex1, 3, 1, 0.0), "top")),
+            "one dimension",
+        ),
+        (
+            lambda lo, up: (
+                (skfem.MeshWedge1().with_boundaries({"b": lambda x: x[2] == 0}), "b"),
+                (block(skfem.MeshHex1, 3, 1, -25.0), "top"),
+            ),
+            "no LAC on this class; allowed: MeshTri1",
+        ),
+    ],
+)
+def test_what_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message) as refusal:
+        LocalAverageContact(*arguments(*good()))
+    assert "\n" not in str(refusal.value)
+
+
+def test_folded_cells_are_refused():
+    lower, upper = good()
+    points = upper.p.copy()
+    points[:, upper.t[0, -1]] = points[:, upper.t[1, -1]]
+    flat = type(upper)(points, upper.t).with_boundaries({"bottom": lambda x: x[1] == 25})
+    with pytest.raises(ValueError, match="cells are flat or folded"):
+        LocalAverageContact((flat, "bottom"), (lower, "top"))
+
+
+@pytest.mark.parametrize(
+    ("basis", "message"),
+    [
+        (
+            lambda m: skfem.Basis(m, skfem.ElementVector(skfem.ElementTriP2())),
+            "needs ElementVector",
+        ),
+        (lambda m: skfem.Basis(m, skfem.ElementTriP1()), "needs ElementVector"),
+        (lambda m: basis_on(good()[1]), "the mesh after the cut"),
+    ],
+)
+def test_a_basis_that_does_not_fit_is_refused(basis, message):
+    lower, upper = good()
+    contact = LocalAverageContact((upper, "bottom"), (lower, "top"))
+    with pytest.raises(ValueError, match=message):
+        contact.matrix(basis(contact.mesh), basis_on(lower))
+
+
+def test_a_body_that_moves_freely_ends_in_one_line():
+    lower, upper = good()
+    contact = LocalAverageContact((upper, "bottom"), (lower, "top"))
+    a, b = basis_on(contact.mesh), basis_on(lower)
+    K = skfem.bmat([[FORM.assemble(a), None], [None, FORM.assemble(b)]], "csr")
+    with pytest.raises(RuntimeError, match="singular"):
+        contact.solve(K, np.zeros(a.N + b.N), contact.matrix(a, b))
+
+
+def test_it_needs_neither_meshes_files_nor_the_batch():
+    """Only the mortar kernel and what it stands on, and no package of the batch's own."""
+    code = """if True:
+        import sys, solver.lac
+        rooms = {name.split(".")[1] for name in sys.modules if name.startswith("solver.")}
+        print(rooms - {"lac", "mechanics", "mesh", "system"}, {"gmsh", "h5py"} & {*sys.modules})"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout.strip() == "set() set()", done.stderr
+
+
+def run(name):
+    return runpy.run_path(str(ROOT / "docs" / "examples" / "lac" / f"{name}.py"))
+
+
+def test_the_example_of_the_patch_test():
+    assert run("ex01_patch")["state"].pressure == pytest.approx([25.0] * 6, rel=1e-12)
+
+
+def test_the_example_of_hertz():
+    _, _, ratio = run("ex02_hertz")["hertz"](12)
+    assert ratio == pytest.approx(1.0, abs=0.03)
+
+
+def test_the_example_that_opens_balances_its_forces():
+    space = run("ex03_opening")
+    assert 0 < space["state"].closed.sum() < 40
+    assert space["force"] + space["supports"] == pytest.approx(0.02 * 40, rel=1e-9)
+
+
+def test_the_method_in_one_file_is_the_package():
+    space = run("ex04_method")
+    upper, lower = space["upper"], space["lower"]
+    contact = LocalAverageContact((upper, "low"), (lower, "high"))
+    a, b = basis_on(contact.mesh), basis_on(lower)
+    K = skfem.bmat([[FORM.assemble(a), None], [None, FORM.assemble(b)]], "csr")
+    top = contact.mesh.facets_satisfying(lambda x: (x[1] == 1.0) & (x[0] < 2.0))
+    push = skfem.LinearForm(lambda v, w: -25.0 * v[1])
+    f = np.concatenate([push.assemble(a.boundary(top)), b.zeros()])
+    held = a.get_dofs("left").all("u^1"), a.N + b.get_dofs("left").all("u^1")
+    D = np.concatenate([*held, a.N + b.get_dofs("low").all("u^2")])
+    state = contact.solve(K, f, contact.matrix(a, b), D=D)
+    assert 0 < state.closed.sum() < 14
+    assert state.pressure == pytest.approx(space["pressure"], abs=1e-12 * 25)
+    lines = (ROOT / "docs/examples/lac/ex04_method.py").read_text().count("\n")
+    assert lines <= 150
