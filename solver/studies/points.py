@@ -40,8 +40,11 @@ class Point:
 
     @property
     def line(self) -> str:
-        """The series, its direction, and the titles of its choices."""
-        titles = [choice.title for choice in self.choices.values()]
+        """The series, its direction, and the titles of its choices, where the group has several."""
+        several = (
+            c.title for axis, c in self.choices.items() if len(self.group.vary.get(axis, ())) != 1
+        )
+        titles = list(several)
         return ", ".join([self.series.name, *["swapped"] * self.swapped, *titles])
 
     @property

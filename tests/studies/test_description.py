@@ -64,7 +64,7 @@ def test_a_point_is_a_case_with_what_is_set_for_it(file):
 
 def test_a_part_has_some_series_and_values(file):
     quick = read_study(file, "quick")
-    assert [p.name for g in quick.groups for p in quick.points(g)] == ["TRIA3, constants/1"]
+    assert [p.name for g in quick.groups for p in quick.points(g)] == ["TRIA3/1"]
     with pytest.raises(InputError, match="no group has a part `large`"):
         read_study(file, "large")
 

@@ -49,11 +49,16 @@ _HEAD = [
 def show(_: Study, groups: Sequence[MeasuredGroup]) -> Shown:
     """A map for each group, then its points in a table."""
     maps, tables, problems = [], [], lost_points(groups)
+    legend = Markup("").join(_legend())
     for one in groups:
         points = [point for point in one.points if "word" in point]
-        legend = Markup("").join(_legend())
         maps.append(
-            PageSection(f"map-{one.group.name}", one.title, legend, [draw_map(one, points)])
+            PageSection(
+                f"map-{one.group.name}",
+                one.title,
+                legend if not maps else "",
+                [draw_map(one, points)],
+            )
         )
         rows = [_row(one, point, i, points) for i, point in enumerate(points)]
         tables.append(

@@ -102,7 +102,7 @@ class SizeLine:
 
 
 def show(study: Study, groups: Sequence[MeasuredGroup]) -> Shown:
-    """Goals, charts of each group, exponents, speed-ups, and every point."""
+    """Goals, cost of all series with exponents and speed-ups, and every point."""
     lines = {
         name: SizeLine(name, [p for p in points if p["outcome"] == "solved"], study.fit)
         for one in groups
@@ -115,11 +115,15 @@ def show(study: Study, groups: Sequence[MeasuredGroup]) -> Shown:
     sections = (
         [PageSection("goals", "Goals", tables=[_goals_table(study.goals, goals)])] if goals else []
     )
-    for one in groups:
-        mine = [lines[name] for name in one.lines if lines[name].points]
-        plots = [_chart(one, mine, what, label) for what, label in _PLOTS.items()] if mine else []
-        tables = [_exponents(mine, names), _points_table(one, names), *_speed_ups(mine, names)]
-        sections.append(PageSection(one.group.name, one.title, one.group.text, plots, tables))
+    solved = [line for line in lines.values() if line.points]
+    if solved:
+        plots = [_chart(solved, what, label) for what, label in _PLOTS.items()]
+        tables = [_exponents(solved, names), *_speed_ups(solved, names)]
+        sections.append(PageSection("cost", "Cost against size", "", plots, tables))
+    sections += [
+        PageSection(one.group.name, one.title, one.group.text, tables=[_points_table(one, names)])
+        for one in groups
+    ]
     wrong = [
         f"{one.group.name}/{p['name']}: {p['verdict']}: {p['reason']}"
         for one in groups
@@ -178,10 +182,10 @@ def _goals_table(goals: Sequence[Goal], found: Sequence[tuple[float | None, str]
     return Table(["Work", "Other codes", "Goal", "Measured"], rows, left=2)
 
 
-def _chart(group: MeasuredGroup, lines: Sequence[SizeLine], what: str, label: str) -> Chart:
+def _chart(lines: Sequence[SizeLine], what: str, label: str) -> Chart:
     """A line for each series: a cost against the unknowns; grey: cost in proportion to size."""
     looks = {
-        line.name: Look(_COLORS[i % len(_COLORS)], SHAPES[i % len(SHAPES)])
+        line.name: Look(_COLORS[i % len(_COLORS)], SHAPES[(i + i // len(_COLORS)) % len(SHAPES)])
         for i, line in enumerate(lines)
     }
     records = [
@@ -195,10 +199,9 @@ def _chart(group: MeasuredGroup, lines: Sequence[SizeLine], what: str, label: st
         for line in lines
         for point in line.points
     ]
-    title = f"{group.title}: {label}"
     x, y = Axis("size", "unknowns", log=True), Axis("cost", label, log=True)
     fan = slopes(records, "size", "cost", [1.0])
-    return series_chart(title, title, records, x, y, looks, tips=_TIPS, layers=fan, width=460)
+    return series_chart(label, label, records, x, y, looks, tips=_TIPS, layers=fan, width=460)
 
 
 def _exponents(lines: Sequence[SizeLine], names: Sequence[str]) -> Table:

@@ -150,7 +150,9 @@ def _overview(panel: Panel) -> TableRow:
     for target in TARGETS:
         ways = [
             Markup("<strong>{}</strong> {}<span class=under>{}</span>").format(
-                title, duration(time_of(point).median), point["name"].split("/", 1)[-1]
+                title,
+                duration(time_of(point).median),
+                f"{point['series']}, level {point['labels']['level']}",
             )
             for title, point in panel.quickest(target).items()
         ]
