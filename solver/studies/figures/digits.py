@@ -48,7 +48,9 @@ _HEAD = [
 
 def show(_: Study, groups: Sequence[MeasuredGroup]) -> Shown:
     """A map for each group, then its points in a table."""
-    maps, tables, problems = [], [], lost_points(groups)
+    maps: list[PageSection] = []
+    tables: list[PageSection] = []
+    problems = lost_points(groups)
     legend = Markup("").join(_legend())
     for one in groups:
         points = [point for point in one.points if "word" in point]
