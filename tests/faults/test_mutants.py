@@ -6,7 +6,7 @@ import pytest
 
 from tests.faults.mutants import MUTANTS, checks, planted, reason, verdict
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "design" / "faults.md"
 
 
 @pytest.mark.parametrize("case", sorted({mutant.case for mutant in MUTANTS}))
