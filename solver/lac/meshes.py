@@ -104,7 +104,7 @@ def cut_mesh(mesh: skfem.Mesh, name: str) -> tuple[skfem.Mesh, SubFaces]:
 
 
 def _facets_at(mesh: skfem.Mesh, corners: np.ndarray) -> np.ndarray:
-    """The facets (n,) of a mesh that have the corners (n, k), −1 where there is none."""
+    """The number (n,) of the facet with each set of corners (n, k), or −1 if there is none."""
     rows = np.concatenate([np.sort(mesh.facets.T), np.sort(corners)])
     label = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
     place = np.full(label.max() + 1, -1)

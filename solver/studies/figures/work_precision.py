@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from markupsafe import Markup
@@ -64,6 +65,11 @@ def time_of(point: Record) -> Spread:
     return spread(point["times"][TOTAL]["cpu" if point["threads"] == 1 else "wall"])
 
 
+def treatment_of(point: Record) -> str:
+    """What a point varies beside its series: the treatment or the linear solver."""
+    return str(point["line"].removeprefix(point["series"]).lstrip(", ") or point["line"])
+
+
 @dataclass(frozen=True)
 class Panel:
     """One error of one group: its points by line."""
@@ -71,16 +77,15 @@ class Panel:
     group: MeasuredGroup
     error: str
 
-    @property
+    @cached_property
     def lines(self) -> dict[str, list[dict[str, Any]]]:
         """The points of each line that have the error, coarsest first."""
         having = (p for p in self.group.solved if self.error in p["errors"])
         return grouped(having, lambda point: str(point["line"]))
 
     def title_of(self, line: str) -> str:
-        """What a line varies beside its series: the treatment or the linear solver."""
-        point = self.lines[line][0]
-        return line.removeprefix(point["series"]).lstrip(", ") or line
+        """The treatment of a line, or its linear solver."""
+        return treatment_of(self.lines[line][0])
 
     def reaching(self, line: str, target: float) -> list[dict[str, Any]]:
         """The levels from which on no error is above the target: one by accident does not count."""
@@ -183,8 +188,8 @@ def looks_of(group: MeasuredGroup) -> dict[str, Look]:
     """The look of every line by its title: one colour a kind of treatment, one mark a line."""
     looks: dict[str, Look] = {}
     kinds: dict[str, int] = {}
-    for line, (point, *_) in group.lines.items():
-        title = line.removeprefix(point["series"]).lstrip(", ") or line
+    for point, *_ in group.lines.values():
+        title = treatment_of(point)
         if title not in looks:
             kind = " ".join(name.split("-")[0] for name in point["choices"].values())
             variant = kinds[kind] = kinds.get(kind, -1) + 1
@@ -231,7 +236,7 @@ def draw(panel: Panel, looks: Mapping[str, Look]) -> list[Chart]:
 
 def _record(panel: Panel, point: Record) -> dict[str, Any]:
     """A record for each level; one without a solve has no error, and breaks the line."""
-    title = point["line"].removeprefix(point["series"]).lstrip(", ") or point["line"]
+    title = treatment_of(point)
     record = {"series": title, "level": point["numbers"]["level"]}
     if point["outcome"] != "solved" or panel.error not in point["errors"]:
         return record | {"time": None, "error": None}
