@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .api import Solved, solve_case
-    from .system.errors import InputError, SolveError
+    from .lac.errors import SolveError
+    from .system.errors import InputError
 
 __all__ = ["InputError", "SolveError", "Solved", "solve_case"]
 

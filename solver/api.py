@@ -33,8 +33,8 @@ from .simulation.options import Options
 from .simulation.solution import Solution, ZoneResult
 from .system.errors import InputError, key_path
 from .system.progress import report_outcomes
-from .system.provenance import gather
 from .verification.judge import judge
+from .verification.provenance import gather
 from .verification.results import write_result
 from .verification.run import mesh_of, solve_checked
 from .verification.verdict import CheckResult, Verdict

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.mortar.facets import facets
-from solver.mesh.catalogue import BY_NAME
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.cells.shape import shape_functions
+from solver.lac.facets import facets
 
 
 def segment_pair(slave_x, master_x, height=0.0):

@@ -7,8 +7,8 @@ import numpy as np
 
 from solver.case.model import Case
 from solver.case.reader import parse_case
+from solver.lac.cells.catalogue import BY_NAME, cell_type
 from solver.mesh import generate
-from solver.mesh.catalogue import BY_NAME, cell_type
 from solver.simulation.simulate import simulate
 from solver.simulation.solution import Solution
 from solver.verification.run import mesh_of
@@ -102,7 +102,7 @@ def turn(dim: int, angle: float) -> np.ndarray:
 
 def straightened(mesh: meshio.Mesh) -> meshio.Mesh:
     """Mid-nodes put back on straight edges (and into the middle of faces and cells)."""
-    from solver.mechanics.fem import shape_functions
+    from solver.lac.cells.shape import shape_functions
 
     points = mesh.points.copy()
     for block in mesh.cells:

@@ -9,15 +9,15 @@ It is 25 everywhere (MPa; lengths in mm), as the patch test asks.
 import meshio
 import numpy as np
 
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.cut import cut
+from solver.lac.facets import facets
+from solver.lac.operator import gap_operator
 from solver.mechanics.fem.elasticity import Block, lame_parameters, stiffness
 from solver.mechanics.fem.faces import boundary_faces, volume_cells
 from solver.mechanics.fem.loads import Field, face_forces
 from solver.mechanics.fem.supports import Fixed, free_motion
 from solver.mechanics.linear.condensation import condense
-from solver.mechanics.mortar.cut import cut
-from solver.mechanics.mortar.facets import facets
-from solver.mechanics.mortar.operator import gap_operator
-from solver.mesh.catalogue import BY_NAME
 
 SIZE, YOUNG, POISSON = 50.0, 2000.0, 0.3
 

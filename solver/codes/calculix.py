@@ -16,10 +16,11 @@ from tempfile import TemporaryDirectory
 import meshio
 import numpy as np
 
-from ..mechanics.fem.faces import FaceBlock
-from ..mesh.catalogue import BY_NAME, CellType
+from ..lac.cells.catalogue import BY_NAME, CellType
+from ..lac.cells.faces import FaceBlock
+from ..lac.errors import SolveError
 from ..mesh.files.abaqus import FACES
-from ..system.errors import InputError, SolveError
+from ..system.errors import InputError
 from ..system.process import cores_for, run_in_subprocess
 from .deck import Deck, UnsupportedError, face_size
 from .files.read import read_result_files
@@ -282,7 +283,7 @@ def _faces(deck: Deck, blocks: Sequence[FaceBlock]) -> Iterator[tuple[int, int]]
 def face_number(cell: CellType, local: int) -> int:
     """CalculiX's number of a cell's face, from 1.
 
-    >>> from solver.mesh.catalogue import BY_NAME
+    >>> from solver.lac.cells.catalogue import BY_NAME
     >>> [face_number(BY_NAME["TETRA4"], i) for i in range(4)]
     [1, 2, 3, 4]
     """

@@ -10,8 +10,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from ..mechanics.fem.faces import FaceBlock
-from ..mesh.catalogue import BY_NAME
+from ..lac.cells.catalogue import BY_NAME
+from ..lac.cells.faces import FaceBlock
 from .deck import Deck, UnsupportedError
 from .plain import Plain
 

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..case.expressions import evaluate
-from ..mechanics.fem.faces import FACE_POINTS, surface_points, surface_vectors
-from ..mechanics.fem.gauss import gauss_rule
-from ..mesh.catalogue import cell_type
+from ..lac.cells.catalogue import cell_type
+from ..lac.cells.faces import FACE_POINTS, surface_points, surface_vectors
+from ..lac.cells.gauss import gauss_rule
 from ..simulation.exact import ExactValues, computed_pressure
 from ..simulation.solution import NodalContact, ZoneResult
 from ..system.errors import InputError

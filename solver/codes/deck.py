@@ -9,8 +9,9 @@ import numpy as np
 from ..case.expressions import evaluate
 from ..case.material import Material
 from ..case.model import Case, Load, Zone
-from ..mechanics.fem.faces import FaceBlock, volume_cells
-from ..mechanics.mortar.cut import cut
+from ..lac.cells.faces import FaceBlock
+from ..lac.cut import cut
+from ..mechanics.fem.faces import volume_cells
 from ..simulation.attributes import Attributes
 from ..simulation.cut_groups import faces_of
 from ..simulation.groups import check_groups, named_parts

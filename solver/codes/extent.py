@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.catalogue import BY_MESHIO
+from ..lac.cells.catalogue import BY_MESHIO
 from .compared import Compared
 from .contact import SurfaceValues
 from .placing import NEAR

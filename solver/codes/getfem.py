@@ -10,7 +10,8 @@ import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..system.errors import InputError, SolveError
+from ..lac.errors import SolveError
+from ..system.errors import InputError
 from ..system.process import printed_by
 from .deck import Deck, UnsupportedError, refuse_rings
 from .files.read import read_result_files

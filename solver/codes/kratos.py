@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..system.errors import SolveError
+from ..lac.errors import SolveError
 from ..system.process import printed_by
 from .deck import Deck, UnsupportedError, refuse_rings
 from .foreign import Field, ForeignResult

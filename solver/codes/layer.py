@@ -12,7 +12,7 @@ import numpy as np
 
 from ..case.model import Case, Load, Support
 from ..case.solutions.base import ExactSolution, Part
-from ..mesh.catalogue import BY_MESHIO, BY_NAME, CellType
+from ..lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
 
 LAYER = "whole layer"
 # The cell of one layer over each plane one.

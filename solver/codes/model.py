@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 
 from ..case.model import Case
-from ..mechanics.fem.faces import FaceBlock, nodal_normals, surface_points
+from ..lac.cells.faces import FaceBlock, nodal_normals, surface_points
 from ..simulation.exact import ExactValues
 from ..simulation.naming import body_infos
 from ..simulation.scene import Scene, ZoneScene, build_scene

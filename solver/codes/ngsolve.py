@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..mesh.catalogue import cell_type
-from ..system.errors import SolveError
+from ..lac.cells.catalogue import cell_type
+from ..lac.errors import SolveError
 from ..system.process import printed_by
 from .deck import Deck, UnsupportedError, face_size, refuse_rings
 from .foreign import Field, ForeignResult

@@ -23,7 +23,8 @@ from msgspec import Meta, field
 
 from ..case.typed import Section, Text, Version, read_as
 from ..case.yaml import read_mapping
-from ..system.errors import InputError, SolveError
+from ..lac.errors import SolveError
+from ..system.errors import InputError
 from .deck import Deck
 from .files.map import CODE, Names, ResultMap
 from .files.read import read_result_files

@@ -8,10 +8,11 @@ from dataclasses import replace
 import meshio
 import numpy as np
 
-from ..mechanics.fem.faces import FACE_POINTS, outer_faces, surface_points, surface_vectors
-from ..mechanics.fem.gauss import gauss_rule
-from ..mesh.catalogue import cell_type
-from ..mesh.orient import right_side_out
+from ..lac.cells.catalogue import cell_type
+from ..lac.cells.faces import FACE_POINTS, surface_points, surface_vectors
+from ..lac.cells.gauss import gauss_rule
+from ..lac.cells.orient import right_side_out
+from ..mechanics.fem.faces import outer_faces
 from ..simulation.exact import computed_pressure
 from ..simulation.solution import NodalContact, Solution, ZoneResult
 from .contact import SurfaceValues

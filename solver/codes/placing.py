@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..lac.cells.catalogue import BY_MESHIO
 from ..mechanics.fem.bodies import body_numbers
-from ..mesh.catalogue import BY_MESHIO
 from ..system.errors import InputError
 from .foreign import Field, ForeignResult
 from .model import Model

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..mechanics.fem.faces import FaceBlock
-from ..system.errors import SolveError
+from ..lac.cells.faces import FaceBlock
+from ..lac.errors import SolveError
 from .deck import Deck, PairedFaces, refuse_rings
 from .foreign import ForeignResult
 

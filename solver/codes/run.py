@@ -10,8 +10,9 @@ from tempfile import TemporaryDirectory
 import meshio
 
 from ..case.model import Case
+from ..lac.errors import SolveError
 from ..system.clock import now
-from ..system.errors import InputError, SolveError
+from ..system.errors import InputError
 from ..system.process import run_in_subprocess
 from ..verification.verdict import CRASHED, FAILED, REFUSED, Verdict, write_verdict
 from .compared import CHECKED_BY

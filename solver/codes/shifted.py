@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..case.material import Material
-from ..mechanics.fem.faces import FaceBlock, nodal_normals
+from ..lac.cells.faces import FaceBlock, nodal_normals
 from .deck import Deck, PairedFaces, UnsupportedError
 from .layer import columns, over
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..case.model import Zone
+from ..lac.cells.faces import FaceBlock, nodal_normals
 from ..mechanics.fem.bodies import body_numbers
-from ..mechanics.fem.faces import FaceBlock, nodal_normals
 from ..mechanics.fem.supports import FreeMotion
 
 # A component of a unit vector below this is round-off.

@@ -18,7 +18,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..system.errors import InputError, SolveError, hint, of_machine
+from ..lac.errors import SolveError
+from ..system.errors import InputError, hint, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
 from . import codes, completion, jobs, look, report, results, studies
 from .options import (

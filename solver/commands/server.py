@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..system.package import PACKAGE
-from ..system.provenance import gather
+from ..verification.provenance import gather
 from .warm import GREETING, LIMIT, THREADS, answer, words
 
 # Modules that the solver imports late. The command itself reports a missing one.

@@ -15,12 +15,12 @@ import skfem
 from scipy.sparse import bmat, csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
-from ..mechanics.fem.faces import surface_points
-from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
-from ..mechanics.mortar.operator import gap_operator
-from ..mechanics.mortar.status import Trial, find_status
-from ..system.errors import SolveError
+from .cells.faces import surface_points
+from .errors import SolveError
+from .facets import Facets, facets, with_nodal_normals
 from .meshes import cut_mesh, read_faces, unknowns_at_nodes
+from .operator import gap_operator
+from .status import Trial, find_status
 
 Boundary = tuple[skfem.Mesh, str]
 Gap = float | Callable[[np.ndarray], np.ndarray]

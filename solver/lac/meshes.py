@@ -1,15 +1,17 @@
 """scikit-fem's meshes as the arrays of the mortar kernel, and back after the cut."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import skfem
 
-from ..mechanics.fem.faces import FaceBlock
-from ..mechanics.mortar.cut import SubFaces, cut, needs_cut
-from ..mesh.catalogue import BY_NAME, CellType
-from ..mesh.orient import right_side_out
+from .cells.catalogue import BY_NAME, CellType
+from .cells.faces import FaceBlock
+from .cells.orient import right_side_out
+from .cut import SubFaces, cut, needs_cut
 
+Names = str | Sequence[str]
 KINDS = {
     "MeshTri1": "TRIA3",
     "MeshTri2": "TRIA6",
@@ -41,25 +43,30 @@ def read_cells(mesh: skfem.Mesh) -> tuple[CellType, np.ndarray, np.ndarray]:
     return kind, order, cells
 
 
-def boundary_of(mesh: skfem.Mesh, name: str, role: str) -> np.ndarray:
-    """The facets (k,) of a named boundary; ValueError for an unknown, empty or inner one."""
+def boundary_of(mesh: skfem.Mesh, names: Names, role: str) -> np.ndarray:
+    """The facets (k,) of named boundaries; ValueError for unknown, empty and inner ones."""
     known = mesh.boundaries or {}
-    if name not in known:
-        names = ", ".join(sorted(known)) or "none"
-        raise ValueError(f"{role} = {name!r}: no such boundary of the mesh; there are: {names}")
-    facets = np.asarray(known[name])
-    if not len(facets):
-        raise ValueError(f"{role} = {name!r}: the boundary has no facet")
+    parts = []
+    for name in [names] if isinstance(names, str) else names:
+        if name not in known:
+            there = ", ".join(sorted(known)) or "none"
+            raise ValueError(f"{role} = {name!r}: no such boundary of the mesh; there are: {there}")
+        if not len(known[name]):
+            raise ValueError(f"{role} = {name!r}: the boundary has no facet")
+        parts.append(np.asarray(known[name]))
+    facets = np.concatenate(parts)
+    if len(np.unique(facets)) < len(facets):
+        raise ValueError(f"{role} = {names!r}: the boundaries share facets")
     inner = mesh.f2t[1, facets] >= 0
     if inner.any():
         text = f"{inner.sum()} of {len(facets)} facets have a cell on both sides"
-        raise ValueError(f"{role} = {name!r}: {text}; they must be on the outside")
+        raise ValueError(f"{role} = {names!r}: {text}; they must be on the outside")
     return facets
 
 
-def read_faces(mesh: skfem.Mesh, name: str, role: str) -> FaceBlock:
-    """The facets of a boundary in its own order, turned outward, with the cells behind them."""
-    facets = boundary_of(mesh, name, role)
+def read_faces(mesh: skfem.Mesh, names: Names, role: str) -> FaceBlock:
+    """The facets of boundaries in their own order, turned outward, with the cells behind them."""
+    facets = boundary_of(mesh, names, role)
     kind, _, cells = read_cells(mesh)
     local = np.array([face.nodes for face in kind.faces])
     cell, corners = mesh.f2t[0, facets], np.sort(mesh.facets[:, facets].T)
@@ -70,13 +77,13 @@ def read_faces(mesh: skfem.Mesh, name: str, role: str) -> FaceBlock:
     return FaceBlock(face, nodes, np.arange(len(facets)), kind, cell, side)
 
 
-def cut_mesh(mesh: skfem.Mesh, name: str) -> tuple[skfem.Mesh, SubFaces]:
+def cut_mesh(mesh: skfem.Mesh, names: Names) -> tuple[skfem.Mesh, SubFaces]:
     """The mesh after the cut, boundaries and subdomains carried over, and its slave sub-faces.
 
-    Each is of the facet, by its place in the boundary, that its `macro` names. Facets that have a
+    Each is of the facet, by its place in the boundaries, that its `macro` names. Facets that have a
     node inside, those of MeshQuad2 and MeshHex2, need no cut: the mesh is returned as it is.
     """
-    faces = read_faces(mesh, name, "slave")
+    faces = read_faces(mesh, names, "slave")
     if not needs_cut(faces.type.name):
         return mesh, SubFaces(faces.type, faces.nodes, faces.number)
     kind, order, cells = read_cells(mesh)
@@ -90,7 +97,7 @@ def cut_mesh(mesh: skfem.Mesh, name: str) -> tuple[skfem.Mesh, SubFaces]:
     piece = _facets_at(new, number[part.nodes[:, :corners]])
     whole = _facets_at(new, number[mesh.facets.T])
     slave = np.full(mesh.nfacets, -1)
-    slave[boundary_of(mesh, name, "slave")] = faces.number
+    slave[boundary_of(mesh, names, "slave")] = faces.number
     named = {
         key: np.concatenate([whole[old][whole[old] >= 0], piece[np.isin(part.macro, slave[old])]])
         for key, old in (mesh.boundaries or {}).items()

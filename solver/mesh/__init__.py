@@ -15,8 +15,8 @@ from typing import Any
 import meshio
 from meshio._mesh import topological_dimension
 
+from ..lac.cells.catalogue import BY_NAME
 from ..system.files import replacing
-from .catalogue import BY_NAME
 
 # meshio knows the nodes of PENTA15 and PYRA13, but its table of dimensions has no line for them.
 for _kind in BY_NAME.values():

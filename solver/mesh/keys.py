@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from msgspec import Meta
 
 from ..case.typed import FieldError, Number, Positive, Section, Text, fields
-from .catalogue import BY_NAME
+from ..lac.cells.catalogue import BY_NAME
 
 LARGEST = 1e150
 """The largest magnitude of a coordinate: the square of twice it is finite."""

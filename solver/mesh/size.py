@@ -19,10 +19,10 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
+from ..lac.cells.catalogue import BY_NAME
 from ..system.errors import MachineError
 from ..system.memory import available
 from ..system.progress import OUTCOME
-from .catalogue import BY_NAME
 
 _LOG = logging.getLogger(__name__)
 

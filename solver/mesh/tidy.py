@@ -3,10 +3,10 @@
 import meshio
 import numpy as np
 
+from ..lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
+from ..lac.cells.orient import right_side_out
 from ..system.errors import InputError
-from .catalogue import BY_MESHIO, BY_NAME, CellType
 from .keys import LARGEST
-from .orient import right_side_out
 
 _RANK = {cell.name: i for i, cell in enumerate(BY_NAME.values())}
 _SHOWN = 5

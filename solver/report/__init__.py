@@ -25,9 +25,9 @@ def write_report(
     """
     from functools import partial
 
+    from ..lac.threads import workers
     from ..system.files import write_text
     from ..system.forks import in_forks
-    from ..system.threads import workers
     from . import tables
     from .bench import write_bench
     from .charts import write_script

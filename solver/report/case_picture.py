@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 from markupsafe import Markup
 
+from ..lac.cells.catalogue import cell_type
 from ..mechanics.fem.faces import outer_faces
-from ..mesh.catalogue import cell_type
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import MUTED, PAPER

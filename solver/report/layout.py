@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ..mesh.catalogue import cell_type
+from ..lac.cells.catalogue import cell_type
 from ..simulation.solution import BodyInfo, Solution, ZoneResult
 from .charts import BLUE, MUTED, ORANGE, PAPER
 from .svg import mixed

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..case.features import features, used
 from ..case.yaml import read_mapping
-from ..mesh.catalogue import BY_NAME
+from ..lac.cells.catalogue import BY_NAME
 from ..mesh.keys import RECIPES
 from ..system.errors import InputError
 from .html import TEMPLATES, render

@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 from markupsafe import Markup
 
-from ..mesh.catalogue import BY_MESHIO
+from ..lac.cells.catalogue import BY_MESHIO
 from .charts import MUTED, PAPER
 from .layout import outlines
 from .parts import outside, three

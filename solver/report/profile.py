@@ -13,7 +13,7 @@ import numpy as np
 
 from ..case.expressions import Expression, evaluate
 from ..case.model import EXACT
-from ..mechanics.fem.faces import surface_points
+from ..lac.cells.faces import surface_points
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.samples import expected_coverage, reference_where_covered

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..mesh.catalogue import BY_NAME
+from ..lac.cells.catalogue import BY_NAME
 from ..system.errors import InputError
 from ..verification.verdict import CRASHED, NUMBERS, WORDS, Body, Verdict, read_verdict, unbound
 

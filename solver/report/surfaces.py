@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..mesh.catalogue import cell_type
+from ..lac.cells.catalogue import cell_type
 from ..simulation.solution import Solution
 from ..verification import samples
 from ..verification.units import with_unit

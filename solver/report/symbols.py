@@ -7,7 +7,7 @@ import numpy as np
 
 from ..case.expressions import Expression, evaluate
 from ..case.model import EXACT, Load, Support
-from ..mechanics.fem.faces import nodal_normals
+from ..lac.cells.faces import nodal_normals
 from ..mechanics.fem.stress import traction
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution

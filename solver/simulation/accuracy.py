@@ -25,12 +25,12 @@ import numpy as np
 from scipy import sparse
 
 from ..case.model import Case
-from ..mechanics.fem import shape_functions
+from ..lac.cells.faces import FaceBlock, area_vectors
+from ..lac.cells.shape import shape_functions
+from ..lac.facets import FLAT
+from ..lac.status import Trial
 from ..mechanics.fem.block import Block
 from ..mechanics.fem.cell_sizes import steepest, steepness
-from ..mechanics.fem.faces import FaceBlock, area_vectors
-from ..mechanics.mortar.facets import FLAT
-from ..mechanics.mortar.status import Trial
 from .iterate import ContactIterate
 from .scene import Scene
 

@@ -9,14 +9,12 @@ import numpy as np
 from ..case.material import Material
 from ..case.model import Exact, Load
 from ..case.solutions.base import ExactSolution
-from ..mechanics.fem import has_straight_edges
+from ..lac.cells.catalogue import BY_NAME
+from ..lac.cells.faces import FaceBlock, nodal_normals
+from ..lac.cells.shape import has_straight_edges
 from ..mechanics.fem.block import Block
 from ..mechanics.fem.elasticity import lame_parameters
-from ..mechanics.fem.faces import (
-    FaceBlock,
-    nodal_normals,
-    volume_cells,
-)
+from ..mechanics.fem.faces import volume_cells
 from ..mechanics.fem.loads import body_forces, face_forces, stress_forces
 from ..mechanics.fem.mixed import MeanStress, in_mixed_form, split
 from ..mechanics.fem.supports import (
@@ -30,7 +28,6 @@ from ..mechanics.fem.supports import (
     released,
     tied,
 )
-from ..mesh.catalogue import BY_NAME
 from ..system.errors import InputError
 from . import rigid
 from .cut_groups import CutGroups

@@ -10,7 +10,7 @@ from itertools import chain, product
 
 import numpy as np
 
-from ..mechanics.mortar.reconstruction import FORMS
+from ..lac.reconstruction import FORMS
 from .solution import NodalContact, RecoveredPressure, Resultants, Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many

@@ -9,11 +9,12 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..case.model import Case, Scalar
+from ..lac.cells.catalogue import BY_MESHIO, BY_NAME
+from ..lac.cells.faces import FaceBlock
+from ..lac.cut import CutMesh, SubFaces
 from ..mechanics.fem.bodies import body_numbers
-from ..mechanics.fem.faces import FaceBlock, FaceError, boundary_faces, volume_cells
+from ..mechanics.fem.faces import FaceError, boundary_faces, volume_cells
 from ..mechanics.fem.loads import Field
-from ..mechanics.mortar.cut import CutMesh, SubFaces
-from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
 from .groups import ALL
 

@@ -8,11 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from ..case.solutions.base import ExactSolution
-from ..mechanics.fem import shape_functions
-from ..mechanics.fem.faces import FACE_POINTS, means_on_faces, nodal_normals
-from ..mechanics.fem.gauss import gauss_rule
+from ..lac.cells.catalogue import cell_type
+from ..lac.cells.faces import FACE_POINTS, nodal_normals
+from ..lac.cells.gauss import gauss_rule
+from ..lac.cells.shape import shape_functions
+from ..mechanics.fem.faces import means_on_faces
 from ..mechanics.fem.stress import normal_stress
-from ..mesh.catalogue import cell_type
 from .solution import Solution, ZoneResult
 
 

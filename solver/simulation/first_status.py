@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..case.model import Step
-from ..mechanics.mortar.status import likely_closed
+from ..lac.status import likely_closed
 from .constraints import ContactConstraints
 from .scene import Scene
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..case.model import Case, Exact, Load, Zone
 from ..case.rules import check_dimension
-from ..mesh.catalogue import BY_MESHIO
+from ..lac.cells.catalogue import BY_MESHIO
 from ..system.errors import InputError, hint
 
 ALL = "all"

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..case.model import Case, Load, Step
-from ..mechanics.fem import shape_functions
+from ..lac.cells.shape import shape_functions
 from ..mechanics.fem.block import Block
 from ..mechanics.fem.initial import StrainLoads, strain_loads
 from ..mechanics.fem.mixed import MeanStress

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import meshio
 import numpy as np
 
+from ..lac.cells.catalogue import BY_MESHIO
+from ..lac.facets import facets
+from ..lac.operator import meet_in_segments
+from ..lac.surface_points import face_samples
 from ..mechanics.fem.faces import FaceError, boundary_faces
-from ..mechanics.mortar.facets import facets
-from ..mechanics.mortar.operator import meet_in_segments
-from ..mechanics.mortar.surface_points import face_samples
-from ..mesh.catalogue import BY_MESHIO
 from ..system.errors import InputError, hint
 
 

@@ -6,19 +6,19 @@ from functools import partial
 import numpy as np
 
 from ..case.model import Zone
-from ..mechanics.fem.faces import FACE_POINTS, FaceBlock, surface_points
-from ..mechanics.mortar.cut import SubFaces
-from ..mechanics.mortar.facets import Facets, facets, with_nodal_normals
-from ..mechanics.mortar.master_normals import sharpest, with_directions, with_master_normals
-from ..mechanics.mortar.multipliers import constants
-from ..mechanics.mortar.operator import GapOperator, Scheme, gap_operator
+from ..lac.cells.catalogue import BY_NAME
+from ..lac.cells.faces import FACE_POINTS, FaceBlock, surface_points
+from ..lac.cut import SubFaces
+from ..lac.facets import Facets, facets, with_nodal_normals
+from ..lac.master_normals import sharpest, with_directions, with_master_normals
+from ..lac.multipliers import constants
+from ..lac.operator import GapOperator, Scheme, gap_operator
+from ..lac.reconstruction import form_of, vertex_neighbours
+from ..lac.recovery import RecoveryRequest
+from ..lac.surface_points import face_samples
 from ..mechanics.mortar.points import gauss
 from ..mechanics.mortar.quadric import Quadric, frame, meet_quadric
-from ..mechanics.mortar.reconstruction import form_of, vertex_neighbours
-from ..mechanics.mortar.recovery import RecoveryRequest
-from ..mechanics.mortar.surface_points import face_samples
 from ..mechanics.mortar.treatments import scheme_of
-from ..mesh.catalogue import BY_NAME
 from ..system.errors import InputError
 from .attributes import Attributes
 from .cut_groups import CutZone

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..lac.cut import needs_cut
 from ..mechanics.fem.mixed import AUTOMATIC_ABOVE
-from ..mechanics.mortar.cut import needs_cut
 from .constraints import MIN_COVERAGE
 from .naming import body_names
 from .options import Options

@@ -9,6 +9,8 @@ import numpy as np
 from scipy import sparse
 
 from ..case.model import Step
+from ..lac.errors import SolveError
+from ..lac.status import StatusResult, Trial, find_status
 from ..mechanics.fem.bodies import (
     rigid_motions,
     unsupported,
@@ -16,8 +18,6 @@ from ..mechanics.fem.bodies import (
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ..mechanics.linear.stabilised import Compliance
 from ..mechanics.linear.systems import Systems, parts_of
-from ..mechanics.mortar.status import StatusResult, Trial, find_status
-from ..system.errors import SolveError
 from ..system.memory import release
 from .accuracy import Accuracy, Roughness, estimate, judged, roughness
 from .constraints import (

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.model import Step
-from ..mechanics.mortar.reconstruction import Reconstruction
-from ..mechanics.mortar.recovery import Recovery
+from ..lac.reconstruction import Reconstruction
+from ..lac.recovery import Recovery
 from .problem import ContactProblem, Equilibrium
 from .scene import ZoneScene
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..mechanics.fem.faces import surface_points
+from ..lac.cells.faces import surface_points
+from ..lac.reconstruction import vertex_neighbours
 from ..mechanics.mortar.edge import Edges, contact_edges
-from ..mechanics.mortar.reconstruction import vertex_neighbours
 from .balance import moment
 from .problem import Equilibrium
 from .recovery import RecoveredZone

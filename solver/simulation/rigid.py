@@ -10,11 +10,12 @@ import meshio
 import numpy as np
 
 from ..case.model import Case
-from ..mechanics.fem.faces import FaceError, boundary_faces, nodal_normals, volume_cells
+from ..lac.cells.catalogue import BY_MESHIO, BY_NAME
+from ..lac.cells.faces import nodal_normals
+from ..mechanics.fem.faces import FaceError, boundary_faces, volume_cells
 from ..mechanics.fem.layer import layer, turned
 from ..mechanics.fem.supports import SAME, Fixed
 from ..mechanics.mortar.quadric import Quadric, ball, cylinder, parabola, plane
-from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError
 from .cut_groups import CutGroups
 

@@ -9,14 +9,15 @@ import numpy as np
 from scipy import sparse
 
 from ..case.model import Case, Step, Zone
+from ..lac.cells.faces import FaceBlock
+from ..lac.cut import CutMesh, SubFaces, cut
+from ..lac.operator import GapOperator
 from ..mechanics.fem.block import Block
-from ..mechanics.fem.faces import FaceBlock, volume_cells
+from ..mechanics.fem.faces import volume_cells
 from ..mechanics.fem.initial import StrainLoads
 from ..mechanics.fem.mixed import MeanStress
 from ..mechanics.fem.supports import Fixed, FreeMotion
-from ..mechanics.mortar.cut import CutMesh, SubFaces, cut
 from ..mechanics.mortar.held import merge_fixed_multipliers
-from ..mechanics.mortar.operator import GapOperator
 from ..mechanics.mortar.treatments import TREATMENTS, Treatment
 from ..system.clock import Clock
 from ..system.progress import stage

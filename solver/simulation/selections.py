@@ -9,8 +9,8 @@ import numpy as np
 
 from ..case.model import Case, Selection
 from ..case.rules import check_dimension
+from ..lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ..mechanics.fem.faces import corner_sets
-from ..mesh.catalogue import BY_MESHIO, BY_NAME
 from ..system.errors import InputError, hint
 from .groups import ALL, with_cells
 from .rigid import with_rigid_surfaces

@@ -10,12 +10,12 @@ import meshio
 import numpy as np
 
 from ..case.model import Case, Step
-from ..mechanics.fem.faces import nodal_normals
+from ..lac.cells.catalogue import BY_NAME
+from ..lac.cells.faces import nodal_normals
+from ..lac.errors import SolveError
 from ..mechanics.fem.nodal_stress import nodal_stress
 from ..mechanics.fem.stress import normal_stress
-from ..mesh.catalogue import BY_NAME
 from ..system.clock import Clock, processor_time
-from ..system.errors import SolveError
 from ..system.memory import peak_mb
 from ..system.progress import OUTCOME, stage
 from .balance import (

@@ -81,7 +81,7 @@ class RecoveredPressure:
 
     def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
         """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
-        from ..mechanics.mortar.reconstruction import FORMS, Local
+        from ..lac.reconstruction import FORMS, Local
 
         local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
         psi = local.shapes(macro, places, FORMS[self.form])

@@ -5,7 +5,7 @@ from typing import TypeAlias
 import meshio
 
 from ..case.model import Case, Zone
-from ..mechanics.fem.faces import FaceBlock
+from ..lac.cells.faces import FaceBlock
 from ..mechanics.mortar.treatments import TREATMENTS
 from ..system.errors import InputError
 from .cut_groups import faces_of

@@ -12,8 +12,8 @@ import numpy as np
 from scipy import sparse
 
 from ..case.model import Case
+from ..lac.cells.faces import circumference
 from ..mechanics.fem.cell_sizes import largest_strain
-from ..mechanics.fem.faces import circumference
 from ..mechanics.mortar.overlap import inside_others
 from .constraints import MIN_COVERAGE
 from .problem import Equilibrium

@@ -10,7 +10,7 @@ Comput. Struct. 79 (2001) 1473–1486.
 import numpy as np
 from scipy import sparse
 
-from ..mechanics.fem import shape_functions
+from ..lac.cells.shape import shape_functions
 from ..mechanics.fem.assembly import CellSum
 from ..mechanics.fem.block import Block
 from ..mechanics.fem.elasticity import physical_gradients, stiffness

@@ -14,6 +14,7 @@ import meshio
 import numpy as np
 from scipy import sparse
 
+from ..lac.errors import SolveError
 from ..mechanics.linear.condensation import CondensedSystem
 from ..mesh import generate, transform
 from ..simulation.accuracy import Accuracy
@@ -22,7 +23,7 @@ from ..simulation.problem import ContactProblem
 from ..simulation.scene import build_scene
 from ..simulation.simulate import solve_problem
 from ..system.clock import Clock
-from ..system.errors import InputError, SolveError
+from ..system.errors import InputError
 from ..verification.verdict import FAILED, PASSED, REFUSED, UNRELIABLE
 from .floor import floor, stress_error
 from .points import Point

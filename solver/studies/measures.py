@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..case.model import Case
+from ..lac.errors import SolveError
 from ..mechanics.linear.direct import force_solver
 from ..simulation.options import Options, Safeguards, Shortcuts
 from ..simulation.problem import ContactProblem
@@ -27,7 +28,7 @@ from ..simulation.scene import build_scene
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
 from ..system.clock import SOLVING, Clock
-from ..system.errors import InputError, SolveError
+from ..system.errors import InputError
 from ..system.memory import available
 from ..system.package import COMMAND
 from ..system.process import run_in_subprocess, used_since

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from ..case.solutions.base import ElasticSolution
-from ..mechanics.fem import shape_functions
+from ..lac.cells.catalogue import cell_type
+from ..lac.cells.faces import circumference, surface_points
+from ..lac.cells.gauss import gauss_rule
+from ..lac.cells.shape import shape_functions
 from ..mechanics.fem.elasticity import physical_gradients
-from ..mechanics.fem.faces import circumference, surface_points
-from ..mechanics.fem.gauss import gauss_rule
-from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution, ZoneResult
 

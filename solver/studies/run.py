@@ -36,7 +36,7 @@ def run_group(
 
     `file` and `level`: where the study was read, for points that are measured apart.
     """
-    from ..system.provenance import gather
+    from ..verification.provenance import gather
 
     started, points = now(), []
     for point in study.points(group):

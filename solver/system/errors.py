@@ -28,10 +28,6 @@ class MachineError(InputError):
     """The input is valid, but memory or disk is short. Another run may succeed."""
 
 
-class SolveError(RuntimeError):
-    """The solve failed (singular system, no convergence): one line with the reason, status 3."""
-
-
 def of_machine(error: Exception) -> str:
     """One line for an error of the machine (memory, a file that cannot be used); else empty."""
     said = " ".join(str(error).split())

@@ -38,14 +38,16 @@ import meshio
 import numpy as np
 
 from ..case.solutions.base import ElasticSolution, ExactSolution, lame_of
-from ..mechanics.fem import cell_loops, shape_functions
+from ..lac.cells.catalogue import cell_type
+from ..lac.cells.faces import SlaveFaces, surface_points
+from ..lac.cells.gauss import gauss_rule
+from ..lac.cells.shape import shape_functions
+from ..lac.threads import prefetch
+from ..mechanics.fem import cell_loops
 from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop
-from ..mechanics.fem.faces import SlaveFaces, pieces, surface_points
-from ..mechanics.fem.gauss import gauss_rule
-from ..mesh.catalogue import cell_type
+from ..mechanics.fem.faces import pieces
 from ..simulation.exact import ExactValues, computed_pressure
 from ..simulation.solution import Solution, ZoneResult
-from ..system.threads import prefetch
 from .oscillation import grown, macro_neighbours, oscillation
 
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.

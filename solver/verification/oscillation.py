@@ -8,7 +8,7 @@ what is linear on a regular grid. Places at the rim of the surface have none.
 import numpy as np
 
 from ..case.solutions.base import ExactSolution
-from ..mesh.catalogue import cell_type
+from ..lac.cells.catalogue import cell_type
 from ..simulation.solution import NodalContact, ZoneResult
 
 # Pairs of neighbours (k, 2), each once, and which places (m,) are at the rim.

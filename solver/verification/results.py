@@ -40,7 +40,7 @@ import numpy as np
 
 from ..case.model import Case
 from ..case.reader import parse_case
-from ..mesh.catalogue import cell_type
+from ..lac.cells.catalogue import cell_type
 from ..mesh.files.vtkhdf import check_name, read_grid, write_grid
 from ..simulation.consistency import inconsistency
 from ..simulation.solution import (

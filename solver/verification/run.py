@@ -12,6 +12,7 @@ import meshio
 from ..case.file import HALVINGS, HALVINGS_TEXT
 from ..case.model import Case
 from ..case.reader import check_mesh_file, load_case
+from ..lac.errors import SolveError
 from ..mechanics.fem.refine import refined as refined_mesh
 from ..mesh import generate, read_mesh, transform
 from ..mesh.files.vtkhdf import check_name
@@ -21,13 +22,13 @@ from ..simulation.options import LEAN, Options
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
 from ..system.clock import Clock, processor_time
-from ..system.errors import InputError, MachineError, SolveError, of_machine
+from ..system.errors import InputError, MachineError, of_machine
 from ..system.files import last_line
 from ..system.progress import OUTCOME, stage
-from ..system.provenance import gather
 from .checks import run_checks
 from .judge import judge, without_result
 from .norms import errors
+from .provenance import gather
 from .regression import accepted_values
 from .results import read_result, write_result
 from .verdict import (

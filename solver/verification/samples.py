@@ -15,7 +15,10 @@ from typing import Any
 import numpy as np
 
 from ..case.expressions import evaluate
-from ..mechanics.fem import shape_functions, volume_rule
+from ..lac.cells.catalogue import cell_type
+from ..lac.cells.quadrature import volume_rule
+from ..lac.cells.shape import shape_functions
+from ..lac.threads import prefetch
 from ..mechanics.fem.elasticity import (
     hoop_values,
     lame_parameters,
@@ -23,13 +26,11 @@ from ..mechanics.fem.elasticity import (
     with_hoop,
 )
 from ..mechanics.fem.stress import COMPONENTS
-from ..mesh.catalogue import cell_type
 from ..simulation.exact import ExactValues
 from ..simulation.groups import ALL
 from ..simulation.initial import strain_at
 from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
-from ..system.threads import prefetch
 
 Reference = Any
 # Pressures and gaps below this share of load and length are zero.

@@ -19,9 +19,9 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..mechanics.mortar.facets import tangents_of
-from ..mechanics.mortar.reconstruction import vertex_neighbours
-from ..mesh.catalogue import cell_type
+from ..lac.cells.catalogue import cell_type
+from ..lac.facets import tangents_of
+from ..lac.reconstruction import vertex_neighbours
 from ..simulation.accuracy import stress_of_motion
 from ..simulation.solution import Solution, ZoneResult
 from .oscillation import macro_neighbours

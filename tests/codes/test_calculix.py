@@ -9,8 +9,8 @@ from solver.codes import calculix
 from solver.codes.calculix import CalculiX, deck_lines, printed_forces
 from solver.codes.deck import UnsupportedError, deck_of, face_size
 from solver.codes.run import CrashError, Limits, run_code
+from solver.lac.errors import SolveError
 from solver.mechanics.fem.faces import boundary_faces
-from solver.system.errors import SolveError
 from tests.codes.blocks import CELLS_2D, CELLS_3D, case_of
 
 # From the manual of CalculiX 2.20, chapter "Element Types": the two nodes between which each node

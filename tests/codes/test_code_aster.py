@@ -5,8 +5,8 @@ import pytest
 
 from solver.codes.code_aster import CodeAster
 from solver.codes.deck import UnsupportedError, deck_of
+from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME
 from solver.mesh import read_mesh
-from solver.mesh.catalogue import BY_MESHIO, BY_NAME
 from tests.codes.blocks import case_of
 
 

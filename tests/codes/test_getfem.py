@@ -11,7 +11,7 @@ from solver.case.reader import load_case
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.codes.getfem import CELLS, GetFEM
 from solver.codes.run import Limits, run_case, run_code
-from solver.mesh.catalogue import BY_NAME
+from solver.lac.cells.catalogue import BY_NAME
 from solver.verification.run import mesh_of
 from tests.codes.blocks import case_of
 

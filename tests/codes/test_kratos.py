@@ -9,7 +9,7 @@ from solver.codes import kratos
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.codes.kratos import Kratos
 from solver.codes.run import Limits, run_code
-from solver.system.errors import SolveError
+from solver.lac.errors import SolveError
 from tests.codes.blocks import case_of
 
 needs_kratos = pytest.mark.skipif(not kratos.PYTHON.is_file(), reason="Kratos is not installed")

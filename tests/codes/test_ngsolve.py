@@ -12,8 +12,8 @@ import solver.codes
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.codes.ngsolve import LINEAR, QUADRATIC, NGSolve
 from solver.codes.run import Limits, run_code
-from solver.mesh.catalogue import BY_NAME
-from solver.system.errors import SolveError
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.errors import SolveError
 from tests.codes.blocks import TURNED, case_of
 
 SCRIPT = Path(solver.codes.__file__).with_name("ngsolve_main.py")

@@ -8,7 +8,7 @@ import pytest
 from solver.codes.deck import UnsupportedError
 from solver.codes.foreign import Field, ForeignResult
 from solver.codes.run import Limits, run_case
-from solver.system.errors import SolveError
+from solver.lac.errors import SolveError
 from solver.verification.verdict import read_verdict
 from tests.codes.blocks import case_of
 

@@ -12,7 +12,7 @@ import pytest
 import solver.verification.run
 from solver.case.reader import load_case
 from solver.commands.cli import main
-from solver.system.errors import SolveError
+from solver.lac.errors import SolveError
 
 PLANE = """\
 name: small

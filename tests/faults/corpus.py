@@ -8,8 +8,8 @@ import meshio
 import numpy as np
 
 from solver.commands.cli import main
+from solver.lac.cells.catalogue import cell_type
 from solver.mesh import generate, write_mesh
-from solver.mesh.catalogue import cell_type
 from solver.mesh.recipes.gmsh_session import number_of, session
 
 MESHES = ("mesh.med", "mesh.msh", "binary.msh", "mesh.inp", "mesh.vtu", "mesh.vtkhdf")

@@ -19,8 +19,9 @@ from unittest.mock import patch
 import numpy as np
 
 from solver.case.reader import load_case
+from solver.lac.errors import SolveError
 from solver.simulation.simulate import simulate
-from solver.system.errors import InputError, SolveError
+from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.judge import judge
 from solver.verification.norms import errors
@@ -133,7 +134,7 @@ def planted(mutant: Mutant) -> Iterator[None]:
 
 MUTANTS = (
     Mutant("gap-sign", "the initial gap has the wrong sign", CLOSING,
-           "solver.mechanics.mortar.operator:integrals",
+           "solver.lac.operator:integrals",
            changed(lambda p: replace(p, gap=-p.gap))),
     Mutant("operator-sign", "the gap operator has the wrong sign: surfaces attract", PLANE,
            "solver.simulation.operators:gap_operator",
@@ -142,25 +143,25 @@ MUTANTS = (
            "solver.simulation.operators:facets",
            given(lambda x, kind, nodes, *more: (x, kind, nodes[:, ::-1], *more))),
     Mutant("master-order", "master shape functions are assigned to the next node", TILTED,
-           "solver.mechanics.mortar.operator:integrals",
+           "solver.lac.operator:integrals",
            changed(lambda p: replace(p, vectors=(p.vectors[0], np.roll(p.vectors[1], 1, axis=2))))),
     Mutant("slave-side-lost", "slave nodes are missing in the derivative of the gap", PLANE,
-           "solver.mechanics.mortar.operator:integrals",
+           "solver.lac.operator:integrals",
            changed(lambda p: replace(p, vectors=(0 * p.vectors[0], p.vectors[1])))),
     Mutant("sliver-lost", "the smallest segment is dropped", PLANE,
-           "solver.mechanics.mortar.operator:intersect", changed(one_dropped)),
+           "solver.lac.operator:intersect", changed(one_dropped)),
     Mutant("sliver-lost-3d", "the smallest segment is dropped, in 3D", TILTED_SOLID,
-           "solver.mechanics.mortar.operator:intersect", changed(one_dropped)),
+           "solver.lac.operator:intersect", changed(one_dropped)),
     Mutant("pair-lost", "the pairing misses one master face", PLANE,
-           "solver.mechanics.mortar.pairing:candidate_pairs", changed(master_overlooked)),
+           "solver.lac.pairing:candidate_pairs", changed(master_overlooked)),
     Mutant("macro-element-dropped", "one macro-element never closes", PLANE,
            "solver.simulation.problem:contact_constraints", never_closing),
     Mutant("macro-element-numbers", "sub-faces are assigned to the next macro-element", VARYING,
            "solver.simulation.scene:cut", changed(rolled_sub_faces)),
     Mutant("template-off-by-one", "the nodes of the first sub-face of the cut are shifted by one",
-           PLANE, "solver.mechanics.mortar.cut:_template", changed(template_off_by_one)),
+           PLANE, "solver.lac.cut:_template", changed(template_off_by_one)),
     Mutant("template-piece-lost", "the cut loses a piece of the cell", SOLID,
-           "solver.mechanics.mortar.cut:_template", changed(template_piece_lost)),
+           "solver.lac.cut:_template", changed(template_piece_lost)),
     Mutant("jacobian", "the Jacobian of one cell is 1 % too large", PLANE,
            "solver.mechanics.fem.elasticity:shapes_in",
            changed(lambda found: replace(found, measure=first_scaled(found.measure, 1.01)))),
@@ -172,10 +173,10 @@ MUTANTS = (
     Mutant("compiled-cell-lost", "the compiled loop for stress at nodes leaves out a cell", SOLID,
            "solver.mechanics.fem.nodal_stress:cell_loops", last_cell_lost),
     Mutant("segment-weight", "one quadrature weight of the segments is 10 % off", TILTED,
-           "solver.mechanics.mortar.segments:simplex_rule",
+           "solver.lac.segments:simplex_rule",
            changed(lambda rule: (rule[0], first_scaled(rule[1], 1.1)))),
     Mutant("segment-arc", "the slopes of arcs in the reference face are 0.1 % too large", SPHERES,
-           "solver.mechanics.mortar.segments:_into_reference",
+           "solver.lac.segments:_into_reference",
            changed(lambda image: lambda *arcs: (image(*arcs)[0], 1.001 * image(*arcs)[1]))),
     Mutant("load-weight", "one quadrature weight of the loads is 10 % off", PLANE,
            "solver.mechanics.fem.loads:face_rule",
@@ -223,7 +224,7 @@ MUTANTS = (
            "solver.mechanics.mortar.quadric:_round",
            lambda true: lambda point, across, *rest: true(point, np.eye(len(across)), *rest)),
     Mutant("segments-lost", "segments farther away than half a slave face are lost", CURVED,
-           "solver.mechanics.mortar.operator:on_one_surface",
+           "solver.lac.operator:on_one_surface",
            changed(lambda found: [s.of(np.abs(s.gap).max(axis=1) < 0.22) for s in found])),
     Mutant("spring-reaction", "the balance of forces leaves out springs", FOUNDATION,
            "solver.simulation.balance:_of_springs", changed(np.zeros_like)),
@@ -290,7 +291,7 @@ MUTANTS = (
            lambda true: lambda self, case, mesh, cut, zones, origin: true(
                self, case, mesh, cut, zones, 0 * origin)),
     Mutant("radius-lost", "segments of axisymmetric faces lack the measure 2πr", DISC,
-           "solver.mechanics.mortar.segments:circumference",
+           "solver.lac.segments:circumference",
            changed(lambda around: np.full(around.shape, around.mean()))),
     Mutant("load-radius-lost", "loads on axisymmetric faces lack the measure 2πr", DISC,
            "solver.mechanics.fem.loads:surface_vectors",
@@ -302,7 +303,7 @@ MUTANTS = (
            "solver.mechanics.fem.elasticity:hoop_values",
            changed(lambda found: (0.5 * found[0], found[1]))),
     Mutant("recovered-load", "the loads of the recovered pressure are 0.1 % too small", BENDING,
-           "solver.mechanics.mortar.operator:recovery",
+           "solver.lac.operator:recovery",
            changed(lambda r: r and replace(r, loads=0.999 * r.loads))),
     Mutant("sweeps-lost", "a recovery makes the sweeps of its form alone", BENDING,
            "solver.simulation.operators:_recovery",
@@ -335,7 +336,7 @@ MUTANTS = (
            "solver.simulation.rigid:turned",
            changed(lambda faces: {name: nodes[:, ::-1] for name, nodes in faces.items()})),
     Mutant("stabilisation-lost", "stabilised contact does not give way", STIFF,
-           "solver.mechanics.mortar.stabilisation:Stabilisation.scatter",
+           "solver.lac.stabilisation:Stabilisation.scatter",
            changed(lambda scatter: 0 * scatter)),
     Mutant("normal-of-slave", "contact follows the slave's normals, not the master's", OBSTACLE,
            "solver.simulation.operators:with_master_normals",

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.errors import SolveError
+from solver.lac.facets import project_along
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import element_matrices
 from solver.mechanics.fem.loads import body_forces
 from solver.mechanics.linear.direct import factorise
-from solver.mechanics.mortar.facets import project_along
 from solver.mesh import read_mesh
-from solver.mesh.catalogue import BY_NAME
-from solver.system.errors import InputError, SolveError
+from solver.system.errors import InputError
 from solver.verification.regression import accepted_values, regression_file
 from tests.faults.refusals import ROOT, page, refusals
 from tests.handmade import plane

@@ -12,9 +12,9 @@ import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from solver.lac import LocalAverageContact
-from solver.mechanics.mortar.facets import facets
-from solver.mechanics.mortar.operator import gap_operator
-from solver.mesh.catalogue import BY_NAME
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.facets import facets
+from solver.lac.operator import gap_operator
 
 ROOT = Path(__file__).resolve().parents[2]
 FORM = linear_elasticity(*lame_parameters(2000.0, 0.3))

@@ -13,7 +13,7 @@ import numpy as np
 import sympy
 from sympy.abc import x, y, z
 
-from solver.mesh.catalogue import BY_NAME, CellType, Face
+from solver.lac.cells.catalogue import BY_NAME, CellType, Face
 
 KINDS = [name for name, cell in BY_NAME.items() if cell.dim > 1]
 # What the shape functions of the linear types hold beside the linear polynomials. Those of the

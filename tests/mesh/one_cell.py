@@ -11,7 +11,7 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk
 
-from solver.mesh.catalogue import BY_MESHIO, BY_NAME
+from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME
 from solver.mesh.recipes.gmsh_session import number_of, session
 from tests.mesh.curved import Curved, ours
 

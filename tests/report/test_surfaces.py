@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.case.reader import load_case
-from solver.mesh.catalogue import cell_type
+from solver.lac.cells.catalogue import cell_type
 from solver.report.layout import ways_apart
 from solver.report.parts import rigid_surface
 from solver.report.surfaces import magnification, split, surfaces

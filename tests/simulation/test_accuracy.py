@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from solver.case.reader import load_case
+from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.cell_sizes import largest_strain
 from solver.mesh import generate, transform
-from solver.mesh.catalogue import BY_NAME
 from solver.simulation.accuracy import Accuracy
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.mechanics.mortar import segments
+from solver.lac import segments
 from solver.mesh import transform
 from solver.simulation.resultants import _extent
 from solver.simulation.scene import build_scene

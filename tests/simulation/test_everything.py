@@ -124,9 +124,9 @@ def test_a_plane_solve_imports_nothing_of_three_dimensions(tmp_path):
         env=os.environ | {"PYTHONPATH": str(CASES.parents[1])},
     )  # fmt: skip
     loaded = set(done.stdout.split("\n")[-2].split())
-    assert "solver.mechanics.fem.shape" in loaded
+    assert "solver.lac.cells.shape" in loaded
     of_space = {
-        "solver.mechanics.fem.extra_elements",
+        "solver.lac.cells.extra_elements",
         "solver.mesh.recipes.hybrid",
         "solver.report.case_picture",
     }

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.mechanics.mortar import operator
-from solver.mechanics.mortar.pairing import candidate_pairs
+from solver.lac import operator
+from solver.lac.pairing import candidate_pairs
 from solver.simulation import first_status
 from solver.simulation.first_status import first_guess, moved
 from solver.simulation.problem import ContactProblem
@@ -80,7 +80,7 @@ def test_a_graded_surface_has_the_same_pairs_found_among_fewer(monkeypatch, flat
         counted[-1] += len(pairs[0])
         return pairs
 
-    monkeypatch.setattr("solver.mechanics.mortar.pairing.candidate_pairs", count)
+    monkeypatch.setattr("solver.lac.pairing.candidate_pairs", count)
     for wider in (operator._WIDER, np.inf):
         monkeypatch.setattr(operator, "_WIDER", wider)
         counted.append(0)

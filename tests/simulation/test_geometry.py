@@ -6,11 +6,12 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.mechanics.mortar.facets import facets
-from solver.mesh.catalogue import BY_NAME
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.errors import SolveError
+from solver.lac.facets import facets
 from solver.mesh.tidy import tidy
 from solver.simulation.simulate import simulate
-from solver.system.errors import InputError, SolveError
+from solver.system.errors import InputError
 from tests.scenes import PRESSURE, block_mesh, changed_case, with_points
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from solver import solve_case
-from solver.mechanics.mortar.facets import facets
-from solver.mechanics.mortar.master_normals import with_master_normals
-from solver.mesh.catalogue import BY_NAME
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.facets import facets
+from solver.lac.master_normals import with_master_normals
 from solver.system.errors import InputError
 
 

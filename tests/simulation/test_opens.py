@@ -7,7 +7,7 @@ import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
 from solver.case.reader import parse_case
-from solver.mesh.catalogue import BY_NAME, cell_type
+from solver.lac.cells.catalogue import BY_NAME, cell_type
 from solver.report.case_picture import draw_case
 from solver.report.profile import draw_profile
 from solver.simulation.simulate import simulate

@@ -6,9 +6,9 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.mechanics.mortar import operator
+from solver.lac import operator
+from solver.lac.cells.catalogue import BY_NAME
 from solver.mesh import generate
-from solver.mesh.catalogue import BY_NAME
 from solver.simulation.simulate import simulate
 from tests.scenes import block_case, block_mesh, errors, moved, straightened, with_points
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
+from solver.lac.errors import SolveError
+from solver.lac.status import StatusResult
 from solver.mechanics.linear.choice import MULTIGRID
 from solver.mechanics.linear.direct import force_solver
-from solver.mechanics.mortar.status import StatusResult
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.mesh import generate
 from solver.simulation import problem
@@ -17,7 +18,6 @@ from solver.simulation.consistency import inconsistency
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
-from solver.system.errors import SolveError
 from tests.scenes import block_case, block_mesh
 from tests.simulation.test_unloaded import SCENE, side_by_side
 

@@ -10,11 +10,11 @@ import yaml
 from solver import solve_case
 from solver.case.reader import parse_case
 from solver.commands.cli import main
-from solver.mechanics.mortar import reconstruction as mortar
-from solver.mechanics.mortar.reconstruction import FORMS
-from solver.mechanics.mortar.recovery import Recovery
+from solver.lac import reconstruction as mortar
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.reconstruction import FORMS
+from solver.lac.recovery import Recovery
 from solver.mesh import generate
-from solver.mesh.catalogue import BY_NAME
 from solver.simulation import recovery as sweeps
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate

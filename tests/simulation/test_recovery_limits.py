@@ -7,9 +7,9 @@ import pytest
 import yaml
 
 from solver.case.reader import parse_case
-from solver.mechanics.fem.faces import surface_points
+from solver.lac import recovery
+from solver.lac.cells.faces import surface_points
 from solver.mechanics.linear import choice
-from solver.mechanics.mortar import recovery
 from solver.mesh import generate
 from solver.simulation.exact import computed_pressure
 from solver.simulation.simulate import simulate

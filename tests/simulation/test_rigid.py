@@ -9,8 +9,8 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.codes.deck import UnsupportedError, deck_of
+from solver.lac.cells.catalogue import BY_NAME
 from solver.mesh import generate
-from solver.mesh.catalogue import BY_NAME
 from solver.mesh.tidy import tidy
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError

@@ -6,11 +6,12 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.mesh.catalogue import BY_MESHIO, BY_NAME, cell_type
+from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME, cell_type
+from solver.lac.errors import SolveError
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate
-from solver.system.errors import InputError, SolveError
+from solver.system.errors import InputError
 from tests.scenes import block_case, block_mesh, changed_case, errors, turn, with_points
 
 

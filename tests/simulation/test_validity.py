@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.mortar.overlap import inside_others
-from solver.mesh.catalogue import BY_NAME
 from solver.simulation import validity
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result

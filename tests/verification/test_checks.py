@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import solver.system.threads
+import solver.lac.threads
 import solver.verification.samples
 from solver.case.rules import ERRORS
 from solver.verification.checks import CHECKS, Accepted, block_size, run_checks
@@ -45,7 +45,7 @@ def test_stress_of_cells_in_parts_is_judged_as_in_one(solution, monkeypatch, val
     solution.displacement[node] += value
     whole = by_name(solution)["integration_stress"]
     assert not whole.passed
-    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     monkeypatch.setattr(solver.verification.samples, "_CHUNK", 1)
     parts = by_name(solution)["integration_stress"]
     assert parts.where == whole.where

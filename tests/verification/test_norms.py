@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
-import solver.system.threads
+import solver.lac.threads
 import solver.verification.norms
 from solver.case.material import Material
 from solver.case.model import Rigid
@@ -73,7 +73,7 @@ def test_the_exact_state_has_none(handmade):
 def test_parts_and_threads_change_no_number(handmade, monkeypatch, threads):
     handmade.displacement *= 1.0 + 0.01 * np.arange(len(handmade.displacement))[:, None]
     whole = errors(handmade)
-    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     monkeypatch.setattr(solver.verification.norms, "_CHUNK", 1)
     assert whole["stress_l2"] > 0.01
     assert errors(handmade) == pytest.approx(whole, rel=1e-13)

@@ -12,8 +12,8 @@ from solver.case.reader import parse_case
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.system.files import seal
-from solver.system.provenance import gather
 from solver.verification.checks import run_checks
+from solver.verification.provenance import gather
 from solver.verification.results import read_result, write_result
 from tests.handmade import plane, solid
 from tests.scenes import block_case, block_mesh, errors

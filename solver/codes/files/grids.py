@@ -12,7 +12,7 @@ import h5py
 import meshio
 import numpy as np
 
-from ...mesh.catalogue import BY_NAME
+from ...lac.cells.catalogue import BY_NAME
 from ...mesh.files import med
 from ...system.errors import InputError
 from ...system.hdf5 import read_file

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import meshio
 import numpy as np
 
-from ...mesh.catalogue import BY_MESHIO
+from ...lac.cells.catalogue import BY_MESHIO
 
 
 class RawField(NamedTuple):

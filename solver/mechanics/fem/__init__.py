@@ -1,7 +1,7 @@
 """Shape functions of every cell type in the file's node order, and quadrature that suffices."""
 
-from .quadrature import face_rule, mortar_degree, simplex_rule, volume_rule
-from .shape import ShapeFunctions, has_straight_edges, shape_functions
+from ...lac.cells.quadrature import face_rule, mortar_degree, simplex_rule, volume_rule
+from ...lac.cells.shape import ShapeFunctions, has_straight_edges, shape_functions
 
 __all__ = [
     "ShapeFunctions",

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from scipy import sparse
 
-from ...system.threads import prefetch
+from ...lac.threads import prefetch
 
 # Nodes whose neighbours are found at once.
 _NODES_AT_ONCE = 1 << 16

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...mesh.catalogue import CellType
-from . import volume_rule
+from ...lac.cells.catalogue import CellType
+from ...lac.cells.quadrature import volume_rule
 
 
 @dataclass(frozen=True)

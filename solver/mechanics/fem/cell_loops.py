@@ -9,11 +9,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...mesh.catalogue import CellType
+from ...lac.cells.catalogue import CellType
+from ...lac.cells.shape import shape_functions
+from ...lac.errors import SolveError
+from ...lac.threads import prefetch, workers
 from ...system.compiled import available
-from ...system.errors import SolveError
-from ...system.threads import prefetch, workers
-from . import cell_kernels, shape_functions
+from . import cell_kernels
 from .block import Block
 
 # Nodes from which these loops pay for loading Numba: 60,000 unknowns.

@@ -14,14 +14,15 @@ from typing import TypeVar
 import numpy as np
 from scipy import sparse
 
-from ...mesh.catalogue import CellType
-from ...system.errors import SolveError
-from ...system.threads import prefetch
-from . import cell_loops, shape_functions
+from ...lac.cells.catalogue import CellType
+from ...lac.cells.faces import circumference
+from ...lac.cells.shape import shape_functions
+from ...lac.cells.small_matrices import invert
+from ...lac.errors import SolveError
+from ...lac.threads import prefetch
+from . import cell_loops
 from .assembly import CellSum
 from .block import Block
-from .faces import circumference
-from .small_matrices import invert
 
 # Bytes of gradients, and of matrices, handled at once: so few stay in the processor's cache.
 _CHUNK_BYTES, _MATRIX_BYTES = 1 << 20, 3 << 20

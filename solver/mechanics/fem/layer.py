@@ -11,10 +11,10 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ...mesh.catalogue import BY_NAME, CellType, cell_type
-from ...mesh.orient import right_side_out
-from .faces import area_vectors, nodal_normals
-from .shape import shape_functions
+from ...lac.cells.catalogue import BY_NAME, CellType, cell_type
+from ...lac.cells.faces import area_vectors, nodal_normals
+from ...lac.cells.orient import right_side_out
+from ...lac.cells.shape import shape_functions
 
 # The cell behind a face, and its thickness in parts of the face's size.
 _BEHIND = {

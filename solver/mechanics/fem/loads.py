@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...system.errors import SolveError
-from . import face_rule, shape_functions, volume_rule
-from .faces import circumference, surface_vectors
-from .small_matrices import invert
+from ...lac.cells.faces import circumference, surface_vectors
+from ...lac.cells.quadrature import face_rule, volume_rule
+from ...lac.cells.shape import shape_functions
+from ...lac.cells.small_matrices import invert
+from ...lac.errors import SolveError
 from .stress import traction
 
 # A value of position: points (n, dim) to values (n,) or (n, dim).

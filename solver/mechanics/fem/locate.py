@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.catalogue import CellType, cell_type
-from .shape import shape_functions
+from ...lac.cells.catalogue import CellType, cell_type
+from ...lac.cells.shape import shape_functions
 
 _STEPS = 30
 # The gradients of a pyramid's shape functions have no value at its apex.

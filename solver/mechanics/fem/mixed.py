@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from . import shape_functions
+from ...lac.cells.shape import shape_functions
 from .assembly import degrees_of_freedom
 from .block import Block
 from .elasticity import chunks, shapes_in

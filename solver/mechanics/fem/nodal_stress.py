@@ -4,8 +4,9 @@ from functools import partial
 
 import numpy as np
 
-from ...mesh.catalogue import CellType
-from . import cell_loops, shape_functions
+from ...lac.cells.catalogue import CellType
+from ...lac.cells.shape import shape_functions
+from . import cell_loops
 from .block import Block
 from .elasticity import by_part, in_precision, shapes_in, stress_in
 

@@ -13,8 +13,8 @@ from itertools import product
 import meshio
 import numpy as np
 
-from ...mesh.catalogue import BY_NAME, CellType, cell_type
-from .shape import shape_functions
+from ...lac.cells.catalogue import BY_NAME, CellType, cell_type
+from ...lac.cells.shape import shape_functions
 
 # Weights of vertices are whole multiples of this; the points of a pyramid have rounded ones.
 _PART = 2.0**20

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import sparse
 
-from . import face_rule
-from .faces import surface_vectors
+from ...lac.cells.faces import surface_vectors
+from ...lac.cells.quadrature import face_rule
 from .loads import Field
 
 

@@ -5,7 +5,7 @@ import logging
 import numpy as np
 from scipy.sparse import diags
 
-from ...system.errors import SolveError
+from ...lac.errors import SolveError
 from .condensed_matrix import Symmetric
 from .direct import Factor, factorise, wanted
 from .hierarchy import Shared

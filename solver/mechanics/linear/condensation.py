@@ -14,7 +14,7 @@ from typing import Protocol, Self, TypeVar
 import numpy as np
 from scipy import sparse
 
-from ...system.errors import SolveError
+from ...lac.errors import SolveError
 from .choice import LinearSolver, prepare
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise_indefinite

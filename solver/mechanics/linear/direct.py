@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from scipy.sparse import csr_matrix, sparray, spmatrix
 
-from ...system.errors import SolveError
+from ...lac.errors import SolveError
 from .backends import BACKENDS, Backend, BreakdownError, Solve
 from .krylov import EPSILON
 

@@ -10,8 +10,8 @@ from functools import cache
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
+from ...lac.threads import prefetch
 from ...system.compiled import compiled, worthwhile
-from ...system.threads import prefetch
 from .products import pattern, ranges, rows_of, share_rows
 
 _PARTS = 8  # of a product that SciPy forms in parts

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
-from ...system.errors import SolveError
+from ...lac.errors import SolveError
 from .aggregation import aggregate
 from .condensed_matrix import Symmetric, in_blocks
 from .contact_levels import Correction, Interface

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ...lac.errors import SolveError
+from ...lac.threads import prefetch
 from ...system.compiled import worthwhile
-from ...system.errors import SolveError
-from ...system.threads import prefetch
 from . import vectors
 
 _LOG = logging.getLogger(__name__)

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ...system.errors import SolveError
-from ...system.threads import prefetch
+from ...lac.errors import SolveError
+from ...lac.threads import prefetch
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .contact_levels import Correction, correction_of
 from .hierarchy import Hierarchy, Level, Shared

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
+from ...lac.threads import prefetch, workers
 from ...system.compiled import compiled, worthwhile
-from ...system.threads import prefetch, workers
 
 _LEAST = 200_000  # multiplications from which another thread pays for its start
 _PARTS = 16  # of a transposed product

@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from ...system.errors import SolveError
+from ...lac.errors import SolveError
 from .condensed_matrix import Symmetric
 from .hierarchy import Shared
 from .krylov import EPSILON, conjugate_residuals

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
+from ...lac.threads import prefetch
 from ...system.compiled import compiled, worthwhile
-from ...system.threads import prefetch
 from .products import chosen_rows, multiply, pattern, ranges
 
 _SLABS = 8  # the most threads that share a product

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ...system.errors import SolveError
+from ...lac.errors import SolveError
 from ..fem.bodies import joined_bodies
 from .augmented import augment
 from .choice import LinearSolver

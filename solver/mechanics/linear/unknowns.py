@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ...system.threads import prefetch
+from ...lac.threads import prefetch
 
 _ROWS = 1 << 15  # that a thread handles at once
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ...lac.threads import prefetch, workers
 from ...system.compiled import compiled, part_of_compiled
-from ...system.threads import prefetch, workers
 
 _PART = 1 << 13  # of a vector
 _PARTS = 8  # of them from which another thread pays for its start

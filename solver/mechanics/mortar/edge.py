@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..fem.faces import circumference
+from ...lac.cells.faces import circumference
 
 # Up to round-off a macro-element is covered as a whole.
 _WHOLE = 1 - 1e-6

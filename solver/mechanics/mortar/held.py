@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
-from .operator import GapOperator
+from ...lac.operator import GapOperator
 
 # A node is held along its normal where less than this share of a motion that way is free.
 _HELD = 1e-12

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..fem import shape_functions
-from .multipliers import InterfaceData, Multipliers, of_nodes
+from ...lac.cells.shape import shape_functions
+from ...lac.multipliers import InterfaceData, Multipliers, of_nodes
 
 # Of a face covered by less than this share, dual functions are those of the whole face: those of
 # so small a part would be lost in round-off.

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ...mesh.catalogue import CellType, cell_type
-from ...system.threads import prefetch
-from .pairing import candidate_pairs
+from ...lac.cells.catalogue import CellType, cell_type
+from ...lac.pairing import candidate_pairs
+from ...lac.threads import prefetch
 
 # Cells that are looked at together.
 _AT_ONCE = 1 << 14

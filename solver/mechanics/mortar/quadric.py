@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.catalogue import BY_NAME
-from .facets import Facets
-from .segments import Segments, Side
-from .surface_points import Samples
+from ...lac.cells.catalogue import BY_NAME
+from ...lac.facets import Facets
+from ...lac.segments import Segments, Side
+from ...lac.surface_points import Samples
 
 
 @dataclass(frozen=True, kw_only=True)

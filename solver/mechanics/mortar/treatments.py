@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
+from ...lac.operator import LAC, Scheme, meet_in_segments
 from .nodal import dual, linear
-from .operator import LAC, Scheme, meet_in_segments
 from .points import at_nodes, gauss, meet_at_points, one_each
 
 DEFAULT_POINTS = 4

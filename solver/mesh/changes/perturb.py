@@ -7,8 +7,8 @@ of curved sides stay, and mid-nodes go with the vertices they lie between.
 import meshio
 import numpy as np
 
-from ..catalogue import CellType, cell_type
-from ..orient import right_side_out
+from ...lac.cells.catalogue import CellType, cell_type
+from ...lac.cells.orient import right_side_out
 
 _Volumes = list[tuple[CellType, np.ndarray]]
 # Squared sine of the angle below which two faces are of one plane.

@@ -12,8 +12,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from ...lac.cells.catalogue import BY_NAME, CellType
 from ...system.errors import InputError
-from ..catalogue import BY_NAME, CellType
 
 _SOLIDS = {
     4: "TETRA4", 10: "TETRA10", 5: "PYRA5", 6: "PENTA6", 15: "PENTA15", 8: "HEXA8", 20: "HEXA20",

@@ -13,9 +13,9 @@ import h5py
 import meshio
 import numpy as np
 
+from ...lac.cells.catalogue import BY_NAME
 from ...system.errors import InputError
 from ...system.hdf5 import read_file
-from ..catalogue import BY_NAME
 
 _TYPES = {
     "SE2": "SEG2", "SE3": "SEG3", "TR3": "TRIA3", "TR6": "TRIA6",

@@ -5,8 +5,8 @@ from pathlib import Path
 import gmsh
 import meshio
 
+from ...lac.cells.catalogue import BY_NAME
 from ...system.errors import InputError
-from ..catalogue import BY_NAME
 from ..recipes.gmsh_session import current_model, foreign_types, session
 
 

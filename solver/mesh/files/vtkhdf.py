@@ -12,10 +12,10 @@ import h5py
 import meshio
 import numpy as np
 
+from ...lac.cells.catalogue import BY_NAME, cell_type
 from ...system.errors import InputError
 from ...system.files import seal, seal_of
 from ...system.hdf5 import new_file, read_file
-from ..catalogue import BY_NAME, cell_type
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
 _GROUPS = "mesh_groups"

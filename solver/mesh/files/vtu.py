@@ -6,8 +6,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from ...lac.cells.catalogue import BY_NAME
 from ...system.errors import InputError
-from ..catalogue import BY_NAME
 
 _COMPRESSORS = ("vtkZLibDataCompressor", "vtkLZMADataCompressor")
 

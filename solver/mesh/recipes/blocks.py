@@ -27,7 +27,7 @@ import gmsh
 import meshio
 import numpy as np
 
-from ..catalogue import BY_NAME
+from ...lac.cells.catalogue import BY_NAME
 from ..keys import BlockKeys, BlocksKeys, Recipe, each
 from ..size import fills_by_hxt
 from .gmsh_session import current_model, session

@@ -9,7 +9,7 @@ import gmsh
 import meshio
 import numpy as np
 
-from ..catalogue import BY_NAME
+from ...lac.cells.catalogue import BY_NAME
 
 # gmsh's own number of each cell type.
 _NUMBERS = {

@@ -18,7 +18,7 @@ import gmsh
 import meshio
 import numpy as np
 
-from ..catalogue import BY_NAME, CellType
+from ...lac.cells.catalogue import BY_NAME, CellType
 from ..keys import BlockKeys, each
 from .gmsh_session import current_model, number_of, session
 from .sides import side_name

@@ -36,7 +36,7 @@ import meshio
 import numpy as np
 
 from ...case.typed import FieldError
-from ..catalogue import cell_type
+from ...lac.cells.catalogue import cell_type
 from ..changes.parts import nodes_of
 from ..keys import (
     HertzKeys,

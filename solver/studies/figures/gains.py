@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from ...mesh.catalogue import BY_NAME
+from ...lac.cells.catalogue import BY_NAME
 from ...report.formats import error as shown_error
 from ..description import Study
 from ..shown import Table, TableRow

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from ...mesh.catalogue import BY_NAME
+from ...lac.cells.catalogue import BY_NAME
 from ...report.charts import (
     CROSS,
     EPSILON,

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import solver.lac.threads
 import solver.mechanics.fem.assembly
 import solver.mechanics.fem.elasticity
-import solver.system.threads
+from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.assembly import CellSum, degrees_of_freedom, selected
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import stiffness
-from solver.mesh.catalogue import BY_NAME
 from tests.scenes import grid
 
 
@@ -63,7 +63,7 @@ def cube(count):
 def test_cells_and_nodes_in_parts_of_any_size_by_any_threads(monkeypatch, size, threads):
     points, block = cube(5)
     whole = stiffness(points, [block])
-    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     monkeypatch.setattr(solver.mechanics.fem.elasticity, "_MATRIX_BYTES", size)
     monkeypatch.setattr(solver.mechanics.fem.assembly, "_NODES_AT_ONCE", max(1, size // 1000))
     parts = stiffness(points, [block])

@@ -4,6 +4,12 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.cells.faces import surface_points
+from solver.lac.facets import facets
+from solver.lac.operator import gap_operator
+from solver.lac.reconstruction import FORMS, vertex_neighbours
+from solver.lac.recovery import RecoveryRequest
 from solver.mechanics.fem.bodies import rigid_motions, support_resistance, unheld_motion
 from solver.mechanics.fem.cell_sizes import largest_strain, sizes
 from solver.mechanics.fem.elasticity import (
@@ -11,17 +17,12 @@ from solver.mechanics.fem.elasticity import (
     internal_force,
     stiffness,
 )
-from solver.mechanics.fem.faces import face_integrals, surface_points
+from solver.mechanics.fem.faces import face_integrals
 from solver.mechanics.fem.loads import body_forces, face_forces, stress_forces
 from solver.mechanics.fem.mixed import split
 from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mechanics.fem.supports import free_motion
 from solver.mechanics.mortar.edge import contact_edges
-from solver.mechanics.mortar.facets import facets
-from solver.mechanics.mortar.operator import gap_operator
-from solver.mechanics.mortar.reconstruction import FORMS, vertex_neighbours
-from solver.mechanics.mortar.recovery import RecoveryRequest
-from solver.mesh.catalogue import BY_NAME
 
 PI = np.pi
 LAME, SHEAR = 3.0, 2.0

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME
+from solver.lac.errors import SolveError
 from solver.mechanics.fem import cell_loops
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepest
 from solver.mechanics.fem.elasticity import internal_force, stiffness
 from solver.mechanics.fem.nodal_stress import nodal_stress
-from solver.mesh.catalogue import BY_MESHIO, BY_NAME
 from solver.system.compiled import available
-from solver.system.errors import SolveError
 from tests.scenes import block_mesh, grid
 
 pytestmark = pytest.mark.skipif(not available(), reason="Numba is not installed")
@@ -22,7 +22,7 @@ def choose(loops, monkeypatch, threads=1):
     """With the compiled loops or without, on so many threads."""
     monkeypatch.setattr(cell_loops, "_LEAST", 1 if loops else 1 << 40)
     monkeypatch.setattr(cell_loops, "workers", lambda: threads)
-    monkeypatch.setattr("solver.system.threads.workers", lambda: threads)
+    monkeypatch.setattr("solver.lac.threads.workers", lambda: threads)
 
 
 def scattered(name):

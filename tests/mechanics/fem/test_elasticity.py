@@ -6,9 +6,11 @@ import skfem
 from skfem.models.elasticity import lame_parameters as skfem_lame
 from skfem.models.elasticity import linear_elasticity
 
+import solver.lac.threads
 import solver.mechanics.fem.elasticity
-import solver.system.threads
-from solver.mechanics.fem import shape_functions, volume_rule
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.cells.quadrature import volume_rule
+from solver.lac.cells.shape import shape_functions
 from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepness
 from solver.mechanics.fem.elasticity import (
     Block,
@@ -18,7 +20,6 @@ from solver.mechanics.fem.elasticity import (
     stiffness,
 )
 from solver.mechanics.fem.nodal_stress import nodal_stress
-from solver.mesh.catalogue import BY_NAME
 from tests.scenes import block_mesh
 
 VOLUMES = [n for n, t in BY_NAME.items() if t.dim > 1]
@@ -181,7 +182,7 @@ def test_parts_and_threads_change_no_number(monkeypatch, name, size, threads):
         ]
 
     whole = found()
-    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     monkeypatch.setattr(solver.mechanics.fem.elasticity, "_CHUNK_BYTES", size)
     for ours, expected in zip(found(), whole, strict=True):
         np.testing.assert_allclose(ours, expected, rtol=1e-13, atol=1e-13)

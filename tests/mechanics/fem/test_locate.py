@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.locate import locate
-from solver.mesh.catalogue import BY_NAME
 from tests.mesh.curved import KINDS, Curved
 
 

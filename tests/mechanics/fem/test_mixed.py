@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
+from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import internal_force
 from solver.mechanics.fem.mixed import split
 from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh import generate
-from solver.mesh.catalogue import BY_NAME
 from solver.simulation.options import LEAN, Options, Safeguards
 from solver.simulation.scene import build_scene
 from solver.simulation.simulate import simulate

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.gauss import gauss_rule
+from solver.lac.cells.catalogue import BY_NAME, cell_type
+from solver.lac.cells.gauss import gauss_rule
+from solver.lac.cells.shape import shape_functions
 from solver.mechanics.fem.refine import refined
 from solver.mesh import write_mesh
-from solver.mesh.catalogue import BY_NAME, cell_type
 from solver.mesh.tidy import tidy
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError

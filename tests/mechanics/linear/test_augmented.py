@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solver.lac.errors import SolveError
 from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.augmented import augment
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.systems import Part, Systems
-from solver.system.errors import SolveError
 from tests.mechanics.linear.test_contact_levels import pressed
 
 COUNT = 30

@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import block_array, csc_matrix, csr_matrix, diags, eye, kron, tril, triu
 
+from solver.lac.errors import SolveError
 from solver.mechanics.linear.direct import (
     BACKENDS,
     factorise,
     factorise_indefinite,
     force_solver,
 )
-from solver.system.errors import SolveError
 
 
 def springs(count: int, ends: float = 1.0) -> csr_matrix:

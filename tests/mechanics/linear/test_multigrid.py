@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from scipy.sparse import block_array, block_diag, bsr_matrix, csr_matrix, eye
 
+from solver.lac import threads
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.errors import SolveError
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
 from solver.mechanics.linear import choice, condensed_matrix, hierarchy, products
@@ -18,9 +21,6 @@ from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.nodal_matrix import NodalMatrix
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
-from solver.mesh.catalogue import BY_NAME
-from solver.system import threads
-from solver.system.errors import SolveError
 from tests.scenes import grid
 
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_matrix, eye, kron, random_array
 
+from solver.lac import threads
 from solver.mechanics.linear import galerkin, products
-from solver.system import compiled, threads
+from solver.system import compiled
 
 NUMBA = pytest.param(True, marks=pytest.mark.skipif(not compiled.available(), reason="no Numba"))
 

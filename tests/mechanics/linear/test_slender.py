@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_matrix
 
+from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem import vertices
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
@@ -15,7 +16,6 @@ from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.slender import Near, filtered, smoothed_along
 from solver.mechanics.linear.unknowns import LevelNodes
-from solver.mesh.catalogue import BY_NAME
 from tests.mechanics.linear.test_multigrid import held, motions
 from tests.scenes import grid, replaced, solved
 

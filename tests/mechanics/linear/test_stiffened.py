@@ -8,6 +8,7 @@ import pytest
 from scipy.sparse import csr_matrix, diags, random
 
 from solver.case.reader import parse_case
+from solver.lac.errors import SolveError
 from solver.mechanics.fem.mixed import MeanStress
 from solver.mechanics.linear import choice
 from solver.mechanics.linear.condensation import condense
@@ -16,7 +17,6 @@ from solver.mechanics.linear.krylov import conjugate_residuals
 from solver.mechanics.linear.stiffened import StiffenedMatrix, part_of
 from solver.mechanics.linear.unknowns import Unknowns
 from solver.simulation.simulate import simulate
-from solver.system.errors import SolveError
 from tests.scenes import block_case, block_mesh, replaced
 
 RUBBER = "all: {young: 2000.0, poisson: 0.3}"

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from solver.lac import threads
 from solver.mechanics.linear import krylov, vectors
-from solver.system import compiled, threads
+from solver.system import compiled
 
 pytestmark = pytest.mark.skipif(not compiled.available(), reason="no Numba")
 

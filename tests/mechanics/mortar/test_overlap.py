@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+import solver.lac.threads
 import solver.mechanics.mortar.overlap
-import solver.system.threads
 from solver.mechanics.mortar.overlap import inside_others
 from tests.scenes import grid
 
@@ -15,7 +15,7 @@ from tests.scenes import grid
 def test_layers_of_cells_in_one_another(monkeypatch, many, layers, threads):
     """Two cubes of 3³ cells: of so many layers of each, the middles are in the other one."""
     monkeypatch.setattr(solver.mechanics.mortar.overlap, "_AT_ONCE", many)
-    monkeypatch.setattr(solver.system.threads, "workers", lambda: threads)
+    monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     points, cells = grid(3)
     depth = np.ptp(points[:, 0]) * (layers + 0.1) / 3
     moved = points + np.array([np.ptp(points[:, 0]) - depth, 1e-3, 1e-3])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from solver.mechanics.mortar.closure import shape_integrals
-from solver.mechanics.mortar.operator import gap_operator
+from solver.lac.closure import shape_integrals
+from solver.lac.operator import gap_operator
 from solver.mechanics.mortar.treatments import TREATMENTS, scheme_of
 from tests.patches import segment_pair, square_pair
 

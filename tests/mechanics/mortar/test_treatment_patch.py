@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from solver.lac.errors import SolveError
 from solver.simulation.simulate import simulate
-from solver.system.errors import InputError, SolveError
+from solver.system.errors import InputError
 from tests.scenes import (
     POISSON,
     PRESSURE,

@@ -9,13 +9,13 @@ import pytest
 from solver.case.material import Material
 from solver.case.reader import load_case
 from solver.case.solutions.catalogue import SOLUTIONS
-from solver.mechanics.fem.faces import surface_points
+from solver.lac.cells.faces import surface_points
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.simulation.exact import computed_pressure
 from solver.simulation.simulate import simulate
 from solver.simulation.solution import NodalContact
-from solver.system.provenance import gather
 from solver.verification.norms import errors
+from solver.verification.provenance import gather
 from solver.verification.results import read_result, write_result
 from solver.verification.run import mesh_of, refined
 from tests.handmade import plane

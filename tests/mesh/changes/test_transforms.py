@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from solver.lac.cells.catalogue import cell_type
+from solver.lac.cells.orient import vertex_jacobians
 from solver.mesh import generate, transform
-from solver.mesh.catalogue import cell_type
-from solver.mesh.orient import vertex_jacobians
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from tests.scenes import POISSON, PRESSURE, YOUNG, changed_case

@@ -14,10 +14,10 @@ import pytest
 import sympy
 from sympy.abc import x, y, z
 
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.gauss import gauss_rule
+from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME
+from solver.lac.cells.gauss import gauss_rule
+from solver.lac.cells.shape import shape_functions
 from solver.mesh import read_mesh
-from solver.mesh.catalogue import BY_MESHIO, BY_NAME
 from tests.mesh.curved import Curved
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")

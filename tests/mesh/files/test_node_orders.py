@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import vtk
 
-from solver.mechanics.fem import shape_functions
-from solver.mechanics.fem.gauss import gauss_rule
+from solver.lac.cells.catalogue import BY_NAME, CellType
+from solver.lac.cells.gauss import gauss_rule
+from solver.lac.cells.shape import shape_functions
 from solver.mesh import read_mesh
-from solver.mesh.catalogue import BY_NAME, CellType
 from tests.mesh.curved import KINDS, Curved, affine, inner_points
 from tests.mesh.one_cell import in_vtk_order, vtk_grid, with_masks, write_by_gmsh
 

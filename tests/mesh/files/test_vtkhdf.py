@@ -9,9 +9,9 @@ import pytest
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-from solver.mechanics.fem import shape_functions
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.cells.shape import shape_functions
 from solver.mesh import generate, read_mesh, write_mesh
-from solver.mesh.catalogue import BY_NAME
 from solver.mesh.files.vtkhdf import read_grid, write_grid
 from solver.system.errors import InputError
 from tests.mesh.curved import KINDS, Curved, inner_points

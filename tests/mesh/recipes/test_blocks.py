@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import yaml
 
+from solver.lac.cells.catalogue import BY_NAME, CellType, cell_type
+from solver.lac.cells.orient import vertex_jacobians
 from solver.mesh import generate, write_mesh
-from solver.mesh.catalogue import BY_NAME, CellType, cell_type
-from solver.mesh.orient import vertex_jacobians
 from solver.system.errors import InputError
 from tests.mesh.curved import KINDS
 

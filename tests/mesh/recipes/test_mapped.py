@@ -5,10 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from solver.mechanics.fem import face_rule, shape_functions, volume_rule
-from solver.mechanics.fem.faces import area_vectors
+from solver.lac.cells.catalogue import cell_type
+from solver.lac.cells.faces import area_vectors
+from solver.lac.cells.quadrature import face_rule, volume_rule
+from solver.lac.cells.shape import shape_functions
 from solver.mesh import generate
-from solver.mesh.catalogue import cell_type
 from solver.system.errors import InputError
 
 PLANE = ["TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9"]

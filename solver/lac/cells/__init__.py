@@ -1,0 +1,1 @@
+"""Cells: their types, shape functions, quadrature, faces, orientation."""

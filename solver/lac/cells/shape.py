@@ -1,0 +1,149 @@
+"""Shape functions by cell type, in the node order of the catalogue.
+
+Those of edges and faces are products of a matrix and monomials, since contact evaluates them at
+many points; solid cells have scikit-fem's.
+"""
+
+from functools import cache, lru_cache
+
+import numpy as np
+
+from .catalogue import BY_NAME, CellType
+
+# Mid-edge nodes off the middle by less than this share of the edge make no bent edge.
+_STRAIGHT = 1e-9
+# Values at points of at most so many coordinates are kept.
+_KEPT = 1 << 10
+
+
+class ShapeFunctions:
+    """The shape functions of one solid cell type.
+
+    scikit-fem numbers the degrees of freedom of an element in its own way; they are matched here
+    with the catalogue's nodes by their place in the reference cell.
+    """
+
+    def __init__(self, name: str):
+        self.type = BY_NAME[name]
+        self._element = _scikit_fem_element(name)
+        places = np.asarray(self._element.doflocs)
+        distance = np.linalg.norm(self.type.nodes[:, None] - places[None], axis=2)
+        self._order = distance.argmin(axis=1)
+        if distance.min(axis=1).max() > 1e-12 or len(set(self._order)) != self.type.n_nodes:
+            raise AssertionError(f"{name}: the nodes of the catalogue and the element differ")
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Values (..., n_nodes) at the reference points (..., dim)."""
+        return self._evaluate(points)[0]
+
+    def gradients(self, points: np.ndarray) -> np.ndarray:
+        """Reference gradients (..., n_nodes, dim) at the reference points (..., dim)."""
+        return self._evaluate(points)[1]
+
+    def both(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (..., n_nodes) and gradients (..., n_nodes, dim) at once."""
+        return self._evaluate(points)
+
+    def _evaluate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        points = np.ascontiguousarray(points, dtype=float)
+        if points.size > _KEPT:
+            return self._computed(points)
+        # Every part of the cells asks for the same points of quadrature.
+        values, gradients = self._known(points.tobytes(), points.shape)
+        return values.copy(), gradients.copy()
+
+    @lru_cache(64)  # noqa: B019 -- there is one object for each cell type
+    def _known(self, points: bytes, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        return self._computed(np.frombuffer(points).reshape(shape))
+
+    def _computed(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        flat = np.ascontiguousarray(np.reshape(points, (-1, self.type.dim)).T, dtype=float)
+        values = np.empty((flat.shape[1], self.type.n_nodes))
+        gradients = np.empty((flat.shape[1], self.type.n_nodes, self.type.dim))
+        for node, dof in enumerate(self._order):
+            value, gradient = self._element.lbasis(flat, int(dof))
+            values[:, node] = value
+            gradients[:, node] = np.asarray(gradient).T
+        shape = np.shape(points)[:-1]
+        return (
+            values.reshape(*shape, self.type.n_nodes),
+            gradients.reshape(*shape, self.type.n_nodes, self.type.dim),
+        )
+
+
+class _Polynomials(ShapeFunctions):
+    """The shape functions of an edge or a face: monomials, around the middle of squares."""
+
+    def __init__(self, name: str):
+        self.type = kind = BY_NAME[name]
+        self._origin = 0.0 if kind.n_vertices == 3 else 0.5
+        powers = np.indices((kind.order + 1,) * kind.dim).reshape(kind.dim, -1).T
+        if kind.n_vertices == 3:
+            powers = powers[powers.sum(axis=1) <= kind.order]
+        self._powers = powers[: kind.n_nodes]
+        self._values = np.linalg.inv(self._monomials(kind.nodes).T).round(2)
+        # The derivative of a monomial is its power times another one.
+        lower = self._powers - np.eye(kind.dim, dtype=int)[:, None]
+        to_lower = (self._powers == lower[:, :, None]).all(axis=3) * self._powers.T[..., None]
+        slopes = np.einsum("kml,ma->lak", to_lower, self._values)
+        self._gradients = slopes.reshape(kind.n_nodes, -1)
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        shape = (*np.shape(points)[:-1], self.type.n_nodes)
+        return (self._monomials(points).T @ self._values).reshape(shape)
+
+    def gradients(self, points: np.ndarray) -> np.ndarray:
+        return self.both(points)[1]
+
+    def both(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        monomials, shape = self._monomials(points).T, (*np.shape(points)[:-1], self.type.n_nodes)
+        slopes = monomials @ self._gradients
+        return (monomials @ self._values).reshape(shape), slopes.reshape(*shape, self.type.dim)
+
+    def _monomials(self, points: np.ndarray) -> np.ndarray:
+        """Monomials (n_nodes, n) at points (..., dim), of which there are n."""
+        x = np.reshape(points, (-1, self.type.dim)).T - self._origin
+        ladder = [np.ones_like(x), x, x * x]
+        found = np.stack([ladder[power][0] for power in self._powers[:, 0]])
+        if self.type.dim == 2:
+            for k, power in enumerate(self._powers[:, 1]):
+                found[k] *= ladder[power][1]
+        return found
+
+
+@cache
+def shape_functions(name: str) -> ShapeFunctions:
+    """The shape functions of the cell type `name` (the field's name: `HEXA20`)."""
+    return _Polynomials(name) if BY_NAME[name].dim < 3 else ShapeFunctions(name)
+
+
+def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
+    """Which cells or faces (c,), of node coordinates (c, n_nodes, dim), have straight edges.
+
+    That is, mid-edge nodes in the middle, to 1e-9 of the edge: all cells of linear types.
+    """
+    if kind.order == 1:
+        return np.ones(len(corner), dtype=bool)
+    ends = corner[:, np.array(kind.edges)]
+    n = kind.n_vertices
+    offset = corner[:, n : n + len(kind.edges)] - ends.mean(axis=2)
+    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    return (np.linalg.norm(offset, axis=2) <= _STRAIGHT * length).all(axis=1)
+
+
+def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
+    import skfem.element as element
+
+    if name in ("PENTA15", "PYRA5", "PYRA13"):
+        from .extra_elements import ElementPyramid, ElementWedgeS2
+
+        return ElementWedgeS2() if name == "PENTA15" else ElementPyramid(name)
+    makers = {
+        "TETRA4": element.ElementTetP1,
+        "TETRA10": element.ElementTetP2,
+        "HEXA8": element.ElementHex1,
+        "HEXA20": element.ElementHexS2,
+        "HEXA27": element.ElementHex2,
+        "PENTA6": element.ElementWedge1,
+    }
+    return makers[name]()

@@ -1,0 +1,268 @@
+"""The gap operator of a zone: the average gap that each multiplier sees, linear in displacement.
+
+With ḡ = (initial + matrix · u) / covered area, the contact forces of pressures p are matrixᵀ · p.
+Source: Abbas, Drouet, Hild, CMAME 339 (2018) 488–513, §2–4.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy import sparse
+
+from .cells.quadrature import mortar_degree
+from .closure import MASTER, SLAVE, Integrals, close_faces, integrals
+from .facets import Facets
+from .multipliers import (
+    InterfaceData,
+    Multipliers,
+    Space,
+    constants,
+)
+from .partners import on_one_surface, uncovered, without_partner
+from .recovery import Recovery, RecoveryRequest, recovery
+from .segments import Segments, intersect
+from .surface_points import Samples, Surface, face_samples
+
+# Slave-side entries of nodal multipliers below this share of their row's largest are round-off.
+_ROUND_OFF = 1e-13
+# The distance within which such faces are looked for grows by this factor at a time.
+_WIDER = 8.0
+
+Meet = Callable[..., list[Segments]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GapOperator:
+    """Gap integrals seen by k multipliers φ; LAC has one on each macro-element, φ = 1.
+
+    `matrix` (k, n_dofs): derivative of ∫ φ gap; `initial` (k,): ∫ φ gap of the undeformed bodies;
+    `area`, `covered` (k,): ∫ φ over the whole and the intersected surface; `mean` (m, k): values
+    by multiplier averaged over the macro-elements of `surface`; `nodes` (k,): the nodes that
+    multipliers belong to, None for macro-elements; `segments`: how many there are; `closed_faces`:
+    on how many faces the closure of integrals was used; `plain`: whether plain Gauss rules are
+    exact on all of them. `at_nodes` (n, k): the values at `nodes`, then (n,), by multiplier, where
+    some nodes have no multiplier of their own. `recovery`: what recovers the pressure, if asked
+    for.
+    """
+
+    matrix: sparse.csr_matrix
+    initial: np.ndarray
+    area: np.ndarray
+    covered: np.ndarray
+    mean: sparse.csr_matrix
+    nodes: np.ndarray | None
+    surface: Surface
+    segments: int
+    closed_faces: int
+    plain: bool = False
+    at_nodes: sparse.csr_matrix | None = None
+    recovery: Recovery | None = None
+
+
+def meet_in_segments(
+    slaves: Sequence[Facets],
+    _: Sequence[Samples],
+    masters: Sequence[Facets],
+    reach: float,
+    among: Sequence[np.ndarray] | None = None,
+    weighted: bool = False,
+    degree: int = 0,
+) -> list[Segments]:
+    """Segments between all pairs of blocks.
+
+    `among`: by block, the slave faces that are looked at, all of them by default; `weighted`: with
+    quadrature for integrands weighted by linear shape functions of the slave, or by polynomials of
+    a `degree`.
+
+    >>> [s.area.tolist() for s in meet_in_segments([slave], [], [master], 1.0)]
+    [[1.0, 1.0]]
+    """
+    found = []
+    for a, slave in enumerate(slaves):
+        more = mortar_degree(slave.type.skeleton) if weighted else degree
+        found += intersect(slaves, a, masters, reach, more, None if among is None else among[a])
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scheme:
+    """How the gap is integrated: which points, which multipliers, and whether closure is due.
+
+    `sample` gives points that measure whole slave faces, `meet` those where the surfaces meet,
+    `space` the multipliers. `nearest`: the master has faces, and a
+    macro-element meets the nearest surface of them.
+    """
+
+    sample: Callable[[list[Facets]], list[Samples]] = face_samples
+    meet: Meet = meet_in_segments
+    space: Space = constants
+    closure: bool = True
+    nearest: bool = True
+
+
+LAC = Scheme()
+
+
+def gap_operator(
+    slaves: list[Facets],
+    masters: list[Facets],
+    n_macro: int,
+    n_nodes: int,
+    search: float | None = None,
+    scheme: Scheme = LAC,
+    asked: RecoveryRequest | None = None,
+) -> GapOperator:
+    """Gap operator of slave sub-faces (numbered by macro-element) over master faces.
+
+    `search` is the largest distance (a length) at which surfaces are looked for, by default the
+    extent of both. They are first looked for nearby, and farther away only for sub-faces that found
+    no partner there. Beside a step of the master the nearer side alone counts. Faces that meet
+    along directions other than their own normals have no closure. `asked`: how the pressure is
+    recovered, for the multipliers of macro-elements alone.
+
+    A slave edge of length 2 under two master edges, open by 1/2:
+
+    >>> operator = gap_operator([slave], [master], 1, len(points), 1.0)
+    >>> operator.matrix.toarray().reshape(5, 2)[:, 1].round(15).tolist()
+    [-1.0, -1.0, 0.5, 1.0, 0.5]
+    >>> operator.initial.round(15).tolist(), operator.covered.round(15).tolist()
+    ([1.0], [2.0])
+    """
+    if asked is not None and scheme.meet is meet_in_segments:
+        scheme = replace(scheme, meet=partial(scheme.meet, degree=asked.form.degree))
+    if any(block.directions is not None for block in slaves):
+        scheme = replace(scheme, closure=False)
+    samples = scheme.sample(slaves)
+    reach = _extent([*slaves, *masters]) if search is None else search
+    found = _search(slaves, samples, masters, reach, scheme.meet)
+    if scheme.nearest:
+        found = on_one_surface(found, slaves, n_macro)
+    data = InterfaceData(slaves=slaves, samples=samples, found=found, n_macro=n_macro)
+    space = scheme.space(data)
+    parts = [integrals(space, segments) for segments in found]
+    parts, closed = close_faces(parts) if scheme.closure else (parts, 0)
+    slave, master = (_assembled(space, parts, side, n_nodes, slaves) for side in (SLAVE, MASTER))
+    initial, covered = np.zeros(space.count), np.zeros(space.count)
+    for part in parts:
+        np.add.at(initial, part.number, part.gap)
+        np.add.at(covered, part.number, part.weight)
+    lost = np.zeros(n_macro)
+    if scheme.nearest:
+        lost = without_partner(slaves, masters, samples, found, reach, n_macro)
+    surface = _surface(data, lost)
+    averages = space.averages(samples, [block.number for block in slaves], n_macro)
+    return GapOperator(
+        matrix=(master - (slave if space.nodes is None else _diagonal(slave))).tocsr(),
+        initial=initial,
+        area=averages.area,
+        covered=covered,
+        mean=averages.mean,
+        nodes=space.nodes,
+        surface=surface,
+        segments=sum(len(segments.gap) for segments in found),
+        closed_faces=closed,
+        plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
+        recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
+    )
+
+
+def _extent(faces: list[Facets]) -> float:
+    """The extent of surfaces plus the radius of their largest face."""
+    centres = np.concatenate([block.centre for block in faces])
+    largest = max(block.radius.max() for block in faces)
+    return float(np.linalg.norm(np.ptp(centres, axis=0)) + largest)
+
+
+def _search(
+    slaves: list[Facets],
+    samples: list[Samples],
+    masters: list[Facets],
+    search: float,
+    meet: Meet,
+) -> list[Segments]:
+    """Segments of all pairs of blocks, nearby first, then ever farther, up to `search`.
+
+    Only faces that are not covered whole are looked for farther away.
+    """
+    near, *farther = _reaches([*slaves, *masters], search)
+    found = meet(slaves, samples, masters, near)
+    for reach in farther:
+        bare = uncovered(samples, found)
+        if not any(len(faces) for faces in bare):
+            break
+        kept = [s.of(~np.isin(s.slave.face, bare[s.slave.index])) for s in found]
+        found = kept + meet(slaves, samples, masters, reach, bare)
+    return found
+
+
+def _reaches(faces: list[Facets], search: float) -> list[float]:
+    """Distances, ascending up to `search`, at which partners are looked for.
+
+    The first is about the size of usual faces: in a graded mesh, all small faces are within the
+    size of the largest one. A rigid surface is one face without end, and everything is near it.
+    """
+    radii = np.concatenate([block.radius for block in faces])
+    usual, largest = float(np.median(radii)), float(radii.max())
+    if not np.isfinite(largest):
+        return [search]
+    reaches = [largest]
+    while reaches[0] > _WIDER * usual:
+        reaches.insert(0, reaches[0] / _WIDER)
+    return [reach for reach in reaches if reach < search] + [search]
+
+
+def _assembled(
+    space: Multipliers, parts: list[Integrals], side: int, n_nodes: int, slaves: list[Facets]
+) -> sparse.csr_matrix:
+    """∫ φ N n of one side (k, n_dofs)."""
+    dim = slaves[0].centre.shape[1]
+    rows, columns, values = [], [], []
+    for part in parts:
+        vectors = part.vectors[side]
+        dofs = dim * part.segments.sides[side].nodes[:, None, :, None] + np.arange(dim)
+        rows.append(_spread(part.number[:, :, None, None], vectors))
+        columns.append(_spread(dofs, vectors))
+        values.append(vectors.ravel())
+    entries = (_joined(values), (_joined(rows).astype(int), _joined(columns).astype(int)))
+    return sparse.coo_matrix(entries, shape=(space.count, dim * n_nodes)).tocsr()
+
+
+def _spread(numbers: np.ndarray, part: np.ndarray) -> np.ndarray:
+    return np.broadcast_to(numbers, part.shape).ravel()
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _diagonal(slave: sparse.csr_matrix) -> sparse.csr_matrix:
+    """Without the round-off at nodes where the integral of a nodal multiplier vanishes.
+
+    Dual multipliers see their own node alone. Linear ones see no other end of a quadratic edge:
+    ∫ t (1 − t) (1 − 2t) dt = 0; then each has an unknown of its own, and can be condensed.
+    """
+    largest = abs(slave).max(axis=1).toarray().ravel()
+    limit = np.repeat(_ROUND_OFF * largest, np.diff(slave.indptr))
+    slave.data[np.abs(slave.data) <= limit] = 0.0
+    slave.eliminate_zeros()
+    return slave
+
+
+def _surface(data: InterfaceData, lost: np.ndarray) -> Surface:
+    n_macro, dim = data.n_macro, data.slaves[0].centre.shape[1]
+    area, covered = np.zeros(n_macro), np.zeros(n_macro)
+    centre, normal = np.zeros((n_macro, dim)), np.zeros((n_macro, dim))
+    for block, sample in zip(data.slaves, data.samples, strict=True):
+        area += np.bincount(block.number, sample.weight.sum(axis=1), minlength=n_macro)
+        place = np.einsum(
+            "fq,qa,fad->fd", sample.weight, sample.values, block.corner, optimize=True
+        )
+        np.add.at(centre, block.number, place)
+        np.add.at(normal, block.number, np.einsum("fq,fqd->fd", sample.weight, sample.normal))
+    for segments in data.found:
+        covered += np.bincount(segments.macro, segments.area, minlength=n_macro)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    centre /= area[:, None]
+    return Surface(area=area, covered=covered, lost=lost, centre=centre, normal=normal)

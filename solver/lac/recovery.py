@@ -1,0 +1,168 @@
+"""Recovery of a pressure of second or third order: the loads that its reconstruction adds.
+
+A reconstruction p* = p + Σ c ψ of the constants p (see `reconstruction`) gives the bodies what the
+constants withhold from them: the loads Fᵀ c with Fᵢₖ = ∫ ψᵢₖ (N_master − N_slave) n dS. All ψ that
+are applied have mean zero on their macro-element: the constants stay the means.
+
+Source: Stetter, Numer. Math. 29 (1978) 425–443, for the deferred correction that applies them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from .cells.faces import circumference
+from .facets import tangents_of
+from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
+from .segments import Segments
+from .stabilisation import Stabilisation, stabilisation
+from .surface_points import Surface
+
+
+@dataclass(frozen=True)
+class RecoveryRequest:
+    """The form of a recovery on m macro-elements.
+
+    `near` (m, m): which share a vertex; `material` (m,): a number of that of the slave's cells. The
+    master's faces have theirs as the number of their `Facets`. `softness`: 1 / E of the materials,
+    and 0 for rigid bodies, the last one; given where contact is to be stabilised.
+    """
+
+    form: Form
+    near: sparse.csr_matrix
+    material: np.ndarray
+    softness: np.ndarray | None = None
+
+
+def moments(found: Sequence[Segments], surface: Surface) -> Moments:
+    """Moments of macro-elements (m,) from the segments that cover them.
+
+    One that is not covered keeps its centre and has no spread.
+
+    A slave edge from 0 to 2: the mean of (x − 1)² is 1/3, whatever the master edges over it.
+
+    >>> found = meet_in_segments([slave], [], [master], 1.0, degree=1)
+    >>> at = Surface(area=np.array([2.0]), covered=np.array([2.0]), centre=np.array([[1.0, 0.0]]),
+    ...              normal=np.array([[0.0, 1.0]]), lost=np.zeros(1))
+    >>> moments(found, at).spread[0, 0, 0].round(12)
+    np.float64(0.333333333333)
+    """
+    m, dim = surface.centre.shape
+    measure, first, second = np.zeros(m), np.zeros((m, dim)), np.zeros((m, dim, dim))
+    for segments in found:
+        owner, w = segments.macro, segments.weight
+        away = segments.points - surface.centre[owner][:, None]
+        np.add.at(measure, owner, segments.area)
+        np.add.at(first, owner, np.einsum("sq,sqd->sd", w, away))
+        np.add.at(second, owner, np.einsum("sq,sqd,sqe->sde", w, away, away))
+    covered = np.where(measure > 0, measure, 1.0)
+    shift = first / covered[:, None]
+    spread = second / covered[:, None, None] - shift[:, :, None] * shift[:, None]
+    size = np.where(measure > 0, measure, surface.area)
+    if found and found[0].slave.faces.axisymmetric:
+        size = size / circumference(surface.centre + shift)
+    size = size ** (1 / (dim - 1))
+    axes = tangents_of(surface.normal) / size[:, None, None]
+    own = np.einsum("nsd,nde,nte->nst", axes, spread, axes)
+    local = Local(centre=surface.centre + shift, axes=axes, spread=own)
+    return Moments(share=measure / surface.area, spread=spread, normal=surface.normal, local=local)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recovery:
+    """The recovery of the pressure on m macro-elements by functions ψ, k on each.
+
+    `near` (m, m): which of them may be neighbours; `loads` (m · k, n_dofs): ∫ ψ (N_master −
+    N_slave) n dS, none for a constant ψ; `products` (m, k, k): ∫ ψ ψᵀ dS.
+    """
+
+    form: Form
+    moments: Moments
+    near: sparse.csr_matrix
+    loads: sparse.csr_matrix
+    products: np.ndarray
+    stabilisation: Stabilisation | None = None
+
+    def reconstruction(self, closed: np.ndarray) -> Reconstruction:
+        """The reconstruction among closed macro-elements (m,)."""
+        return reconstruct(self.moments, self.near, closed, self.form)
+
+    def error(self, coefficients: np.ndarray) -> np.ndarray:
+        """η (m,), the L2 norm of p* − p on each, for `coefficients` (m · k,)."""
+        c = coefficients.reshape(len(self.products), -1)
+        scale = np.abs(c).max(initial=0.0) or 1.0  # squares of the largest numbers overflow
+        square = np.einsum("mk,mkl,ml->m", c / scale, self.products, c / scale)
+        return scale * np.sqrt(np.maximum(square, 0.0))
+
+
+def recovery(
+    asked: RecoveryRequest, found: Sequence[Segments], surface: Surface, n_nodes: int
+) -> Recovery:
+    """The recovery of the pressure of macro-elements, from the segments that cover them.
+
+    A slave edge from 0 to 2 under two master edges, with ψ = (1 − x) / 2: ∫ ψ N is ±1/6 at the two
+    slave nodes, 1/6, 0, −1/6 at the three master nodes, and ∫ ψ² is 1/6.
+
+    >>> found = meet_in_segments([slave], [], [master], 1.0, degree=1)
+    >>> at = Surface(area=np.array([2.0]), covered=np.array([2.0]), centre=np.array([[1.0, 0.0]]),
+    ...              normal=np.array([[0.0, 1.0]]), lost=np.zeros(1))
+    >>> near = sparse.eye_array(1, dtype=bool).tocsr()
+    >>> alone = RecoveryRequest(FORMS["linear"], near, np.zeros(1))
+    >>> one = recovery(alone, found, at, len(points))
+    >>> one.loads.toarray().reshape(5, 2)[:, 1].round(4).tolist(), one.products.round(4).tolist()
+    ([-0.1667, 0.1667, 0.1667, 0.0, -0.1667], [[[0.1667]]])
+    """
+    form = asked.form
+    at, (m, dim) = moments(found, surface), surface.centre.shape
+    k = form.count(dim)
+    products = np.zeros((m, k, k))
+    rows, columns, values = [], [], []
+    for segments in found:
+        psi = at.local.shapes(segments.macro, segments.points, form)
+        weighted = segments.weight[..., None] * psi
+        np.add.at(products, segments.macro, np.einsum("sqk,sql->skl", weighted, psi))
+        if not form.sweeps:
+            continue
+        applied = weighted[..., : k - (not form.keeps_means)]
+        row = segments.macro[:, None] * k + np.arange(applied.shape[-1])
+        for sign, side in zip((-1.0, 1.0), segments.sides, strict=True):
+            part = np.einsum("sqk,sqa,sqd->skad", sign * applied, side.values, segments.normal)
+            column = dim * side.nodes[:, :, None] + np.arange(dim)
+            rows.append(np.broadcast_to(row[:, :, None, None], part.shape).ravel())
+            columns.append(np.broadcast_to(column[:, None], part.shape).ravel())
+            values.append(part.ravel())
+    entries = [np.concatenate(part or [np.empty(0, int)]) for part in (values, rows, columns)]
+    loads = sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=(m * k, dim * n_nodes))
+    near = _same_materials(asked, found)
+    stabilised = None
+    if asked.softness is not None:
+        soft = asked.softness[asked.material], asked.softness
+        stabilised = stabilisation(found, at, near, surface.covered, soft)
+    return Recovery(
+        form=form,
+        moments=at,
+        near=near,
+        loads=loads.tocsr(),
+        products=products,
+        stabilisation=stabilised,
+    )
+
+
+def _same_materials(asked: RecoveryRequest, found: Sequence[Segments]) -> sparse.csr_matrix:
+    """Pairs of macro-elements (m, m) that share a vertex, the second between no other materials.
+
+    Where the material of the master changes under a macro-element, it has neighbours on both sides,
+    and is itself no neighbour to these.
+    """
+    m = len(asked.material)
+    least, most = np.full(m, np.inf), np.full(m, -np.inf)
+    for segments in found:
+        master = segments.master.faces.number[segments.master.face]
+        np.minimum.at(least, segments.macro, master)
+        np.maximum.at(most, segments.macro, master)
+    pairs = asked.near.tocoo()
+    i, j = pairs.row, pairs.col
+    kept = (asked.material[i] == asked.material[j]) & (least[i] <= least[j]) & (most[j] <= most[i])
+    return sparse.csr_matrix((pairs.data[kept], (i[kept], j[kept])), shape=(m, m))

@@ -1,0 +1,268 @@
+"""Contact status by a primal–dual active set (semi-smooth Newton), with guaranteed termination.
+
+ḡ ≥ 0, p ≥ 0, p ḡ = 0 for each macro-element. One iteration solves with the present closed
+macro-elements as equality constraints; a closed one then opens where p < 0, an open one closes
+where ḡ < 0, by more than round-off of its own size. Source: Hüeber, Wohlmuth, A primal–dual active
+set strategy for non-linear multibody contact problems, CMAME 194 (2005).
+
+From few closed macro-elements, more would close at once than are in contact in the end, and these
+open ring by ring: an iteration closes no more than are closed already.
+
+The search goes on while it makes progress: fewer wrong statuses than ever before, or fewer or more
+closed macro-elements. Contact that peels off opens row by row and makes progress in each step. None
+of the three can go on for ever. The search may also open so much that a body moves freely. Then it
+is repeated from another start, if there is one. Where that fails too, the linear complementarity
+problem |T| p = W ḡ + q of all macro-elements is formed on the factor that has them
+all closed, and solved by a method that ends after finitely many steps (`complementarity`). A solve
+with the set found yields accurate p and ḡ, from which q is corrected until no status is wrong.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .complementarity import complementary
+from .errors import SolveError
+
+_LOG = logging.getLogger(__name__)
+
+# Between information and warnings: what a user wants to see.
+_OUTCOME = 25
+# Stop the active-set search when this many solves make no progress.
+_PATIENCE = 8
+# At most this many may close in one iteration when few are closed.
+_FEW = 50
+_MAX_CORRECTIONS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """The result of a solve with given closed multipliers, and its round-off; all (k,).
+
+    `pressure` is zero where open. Pressures above −`pressure_limit` and gaps above −`gap_limit`
+    change no status.
+    """
+
+    pressure: np.ndarray
+    gap: np.ndarray
+    pressure_limit: np.ndarray
+    gap_limit: np.ndarray
+
+    def violation(self, closed: np.ndarray) -> np.ndarray:
+        """Violation of each multiplier's sign condition, as a multiple of the round-off limit.
+
+        That is p ≥ 0 where `closed` (k,), else ḡ ≥ 0.
+        """
+        value = np.where(closed, -self.pressure, -self.gap)
+        limit = np.where(closed, self.pressure_limit, self.gap_limit)
+        with np.errstate(over="ignore"):
+            return value / np.maximum(limit, np.finfo(float).tiny)
+
+
+Solve = Callable[[np.ndarray], Trial]
+
+
+@dataclass(frozen=True)
+class StatusResult:
+    """Final `closed` (k,), how many solves it took, and how many statuses changed in each."""
+
+    closed: np.ndarray
+    iterations: int
+    changes: list[int]
+
+
+def find_status(
+    solve: Solve,
+    start: np.ndarray,
+    eligible: np.ndarray,
+    area: np.ndarray,
+    stiffness: Callable[[], np.ndarray],
+    confirm: bool = False,
+    guess: Callable[[], np.ndarray] | None = None,
+) -> StatusResult:
+    """Iterate from `start` (k,) until no status changes; only `eligible` (k,) may close.
+
+    `guess()` (k,) is asked for another start where the search from the first one fails. `area` (k,)
+    turns pressures into forces. `stiffness()` is asked for where both fail: the forces (e, e) that
+    average gaps of the eligible multipliers bring up, each imposed with all others closed. It may
+    raise SolveError where no pressure makes equilibrium. `confirm`: the set that is found is solved
+    once more. Raises SolveError where no status fulfils the conditions.
+
+    Two macro-elements, of which the second one would be pulled:
+
+    >>> tiny, both = np.full(2, 1e-9), np.array([True, True])
+    >>> def solve(closed):
+    ...     pressure, gap = np.where(closed, [1.0, -1.0], 0.0), np.where(closed, 0.0, 0.5)
+    ...     return Trial(pressure=pressure, gap=gap, pressure_limit=tiny, gap_limit=tiny)
+    >>> result = find_status(solve, both, both, np.ones(2), lambda: np.eye(2))
+    >>> result.closed.tolist(), result.iterations
+    ([True, False], 2)
+    """
+    changes: list[int] = []
+    failure: SolveError | None = None
+    for number, begin in enumerate((lambda: start, guess)):
+        if begin is None:
+            break
+        changes += [0] * number
+        begun = begin() & eligible
+        try:
+            closed = _quick(solve, begun, eligible, changes, confirm)
+        except SolveError as error:
+            if not changes:
+                raise
+            failure = error
+            continue
+        if closed is not None:
+            return StatusResult(closed, len(changes) + 1 + confirm, changes)
+    return _solve_complementarity(solve, eligible, area, stiffness, changes, failure)
+
+
+def _quick(
+    solve: Solve, closed: np.ndarray, eligible: np.ndarray, changes: list[int], confirm: bool
+) -> np.ndarray | None:
+    """The status (k,) that Newton's steps find from `closed` (k,), None where they find none.
+
+    They are added to the `changes`. Raises the SolveError of a solve.
+    """
+    seen, single = set(), False
+    progress = _Progress(len(closed))
+    while not progress.ended:
+        violation = np.where(eligible, solve(closed).violation(closed), 0.0)
+        wrong = violation > 1
+        _log(len(changes) + 1, closed, wrong)
+        if not wrong.any():
+            if not confirm:
+                return closed
+            confirm = False
+            continue
+        progress.note(int(wrong.sum()), int(closed.sum()))
+        seen.add(closed.tobytes())
+        following = closed ^ _first_changes(closed, wrong, violation)
+        # A cycle is broken by changing the worst offender alone from then on.
+        single = single or following.tobytes() in seen
+        if single:
+            following = closed.copy()
+            following[violation.argmax()] ^= True
+        if not progress.ended:
+            changes.append(int((following ^ closed).sum()))
+            closed = following
+    return None
+
+
+class _Progress:
+    """Records of a search among `count` multipliers: wrong statuses, fewest and most closed.
+
+    >>> progress = _Progress(100)
+    >>> for closed in range(90, 50, -1):
+    ...     progress.note(16, closed)
+    >>> progress.ended
+    False
+    >>> for _ in range(8):
+    ...     progress.note(16, 60)
+    >>> progress.ended
+    True
+    """
+
+    def __init__(self, count: int):
+        self._wrong, self._fewest, self._most = count + 1, count + 1, -1
+        self._without = 0
+
+    def note(self, wrong: int, closed: int) -> None:
+        """Note a solve with so many wrong statuses and closed multipliers."""
+        record = wrong < self._wrong or closed < self._fewest or closed > self._most
+        self._without = 0 if record else self._without + 1
+        self._wrong = min(self._wrong, wrong)
+        self._fewest, self._most = min(self._fewest, closed), max(self._most, closed)
+
+    @property
+    def ended(self) -> bool:
+        """Whether too many solves set no record."""
+        return self._without >= _PATIENCE
+
+
+def _first_changes(closed: np.ndarray, wrong: np.ndarray, violation: np.ndarray) -> np.ndarray:
+    """Those of the `wrong` (k,) that change now: all that open, and the worst of many that close.
+
+    From one closed macro-element, `_FEW` more close at once:
+
+    >>> closed, wrong = np.arange(100) == 0, np.arange(100) > 0
+    >>> np.flatnonzero(_first_changes(closed, wrong, np.arange(100.0)))[[0, -1]].tolist()
+    [50, 99]
+    """
+    closing = np.flatnonzero(wrong & ~closed)
+    most = max(int(closed.sum()), _FEW)
+    now = wrong & closed
+    now[closing[np.argsort(violation[closing], kind="stable")[-most:]]] = True
+    return now
+
+
+def _solve_complementarity(
+    solve: Solve,
+    eligible: np.ndarray,
+    area: np.ndarray,
+    stiffness: Callable[[], np.ndarray],
+    changes: list[int],
+    failure: SolveError | None,
+) -> StatusResult:
+    """The status from the complementarity problem of all multipliers; see the module.
+
+    Raises `failure`, why the quick search ended, where this one ends without a status too.
+    """
+    text = "contact status: complementarity problem, one solve for each of %d macro-elements"
+    _LOG.log(_OUTCOME, text, eligible.sum())
+    latest = closed = eligible
+    try:
+        matrix = stiffness()
+    except SolveError as error:
+        raise failure or error from None
+    for _ in range(_MAX_CORRECTIONS):
+        try:
+            trial = solve(closed)
+        except SolveError as error:
+            raise failure or error from None
+        wrong = eligible & (trial.violation(closed) > 1)
+        changes.append(int((closed ^ latest).sum()))
+        _log(len(changes) + 1, closed, wrong)
+        if not wrong.any():
+            return StatusResult(closed, len(changes) + 1, changes)
+        opened = np.where(closed, 0.0, trial.gap)
+        force = (area * trial.pressure)[eligible] - matrix @ opened[eligible]
+        latest, closed = closed, eligible.copy()
+        closed[eligible] = complementary(matrix, force) == 0
+    raise failure or SolveError(
+        f"the contact status did not settle ({int(wrong.sum())} macro-elements still change)"
+    )
+
+
+def _log(iteration: int, closed: np.ndarray, wrong: np.ndarray) -> None:
+    known = iteration, int(closed.sum()), len(closed), int(wrong.sum())
+    _LOG.info("contact status: iteration %d, %d of %d closed, %d wrong", *known)
+
+
+def likely_closed(
+    gap: np.ndarray, area: np.ndarray, eligible: np.ndarray, push: float, dim: int
+) -> np.ndarray:
+    """Which macro-elements (m,) a force is likely to close, judged by their initial gaps (m,).
+
+    Bodies that touch on an area A under a force F approach each other there by about F/(E* √A), in
+    the plane by F/E*; `push` is F/E*, F per thickness in the plane. Macro-elements close in the
+    order of their gaps up to that approach, from where bodies that are apart first touch. A first
+    guess that is too small grows in one iteration; one that is too large shrinks step by step.
+
+    In the plane, an approach of 2 closes gaps of 0 and 1, but not of 3:
+
+    >>> gap, eligible = np.array([0.0, 1.0, 3.0]), np.ones(3, dtype=bool)
+    >>> likely_closed(gap, np.ones(3), eligible, 2.0, 2).tolist()
+    [True, True, False]
+    """
+    if not eligible.any():
+        return eligible
+    order = np.argsort(np.where(eligible, gap, np.inf), kind="stable")
+    touching = np.cumsum(area[order])
+    approach = push / touching ** ((dim - 2) / (dim - 1))
+    above = gap[order] - max(gap[order[0]], 0.0)
+    closed = np.zeros(len(gap), dtype=bool)
+    closed[order[above <= approach]] = True
+    return closed & eligible

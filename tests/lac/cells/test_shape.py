@@ -1,0 +1,92 @@
+"""Shape functions: one at their node, gradients, polynomials they must contain, quadrature."""
+
+from math import factorial
+
+import numpy as np
+import pytest
+
+from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.cells.quadrature import simplex_rule, volume_rule
+from solver.lac.cells.shape import shape_functions
+
+TYPES = list(BY_NAME)
+VOLUME = {"SEG": 1, "TRIA": 1 / 2, "QUAD": 1, "TETRA": 1 / 6, "HEXA": 1, "PENTA": 1 / 2}
+VOLUME["PYRA"] = 4 / 3
+
+
+def shape_name(name: str) -> str:
+    return name.rstrip("0123456789")
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_each_function_is_one_at_its_node_and_zero_at_the_others(name):
+    kind = BY_NAME[name]
+    # The functions of a pyramid have limits, but no values, at the apex.
+    nodes = np.delete(np.arange(kind.n_nodes), 4 if name.startswith("PYRA") else [])
+    values = shape_functions(name).values(kind.nodes[nodes])
+    assert np.allclose(values, np.eye(kind.n_nodes)[nodes], atol=1e-14)
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_gradients_are_those_of_the_values(name):
+    points, _ = volume_rule(name)
+    shape, step = shape_functions(name), 1e-6
+    for axis, direction in enumerate(np.eye(BY_NAME[name].dim)):
+        prefetch, behind = (
+            shape.values(points + step * direction),
+            shape.values(points - step * direction),
+        )
+        slope = (prefetch - behind) / (2 * step)
+        assert np.allclose(shape.gradients(points)[..., axis], slope, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_polynomials_up_to_the_order_are_reproduced(name):
+    kind = BY_NAME[name]
+    points, _ = volume_rule(name)
+    values = shape_functions(name).values(points)
+
+    def basis(x):
+        linear = [np.ones(len(x)), *x.T]
+        if kind.order == 1:
+            return np.stack(linear)
+        return np.stack([a * b for a in linear for b in linear])
+
+    assert np.allclose(values @ basis(kind.nodes).T, basis(points).T, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_weights_sum_to_the_volume_of_the_reference_cell(name):
+    _, weights = volume_rule(name)
+    assert weights.sum() == pytest.approx(VOLUME[shape_name(name)], rel=1e-14)
+    assert (weights > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("dim", "degree"), [(d, k) for d in (1, 2) for k in range(1, 9)] + [(3, k) for k in range(1, 5)]
+)
+def test_simplex_rules_integrate_monomials(dim, degree):
+    points, weights = simplex_rule(dim, degree)
+    for k in range(degree + 1):
+        exact = factorial(k) / factorial(k + dim)
+        assert weights @ points[:, 0] ** k == pytest.approx(exact, rel=1e-12)
+
+
+def test_tetrahedron_rules_that_miss_their_degree_are_refused():
+    with pytest.raises(ValueError, match="degree 5"):
+        simplex_rule(3, 5)
+
+
+def test_pyramid_rule_makes_the_integrals_of_rational_gradients_exact():
+    """∫ ∂N/∂x dV over the pyramid equals ∫ N n_x dS over its faces, function by function."""
+    from solver.mechanics.fem.faces import face_integrals
+
+    for name in ("PYRA5", "PYRA13"):
+        kind = BY_NAME[name]
+        points, weights = volume_rule(name)
+        inside = np.einsum("q,qai->ai", weights, shape_functions(name).gradients(points))
+        outside = np.zeros_like(inside)
+        for face in kind.faces:
+            nodes = np.array([face.nodes])
+            outside[list(face.nodes)] += face_integrals(kind.nodes, nodes, face.type)[0][0]
+        assert np.allclose(inside, outside, atol=1e-14)
