@@ -15,7 +15,7 @@ __all__ = ["InputError", "SolveError", "Solved", "solve_case"]
 
 _HOME = {
     "InputError": ".system.errors",
-    "SolveError": ".system.errors",
+    "SolveError": ".lac.errors",
     "Solved": ".api",
     "solve_case": ".api",
 }

@@ -104,6 +104,12 @@ def test_the_import_solves_and_every_module_is_found(fresh):
     assert version == "0.1.0"
 
 
+def test_contact_serves_scripts_over_scikit_fem(fresh):
+    script = (ROOT / "docs/examples/lac/ex01_patch.py").read_text(encoding="utf-8")
+    done = fresh("-c", script.replace("from solver.lac", "from mortarcheck.lac"))
+    assert done.stdout == "pressure: 25 … 25\n", done.stderr
+
+
 def test_the_citation_has_the_same_version():
     assert "\nversion: 0.1.0\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 

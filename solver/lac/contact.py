@@ -7,8 +7,9 @@ inside. Source: Abbas, Drouet, Hild, The Local Average Contact (LAC) method, CMA
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Any, Literal, Self
 
 import numpy as np
 import skfem
@@ -18,16 +19,21 @@ from scipy.sparse.linalg import splu
 from .cells.faces import surface_points
 from .errors import SolveError
 from .facets import Facets, facets, with_nodal_normals
-from .meshes import cut_mesh, read_faces, unknowns_at_nodes
+from .master_normals import with_master_normals
+from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
 from .operator import gap_operator
+from .reconstruction import FORMS, vertex_neighbours
+from .recovery import Recovery, RecoveryRequest, settled_means
 from .status import Trial, find_status
 
-Boundary = tuple[skfem.Mesh, str]
+Boundary = tuple[skfem.Mesh, Names]
 Gap = float | Callable[[np.ndarray], np.ndarray]
 # Facets that cover less of their area have no partner, and carry no pressure.
 _COVERED = 1e-9
 # Pressures and gaps of this share of the largest pressure, and of the mesh, are round-off.
 _ROUND_OFF = 1e-10
+# A pivot stays on the diagonal down to this share of its column's largest: fewer entries fill in.
+_PIVOT = 0.01
 _SINGULAR = "the system is singular: a body may move freely"
 _SINGULAR_FROM = 1e14
 
@@ -55,6 +61,33 @@ class ContactState:
     gap: np.ndarray
     closed: np.ndarray
     iterations: int
+    _system: "_System" = field(repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class RecoveredState:
+    """A polynomial pressure on each facet, and the state under it.
+
+    Attributes:
+    ----------
+    state
+        The `ContactState` in equilibrium with this pressure. Its `pressure` are the means.
+    error
+        By slave facet (k,), the L2 norm of the difference between the pressure and its mean: an
+        estimate of the error of one constant on the facet.
+    """
+
+    state: ContactState
+    error: np.ndarray
+    _recovery: Recovery = field(repr=False, compare=False)
+    _coefficients: np.ndarray = field(repr=False, compare=False)
+
+    def at(self, facet: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """The pressure (n,) at places x (dim, n) on facets (n,), counted as in the boundary."""
+        facet, form = np.asarray(facet), self._recovery.form
+        psi = self._recovery.moments.local.shapes(facet, np.asarray(x).T[:, None], form)[:, 0]
+        own = self._coefficients.reshape(len(self.error), -1)[facet]
+        return np.asarray(self.state.pressure[facet] + (psi * own).sum(axis=1))
 
 
 class LocalAverageContact:
@@ -63,11 +96,13 @@ class LocalAverageContact:
     Parameters
     ----------
     slave, master
-        Pairs of a `skfem.Mesh` and the name of one of its boundaries. The classes are MeshTri1,
-        MeshTri2, MeshQuad1, MeshQuad2, MeshTet1, MeshTet2, MeshHex1 and MeshHex2, in any pair of
-        one dimension. A MeshHex1 is cut into hexahedra.
+        Pairs of a `skfem.Mesh` and the name of one of its boundaries, or several names: two
+        contacts of one slave mesh are one of both boundaries, since each would cut the mesh. The
+        classes are MeshTri1, MeshTri2, MeshQuad1, MeshQuad2, MeshTet1, MeshTet2, MeshHex1 and
+        MeshHex2, in any pair of one dimension. A MeshHex1 is cut into hexahedra.
     normal
-        The direction of the gap: `element`, the slave facet's own, or `nodal`, averaged at nodes.
+        The direction of the gap: `element`, the slave facet's own; `nodal`, averaged at nodes;
+        `master`, that of the nearest point of the master, for smooth obstacles.
     gap
         The initial gap, a length: a number, or a function of places (dim, n) that returns (n,). By
         default the one between the meshes as they are.
@@ -106,12 +141,12 @@ class LocalAverageContact:
         self,
         slave: Boundary,
         master: Boundary,
-        normal: Literal["element", "nodal"] = "element",
+        normal: Literal["element", "nodal", "master"] = "element",
         gap: Gap | None = None,
         search: float | None = None,
     ):
-        if normal not in ("element", "nodal"):
-            raise ValueError(f"normal = {normal!r}: must be element or nodal")
+        if normal not in ("element", "nodal", "master"):
+            raise ValueError(f"normal = {normal!r}: must be element, nodal or master")
         if slave[0].dim() != master[0].dim():
             raise ValueError("slave, master: the meshes must be of one dimension")
         if slave[0] is master[0] and slave[1] == master[1]:
@@ -124,10 +159,16 @@ class LocalAverageContact:
         points = self.mesh.p.T if self._whole else np.hstack([self.mesh.p, master[0].p]).T
         count = int(faces.macro.max()) + 1
         slaves = [facets(points, faces.type, faces.nodes, faces.macro)]
+        masters = [facets(points, other.type, other.nodes + first, other.number * 0)]
         if normal == "nodal":
             slaves = with_nodal_normals(slaves, points)
-        masters = [facets(points, other.type, other.nodes + first, other.number)]
-        operator = gap_operator(slaves, masters, count, len(points), search)
+        elif normal == "master":
+            slaves = with_master_normals(slaves, masters, points)
+        self._surfaces = slaves, masters, count, len(points), search
+        whole = read_faces(*slave, "slave")
+        self._vertices = whole.nodes[:, : whole.type.n_vertices]
+        self._unknown = np.zeros(0, dtype=int)
+        operator = gap_operator(*self._surfaces)
         self._matrix = operator.matrix
         self.area, self.covered = operator.area, operator.covered
         if not (self.covered > _COVERED * self.area).any():
@@ -163,17 +204,15 @@ class LocalAverageContact:
         """
         slave = unknowns_at_nodes(slave_basis, self.mesh, "slave")
         if self._whole:
-            unknown = slave.T.ravel()
-            size = slave_basis.N
+            unknown, size = slave.T.ravel(), slave_basis.N
         else:
             master = unknowns_at_nodes(master_basis, self._master, "master")
             if master.min() < slave_basis.N:
                 master = master + slave_basis.N
             unknown = np.hstack([slave, master]).T.ravel()
             size = max(slave_basis.N, int(unknown.max()) + 1)
-        entries = self._matrix.tocoo()
-        shape = len(self.area), size
-        return csr_matrix((entries.data, (entries.row, unknown[entries.col])), shape=shape)
+        self._unknown = unknown
+        return _numbered(self._matrix, unknown, size)
 
     def solve(
         self,
@@ -195,10 +234,47 @@ class LocalAverageContact:
         system = _System(self, K.tocsr(), np.asarray(f, dtype=float), B, x, D)
         touching = self.covered > _COVERED * self.area
         found = find_status(system.trial, touching, touching, self.area, system.stiffness)
-        system.trial(found.closed)
-        return ContactState(
-            system.displacement, system.pressure, system.gap, found.closed, found.iterations
+        return system.state(found.closed, found.iterations)
+
+    def recover(
+        self, state: ContactState, form: Literal["linear", "quadratic", "smooth"] = "linear"
+    ) -> RecoveredState:
+        """A pressure of second order (`quadratic`: of third) from one constant for each facet.
+
+        The reconstruction is given to the bodies as a load, so that it is in equilibrium. `smooth`
+        does not keep the means; it serves where these scatter, as on linear tetrahedra.
+
+        Raises:
+        ------
+        ValueError
+            For an unknown form.
+        """
+        if form not in FORMS or not FORMS[form].sweeps:
+            raise ValueError(f"form = {form!r}: must be linear, quadratic or smooth")
+        near = vertex_neighbours([(np.arange(len(self.area)), self._vertices)], len(self.area))
+        asked = RecoveryRequest(FORMS[form], near, np.zeros(len(self.area), dtype=int))
+        recovery = gap_operator(*self._surfaces, asked=asked).recovery
+        assert recovery is not None
+        system, closed = state._system, state.closed
+        fit, size = recovery.reconstruction(closed).matrix, len(system.force)
+        loads = _numbered(recovery.loads, self._unknown, size).T @ fit
+
+        def change(force: np.ndarray) -> np.ndarray:
+            return system.under(force).state(closed, 0).pressure - state.pressure
+
+        means = settled_means(
+            state.pressure, np.zeros(size), FORMS[form].sweeps, lambda p: loads @ p, change
         )
+        found = system.under(loads @ means).state(closed, state.iterations)
+        coefficients = fit @ (means if FORMS[form].degree == 2 else found.pressure)
+        return RecoveredState(found, recovery.error(coefficients), recovery, coefficients)
+
+
+def _numbered(matrix: csr_matrix, unknown: np.ndarray, size: int) -> csr_matrix:
+    """A matrix by nodes in the unknowns of the bases, of which there are `size`."""
+    entries = matrix.tocoo()
+    places = entries.row, unknown[entries.col]
+    return csr_matrix((entries.data, places), shape=(matrix.shape[0], size))
 
 
 class _System:
@@ -214,24 +290,43 @@ class _System:
         held: np.ndarray | None,
     ):
         self.contact, self.size = contact, float(np.ptp(contact.mesh.p))
-        self.imposed = np.zeros(len(force)) if imposed is None else np.array(imposed, dtype=float)
         given = np.zeros(0, dtype=int) if held is None else np.asarray(held).ravel()
-        self.free = np.setdiff1d(np.arange(len(force)), given)
-        rest = np.zeros(len(force))
-        rest[given] = self.imposed[given]
-        self.imposed = rest
+        self.force, self.free = force, np.setdiff1d(np.arange(len(force)), given)
+        self.imposed = np.zeros(len(force))
+        if imposed is not None:
+            self.imposed[given] = np.asarray(imposed, dtype=float)[given]
         self.matrix = stiffness[self.free][:, self.free]
         self.gaps = gaps[:, self.free]
-        self.load = (force - stiffness @ rest)[self.free]
-        self.before = contact.initial + gaps @ rest
+        self.load = (force - stiffness @ self.imposed)[self.free]
+        self.before = contact.initial + gaps @ self.imposed
         # Makes the constraints as large as the stiffness, for the digits of the factor.
         self.scale = abs(self.matrix.diagonal()).mean() / abs(self.gaps).max()
+        self.factored: tuple[bytes, Any] = b"", None
+
+    def under(self, force: np.ndarray) -> Self:
+        """The system under a further force (N,), with the same factor."""
+        other = copy(self)
+        other.load = self.load + force[self.free]
+        return other
+
+    def state(self, closed: np.ndarray, iterations: int) -> ContactState:
+        """The state with these facets closed."""
+        found = self.trial(closed)
+        return ContactState(
+            self.displacement, found.pressure, found.gap, closed, iterations, _system=self
+        )
 
     def _factor(self, closed: np.ndarray) -> tuple[Any, csc_matrix]:
+        key = closed.tobytes()
+        if key != self.factored[0]:
+            self.factored = key, self._new_factor(closed)
+        return self.factored[1]
+
+    def _new_factor(self, closed: np.ndarray) -> tuple[Any, csc_matrix]:
         rows = self.scale * self.gaps[closed]
         system = bmat([[self.matrix, rows.T], [rows, None]], "csc")
         try:
-            factor = splu(system)
+            factor = splu(system, "MMD_AT_PLUS_A", _PIVOT, options={"SymmetricMode": True})
         except RuntimeError:
             raise SolveError(_SINGULAR) from None
         # A factor of a singular matrix makes almost any right-hand side as large as this.
@@ -245,19 +340,19 @@ class _System:
         factor, system = self._factor(closed)
         right = np.concatenate([self.load, -self.scale * self.before[closed]])
         found = factor.solve(right)
-        found += factor.solve(right - system @ found)  # the digits that pivoting lost
+        for _ in range(2):  # the digits that pivoting lost
+            found += factor.solve(right - system @ found)
         free, covered = len(self.free), self.contact.covered
-        self.pressure = np.zeros(len(closed))
-        self.pressure[closed] = -self.scale * found[free:]
+        pressure = np.zeros(len(closed))
+        pressure[closed] = -self.scale * found[free:]
         seen = np.where(covered > _COVERED * self.contact.area, covered, np.inf)
-        self.gap = np.where(closed, 0.0, (self.before + self.gaps @ found[:free]) / seen)
         self.displacement = self.imposed.copy()
         self.displacement[self.free] = found[:free]
         least = _ROUND_OFF * np.ones(len(closed))
         return Trial(
-            pressure=self.pressure,
-            gap=self.gap,
-            pressure_limit=least * (np.abs(self.pressure).max(initial=0.0) or 1.0),
+            pressure=pressure,
+            gap=np.where(closed, 0.0, (self.before + self.gaps @ found[:free]) / seen),
+            pressure_limit=least * (np.abs(pressure).max(initial=0.0) or 1.0),
             gap_limit=least * self.size,
         )
 

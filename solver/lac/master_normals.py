@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .cells.catalogue import CellType
 from .cells.faces import nodal_normals
@@ -84,6 +83,8 @@ def _nearest_normals(
     Where several points are equally near, the mean of their normals: it does not depend on the
     order of the faces.
     """
+    from scipy.spatial import cKDTree  # a quarter of the time that the package takes to load
+
     corners = np.concatenate([block.corner.reshape(-1, places.shape[1]) for block in masters])
     limit, _ = cKDTree(corners).query(places)
     owner, distances, found = [], [], []

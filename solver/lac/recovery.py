@@ -4,10 +4,16 @@ A reconstruction p* = p + Σ c ψ of the constants p (see `reconstruction`) give
 constants withhold from them: the loads Fᵀ c with Fᵢₖ = ∫ ψᵢₖ (N_master − N_slave) n dS. All ψ that
 are applied have mean zero on their macro-element: the constants stay the means.
 
-Source: Stetter, Numer. Math. 29 (1978) 425–443, for the deferred correction that applies them.
+What constants withhold is known as soon as the means p are. It is given to the bodies as a load,
+which changes p, and so on: p ↦ p + ω (pₖ − p), ω = 0.87. The map is affine and contracts by 0.1–0.4
+a sweep, whatever the mesh, the materials and Poisson's ratio (docs/recovery.md). From the second
+sweep on the combination of the last two is taken that leaves least of pₖ − p.
+
+Source: Stetter, Numer. Math. 29 (1978) 425–443, for the deferred correction that applies them;
+D. G. Anderson, J. ACM 12 (1965) 547–560, for the combination.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +25,9 @@ from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
 from .stabilisation import Stabilisation, stabilisation
 from .surface_points import Surface
+
+# The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
+_RELAXATION = 0.87
 
 
 @dataclass(frozen=True)
@@ -166,3 +175,35 @@ def _same_materials(asked: RecoveryRequest, found: Sequence[Segments]) -> sparse
     i, j = pairs.row, pairs.col
     kept = (asked.material[i] == asked.material[j]) & (least[i] <= least[j]) & (most[j] <= most[i])
     return sparse.csr_matrix((pairs.data[kept], (i[kept], j[kept])), shape=(m, m))
+
+
+def settled_means(
+    pressure: np.ndarray,
+    force: np.ndarray,
+    sweeps: int,
+    loads: Callable[[np.ndarray], np.ndarray],
+    change: Callable[[np.ndarray], np.ndarray],
+) -> np.ndarray:
+    """The means (k,) whose reconstruction is applied in the last of the `sweeps`.
+
+    `pressure` (k,) is the one under the loads `force` (n_dofs,) of a reconstruction; `loads` gives
+    those of the reconstruction of any means, `change` by how much (k,) loads change the pressure.
+
+    Here loads that are the means, and lower them by a third of their own, leave 3/4 of them:
+
+    >>> found = settled_means(np.ones(1), np.zeros(1), 3, lambda p: p, lambda f: -f / 3)
+    >>> found.round(12).tolist()
+    [0.75]
+    """
+    last, left, moved = pressure, pressure, pressure
+    for sweep in range(sweeps - 1):
+        following = loads(pressure)
+        last = last + change(following - force)
+        before, left = left, last - pressure
+        step = _RELAXATION * left
+        if sweep:
+            fell = left - before
+            share = np.linalg.lstsq(fell[:, None], left, rcond=None)[0]
+            step -= share * (moved + _RELAXATION * fell)
+        pressure, moved, force = pressure + step, step, following
+    return pressure

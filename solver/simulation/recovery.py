@@ -1,12 +1,7 @@
 """The recovered pressure: an equilibrium corrected by a reconstruction of its pressure.
 
-What constants withhold from the bodies, Fᵀ c with c = R p, is known as soon as the means p are. It
-is given to the bodies as a load, which changes p, and so on: p ↦ p + ω (pₖ − p), ω = 0.87. The map
-is affine and contracts by 0.1–0.4 a sweep, whatever the mesh, the materials and Poisson's ratio
-(docs/recovery.md). From the second sweep on the combination of the last two is taken that leaves
-least of pₖ − p (D. G. Anderson, J. ACM 12 (1965) 547–560). All sweeps run on the factor of the
-equilibrium; the last is solved in full, so that means and loads are in equilibrium with the
-displacement.
+The sweeps that settle it (`lac.recovery`) run on the factor of the equilibrium; the last is solved
+in full, so that means and loads are in equilibrium with the displacement.
 """
 
 import logging
@@ -16,13 +11,11 @@ import numpy as np
 
 from ..case.model import Step
 from ..lac.reconstruction import Reconstruction
-from ..lac.recovery import Recovery
+from ..lac.recovery import Recovery, settled_means
 from .problem import ContactProblem, Equilibrium
 from .scene import ZoneScene
 
 _LOG = logging.getLogger(__name__)
-# The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
-_RELAXATION = 0.87
 # How often a status that the correction changes is found anew.
 _ROUNDS = 3
 
@@ -114,25 +107,24 @@ def _corrected(
     problem: ContactProblem, state: Equilibrium, zones: list[_Zone]
 ) -> tuple[Equilibrium, list[np.ndarray], list[np.ndarray]]:
     """The state with the loads of its reconstruction; coefficients and loads (n_dofs,) by zone."""
+    size = state.correction.size
     sweeps = max(zone.recovery.form.sweeps for zone in zones)
-    pressure, applied = state.pressure, [np.zeros(0)] * len(zones)
-    force = state.correction.ravel().copy()
-    last, loads = pressure, [np.zeros_like(force)] * len(zones)
-    left = moved = np.zeros(0)
-    for sweep in range(sweeps):
-        applied = [zone.coefficients(pressure) for zone in zones]
-        loads = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
-        following = sum(loads, np.zeros_like(force))
-        if sweep == sweeps - 1:
-            state = problem.corrected(state, following.reshape(state.correction.shape))
-            break
-        last = last + problem.pressure_change(state.status.closed, following - force)
-        before, left = left, last - pressure
-        step = _RELAXATION * left
-        if sweep:
-            fell = left - before
-            share = np.linalg.lstsq(fell[:, None], left, rcond=None)[0]
-            step -= share * (moved + _RELAXATION * fell)
-        pressure, moved, force = pressure + step, step, following
+    if not sweeps:
+        return state, [z.coefficients(state.pressure) for z in zones], [np.zeros(size)] * len(zones)
+
+    def loads(pressure: np.ndarray) -> list[np.ndarray]:
+        return [z.recovery.loads.T @ z.coefficients(pressure) for z in zones]
+
+    pressure = settled_means(
+        state.pressure,
+        state.correction.ravel(),
+        sweeps,
+        lambda pressure: sum(loads(pressure), np.zeros(size)),
+        lambda force: problem.pressure_change(state.status.closed, force),
+    )
+    applied = [zone.coefficients(pressure) for zone in zones]
+    added = loads(pressure)
+    correction = np.sum(added, axis=0).reshape(state.correction.shape)
+    state = problem.corrected(state, correction)
     read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
-    return state, read, loads
+    return state, read, added

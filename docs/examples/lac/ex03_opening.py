@@ -39,6 +39,18 @@ force = state.pressure @ contact.covered
 vertical = a.get_dofs("ends").all("u^2")
 supports = (K @ state.u - f - B.T @ state.pressure)[vertical].sum()
 
+
+def visualize():
+    """The pressure along the beam."""
+    import matplotlib.pyplot as plt
+
+    ends = np.linspace(0, LENGTH, len(state.pressure) + 1)
+    ax = plt.subplots()[1]
+    ax.stairs(state.pressure, ends)
+    ax.set(xlabel="x", ylabel="contact pressure")
+    return ax
+
+
 if __name__ == "__main__":
     print(f"{state.closed.sum()} of {len(state.closed)} facets touch, in {state.iterations} solves")
     print(f"contact {force:.6g} + supports {supports:.6g} = load {LOAD * LENGTH:.6g}")

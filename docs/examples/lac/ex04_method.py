@@ -127,6 +127,18 @@ def solve(slave, halves, master, facets):
 lower, upper = block(8, 3, -HEIGHT), block(14, 4, 0.0)
 pressure, solves = solve(*cut(upper, "low"), lower, lower.boundaries["high"])
 
+
+def visualize():
+    """The pressure along the contact."""
+    import matplotlib.pyplot as plt
+
+    ends = np.linspace(0, WIDTH, len(pressure) + 1)
+    ax = plt.subplots()[1]
+    ax.stairs(pressure, ends)
+    ax.set(xlabel="x", ylabel="contact pressure")
+    return ax
+
+
 if __name__ == "__main__":
     print(f"{(pressure > 0).sum()} of {len(pressure)} facets are in contact, {solves} solves")
     print(pressure.round(3))
