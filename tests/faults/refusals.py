@@ -1,4 +1,4 @@
-"""Every refusal in the sources, found by their syntax: the table of `docs/refusals.md`.
+"""Every refusal in the sources, found by their syntax: the table of `docs/design/refusals.md`.
 
 `python -m tests.faults.refusals` prints the page.
 """

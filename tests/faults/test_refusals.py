@@ -24,7 +24,7 @@ from tests.scenes import block_case, block_mesh
 
 
 def test_the_page_is_that_of_the_sources():
-    assert (ROOT / "docs" / "refusals.md").read_text(encoding="utf-8") == page()
+    assert (ROOT / "docs" / "design" / "refusals.md").read_text(encoding="utf-8") == page()
     assert len(refusals()) > 100
 
 
