@@ -8,10 +8,10 @@ scikit-fem, and nothing else of this program. Its files in the order of the meth
 - `cut`: slave cells are cut, so that each macro-element has a node inside
 - `facets`, `master_normals`: geometry of faces, projection, directions of the gap
 - `pairing`, `clipping`, `regions`, `fans`, `segments`: mortar segments and points on them
-- `lines`, `partners`, `surface_points`: area without a partner
+- `partners`, `surface_points`: the surface that a macro-element meets, and its area
 - `multipliers`, `closure`, `operator`: the gap operator B, its sums as exact as the area
 - `status`, `complementarity`: which macro-elements are closed
-- `reconstruction`, `stabilisation`, `recovery`: a pressure of second order
+- `reconstruction`, `recovery`: a pressure of second order
 
 Examples in it use its public names, NumPy as `np`, the catalogue `BY_NAME`, and two surfaces in the
 plane: `slave`, one edge of length 2 on y = 0 that faces up, with the nodes 1 and 0 at its ends

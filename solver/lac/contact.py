@@ -9,7 +9,7 @@ inside. Source: Abbas, Drouet, Hild, The Local Average Contact (LAC) method, CMA
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 import skfem
@@ -22,11 +22,12 @@ from .facets import Facets, facets, with_nodal_normals
 from .master_normals import with_master_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
 from .operator import gap_operator
-from .reconstruction import FORMS, vertex_neighbours
+from .reconstruction import form_of, vertex_neighbours
 from .recovery import Recovery, RecoveryRequest, settled_means
 from .status import Trial, find_status
 
 Boundary = tuple[skfem.Mesh, Names]
+Recovered = Literal["automatic", "linear", "quadratic", "smooth"]
 Gap = float | Callable[[np.ndarray], np.ndarray]
 # Facets that cover less of their area have no partner, and carry no pressure.
 _COVERED = 1e-9
@@ -166,7 +167,7 @@ class LocalAverageContact:
             slaves = with_master_normals(slaves, masters, points)
         self._surfaces = slaves, masters, count, len(points), search
         whole = read_faces(*slave, "slave")
-        self._vertices = whole.nodes[:, : whole.type.n_vertices]
+        self._vertices, self._order = whole.nodes[:, : whole.type.n_vertices], whole.type.order
         self._unknown = np.zeros(0, dtype=int)
         operator = gap_operator(*self._surfaces)
         self._matrix = operator.matrix
@@ -236,23 +237,23 @@ class LocalAverageContact:
         found = find_status(system.trial, touching, touching, self.area, system.stiffness)
         return system.state(found.closed, found.iterations)
 
-    def recover(
-        self, state: ContactState, form: Literal["linear", "quadratic", "smooth"] = "linear"
-    ) -> RecoveredState:
+    def recover(self, state: ContactState, form: Recovered = "automatic") -> RecoveredState:
         """A pressure of second order (`quadratic`: of third) from one constant for each facet.
 
         The reconstruction is given to the bodies as a load, so that it is in equilibrium. `smooth`
-        does not keep the means; it serves where these scatter, as on linear tetrahedra.
+        does not keep the means; it serves where these scatter, as on linear tetrahedra. `automatic`
+        is the form that is best for the slave's cells by measurement (docs/recovery.md).
 
         Raises:
         ------
         ValueError
             For an unknown form.
         """
-        if form not in FORMS or not FORMS[form].sweeps:
-            raise ValueError(f"form = {form!r}: must be linear, quadratic or smooth")
+        if form not in get_args(Recovered):
+            raise ValueError(f"form = {form!r}: must be {', '.join(get_args(Recovered))}")
+        shape = form_of(form, self._order, self._vertices.shape[1])
         near = vertex_neighbours([(np.arange(len(self.area)), self._vertices)], len(self.area))
-        asked = RecoveryRequest(FORMS[form], near, np.zeros(len(self.area), dtype=int))
+        asked = RecoveryRequest(shape, near, np.zeros(len(self.area), dtype=int))
         recovery = gap_operator(*self._surfaces, asked=asked).recovery
         assert recovery is not None
         system, closed = state._system, state.closed
@@ -263,10 +264,10 @@ class LocalAverageContact:
             return system.under(force).state(closed, 0).pressure - state.pressure
 
         means = settled_means(
-            state.pressure, np.zeros(size), FORMS[form].sweeps, lambda p: loads @ p, change
+            state.pressure, np.zeros(size), shape.sweeps, lambda p: loads @ p, change
         )
         found = system.under(loads @ means).state(closed, state.iterations)
-        coefficients = fit @ (means if FORMS[form].degree == 2 else found.pressure)
+        coefficients = fit @ (means if shape.degree == 2 and shape.keeps_means else found.pressure)
         return RecoveredState(found, recovery.error(coefficients), recovery, coefficients)
 
 

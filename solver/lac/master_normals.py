@@ -54,27 +54,6 @@ def with_directions(slaves: list[Facets], vectors: np.ndarray) -> list[Facets]:
     return [replace(b, directions=along) for along, b in zip(found, slaves, strict=True)]
 
 
-def sharpest(masters: Sequence[Facets], points: np.ndarray) -> tuple[float, np.ndarray]:
-    """The largest angle between a face and the mean normal at one of its nodes, and the place.
-
-    The angle is in radians, half the angle of an edge between two faces.
-
-    >>> ends = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    >>> corner = facets(ends, BY_NAME["SEG2"], np.array([[0, 1], [1, 2]]), np.arange(2))
-    >>> angle, place = sharpest([corner], ends)
-    >>> round(np.degrees(angle)), place.tolist()
-    (45, [1.0, 0.0])
-    """
-    normals = nodal_normals(points, [(block.type.name, block.nodes) for block in masters])
-    found = []
-    for block in masters:
-        cosine = np.einsum("fad,fd->fa", normals[block.nodes], block.normal)
-        worst = int(cosine.argmin())
-        found.append((float(cosine.min()), int(block.nodes.ravel()[worst])))
-    cosine, node = min(found)
-    return float(np.arccos(np.clip(cosine, -1.0, 1.0))), points[node]
-
-
 def _nearest_normals(
     places: np.ndarray, masters: Sequence[Facets], normals: np.ndarray
 ) -> np.ndarray:

@@ -80,23 +80,6 @@ class InterfaceData:
 Space = Callable[[InterfaceData], Multipliers]
 
 
-def of_nodes(nodes: Sequence[np.ndarray], shapes: Sequence[np.ndarray]) -> Multipliers:
-    """One multiplier for each of the `nodes` (n, k) of faces, with functions `shapes`, by block.
-
-    >>> space = of_nodes([np.array([[7, 3]])], [np.eye(2)])
-    >>> space.nodes.tolist(), space.number[0].tolist()
-    ([3, 7], [[1, 0]])
-    """
-    known = np.unique(np.concatenate([block.ravel() for block in nodes]))
-    return Multipliers(
-        count=len(known),
-        number=[np.searchsorted(known, block) for block in nodes],
-        coefficients=[shape[None] for shape in shapes],
-        shapes=list(shapes),
-        nodes=known,
-    )
-
-
 def constants(data: InterfaceData) -> Multipliers:
     """One multiplier for each macro-element, constant on it.
 

@@ -20,7 +20,7 @@ from .multipliers import (
     Space,
     constants,
 )
-from .partners import on_one_surface, uncovered, without_partner
+from .partners import on_one_surface, uncovered
 from .recovery import Recovery, RecoveryRequest, recovery
 from .segments import Segments, intersect
 from .surface_points import Samples, Surface, face_samples
@@ -91,8 +91,9 @@ class Scheme:
     """How the gap is integrated: which points, which multipliers, and whether closure is due.
 
     `sample` gives points that measure whole slave faces, `meet` those where the surfaces meet,
-    `space` the multipliers. `nearest`: the master has faces, and a
-    macro-element meets the nearest surface of them.
+    `space` the multipliers. `nearest`: the master has faces, and a macro-element meets the nearest
+    surface of them. `lost`: measures the area that has no partner there, from slaves, masters,
+    samples, segments, the reach and the number of macro-elements.
     """
 
     sample: Callable[[list[Facets]], list[Samples]] = face_samples
@@ -100,6 +101,7 @@ class Scheme:
     space: Space = constants
     closure: bool = True
     nearest: bool = True
+    lost: Callable[..., np.ndarray] | None = None
 
 
 LAC = Scheme()
@@ -149,8 +151,8 @@ def gap_operator(
         np.add.at(initial, part.number, part.gap)
         np.add.at(covered, part.number, part.weight)
     lost = np.zeros(n_macro)
-    if scheme.nearest:
-        lost = without_partner(slaves, masters, samples, found, reach, n_macro)
+    if scheme.nearest and scheme.lost:
+        lost = scheme.lost(slaves, masters, samples, found, reach, n_macro)
     surface = _surface(data, lost)
     averages = space.averages(samples, [block.number for block in slaves], n_macro)
     return GapOperator(

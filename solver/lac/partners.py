@@ -1,10 +1,8 @@
-"""Which part of the master a macro-element meets, and which of its area has no partner.
+"""Which part of the master a macro-element meets, and which faces are not covered whole.
 
 Along the normal of a point the nearest visible master face counts (`pairing`, `segments`). What is
 left is decided here, from distances at the points of the segments: a macro-element beside a step
-of the master meets the nearer side alone, since one pressure cannot act on both. The area without
-partner is measured by lines through points of the faces, a route that shares nothing with the
-segments but the projection onto a face.
+of the master meets the nearer side alone, since one pressure cannot act on both.
 """
 
 from collections.abc import Sequence
@@ -13,19 +11,15 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .cells.gauss import gauss_rule
 from .facets import Facets
-from .lines import all_hits
 from .segments import Segments
-from .surface_points import Samples, sampled
+from .surface_points import Samples
 
 # Parts of the master without common nodes are one surface for a macro-element where their
 # distances differ by less than this share of its size.
 _STEP = 0.1
 # A face that misses less than this share of its area is covered whole.
-_MISSED = 1e-6
-# Lines through so many Gauss points each way tell whether a face lies within the master's outline.
-_LINES = 4
+MISSED = 1e-6
 
 
 def uncovered(samples: Sequence[Samples], found: Sequence[Segments]) -> list[np.ndarray]:
@@ -35,18 +29,27 @@ def uncovered(samples: Sequence[Samples], found: Sequence[Segments]) -> list[np.
     >>> [faces.tolist() for faces in (*uncovered(samples, found), *uncovered(samples, found[1:]))]
     [[], [0]]
     """
-    return _bare(samples, _missed(samples, found))
+    return bare_faces(samples, missed_area(samples, found))
 
 
-def _bare(samples: Sequence[Samples], missed: Sequence[np.ndarray]) -> list[np.ndarray]:
+def bare_faces(samples: Sequence[Samples], missed: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """By block, the faces of which segments miss an area (n,).
+
+    >>> [faces.tolist() for faces in bare_faces(face_samples([slave]), [np.array([0.5])])]
+    [[0]]
+    """
     return [
-        np.flatnonzero(area > _MISSED * sample.weight.sum(axis=1))
+        np.flatnonzero(area > MISSED * sample.weight.sum(axis=1))
         for area, sample in zip(missed, samples, strict=True)
     ]
 
 
-def _missed(samples: Sequence[Samples], found: Sequence[Segments]) -> list[np.ndarray]:
-    """By block, the area (n,) of slave faces that segments do not cover."""
+def missed_area(samples: Sequence[Samples], found: Sequence[Segments]) -> list[np.ndarray]:
+    """By block, the area (n,) of slave faces that segments do not cover.
+
+    >>> missed_area(face_samples([slave]), [])[0].round(12).tolist()
+    [2.0]
+    """
     missed = [sample.weight.sum(axis=1) for sample in samples]
     for segments in found:
         np.subtract.at(missed[segments.slave.index], segments.slave.face, segments.area)
@@ -71,7 +74,7 @@ def on_one_surface(found: list[Segments], slaves: Sequence[Facets], n_macro: int
     macro, low, high = (np.concatenate(part) for part in zip(*ranges, strict=True))
     # Gauss points are inside; by half of their range more it is that of the whole segment.
     low, high = low - (high - low) / 2, high + (high - low) / 2
-    size = _sizes(slaves, n_macro)
+    size = extents(slaves, n_macro)
     lowest, highest = np.full(n_macro, np.inf), np.full(n_macro, -np.inf)
     np.minimum.at(lowest, macro, low)
     np.maximum.at(highest, macro, high)
@@ -100,8 +103,12 @@ def on_one_surface(found: list[Segments], slaves: Sequence[Facets], n_macro: int
     return [s.of(mine) for s, mine in zip(found, chosen, strict=True) if mine.any()]
 
 
-def _sizes(slaves: Sequence[Facets], n_macro: int) -> np.ndarray:
-    """The extents (m,) of macro-elements."""
+def extents(slaves: Sequence[Facets], n_macro: int) -> np.ndarray:
+    """The extents (m,) of macro-elements.
+
+    >>> extents([slave], 1).tolist()
+    [2.0]
+    """
     low, high = (np.full((n_macro, slaves[0].corner.shape[2]), x) for x in (np.inf, -np.inf))
     for block in slaves:
         np.minimum.at(low, block.number, block.corner.min(axis=1))
@@ -127,65 +134,3 @@ def _connected(found: Sequence[Segments], stepped: np.ndarray) -> tuple[np.ndarr
     number = connected_components(graph, directed=False)[1][:first]
     names, part = np.unique(number, return_inverse=True)
     return part.ravel(), len(names)
-
-
-def _lines(block: Facets) -> Samples:
-    """Points of faces: their nodes, without weight, and Gauss points.
-
-    If all see the master, so does the whole face.
-    """
-    places, weights = gauss_rule(block.type.name, _LINES)
-    nodes = block.type.nodes
-    rule = np.concatenate([nodes, places]), np.concatenate([np.zeros(len(nodes)), weights])
-    return sampled(block, rule)
-
-
-def without_partner(
-    slaves: Sequence[Facets],
-    masters: Sequence[Facets],
-    samples: Sequence[Samples],
-    found: Sequence[Segments],
-    reach: float,
-    n_macro: int,
-) -> np.ndarray:
-    """The area (m,) of macro-elements that lies opposite the master but in no segment.
-
-    Of faces that are not covered whole, lines along the normal tell how much is opposite a master
-    face: one that looks at the point, and is no farther from the segments of the macro-element
-    than its own size. What lies beyond is a step. Faces that the master's edge crosses are known
-    to one of their points.
-
-    >>> samples, found = face_samples([slave]), meet_in_segments([slave], [], [master], 1.0)
-    >>> both = [slave], [master], samples
-    >>> [without_partner(*both, some, 1.0, 1).round(12).tolist()
-    ...  for some in (found, [found[0].of(np.array([0]))])]
-    [[0.0], [1.0]]
-    """
-    lost = np.zeros(n_macro)
-    missed = _missed(samples, found)
-    bare = _bare(samples, missed)
-    if not any(len(faces) for faces in bare):
-        return lost
-    low, high = np.full(n_macro, np.inf), np.full(n_macro, -np.inf)
-    for segments in found:
-        np.minimum.at(low, segments.macro, segments.gap.min(axis=1))
-        np.maximum.at(high, segments.macro, segments.gap.max(axis=1))
-    size = _sizes(slaves, n_macro)
-    low, high = (np.where(high < low, sign * reach, x) for x, sign in ((low, -1), (high, 1)))
-    for a, (block, faces) in enumerate(zip(slaves, bare, strict=True)):
-        if not len(faces):
-            continue
-        sample = _lines(block)
-        point, gap = all_hits(block, sample, masters, reach, faces)
-        face = point // len(sample.values)
-        macro = block.number[face]
-        near = (gap >= low[macro] - size[macro]) & (gap <= high[macro] + size[macro])
-        met = np.zeros(sample.weight.shape, dtype=bool)
-        met.flat[point[near]] = True
-        opposite = np.where(met, sample.weight, 0.0).sum(axis=1)[faces]
-        whole, largest = sample.weight.sum(axis=1)[faces], sample.weight.max(axis=1)[faces]
-        # The edge of the master is known to the share of one row of points.
-        unsure = np.where(met[faces].all(axis=1), 0.0, _LINES ** (block.type.dim - 1) * largest)
-        beyond = opposite - (whole - missed[a][faces]) - unsure
-        np.add.at(lost, block.number[faces], np.where(beyond > _MISSED * whole, beyond, 0.0))
-    return lost

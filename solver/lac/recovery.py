@@ -15,6 +15,7 @@ D. G. Anderson, J. ACM 12 (1965) 547–560, for the combination.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -23,7 +24,6 @@ from .cells.faces import circumference
 from .facets import tangents_of
 from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
-from .stabilisation import Stabilisation, stabilisation
 from .surface_points import Surface
 
 # The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
@@ -35,14 +35,14 @@ class RecoveryRequest:
     """The form of a recovery on m macro-elements.
 
     `near` (m, m): which share a vertex; `material` (m,): a number of that of the slave's cells. The
-    master's faces have theirs as the number of their `Facets`. `softness`: 1 / E of the materials,
-    and 0 for rigid bodies, the last one; given where contact is to be stabilised.
+    master's faces have theirs as the number of their `Facets`. `stabilise`: makes what stabilises
+    contact, if asked for, of the segments, the moments, neighbours (m, m) and covered areas (m,).
     """
 
     form: Form
     near: sparse.csr_matrix
     material: np.ndarray
-    softness: np.ndarray | None = None
+    stabilise: Callable[..., Any] | None = None
 
 
 def moments(found: Sequence[Segments], surface: Surface) -> Moments:
@@ -92,7 +92,7 @@ class Recovery:
     near: sparse.csr_matrix
     loads: sparse.csr_matrix
     products: np.ndarray
-    stabilisation: Stabilisation | None = None
+    stabilisation: Any = None
 
     def reconstruction(self, closed: np.ndarray) -> Reconstruction:
         """The reconstruction among closed macro-elements (m,)."""
@@ -145,17 +145,14 @@ def recovery(
     entries = [np.concatenate(part or [np.empty(0, int)]) for part in (values, rows, columns)]
     loads = sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=(m * k, dim * n_nodes))
     near = _same_materials(asked, found)
-    stabilised = None
-    if asked.softness is not None:
-        soft = asked.softness[asked.material], asked.softness
-        stabilised = stabilisation(found, at, near, surface.covered, soft)
+    stabilise = asked.stabilise
     return Recovery(
         form=form,
         moments=at,
         near=near,
         loads=loads.tocsr(),
         products=products,
-        stabilisation=stabilised,
+        stabilisation=stabilise and stabilise(found, at, near, surface.covered),
     )
 
 

@@ -239,30 +239,3 @@ def _solve_complementarity(
 def _log(iteration: int, closed: np.ndarray, wrong: np.ndarray) -> None:
     known = iteration, int(closed.sum()), len(closed), int(wrong.sum())
     _LOG.info("contact status: iteration %d, %d of %d closed, %d wrong", *known)
-
-
-def likely_closed(
-    gap: np.ndarray, area: np.ndarray, eligible: np.ndarray, push: float, dim: int
-) -> np.ndarray:
-    """Which macro-elements (m,) a force is likely to close, judged by their initial gaps (m,).
-
-    Bodies that touch on an area A under a force F approach each other there by about F/(E* √A), in
-    the plane by F/E*; `push` is F/E*, F per thickness in the plane. Macro-elements close in the
-    order of their gaps up to that approach, from where bodies that are apart first touch. A first
-    guess that is too small grows in one iteration; one that is too large shrinks step by step.
-
-    In the plane, an approach of 2 closes gaps of 0 and 1, but not of 3:
-
-    >>> gap, eligible = np.array([0.0, 1.0, 3.0]), np.ones(3, dtype=bool)
-    >>> likely_closed(gap, np.ones(3), eligible, 2.0, 2).tolist()
-    [True, True, False]
-    """
-    if not eligible.any():
-        return eligible
-    order = np.argsort(np.where(eligible, gap, np.inf), kind="stable")
-    touching = np.cumsum(area[order])
-    approach = push / touching ** ((dim - 2) / (dim - 1))
-    above = gap[order] - max(gap[order[0]], 0.0)
-    closed = np.zeros(len(gap), dtype=bool)
-    closed[order[above <= approach]] = True
-    return closed & eligible

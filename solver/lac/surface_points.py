@@ -13,7 +13,7 @@ class Surface:
     """The m macro-elements of a slave surface.
 
     `area`, `covered` (m,): whole and intersected area; `lost` (m,): opposite the master, but
-    without a partner; `centre`, `normal` (m, dim).
+    without a partner, where it is measured; `centre`, `normal` (m, dim).
     """
 
     area: np.ndarray

@@ -1,5 +1,6 @@
 """The gap operator of a zone from its faces: initial gaps, and the recovery of its pressure."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -7,10 +8,10 @@ import numpy as np
 
 from ..case.model import Zone
 from ..lac.cells.catalogue import BY_NAME
-from ..lac.cells.faces import FACE_POINTS, FaceBlock, surface_points
+from ..lac.cells.faces import FACE_POINTS, FaceBlock, nodal_normals, surface_points
 from ..lac.cut import SubFaces
 from ..lac.facets import Facets, facets, with_nodal_normals
-from ..lac.master_normals import sharpest, with_directions, with_master_normals
+from ..lac.master_normals import with_directions, with_master_normals
 from ..lac.multipliers import constants
 from ..lac.operator import GapOperator, Scheme, gap_operator
 from ..lac.reconstruction import form_of, vertex_neighbours
@@ -18,6 +19,7 @@ from ..lac.recovery import RecoveryRequest
 from ..lac.surface_points import face_samples
 from ..mechanics.mortar.points import gauss
 from ..mechanics.mortar.quadric import Quadric, frame, meet_quadric
+from ..mechanics.mortar.stabilisation import stabilisation
 from ..mechanics.mortar.treatments import scheme_of
 from ..system.errors import InputError
 from .attributes import Attributes
@@ -71,7 +73,7 @@ def _without_segments(scheme: Scheme, surface: Quadric) -> Scheme:
 
 
 def _refuse_sharp(groups: Attributes, zone: Zone, masters: list[Facets]) -> None:
-    angle, place = sharpest(masters, groups.points)
+    angle, place = _sharpest(masters, groups.points)
     if angle > _SMOOTH:
         at = ", ".join(f"{x:.6g}" for x in place + groups.origin)
         allowed = (
@@ -80,6 +82,21 @@ def _refuse_sharp(groups: Attributes, zone: Zone, masters: list[Facets]) -> None
         )
         key = f"contact[{groups.case.zones.index(zone)}].normal"
         raise InputError(groups.case.path, key, zone.normal, allowed)
+
+
+def _sharpest(masters: Sequence[Facets], points: np.ndarray) -> tuple[float, np.ndarray]:
+    """The largest angle between a face and the mean normal at one of its nodes, and the place.
+
+    The angle is in radians, half the angle of an edge between two faces.
+    """
+    normals = nodal_normals(points, [(block.type.name, block.nodes) for block in masters])
+    found = []
+    for block in masters:
+        cosine = np.einsum("fad,fd->fa", normals[block.nodes], block.normal)
+        worst = int(cosine.argmin())
+        found.append((float(cosine.min()), int(block.nodes.ravel()[worst])))
+    cosine, node = min(found)
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0))), points[node]
 
 
 def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> RecoveryRequest:
@@ -94,10 +111,11 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> R
     form = form_of(zone.recovery, order, corners)
     if form.sweeps and zone.sweeps:
         form = replace(form, sweeps=zone.sweeps)
-    softness = None
+    stabilise = None
     if zone.stabilised:
         softness = np.array([1 / m.young for m in groups.case.materials.values()] + [0.0])
-    return RecoveryRequest(form, vertex_neighbours(vertices, count), material, softness)
+        stabilise = partial(stabilisation, soft_of=(softness[material], softness))
+    return RecoveryRequest(form, vertex_neighbours(vertices, count), material, stabilise)
 
 
 def _as_bent(block: Facets) -> Facets:

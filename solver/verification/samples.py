@@ -16,7 +16,6 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..lac.cells.catalogue import cell_type
-from ..lac.cells.quadrature import volume_rule
 from ..lac.cells.shape import shape_functions
 from ..lac.threads import prefetch
 from ..mechanics.fem.elasticity import (
@@ -26,6 +25,7 @@ from ..mechanics.fem.elasticity import (
     with_hoop,
 )
 from ..mechanics.fem.stress import COMPONENTS
+from ..mechanics.fem.volume_rules import volume_rule
 from ..simulation.exact import ExactValues
 from ..simulation.groups import ALL
 from ..simulation.initial import strain_at

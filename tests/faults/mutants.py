@@ -336,7 +336,7 @@ MUTANTS = (
            "solver.simulation.rigid:turned",
            changed(lambda faces: {name: nodes[:, ::-1] for name, nodes in faces.items()})),
     Mutant("stabilisation-lost", "stabilised contact does not give way", STIFF,
-           "solver.lac.stabilisation:Stabilisation.scatter",
+           "solver.mechanics.mortar.stabilisation:Stabilisation.scatter",
            changed(lambda scatter: 0 * scatter)),
     Mutant("normal-of-slave", "contact follows the slave's normals, not the master's", OBSTACLE,
            "solver.simulation.operators:with_master_normals",

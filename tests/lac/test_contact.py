@@ -284,7 +284,7 @@ def test_gaps_along_the_normal_asked_for(normal, share):
     assert ratio[inner] == pytest.approx(share * 0.75 * middle[inner], rel=1e-12)
 
 
-@pytest.mark.parametrize(("form", "better"), [("linear", 10), ("quadratic", 50), ("smooth", 50)])
+@pytest.mark.parametrize(("form", "better"), [("linear", 10), ("quadratic", 50), ("automatic", 50)])
 @pytest.mark.parametrize("kind", [skfem.MeshTri2, skfem.MeshQuad2])
 def test_a_linear_pressure_is_recovered(kind, form, better):
     """With ν = 0: u = (b y² / 2 E, −p y / E), p = a + b x; constants are wrong at the ends."""
@@ -319,7 +319,7 @@ def test_an_unknown_form_is_refused():
     lower, upper = good()
     contact = LocalAverageContact((upper, "bottom"), (lower, "top"))
     state, *_ = pressed(contact, lower, 2)
-    with pytest.raises(ValueError, match="must be linear, quadratic or smooth"):
+    with pytest.raises(ValueError, match="must be automatic, linear, quadratic, smooth"):
         contact.recover(state, "none")
 
 

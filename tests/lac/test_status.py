@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from solver.lac.errors import SolveError
-from solver.lac.status import Trial, find_status, likely_closed
+from solver.lac.status import Trial, find_status
+from solver.simulation.first_status import likely_closed
 
 
 def trial(pressure, gap, limit=1e-10):

@@ -126,7 +126,7 @@ def test_a_plane_solve_imports_nothing_of_three_dimensions(tmp_path):
     loaded = set(done.stdout.split("\n")[-2].split())
     assert "solver.lac.cells.shape" in loaded
     of_space = {
-        "solver.lac.cells.extra_elements",
+        "solver.mechanics.fem.extra_elements",
         "solver.mesh.recipes.hybrid",
         "solver.report.case_picture",
     }

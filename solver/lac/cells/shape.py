@@ -4,12 +4,16 @@ Those of edges and faces are products of a matrix and monomials, since contact e
 many points; solid cells have scikit-fem's.
 """
 
+from collections.abc import Callable
 from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 
 from .catalogue import BY_NAME, CellType
 
+MORE_ELEMENTS: dict[str, Callable[[], Any]] = {}
+"""Elements by cell type that scikit-fem does not have; `solver.mechanics.fem` adds them."""
 # Mid-edge nodes off the middle by less than this share of the edge make no bent edge.
 _STRAIGHT = 1e-9
 # Values at points of at most so many coordinates are kept.
@@ -131,13 +135,11 @@ def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
     return (np.linalg.norm(offset, axis=2) <= _STRAIGHT * length).all(axis=1)
 
 
-def _scikit_fem_element(name: str):  # type: ignore[no-untyped-def]
+def _scikit_fem_element(name: str) -> Any:
     import skfem.element as element
 
-    if name in ("PENTA15", "PYRA5", "PYRA13"):
-        from .extra_elements import ElementPyramid, ElementWedgeS2
-
-        return ElementWedgeS2() if name == "PENTA15" else ElementPyramid(name)
+    if name in MORE_ELEMENTS:
+        return MORE_ELEMENTS[name]()
     makers = {
         "TETRA4": element.ElementTetP1,
         "TETRA10": element.ElementTetP2,

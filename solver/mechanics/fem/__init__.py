@@ -1,14 +1,24 @@
-"""Shape functions of every cell type in the file's node order, and quadrature that suffices."""
+"""Finite elements on arrays; elements that scikit-fem does not have join the kernel's here."""
 
-from ...lac.cells.quadrature import face_rule, mortar_degree, simplex_rule, volume_rule
-from ...lac.cells.shape import ShapeFunctions, has_straight_edges, shape_functions
+from typing import Any
 
-__all__ = [
-    "ShapeFunctions",
-    "face_rule",
-    "has_straight_edges",
-    "mortar_degree",
-    "shape_functions",
-    "simplex_rule",
-    "volume_rule",
-]
+from ...lac.cells.shape import MORE_ELEMENTS
+
+
+def _wedge() -> Any:
+    from .extra_elements import ElementWedgeS2
+
+    return ElementWedgeS2()
+
+
+def _pyramid(name: str) -> Any:
+    from .extra_elements import ElementPyramid
+
+    return ElementPyramid(name)
+
+
+MORE_ELEMENTS |= {
+    "PENTA15": _wedge,
+    "PYRA5": lambda: _pyramid("PYRA5"),
+    "PYRA13": lambda: _pyramid("PYRA13"),
+}

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...lac.cells.catalogue import CellType
-from ...lac.cells.quadrature import volume_rule
+from .volume_rules import volume_rule
 
 
 @dataclass(frozen=True)

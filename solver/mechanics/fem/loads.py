@@ -5,11 +5,12 @@ from collections.abc import Callable
 import numpy as np
 
 from ...lac.cells.faces import circumference, surface_vectors
-from ...lac.cells.quadrature import face_rule, volume_rule
+from ...lac.cells.quadrature import face_rule
 from ...lac.cells.shape import shape_functions
 from ...lac.cells.small_matrices import invert
 from ...lac.errors import SolveError
 from .stress import traction
+from .volume_rules import volume_rule
 
 # A value of position: points (n, dim) to values (n,) or (n, dim).
 Field = Callable[[np.ndarray], np.ndarray]

@@ -8,12 +8,13 @@ deformation solid mechanics, CMAME 193 (2004) 601–629; Puso, Laursen, Solberg,
 mortar contact method for quadratic elements and large deformations, CMAME 197 (2008) 555–566.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ...lac.cells.shape import shape_functions
-from ...lac.multipliers import InterfaceData, Multipliers, of_nodes
+from ...lac.multipliers import InterfaceData, Multipliers
 
 # Of a face covered by less than this share, dual functions are those of the whole face: those of
 # so small a part would be lost in round-off.
@@ -63,3 +64,20 @@ def dual(data: InterfaceData) -> Multipliers:
         diagonal = np.eye(block.type.n_nodes) * mass.sum(axis=2)[:, None]
         coefficients.append(np.linalg.solve(mass, diagonal))
     return replace(plain, coefficients=coefficients, dual=True)
+
+
+def of_nodes(nodes: Sequence[np.ndarray], shapes: Sequence[np.ndarray]) -> Multipliers:
+    """One multiplier for each of the `nodes` (n, k) of faces, with functions `shapes`, by block.
+
+    >>> space = of_nodes([np.array([[7, 3]])], [np.eye(2)])
+    >>> space.nodes.tolist(), space.number[0].tolist()
+    ([3, 7], [[1, 0]])
+    """
+    known = np.unique(np.concatenate([block.ravel() for block in nodes]))
+    return Multipliers(
+        count=len(known),
+        number=[np.searchsorted(known, block) for block in nodes],
+        coefficients=[shape[None] for shape in shapes],
+        shapes=list(shapes),
+        nodes=known,
+    )

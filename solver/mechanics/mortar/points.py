@@ -18,11 +18,12 @@ from ...lac.cells.faces import nodal_normals
 from ...lac.cells.gauss import gauss_rule
 from ...lac.cells.shape import shape_functions
 from ...lac.facets import Facets
-from ...lac.lines import EDGE, Hits, meet
-from ...lac.multipliers import InterfaceData, Multipliers, of_nodes
+from ...lac.multipliers import InterfaceData, Multipliers
 from ...lac.pairing import facing_pairs
 from ...lac.segments import Segments, Side
 from ...lac.surface_points import Samples, face_samples, sampled
+from .lines import EDGE, Hits, meet
+from .nodal import of_nodes
 
 Among = Sequence[np.ndarray] | None
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from ...lac.operator import LAC, Scheme, meet_in_segments
+from .lost import without_partner
 from .nodal import dual, linear
 from .points import at_nodes, gauss, meet_at_points, one_each
 
@@ -82,4 +83,5 @@ def scheme_of(name: str, points: int | None) -> Scheme:
     >>> scheme_of("quadrature", 2).closure, scheme_of("lac", None).closure
     (False, True)
     """
-    return TREATMENTS[name].scheme(points or DEFAULT_POINTS)
+    scheme = TREATMENTS[name].scheme(points or DEFAULT_POINTS)
+    return replace(scheme, lost=without_partner)

@@ -9,7 +9,6 @@ from skfem.models.elasticity import linear_elasticity
 import solver.lac.threads
 import solver.mechanics.fem.elasticity
 from solver.lac.cells.catalogue import BY_NAME
-from solver.lac.cells.quadrature import volume_rule
 from solver.lac.cells.shape import shape_functions
 from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepness
 from solver.mechanics.fem.elasticity import (
@@ -20,6 +19,7 @@ from solver.mechanics.fem.elasticity import (
     stiffness,
 )
 from solver.mechanics.fem.nodal_stress import nodal_stress
+from solver.mechanics.fem.volume_rules import volume_rule
 from tests.scenes import block_mesh
 
 VOLUMES = [n for n, t in BY_NAME.items() if t.dim > 1]

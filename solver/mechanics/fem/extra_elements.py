@@ -8,7 +8,7 @@ import numpy as np
 from skfem.element.element_h1 import ElementH1
 from skfem.refdom import RefHex, RefWedge
 
-from .catalogue import BY_NAME
+from ...lac.cells.catalogue import BY_NAME
 
 
 class _NodeElement(ElementH1):

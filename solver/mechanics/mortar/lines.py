@@ -6,12 +6,12 @@ from typing import Self
 
 import numpy as np
 
-from .cells.catalogue import CellType
-from .cells.shape import shape_functions
-from .facets import Facets, project_along
-from .pairing import line_pairs
-from .segments import area_vectors_at
-from .surface_points import Samples
+from ...lac.cells.catalogue import CellType
+from ...lac.cells.shape import shape_functions
+from ...lac.facets import Facets, project_along
+from ...lac.pairing import line_pairs
+from ...lac.segments import area_vectors_at
+from ...lac.surface_points import Samples
 
 # A point this far outside a face, in parts of its reference face, is on its edge.
 EDGE = 1e-9

@@ -5,7 +5,7 @@ has to follow the master's facets, and the forces that bend it scatter. With S t
 
     |T| ḡ + S p = 0,    S = (I − R)ᵀ D (I − R),
 
-R p the linear least squares fit to neighbours (the form `none` of `reconstruction`). S p is zero
+R p the linear least squares fit to neighbours (the form `none` of a recovery). S p is zero
 for a linear pressure, so that the patch test stays exact, and small for smooth ones. D is the area
 of the macro-element times a displacement per pressure,
 
@@ -24,8 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from .reconstruction import FORMS, Moments, reconstruct
-from .segments import Segments
+from ...lac.reconstruction import FORMS, Moments, reconstruct
+from ...lac.segments import Segments
 
 _SHARE = 0.1
 # A master face counts as at most so many slave faces wide.
@@ -67,11 +67,11 @@ def stabilisation(
     moments: Moments,
     near: sparse.csr_matrix,
     area: np.ndarray,
-    softness: tuple[np.ndarray, np.ndarray],
+    soft_of: tuple[np.ndarray, np.ndarray],
 ) -> Stabilisation:
     """That of m macro-elements of covered `area` (m,), from the segments that cover them.
 
-    `softness`: 1 / E of the slave's cells behind each macro-element (m,), and by the numbers of the
+    `soft_of`: 1 / E of the slave's cells behind each macro-element (m,), and by the numbers of the
     master's faces.
 
     Master edges of length 1 over a slave edge of length 2, with 1 / E = 1/4 and 1/2: they count as
@@ -88,7 +88,7 @@ def stabilisation(
     sizes, soft, covered = np.zeros((3, len(area)))
     for segments in found:
         faces, face = segments.master.faces, segments.master.face
-        compliant = softness[1][faces.number[face]]
+        compliant = soft_of[1][faces.number[face]]
         size = faces.radius[face] * (2.0 if dim == 2 else np.sqrt(2.0)) / faces.type.order
         size = np.where(compliant > 0, size, 0.0)  # facets of rigid masters are their shape
         np.add.at(covered, segments.macro, segments.area)
@@ -98,6 +98,6 @@ def stabilisation(
     own = 1 / np.linalg.norm(moments.local.axes[:, 0], axis=1)
     stretch = _stretch(moments.spread)
     ratio = np.clip(sizes / covered / (own * np.sqrt(stretch)), 1.0, _COARSEST)
-    slave = 4 * own * stretch**3 * softness[0]
+    slave = 4 * own * stretch**3 * soft_of[0]
     weight = _SHARE * area * ((1 + ratio**4) * soft / covered + slave)
     return Stabilisation(weight=weight, moments=moments, near=near)
