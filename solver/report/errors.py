@@ -20,14 +20,11 @@ from .charts import (
     Look,
     Spec,
     floor_band,
-    interaction,
     level,
     round_off,
-    series,
     series_chart,
-    tooltip,
 )
-from .families import CodeError, page_name
+from .families import CodeError
 from .html import KINDS
 from .rows import Row
 
@@ -44,8 +41,6 @@ _BAD = "not passed"
 _NEAR = 1e-9
 # A line has a label where the next one is this share of the chart's height above it, at least.
 _APART = 0.05
-# Smaller shares of a tolerance are drawn here: zero has no logarithm.
-_LEAST = 1e-9
 
 
 def drawn(rows: Sequence[Row]) -> list[Row]:
@@ -94,46 +89,6 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
         layers=levels,
         width=900,
         height=400,
-    )
-
-
-def draw_strip(rows: Sequence[Row]) -> Chart:
-    """The largest checked error of every solve over its tolerance, a line for each family."""
-    records = [
-        {
-            "case": row.name,
-            "series": row.word,
-            "family": row.group,
-            "share": max(row.accuracy[0] / row.allowed, _LEAST),  # type: ignore[index]
-            "error": row.accuracy[0],  # type: ignore[index]
-            "check": row.accuracy[1],  # type: ignore[index]
-            "url": f"{page_name(row.group)}#{quote(row.anchor)}",
-        }
-        for row in drawn(rows)
-        if row.allowed
-    ]
-    titles = {"case": "case", "share": "error / tolerance", "error": "error", "check": "check"}
-    looks = {"passed": Look(GREEN), "failed": Look(RED, CROSS), "unreliable": Look(ORANGE, CROSS)}
-    found = {record["series"] for record in records}
-    channels = series({word: look for word, look in looks.items() if word in found})
-    channels.pop("strokeDash")
-    x = Axis("share", "error / tolerance", log=True).over([*records, {"share": 1.0}])
-    families = {"field": "family", "type": "nominal", "sort": None, "title": None}
-    channels |= {"x": x.channel(), "y": families, "href": {"field": "url"}}
-    marks = {"type": "point", "strokeWidth": 1.6, "size": 40, "cursor": "pointer"}
-    limit = {"x": {"datum": 1.0}, "color": {"value": RED}}
-    layers = [
-        {"data": {"values": [{}]}, "mark": {"type": "rule"}, "encoding": limit},
-        {
-            "mark": marks,
-            "encoding": channels | {"tooltip": tooltip(records, titles)},
-            "params": interaction()[1:],
-        },
-    ]
-    height = 22 * len({record["family"] for record in records})
-    spec = {"data": {"values": records}, "width": 900, "height": height, "layer": layers}
-    return Chart(
-        "error-over-tolerance", "Largest checked error of every solve over tolerance", spec, 900
     )
 
 

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from . import stages
+from . import overview, stages
 from .charts import Chart
-from .errors import draw_strip, drawn
 from .html import MEANING, NORMS, TEMPLATES, render
 from .pictures import VIEWER, picture, profile
 from .rows import Row, causes, choices, ours
@@ -51,11 +50,18 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         bad=bad,
         causes=causes(bad),
         choices=choices(rows),
-        strip=draw_strip(ours(rows)) if drawn(rows) else None,
+        verified=overview.in_words(rows),
+        errors=overview.error_chart(ours(rows)),
+        digits=overview.digit_chart(rows),
+        fewest=overview.fewest_digits(rows),
+        digits_kept=overview.digits_kept,
+        cause=overview.cause,
+        left_out=overview.left_out_by_family(rows),
+        switches=overview.WORK,
         good=bool(rows) and not bad,
         outcome=outcome(rows),
         families=sections,
-        facts=_facts(rows),
+        origin=_facts(rows),
         checks=[checks[name] for name in sorted(checks, key=_order)],
         meaning=MEANING,
         stages=_stages(rows),

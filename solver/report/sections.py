@@ -75,6 +75,11 @@ class FamilySection:
         return sum(row.verdict.cpu_seconds or 0.0 for row in self.rows)
 
     @property
+    def worst(self) -> tuple[float, str] | None:
+        """The largest error of all solves, with its check."""
+        return max((row.accuracy for row in ours(self.rows) if row.accuracy), default=None)
+
+    @property
     def cost(self) -> str:
         """The processor time in words."""
         return f"{formats.seconds(self.cpu)} of processor time."

@@ -61,7 +61,7 @@ def test_a_page_fits_every_width_in_light_and_dark(pages, window, name):
         assert window.run("document.documentElement.scrollWidth <= innerWidth"), width
         paper = window.run("getComputedStyle(document.body).backgroundColor")
         assert paper == ("rgb(20, 25, 31)" if dark else "rgb(255, 255, 255)")
-    assert window.problems() == []
+    assert window.complaints() == []
     assert (pages / f"{name}.html").stat().st_size < 1_500_000
 
 
@@ -90,7 +90,7 @@ def test_the_charts_of_a_family_are_drawn_and_say_what_they_show(pages, window):
     tip = window.wait("document.querySelector('#vg-tooltip-element.visible')?.innerText")
     assert "contact pressure" in tip
     assert "25" in tip
-    assert window.problems() == []
+    assert window.complaints() == []
 
 
 def test_a_filter_chooses_rows_at_once_and_stays_in_the_address(pages, window):
@@ -110,7 +110,19 @@ def test_a_filter_chooses_rows_at_once_and_stays_in_the_address(pages, window):
     assert window.run(shown) == ["bad"]
     window.run("document.querySelector('[type=reset]').click()")
     window.wait(f"{shown}.length === {MANY}")
-    assert window.problems() == []
+    assert window.complaints() == []
+
+
+def test_the_chart_of_all_solves_shows_the_family_picked(pages, window):
+    window.open(pages / "summary.html")
+    marks = "document.querySelectorAll('#error-against-time .mark-symbol.role-mark path').length"
+    window.wait(f"{marks} >= {MANY}")
+    window.run(
+        """((field) => { field.value = "fam"; field.dispatchEvent(new Event("change")); })(
+        document.querySelector("#error-against-time [name=pick_family]"))"""
+    )
+    assert 0 < window.wait(f"{marks} < {MANY} ? {marks} : 0") < 10
+    assert window.complaints() == []
 
 
 def test_failures_are_grouped_by_check_and_cause(pages, window):
@@ -184,7 +196,7 @@ def test_a_result_is_turned_and_its_maps_change(pages, window, number):
         document.querySelector('.turned input[type=range]'))"""
     )
     window.wait(f"{SHADES}[1] !== {third[1]}")
-    assert window.problems() == []
+    assert window.complaints() == []
 
 
 def test_pointing_at_a_face_says_its_value(pages, window):
@@ -217,7 +229,7 @@ def test_a_turned_result_fits_every_width(pages, window, width, dark):
     assert window.run("document.documentElement.scrollWidth <= innerWidth")
     box = window.run(f"(({{width, height}}) => [width, height])({BOX})")
     assert 250 < box[0] <= width
-    assert window.problems() == []
+    assert window.complaints() == []
 
 
 def test_one_result_is_open_at_a_time(pages, window):
@@ -229,7 +241,7 @@ def test_one_result_is_open_at_a_time(pages, window):
         f"document.querySelectorAll('.turned').length === 1 && {buttons}.length === {whole}"
     )
     window.wait(f"{SHADES}[0] > 3")
-    assert window.problems() == []
+    assert window.complaints() == []
 
 
 def test_without_javascript_there_is_the_picture(pages):
@@ -279,6 +291,6 @@ def test_a_summary_of_a_thousand_solves_stays_small_and_quick(thousand, window):
     best = min(max(window.run(THOUSAND)) for _ in range(5))
     assert best < 100, best
     assert window.run(shown) == 1000
-    assert window.problems() == []
+    assert window.complaints() == []
     for page in thousand.glob("*.html"):
         assert page.stat().st_size < 1_500_000, page

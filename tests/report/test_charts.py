@@ -176,4 +176,4 @@ def test_a_browser_draws_the_chart_and_shows_its_values(tmp_path):
         assert "one </script>,1,0.001,QUAD4" in unquote(saved)
         window.point(*window.run(f"{place}({mark}.getBoundingClientRect())"), press=True)
         window.wait("location.hash === '#there'")
-        assert window.problems() == []
+        assert window.complaints() == []

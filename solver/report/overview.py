@@ -1,0 +1,195 @@
+"""The first screen of the report: how well, error against run time, digits kept, work left out."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+from urllib.parse import quote
+
+from . import formats
+from .charts import (
+    BLUE,
+    CROSS,
+    EPSILON,
+    GREEN,
+    MUTED,
+    ORANGE,
+    RED,
+    Axis,
+    Chart,
+    Look,
+    floor_band,
+    level,
+    series_chart,
+)
+from .errors import drawn
+from .families import page_name
+from .rows import Row, ours
+
+_BAD = "not passed"
+# How strictly a solve is judged: what an error may be compared with.
+_LOOKS = {
+    "exact": Look(GREEN),
+    "expected error": Look(BLUE, "square"),
+    "stated tolerance": Look(ORANGE, "diamond"),
+    "no reference": Look(MUTED, "triangle-up"),
+    _BAD: Look(RED, CROSS),
+}
+_DIMENSIONS = {2: "2D", 3: "3D"}
+_DIGITS_OF_DOUBLE = -math.log10(EPSILON)
+# With fewer digits a result is unreliable (`solver.simulation.accuracy`).
+_FEWEST = 4
+_WORST = 10
+# What may cost the digits of a solve, by the keys of `Verdict.accuracy`.
+CAUSES = {
+    "forces": "forces: terms far larger than their sum",
+    "gap": "gap: a difference of rounded displacements",
+    "coordinates": "coordinates far from the origin",
+    "stress": "strain: a difference of rounded displacements",
+    "slender": "small faces of slender cells",
+    "sums": "cells with many nodes",
+}
+# What each switch of `Shortcuts` leaves out, in a few words.
+WORK = {
+    "quadrature": "more Gauss points",
+    "unloaded": "bodies that nothing moves",
+    "status": "further solves",
+}
+
+
+def in_words(rows: Sequence[Row]) -> str:
+    """What was verified and how well, in one sentence."""
+    said = []
+    for judged, text in (
+        ("exact", "{} reach an exact answer, with errors up to {}"),
+        ("expected error", "{} have the error that refined meshes predict, at most {}"),
+        ("stated tolerance", "{} keep a stated tolerance, with errors up to {}"),
+    ):
+        mine = [row for row in ours(rows) if row.sound and row.verdict.judged == judged]
+        errors = [row.accuracy[0] for row in mine if row.accuracy]
+        if errors:
+            said.append(text.format(len(mine), formats.error(max(errors))))
+    types = {name for row in ours(rows) for body in row.sides for name in body.cells}
+    on = f" on {len(types)} cell types" if types else ""
+    return f"Of {len(ours(rows))} solves{on}, {'; '.join(said)}." if said else ""
+
+
+def error_chart(rows: Sequence[Row]) -> Chart | None:
+    """The worst error of every solve over its run time; family and cell type to be picked."""
+    shown = drawn(rows)
+    if not shown:
+        return None
+    records: list[dict[str, Any]] = [
+        {
+            "series": (row.verdict.judged or "no reference") if row.sound else _BAD,
+            "case": row.name,
+            "seconds": row.total,
+            "error": max(row.accuracy[0], EPSILON / 4),  # type: ignore[index]
+            "check": row.accuracy[1],  # type: ignore[index]
+            "family": row.group,
+            "cells": " ".join(row.tags["cells"]),
+            "url": _link(row),
+        }
+        for row in shown
+    ]
+    unknowns = max((row.verdict.dofs or 1 for row in shown), default=1)
+    errors = [record["error"] for record in records]
+    found = {record["series"] for record in records}
+    chart = series_chart(
+        "error-against-time",
+        "Worst error of every solve against its run time",
+        records,
+        Axis("seconds", "wall time of the solve, s", log=True),
+        Axis("error", "worst relative error", log=True, domain=(min(errors) / 3, max(errors) * 3)),
+        {name: look for name, look in _LOOKS.items() if name in found},
+        lines=False,
+        tips={"case": "case", "check": "check", "family": "family", "cells": "cells"},
+        layers=[floor_band(unknowns)],
+        width=1200,
+        height=330,
+    )
+    families = list(dict.fromkeys(str(record["family"]) for record in records))
+    cells = sorted({name for row in shown for name in row.tags["cells"]})
+    picks = [_pick("family", families), _pick("cells", cells)]
+    wanted = " && ".join(
+        f"(!pick_{field} || indexof(split(datum.{field}, ' '), pick_{field}) >= 0)"
+        for field in ("family", "cells")
+    )
+    layers = [dict(layer) for layer in chart.spec["layer"]]
+    layers[-1]["transform"] = [{"filter": wanted}]
+    return replace(chart, spec=chart.spec | {"params": picks, "layer": layers})
+
+
+def digit_chart(rows: Sequence[Row]) -> Chart | None:
+    """The digits that rounding leaves, as each solve estimates them, over its unknowns."""
+    known = [row for row in ours(rows) if row.verdict.attainable and row.verdict.dofs]
+    if not known:
+        return None
+    records: list[dict[str, Any]] = [
+        {
+            "series": _DIMENSIONS.get(row.dim, "other"),
+            "case": row.name,
+            "unknowns": row.verdict.dofs,
+            "digits": digits_kept(row),
+            "cause": cause(row),
+            "url": _link(row),
+        }
+        for row in known
+    ]
+    looks = {"2D": Look(BLUE), "3D": Look(ORANGE, "square"), "other": Look(MUTED)}
+    found = {record["series"] for record in records}
+    return series_chart(
+        "digits-kept",
+        "Digits that rounding leaves in each solve",
+        records,
+        Axis("unknowns", "unknowns", log=True),
+        Axis("digits", "digits kept", domain=(0.0, _DIGITS_OF_DOUBLE)),
+        {name: look for name, look in looks.items() if name in found},
+        lines=False,
+        tips={"case": "case", "cause": "lost by"},
+        layers=[level(_FEWEST, "fewer: unreliable", RED)],
+        width=560,
+        height=230,
+    )
+
+
+def digits_kept(row: Row) -> float:
+    """How many decimal digits rounding leaves in the pressure, by the estimate of the solve."""
+    return min(max(-math.log10(row.verdict.attainable or 1.0), 0.0), _DIGITS_OF_DOUBLE)
+
+
+def cause(row: Row) -> str:
+    """What costs a solve most of its digits."""
+    name, _ = max(row.verdict.accuracy.items(), key=lambda item: item[1], default=("", 0.0))
+    return CAUSES.get(name, name)
+
+
+def fewest_digits(rows: Sequence[Row]) -> list[Row]:
+    """The ten solves that keep the fewest digits."""
+    known = [row for row in ours(rows) if row.verdict.attainable]
+    return sorted(known, key=lambda row: (digits_kept(row), row.anchor))[:_WORST]
+
+
+def left_out_by_family(
+    rows: Sequence[Row], switches: Sequence[str] = tuple(WORK)
+) -> dict[str, tuple[int, list[int]]]:
+    """By family: how many solves, and how many of them left out the work of each switch."""
+    found: dict[str, tuple[int, list[int]]] = {}
+    solved = [row for row in ours(rows) if row.verdict.dofs]
+    for family, count in Counter(row.group for row in solved).items():
+        mine = [
+            {s for line in r.verdict.plan for s in line[2:]} for r in solved if r.group == family
+        ]
+        found[family] = count, [sum(switch in used for used in mine) for switch in switches]
+    return found
+
+
+def _pick(field: str, names: Sequence[str]) -> dict[str, object]:
+    """A list above the chart from which one value of a field is chosen."""
+    choice = {"input": "select", "options": ["", *names], "labels": ["all", *names]}
+    return {"name": f"pick_{field}", "value": "", "bind": choice | {"name": f"{field}: "}}
+
+
+def _link(row: Row) -> str:
+    return f"{page_name(row.group)}#{quote(row.anchor)}"

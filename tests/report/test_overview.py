@@ -1,0 +1,75 @@
+"""The first screen of the report: its sentence, charts, and tables."""
+
+import math
+
+import pytest
+
+from solver.report import overview
+from solver.report.rows import Row
+from tests.report.test_report import CHECK, verdict
+from tests.report.verdicts import record
+
+
+def row(job, folder, word="passed", judged="exact", error=1e-14, **more):
+    worst = CHECK | {"error": error}
+    content = verdict(job, word, judged=judged, worst=worst, checks=[worst], **more)
+    return Row(record(content), folder)
+
+
+@pytest.fixture
+def rows(tmp_path):
+    plan = [["no second solve", "the first status holds", "status"], ["by a factor", "small", ""]]
+    return [
+        row("a", tmp_path, accuracy={"gap": 1e-9, "sums": 1e-15}, attainable=1e-9, plan=plan),
+        row("b", tmp_path, judged="expected error", error=2e-2, attainable=1e-13, plan=plan),
+        row("c", tmp_path, word="failed", error=0.5, reason="wrong", judged="", plan=plan[1:]),
+        row("d", tmp_path, family="other", error=3e-13),
+    ]
+
+
+def test_the_sentence_says_how_well(rows):
+    assert overview.in_words(rows) == (
+        "Of 4 solves on 2 cell types, 2 reach an exact answer, with errors up to 3.0e-13; "
+        "1 have the error that refined meshes predict, at most 2.0e-02."
+    )
+
+
+def test_every_solve_is_a_mark_that_leads_to_it(rows):
+    chart = overview.error_chart(rows)
+    marks = {mark["case"]: mark for mark in chart.spec["data"]["values"]}
+    assert {name: mark["series"] for name, mark in marks.items()} == {
+        "a": "exact",
+        "b": "expected error",
+        "c": "not passed",
+        "d": "exact",
+    }
+    assert marks["c"]["error"] == 0.5
+    assert marks["c"]["seconds"] == 0.75
+    assert marks["d"]["url"] == "other.html#other/d"
+    assert marks["a"]["cells"] == "QUAD4 TRIA3"
+    picks = {pick["name"]: pick["bind"]["options"] for pick in chart.spec["params"]}
+    assert picks == {"pick_family": ["", "fam", "other"], "pick_cells": ["", "QUAD4", "TRIA3"]}
+
+
+def test_the_digits_are_those_of_the_estimate(rows):
+    kept = {r.name: overview.digits_kept(r) for r in overview.fewest_digits(rows)}
+    assert kept == pytest.approx({"a": 9.0, "b": 13.0})
+    assert list(kept) == ["a", "b"]
+    assert overview.cause(rows[0]) == overview.CAUSES["gap"]
+    marks = overview.digit_chart(rows).spec["data"]["values"]
+    assert [mark["digits"] for mark in marks] == pytest.approx([9.0, 13.0])
+
+
+def test_an_estimate_of_nothing_keeps_all_digits_of_doubles(tmp_path):
+    assert overview.digits_kept(row("x", tmp_path, attainable=1e-30)) == -math.log10(2.0**-52)
+
+
+def test_work_left_out_is_counted_by_family(rows):
+    found = overview.left_out_by_family(rows, ["status", "quadrature"])
+    assert found == {"fam": (3, [2, 0]), "other": (1, [0, 0])}
+
+
+def test_without_solves_there_is_nothing_to_show():
+    assert overview.in_words([]) == ""
+    assert overview.error_chart([]) is None
+    assert overview.digit_chart([]) is None
