@@ -79,8 +79,8 @@ class Deck:
         """The smallest Young's modulus of a deformable body."""
         return min(m.young for m in self.case.materials.values())
 
-    def of_plane_strain(self, stress: np.ndarray) -> np.ndarray:
-        """Stress (n, 6) at all nodes from xx, yy, xy (n, 3): zz = ν (xx + yy), the others zero.
+    def of_plane_strain(self, stress: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+        """Stress (n, 6) at nodes (n,) from xx, yy, xy (n, 3): zz = ν (xx + yy), the others zero.
 
         At a node between materials ν is taken from one of them.
         """
@@ -90,7 +90,7 @@ class Deck:
             poisson[cells] = of[self.material[name]][:, None]
         found = np.zeros((len(stress), 6))
         found[:, [0, 1, 3]] = stress
-        found[:, 2] = poisson * (stress[:, 0] + stress[:, 1])
+        found[:, 2] = poisson[nodes] * (stress[:, 0] + stress[:, 1])
         return found
 
     def fixed(self) -> Iterator[tuple[int, int, float]]:
@@ -197,9 +197,9 @@ def _paired(case: Case, mesh: meshio.Mesh, number: int, flat: int) -> PairedFace
 
 def face_size(deck: Deck) -> float:
     """The size of a slave face, the median: a length, or the root of an area."""
-    sizes = []
+    sizes = [np.zeros(0)]
     for block in (block for pair in deck.pairs for block in pair.slave):
         corner = deck.points[block.nodes[:, : block.type.n_vertices]]
         area = np.linalg.norm(np.ptp(corner, axis=1), axis=1) / np.sqrt(block.type.dim)
         sizes.append(area)
-    return float(np.median(np.concatenate(sizes)))
+    return float(np.median(np.concatenate(sizes))) if len(sizes) > 1 else 0.0

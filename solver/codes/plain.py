@@ -5,7 +5,10 @@ VTK; `material`: by type, the place of each cell's material in `materials`; `hel
 displacement]; `oblique`: [node, direction, displacement along it]; `forces`: [node, axis, force],
 all loads; `start`: displacements (n, dim) that close open bodies which contact alone holds;
 `contact`: pairs with the nodes of slave and master faces by type, turned outward, and the initial
-gap as [node, gap] (null: as meshed, less `interference`).
+gap as [node, gap] (null: as meshed, less `interference`). `face_size`: of a slave face, a length.
+
+A code may answer with `result.json`: `displacement`, `stress` and `pressure`, each rows of a node
+and its values. Stress is xx, yy, zz, xy, yz, xz, or in plane strain xx, yy, xy.
 """
 
 import json
@@ -17,10 +20,10 @@ import numpy as np
 
 from ..lac.cells.faces import FaceBlock
 from ..lac.errors import SolveError
-from .deck import Deck, PairedFaces, refuse_rings
-from .foreign import ForeignResult
+from .deck import Deck, PairedFaces, face_size, refuse_rings
+from .foreign import Field, ForeignResult
 
-FILE = "deck.json"
+FILE, RESULT = "deck.json", "result.json"
 
 
 class Plain:
@@ -46,9 +49,20 @@ class Plain:
         """There is nothing to run."""
         return []
 
-    def read(self, deck: Deck, folder: Path) -> ForeignResult:  # noqa: ARG002
-        """There is nothing to read."""
-        raise SolveError("its files of results are not named")
+    def read(self, deck: Deck, folder: Path) -> ForeignResult:
+        """The fields in `result.json`; SolveError without one."""
+        try:
+            found = json.loads((folder / RESULT).read_text(encoding="ascii"))
+        except (OSError, ValueError):
+            raise SolveError(f"it wrote no {RESULT}") from None
+        fields = {name: _by_node(deck, name, np.array(rows)) for name, rows in found.items()}
+        return ForeignResult(
+            code=self.name,
+            displacement=fields.get("displacement"),
+            stress=fields.get("stress"),
+            pressure=fields.get("pressure"),
+            step=deck.case.factors[-1],
+        )
 
 
 def content(deck: Deck) -> dict[str, Any]:
@@ -57,6 +71,7 @@ def content(deck: Deck) -> dict[str, Any]:
     forces = deck.all_forces[nodes, axes]
     return {
         "name": deck.case.name,
+        "face_size": face_size(deck),
         "points": deck.points.tolist(),
         "cells": {name: cells.tolist() for name, cells in deck.cells.items()},
         "materials": [{"young": m.young, "poisson": m.poisson} for m in deck.materials],
@@ -76,6 +91,17 @@ def content(deck: Deck) -> dict[str, Any]:
             for pair in deck.pairs
         ],
     }
+
+
+def _by_node(deck: Deck, name: str, rows: np.ndarray) -> Field:
+    nodes, values = rows[:, 0].astype(int), rows[:, 1:]
+    if name == "pressure":
+        values = values[:, 0]
+    elif name == "displacement":
+        values = values[:, : deck.points.shape[1]]
+    elif values.shape[1] == 3:
+        values = deck.of_plane_strain(values, nodes)
+    return Field(places=deck.points[nodes], values=values, nodes=nodes)
 
 
 def _gap(pair: PairedFaces) -> list[tuple[int, float]] | None:

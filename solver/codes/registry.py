@@ -1,4 +1,4 @@
-"""The codes by name: this folder's, and users' own, each in a folder."""
+"""The codes by name: modules of this folder, and plug-ins, this folder's and users' own."""
 
 from collections.abc import Mapping, Sequence
 from importlib import import_module
@@ -8,15 +8,14 @@ from typing import Protocol
 from ..system.errors import InputError, hint
 from .deck import Deck
 from .foreign import ForeignResult
-from .own import own_code
+from .plugin import FILE, plugin
 
+# The folders of plug-ins.
+_PLUGINS = {file.parent.name: file.parent for file in Path(__file__).parent.glob(f"*/{FILE}")}
 # Module and class, imported on demand.
 _CODES = {
     "calculix": (".calculix", "CalculiX"),
     "code_aster": (".code_aster", "CodeAster"),
-    "getfem": (".getfem", "GetFEM"),
-    "kratos": (".kratos", "Kratos"),
-    "ngsolve": (".ngsolve", "NGSolve"),
     "plain": (".plain", "Plain"),
 }
 
@@ -53,16 +52,16 @@ class Code(Protocol):
 
 def names() -> list[str]:
     """The names of the codes of this folder."""
-    return list(_CODES)
+    return sorted([*_CODES, *_PLUGINS])
 
 
 def find(name: str) -> Code:
     """The code of a name, or in a folder of the user; InputError for an unknown name."""
-    if "/" in name or Path(name).is_dir():
-        own: Code = own_code(Path(name), find)
-        return own
+    if name in _PLUGINS or "/" in name or Path(name).is_dir():
+        found: Code = plugin(_PLUGINS.get(name, Path(name)), find)
+        return found
     if name not in _CODES:
-        raise InputError("--code", "name", name, f"unknown; {hint(name, _CODES)}")
+        raise InputError("--code", "name", name, f"unknown; {hint(name, names())}")
     module, kind = _CODES[name]
     code: Code = getattr(import_module(module, __package__), kind)()
     return code

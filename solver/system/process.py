@@ -69,11 +69,11 @@ def cores_for(threads: int) -> list[int]:
     return sorted(os.sched_getaffinity(0))[-threads:]
 
 
-def printed_by(python: Path, option: str, program: str) -> str:
-    """What a program prints in another Python, started with `option`; empty without this Python."""
-    if not python.is_file():
+def printed_by(program: Path, *arguments: str) -> str:
+    """What a program prints; empty where it is not there."""
+    if not program.is_file():
         return ""
-    return run_in_subprocess([str(python), option, "-c", program], None, 60.0).output.strip()
+    return run_in_subprocess([str(program), *arguments], None, 60.0).output.strip()
 
 
 def run_in_subprocess(

@@ -12,17 +12,15 @@ from solver.codes import calculix
 from solver.codes.calculix import CalculiX, deck_lines
 from solver.codes.code_aster import CodeAster
 from solver.codes.deck import UnsupportedError, deck_of
-from solver.codes.getfem import GetFEM
-from solver.codes.kratos import Kratos
-from solver.codes.ngsolve import NGSolve
 from solver.codes.plain import Plain
+from solver.codes.registry import find
 from solver.codes.run import Limits, run_code
 from tests.codes.blocks import TURNED, case_of
 
 SIDES = {"name": "i", "slave": "bottom_contact", "master": "top_contact"}
 CODES = [
     pytest.param(code, marks=pytest.mark.skipif(not code.version(), reason="not installed"))
-    for code in (CalculiX(), GetFEM(), NGSolve())
+    for code in (CalculiX(), find("getfem"), find("ngsolve"))
 ]
 
 
@@ -148,7 +146,7 @@ def test_equations_of_oblique_supports(tmp_path):
     assert len(deck.oblique) == 4 + 3 + 4 - 2
     CodeAster().write(deck, tmp_path)
     assert (tmp_path / "lac.comm").read_text().count("_F(GROUP_NO=('across_") == len(deck.oblique)
-    for code in (Kratos(), NGSolve()):
+    for code in (find("kratos"), find("ngsolve")):
         with pytest.raises(UnsupportedError, match="supports across the axes"):
             code.write(deck, tmp_path)
 
@@ -168,9 +166,8 @@ def test_rings_by_axis(tmp_path):
     assert {kind.split("TYPE=")[1].split(",")[0] for kind in kinds} == {"CAX6", "CAX8"}
     CodeAster().write(deck, tmp_path)
     assert "MODELISATION='AXIS'" in (tmp_path / "lac.comm").read_text()
-    for code, name in ((Plain(), "deck.json"), (Kratos(), "Kratos"), (GetFEM(), "GetFEM")):
-        with pytest.raises(UnsupportedError, match=f"axisymmetric bodies: not written for {name}"):
-            code.write(deck, tmp_path)
+    with pytest.raises(UnsupportedError, match=r"axisymmetric bodies: not written for deck\.json"):
+        Plain().write(deck, tmp_path)
 
 
 @pytest.mark.parametrize("code", CODES[:2])

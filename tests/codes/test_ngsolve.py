@@ -3,20 +3,20 @@
 import ast
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import solver.codes
 from solver.codes.deck import UnsupportedError, deck_of
-from solver.codes.ngsolve import LINEAR, QUADRATIC, NGSolve
+from solver.codes.registry import find
 from solver.codes.run import Limits, run_code
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.errors import SolveError
 from tests.codes.blocks import TURNED, case_of
 
-SCRIPT = Path(solver.codes.__file__).with_name("ngsolve_main.py")
+NGSOLVE = find("ngsolve")
+SCRIPT = NGSOLVE.folder / "main.py"
+QUADRATIC = ("TRIA6", "TETRA10")
 
 
 def test_middle_nodes_are_those_of_the_catalogue():
@@ -31,7 +31,7 @@ def test_middle_nodes_are_those_of_the_catalogue():
         ast.literal_eval(k): ast.literal_eval(v.elts[2])
         for k, v in zip(kinds.keys, kinds.values, strict=True)
     }
-    assert set(edges) == {*LINEAR, *QUADRATIC}
+    assert set(edges) == set(NGSOLVE.file.cells)
     for name, pairs in edges.items():
         owners = BY_NAME[name].owners[BY_NAME[name].n_vertices :]
         assert [set(pair) for pair in pairs] == [set(pair) for pair in owners]
@@ -43,7 +43,7 @@ def test_middle_nodes_are_those_of_the_catalogue():
 @pytest.mark.parametrize(
     ("bottom", "top", "more", "reason"),
     [
-        ("QUAD8", "QUAD8", {}, "QUAD8: not written for NGSolve"),
+        ("QUAD8", "QUAD8", {}, "QUAD8: not written for ngsolve"),
         ("TRIA6", "QUAD4", {}, "linear and quadratic cells in one mesh: not written for NGSolve"),
         ("QUAD4", "QUAD4", {"plane": "axisymmetric"}, "axisymmetric bodies: not written"),
         ("QUAD4", "QUAD4", TURNED, "supports across the axes: NGSolve's space holds components"),
@@ -51,38 +51,24 @@ def test_middle_nodes_are_those_of_the_catalogue():
 )
 def test_what_is_refused(tmp_path, bottom, top, more, reason):
     with pytest.raises(UnsupportedError, match=reason):
-        NGSolve().write(deck_of(*case_of(bottom, top, **more)), tmp_path)
+        NGSOLVE.write(deck_of(*case_of(bottom, top, **more)), tmp_path)
 
 
 def test_curved_sides_are_refused(tmp_path):
     deck = deck_of(*case_of("TRIA6", "TRIA6"))
-    NGSolve().write(deck, tmp_path)
+    NGSOLVE.write(deck, tmp_path)
     points = deck.points.copy()
     points[deck.cells["TRIA6"][0, 3]] += 1e-3
     with pytest.raises(UnsupportedError, match="curved sides of cells: not written for NGSolve"):
-        NGSolve().write(replace(deck, points=points), tmp_path)
+        NGSOLVE.write(replace(deck, points=points), tmp_path)
 
 
-def test_the_penalty_follows_the_softest_body(tmp_path):
-    materials = {"bottom": {"young": 400.0, "poisson": 0.1}, "top": {"young": 2.0, "poisson": 0.2}}
-    NGSolve().write(deck_of(*case_of("QUAD4", "QUAD4", materials=materials)), tmp_path)
-    assert json.loads((tmp_path / "deck.json").read_text())["stiffness"] == 2.5e4 * 2.0 / (50 / 3)
-
-
-def test_the_result_is_read(tmp_path):
-    deck = deck_of(*case_of("QUAD4", "QUAD4"))
-    count = len(deck.points)
-    found = {"displacement": [[1.0, n] for n in range(count)], "pressure": [[3, 25.0]]}
-    found["stress"] = [[10.0, 20.0, 3.0]] * count
-    (tmp_path / "result.json").write_text(json.dumps(found))
-    result = NGSolve().read(deck, tmp_path)
-    # Plane strain: zz = 0.3 (10 + 20).
-    assert result.stress.values[0].tolist() == pytest.approx([10, 20, 9, 3, 0, 0])
-    assert result.displacement.values[5].tolist() == [1.0, 5.0]
-    assert (result.pressure.nodes.tolist(), result.pressure.values.tolist()) == ([3], [25.0])
-    (tmp_path / "result.json").write_text("{")
-    with pytest.raises(SolveError, match="NGSolve: it wrote no result"):
-        NGSolve().read(deck, tmp_path)
+def test_the_penalty_follows_the_size_of_a_face(tmp_path):
+    NGSOLVE.write(deck_of(*case_of("QUAD4", "QUAD4")), tmp_path)
+    told = json.loads((tmp_path / "deck.json").read_text())
+    assert told["face_size"] == pytest.approx(50 / 3)
+    # Rigid bodies have the last material.
+    assert told["materials"] == [{"young": 2000.0, "poisson": 0.3}, {"young": 1.0, "poisson": 0.0}]
 
 
 def mesh_of(cells):
@@ -96,12 +82,12 @@ def mesh_of(cells):
     return {"mesh": {"recipe": "blocks", "size": 50, "bottom": one, "top": other}}
 
 
-@pytest.mark.skipif(not NGSolve().version(), reason="NGSolve is not installed")
-@pytest.mark.parametrize("cells", [*LINEAR, *QUADRATIC])
+@pytest.mark.skipif(not NGSOLVE.version(), reason="NGSolve is not installed")
+@pytest.mark.parametrize("cells", NGSOLVE.file.cells)
 def test_ngsolve_solves_it(cells, tmp_path):
     """Its integrals over nonmatching faces leave some per cent of pressure on coarse meshes."""
     deck = deck_of(*case_of(cells, cells, **mesh_of(cells)))
-    found = run_code(NGSolve(), deck, tmp_path, Limits())
+    found = run_code(NGSOLVE, deck, tmp_path, Limits())
     dim = deck.points.shape[1]
     slave = np.unique(np.concatenate([b.nodes.ravel() for b in deck.pairs[0].slave]))
     assert found.pressure.nodes.tolist() == slave.tolist()
@@ -114,15 +100,15 @@ def test_ngsolve_solves_it(cells, tmp_path):
     assert np.abs(found.stress.values[away] - expected).max() < 0.3
 
 
-@pytest.mark.skipif(not NGSolve().version(), reason="NGSolve is not installed")
+@pytest.mark.skipif(not NGSOLVE.version(), reason="NGSolve is not installed")
 def test_a_body_pulled_off_does_not_converge(tmp_path):
     """Nothing holds the upper body then."""
     loads = [{"group": "press", "pressure": -25.0}]
     with pytest.raises(SolveError, match="no convergence"):
-        run_code(NGSolve(), deck_of(*case_of("QUAD4", "QUAD4", loads=loads)), tmp_path, Limits())
+        run_code(NGSOLVE, deck_of(*case_of("QUAD4", "QUAD4", loads=loads)), tmp_path, Limits())
 
 
-@pytest.mark.skipif(not NGSolve().version(), reason="NGSolve is not installed")
+@pytest.mark.skipif(not NGSOLVE.version(), reason="NGSolve is not installed")
 @pytest.mark.parametrize("cells", ["TRIA6", "TETRA10", "HEXA8"])
 def test_stress_of_a_linear_displacement(cells, tmp_path):
     """All six components by hand: 2 μ ε + λ tr ε, both blocks held and apart."""
@@ -133,7 +119,7 @@ def test_stress_of_a_linear_displacement(cells, tmp_path):
     upper = deck.points[:, -1] > 1e-9
     upper[np.concatenate([b.nodes.ravel() for b in deck.pairs[0].master])] = True
     held[upper, -1] += 1.0
-    found = run_code(NGSolve(), replace(deck, held=held), tmp_path, Limits())
+    found = run_code(NGSOLVE, replace(deck, held=held), tmp_path, Limits())
     strain = np.zeros((3, 3))
     strain[:dim, :dim] = (gradient + gradient.T) / 2
     mu, lame = 2000 / 2.6, 2000 * 0.3 / (1.3 * 0.4)

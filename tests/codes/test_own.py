@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.codes import plain
-from solver.codes.deck import deck_of
+from solver.codes.deck import UnsupportedError, deck_of
 from solver.codes.registry import find
 from solver.codes.run import Limits, run_case
 from solver.commands.cli import main
@@ -17,6 +17,7 @@ from tests.codes.blocks import case_of
 
 TOY = Path(__file__).parents[2] / "docs/examples/toy"
 PAGE = Path(__file__).parents[2] / "docs/run-codes.md"
+ZONE = {"name": "i", "slave": "bottom_contact", "master": "top_contact"}
 FILE = "command: ['true']\nversion: '1'\n"
 
 
@@ -62,6 +63,40 @@ def test_the_class_of_the_documentation(tmp_path):
     assert (verdict.verdict, verdict.code, verdict.code_version) == ("passed", "mycode", "1.0")
 
 
+@pytest.mark.parametrize(
+    ("keys", "cells", "more", "reason"),
+    [
+        ("cells: [QUAD4]", "TRIA3", {}, "TRIA3: not written for mine"),
+        ("lacks: {gap: as meshed}", "QUAD4", {"contact": [ZONE | {"clearance": 1}]}, "as meshed"),
+        ("lacks: {orders: one}", ("QUAD4", "QUAD8"), {}, "one"),
+    ],
+)
+def test_what_a_code_lacks_is_refused_by_its_own_words(tmp_path, keys, cells, more, reason):
+    code = find(str(write(tmp_path, FILE + keys + "\n")))
+    one, other = (cells, cells) if isinstance(cells, str) else cells
+    with pytest.raises(UnsupportedError, match=reason):
+        code.write(deck_of(*case_of(one, other, **more)), tmp_path)
+    code.write(deck_of(*case_of("QUAD4", "QUAD4")), tmp_path)
+
+
+def test_a_command_may_print_the_version(tmp_path):
+    text = FILE.replace("'1'", "['{python}', -c, 'print(2)']")
+    assert find(str(write(tmp_path, text))).version() == "2"
+
+
+def test_a_result_by_nodes(tmp_path):
+    """Two nodes of the deck, stress in plane strain."""
+    code = find(str(write(tmp_path, FILE)))
+    deck = deck_of(*case_of("QUAD4", "QUAD4"))
+    told = {"stress": [[3, 10.0, 20.0, 3.0]], "pressure": [[2, 25.0]]}
+    (tmp_path / "result.json").write_text(json.dumps(told))
+    found = code.read(deck, tmp_path)
+    assert (found.code, found.displacement) == ("mine", None)
+    assert found.stress.values.tolist() == [pytest.approx([10, 20, 9, 3, 0, 0])]
+    assert found.stress.places.tolist() == [deck.points[3].tolist()]
+    assert (found.pressure.nodes.tolist(), found.pressure.values.tolist()) == ([2], [25.0])
+
+
 def test_the_file_of_the_page_is_that_of_the_toy():
     shown = [part.split("```")[0] for part in PAGE.read_text().split("```yaml\n")[1:]]
     assert (TOY / "code.yaml").read_text() in shown
@@ -101,6 +136,7 @@ def test_the_plain_input_balances(tmp_path):
     [
         ("version: '1'\n", "code.yaml", "command"),
         (FILE + "input: abaqus\n", "code.yaml", "input = 'abaqus': must be plain, calculix"),
+        (FILE + "lacks: {friction: no}\n", "code.yaml", "lacks.friction"),
         (FILE + "gave_up: '('\n", "code.yaml", "gave_up = '(': must be a regular expression"),
         ("class Code:\n    layer = False\n", "code.py", "Code: it has no install, gave_up"),
         ("raise OSError('no licence')", "code.py", "Code: OSError: no licence"),

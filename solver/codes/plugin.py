@@ -1,10 +1,12 @@
-"""A user's own code: a folder with `code.yaml`, its commands, or `code.py`, one class.
+"""A code as a plug-in: a folder with `code.yaml`, its commands, or `code.py`, one class.
 
-The folder's name is the code's name. `code.yaml`:
+The folder's name is the code's name. The codes of this program (`kratos`, `ngsolve`, `getfem`) and
+those of users have the same form. `code.yaml`:
 
     command: ["{python}", "{code}/toy.py"]   # run in a folder that holds the input
-    version: "1.0"
-    input: plain                             # deck.json; or the input of calculix, kratos …
+    version: "1.0"                           # or a command that prints it
+    input: plain                             # deck.json; or the input of calculix …
+    cells: [TRIA3, QUAD4]                    # left out: all
     results: [displacement.csv, pressure.csv]
     map: map.yaml                            # of names and units, see `check-result --map`
     settings: {penalty: 100 E}               # shown beside the results
@@ -14,32 +16,44 @@ The folder's name is the code's name. `code.yaml`:
 import importlib.util
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from msgspec import Meta, field
 
 from ..case.typed import Section, Text, Version, read_as
 from ..case.yaml import read_mapping
+from ..lac.cells.catalogue import cell_type
 from ..lac.errors import SolveError
 from ..system.errors import InputError
-from .deck import Deck
+from ..system.process import printed_by
+from .deck import Deck, UnsupportedError
 from .files.map import CODE, Names, ResultMap
 from .files.read import read_result_files
 from .foreign import ForeignResult
 
-_FILE, _CLASS = "code.yaml", "code.py"
+FILE, _CLASS = "code.yaml", "code.py"
+_PROJECT = Path(__file__).resolve().parents[2]
+# How far from the middle of its edge, over the size of the mesh, a node is still in the middle.
+_STRAIGHT = 1e-9
 _NEEDED = ("layer", "install", "gave_up", "settings", "version", "write", "command", "read")
 
 
-class OwnCodeFile(Section, frozen=True):
+class PluginFile(Section, frozen=True):
     """The keys of `code.yaml`.
 
-    command: program and arguments; {code} is the folder of this file, {python} our Python
-    version: of the code, shown beside its results
+    command: program and arguments; {code} is the folder of this file, {python} our Python,
+      {project} the folder of this program
+    version: of the code, shown beside its results; or a command that prints it
+    install: how it is installed
     input: what is written for it
+    cells: the cell types that it takes, all if left out
+    lacks: what it is not given, and the words of the refusal: oblique (supports across the axes),
+      gap (another than as meshed), zones (more or less than one), curved (sides of cells), orders
+      (linear and quadratic cells together)
     results: its files of results, as check-result reads them; by default as `input` writes them
     map: a map of their names and units
     settings: shown beside the results
@@ -48,8 +62,13 @@ class OwnCodeFile(Section, frozen=True):
     """
 
     command: Annotated[tuple[Text, ...], Meta(min_length=1)]
-    version: Version
-    input: Literal["plain", "calculix", "code_aster", "kratos"] = "plain"
+    version: Version | Annotated[tuple[Text, ...], Meta(min_length=1)]
+    install: Text = "the folder of a user's own code"
+    input: Literal["plain", "calculix", "code_aster"] = "plain"
+    cells: tuple[Text, ...] = ()
+    lacks: dict[Literal["oblique", "gap", "zones", "curved", "orders"], Text] = field(
+        default_factory=dict
+    )
     results: Names | None = None
     map: Path | None = None
     settings: dict[str, str] = field(default_factory=dict)
@@ -57,29 +76,57 @@ class OwnCodeFile(Section, frozen=True):
     gave_up: str = ""
 
 
-class OwnCode:
-    """A code whose commands a user wrote down; `base` writes its input."""
+def _has_curved_sides(deck: Deck) -> bool:
+    straight = deck.points.copy()
+    for name, cells in deck.cells.items():
+        cell_type(name).put_between(straight, cells)
+    return bool(np.abs(straight - deck.points).max() > _STRAIGHT * np.ptp(deck.points))
 
-    install = "the folder of a user's own code"
 
-    def __init__(self, folder: Path, file: OwnCodeFile, base: Any):
+_HAS: dict[str, Callable[[Deck], bool]] = {
+    "oblique": lambda deck: bool(deck.oblique),
+    "gap": lambda deck: any(p.gap is not None or p.zone.interference for p in deck.pairs),
+    "zones": lambda deck: len(deck.pairs) != 1,
+    "curved": _has_curved_sides,
+    "orders": lambda deck: len({cell_type(name).order for name in deck.cells}) == 2,
+}
+
+
+class PluginCode:
+    """A code whose commands are written down; `base` writes its input."""
+
+    def __init__(self, folder: Path, file: PluginFile, base: Any):
         self.name, self.folder, self.file, self.base = folder.resolve().name, folder, file, base
-        self.layer = file.layer or base.layer
+        self.layer, self.install = file.layer or base.layer, file.install
         self.gave_up = file.gave_up or base.gave_up
         self.settings: Mapping[str, str] = {**base.settings, **file.settings}
 
     def version(self) -> str:
-        """As the file says."""
-        return self.file.version
+        """As the file says, or as its command prints it; empty if the code is not installed."""
+        given = self.file.version
+        if not isinstance(given, tuple):
+            return str(given)
+        program, *arguments = self._placed(given)
+        return printed_by(Path(program), *arguments)
 
     def write(self, deck: Deck, folder: Path) -> None:
-        """Write the input."""
+        """Write the input; UnsupportedError for what the file says that the code lacks."""
+        for name in deck.cells if self.file.cells else ():
+            if name not in self.file.cells:
+                raise UnsupportedError(f"{name}: not written for {self.name}")
+        for feature, words in self.file.lacks.items():
+            if _HAS[feature](deck):
+                raise UnsupportedError(words)
         self.base.write(deck, folder)
 
     def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
         """As the file says."""
+        return self._placed(self.file.command)
+
+    def _placed(self, words: Sequence[str]) -> list[str]:
         places = {"{code}": str(self.folder.resolve()), "{python}": sys.executable}
-        found = list(self.file.command)
+        places["{project}"] = str(_PROJECT)
+        found = list(words)
         for word, place in places.items():
             found = [part.replace(word, place) for part in found]
         return found
@@ -98,7 +145,7 @@ class OwnCode:
             raise SolveError(f"its results: {error}") from None
 
 
-def own_code(folder: Path, find: Any) -> Any:
+def plugin(folder: Path, find: Any) -> Any:
     """The code in a folder. `find` gives the code whose input it takes, by name.
 
     Raises InputError for a folder that holds none, and for a file or class that does not fit.
@@ -107,16 +154,16 @@ def own_code(folder: Path, find: Any) -> Any:
         raise InputError(folder, "name", name, "must be letters, digits, -, _ and .")
     if (path := folder / _CLASS).is_file():
         return _of_class(path)
-    if not (path := folder / _FILE).is_file():
-        raise InputError(folder, "code", None, f"a folder with {_FILE} or {_CLASS} is needed")
-    file = read_as(OwnCodeFile, read_mapping(path), path)
+    if not (path := folder / FILE).is_file():
+        raise InputError(folder, "code", None, f"a folder with {FILE} or {_CLASS} is needed")
+    file = read_as(PluginFile, read_mapping(path), path)
     try:
         re.compile(file.gave_up)
     except re.error as error:
         raise InputError(
             path, "gave_up", file.gave_up, f"must be a regular expression: {error}"
         ) from None
-    return OwnCode(folder, file, find(file.input))
+    return PluginCode(folder, file, find(file.input))
 
 
 def _of_class(path: Path) -> Any:

@@ -51,6 +51,8 @@ KINDS = {
 CORNERS = {"SEG3": 2, "TRIA6": 3, "TETRA10": 4}
 # The order of integration over faces is high: integrands have kinks inside them.
 ITERATIONS, ORDER = 50, 20
+# Pressure by overlap, over Young's modulus of the softest body by the size of a slave face.
+STIFFNESS = 2.5e4
 
 
 def corners(blocks):
@@ -137,6 +139,12 @@ class Nodes:
             free[at] = False
 
 
+def stiffness(deck):
+    """The penalty; the last material is that of rigid bodies."""
+    softest = min(law["young"] for law in deck["materials"][:-1])
+    return STIFFNESS * softest / deck["face_size"]
+
+
 class Contact:
     """A zone: pairs of points of its slave and master before any motion, and a penalty."""
 
@@ -144,7 +152,7 @@ class Contact:
         self.mesh, self.dim, self.nodes = mesh, mesh.dim, nodes
         self.slave = mesh.Boundaries(f"s{2 * number}")
         self.master = mesh.Boundaries(f"s{2 * number + 1}")
-        self.stiffness, self.kept = deck["stiffness"], []
+        self.stiffness, self.kept = stiffness(deck), []
         zone = deck["contact"][number]
         faces = zone["slave"].values()
         self.used = np.unique(np.concatenate([np.ravel(rows) for rows in faces]))
@@ -256,9 +264,11 @@ def main():
     zones = [Contact(deck, mesh, nodes, i) for i in range(len(deck["contact"]))]
     found = solve(deck, mesh, nodes, zones)
     components = found.vec.FV().NumPy().reshape(mesh.dim, -1)
+    moved = np.stack([nodes.values(c) for c in components], axis=1)
+    number = np.arange(len(moved))
     result = {
-        "displacement": np.stack([nodes.values(c) for c in components], axis=1).tolist(),
-        "stress": nodal(deck, mesh, stress_of(deck, mesh, found)).tolist(),
+        "displacement": np.c_[number, moved].tolist(),
+        "stress": np.c_[number, nodal(deck, mesh, stress_of(deck, mesh, found))].tolist(),
         "pressure": [row for zone in zones for row in zone.pressure(found).tolist()],
     }
     Path("result.json").write_text(json.dumps(result), encoding="ascii")
