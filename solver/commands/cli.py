@@ -132,9 +132,11 @@ def _add_cases(commands: Any) -> None:
     command.add_argument("case", type=Path, metavar="CASE.yaml")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="MESH")
 
-    command = add_command(commands, "solve", _solve, "solve a case, check it and write the result")
+    command = add_command(commands, "solve", _solve, "solve a case and check it")
     _add_job(command)
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="RESULT.vtkhdf")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="RESULT.vtkhdf", help="without it nothing is written"
+    )
     command.add_argument(
         "--verdict", type=Path, metavar="VERDICT.json", help="written for every outcome"
     )
@@ -241,7 +243,8 @@ def _solve(options: argparse.Namespace) -> int:
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
     with details(options.verbose, options.quiet), report_outcomes(log):
-        draw = partial(_draw, options.pictures, options.output.parent) if options.pictures else None
+        drawn = options.pictures and options.output
+        draw = partial(_draw, options.pictures, options.output.parent) if drawn else None
         verdict = solve(job, options.output, options.verdict, draw)
     return PASSED if verdict.sound else FAILED
 

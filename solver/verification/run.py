@@ -113,11 +113,11 @@ def mesh_of(case: Case, memory_check: bool = True, limited: bool = False) -> mes
 
 def solve(
     job: Job,
-    output: Path,
-    verdict_file: Path | None,
+    output: Path | None = None,
+    verdict_file: Path | None = None,
     then: Callable[[Solution, Verdict], None] | None = None,
 ) -> Verdict:
-    """Solve, check, write the result; the verdict, also written to `verdict_file` if given.
+    """Solve and check; the verdict. The result and the verdict are written where files are given.
 
     `then` is called at the end with a solution that has a result.
 
@@ -127,7 +127,7 @@ def solve(
     case: Case | None = None
     try:
         case = job.of(refined(load_case(job.case), job.refine))
-        solution, verdict = _solve(job, case, output, verdict_file or output)
+        solution, verdict = _solve(job, case, output, verdict_file)
     except Exception as error:
         if verdict_file:
             word, reason, transient = _ending(error)
@@ -213,12 +213,14 @@ def _death(status: int) -> str:
     return f"{died}, ended by {names[status]}{hint}"
 
 
-def _solve(job: Job, case: Case, output: Path, beside: Path) -> tuple[Solution, Verdict]:
-    """A solve that comes to its end, and its verdict; `beside` is the path of the verdict."""
+def _solve(
+    job: Job, case: Case, output: Path | None, verdict_file: Path | None
+) -> tuple[Solution, Verdict]:
+    """A solve that comes to its end, and its verdict."""
     started, clock = processor_time(), Clock()
-    # Refuse before the solve, not after it.
-    check_name(output)
-    output.parent.mkdir(parents=True, exist_ok=True)
+    if output:  # refuse before the solve, not after it
+        check_name(output)
+        output.parent.mkdir(parents=True, exist_ok=True)
     with stage(clock, "read" if job.mesh or "path" in case.mesh else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check, limited=True)
     if job.memory_check:
@@ -229,9 +231,11 @@ def _solve(job: Job, case: Case, output: Path, beside: Path) -> tuple[Solution, 
     solution, checks = solve_checked(case, mesh, options, accepted, clock)
     solution.cpu_seconds = processor_time() - started
     provenance = gather(job.case, job.mesh or case.mesh.get("path"))
+    if not output:
+        return solution, judge(solution, checks, provenance=provenance)
     with stage(clock, "write"):
         sha256 = write_result(output, solution, checks, provenance)
-    name = os.path.relpath(output, beside.parent)
+    name = os.path.relpath(output, (verdict_file or output).parent)
     return solution, judge(solution, checks, name, provenance, sha256)
 
 

@@ -172,6 +172,13 @@ def test_an_interruption_is_130_and_quiet(small, capsys, monkeypatch):
     assert capsys.readouterr() == ("", "")
 
 
+def test_a_solve_without_a_file_prints_its_verdict_and_writes_nothing(small, capsys):
+    before = sorted(small.rglob("*"))
+    assert main(["solve", str(small / "c.yaml")]) == 0
+    assert "passed, largest checked error" in capsys.readouterr().out
+    assert sorted(small.rglob("*")) == before
+
+
 def test_a_process_that_died_gets_its_verdict(small):
     (small / "log").write_text("started\nSegmentation fault\n\n")
     verdict = small / "v.json"
