@@ -62,7 +62,7 @@ family: environment ## the batch of one family: make family FAMILY=ssnp170
 case: override CONFIG += $(CHOICE)
 case: override ARGS += --forcerun solve
 case: environment ## solve one case again, then report: make case CASE=ssnp170-e-swapped
-	@test -n "$(CASE)" || { echo "make case: set CASE to a job name from the report"; exit 2; }
+	@test -n "$(CASE)" || { echo "make case: set CASE to the name of a solve, or to a case file"; exit 2; }
 	$(call RUN,all_cases)
 
 report: environment ## write the report again from existing results

@@ -98,6 +98,9 @@ def test_one_case_again_is_one_case(project):
 def test_cases_are_chosen_by_pattern(project):
     forced = ("--forcerun", "solve", "--config", "case=tiny-a*")
     assert jobs(project, *forced) == {"solve tiny-a", "solve tiny-a-swapped"} | REPORT
+    (file,) = (project / "cases").rglob("tiny-a.yaml")
+    forced = ("--forcerun", "solve", "--config", f"case={file.relative_to(project)}")
+    assert jobs(project, *forced) == {"solve tiny-a", "solve tiny-a-swapped"} | REPORT
 
 
 def test_what_has_not_passed_runs_once_more(project):

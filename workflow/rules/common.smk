@@ -157,6 +157,11 @@ def choose_jobs():
     """The jobs of this run: of the configured families and cases, and of these, if it is configured,
     those that have not passed."""
     jobs = {key: job for key, job in BATCH.items() if job.family in FAMILIES}
+    files = {}  # a case may be named by its file
+    for job in jobs.values():
+        files.setdefault(job.file, []).append(job.name)
+    given = listed(config["case"])
+    config["case"] = [name for case in given for name in files.get(case, [case])]
     names = chosen("case", {job.name for job in jobs.values()})
     jobs = {key: job for key, job in jobs.items() if job.name in names}
     if config["failed"] in (True, "true"):
