@@ -36,7 +36,8 @@ def write_studies(cases: Path) -> None:
             axis: {k: {**choice, "groups": []} for k, choice in choices.items()}
             for axis, choices in study.get("axes", {}).items()
         }
-        file.write_text(yaml.safe_dump(study | {"groups": [group], "goals": []}))
+        once = {"groups": [group], "goals": [], "repetitions": 1}
+        file.write_text(yaml.safe_dump(study | once))
 
 
 @pytest.fixture

@@ -27,7 +27,9 @@ PAIRS = [(dim, *pair) for dim, kinds in MESHES.items() for pair in product(kinds
 
 def block(kind, dim, n, low, size=50.0):
     """A block of n cells each way that stands on the height `low`, half as high as wide."""
-    axes = [np.linspace(0, size, n + 1)] * (dim - 1) + [np.linspace(low, low + size / 2, n + 1)]
+    levels = n if dim == 2 else 1
+    axes = [np.linspace(0, size, n + 1)] * (dim - 1)
+    axes.append(np.linspace(low, low + size / 2, levels + 1))
     linear = next(k for k in MESHES[dim] if issubclass(kind, k))
     mesh = linear.init_tensor(*axes)
     mesh = mesh if kind is linear else kind.from_mesh(mesh)

@@ -94,7 +94,7 @@ def loaded(matrix, constraints):
     return force, violation, *np.split(found, [len(force)])
 
 
-@pytest.mark.parametrize(("slave", "master"), [(10, 8), (8, 10), (12, 3), (2, 1)])
+@pytest.mark.parametrize(("slave", "master"), [(8, 6), (6, 8), (8, 2), (2, 1)])
 def test_multigrid_of_overlapping_constraints(slave, master, monkeypatch):
     """In few iterations; the exact solve beside contact is needed, however large its share."""
     monkeypatch.setattr(multigrid, "_MOST_BESIDE", 0.0)
