@@ -12,12 +12,11 @@ import numpy as np
 
 from ..lac.cells.catalogue import BY_NAME
 from ..lac.cells.faces import FaceBlock
+from ..mesh.files import med
 from .deck import Deck, UnsupportedError
 from .plain import Plain
 
 _MESH = "mesh.med"
-# Face centres of HEXA27 have an order of their own; all cells are mirrored (see `mesh.files.med`).
-_HEXA27 = [*range(20), 24, 22, 21, 23, 20, 25, 26]
 # The largest number of different values of imposed displacements that are written.
 _VALUES = 12
 
@@ -81,45 +80,22 @@ SIDES = ("slave", "master")
 
 def write_med(deck: Deck, held: Held, path: Path) -> None:
     """Write the mesh with its groups: bodies by material, surfaces, held nodes."""
-    from meshio.med import _med
-
-    _med.meshio_to_med_type.update(quad9="QU9", hexahedron27="H27")
-    families: dict[int, list[str]] = {}
-    cells: dict[str, list[np.ndarray]] = {}
-    tags: dict[str, list[np.ndarray]] = {}
-
-    def add(kind: str, nodes: np.ndarray, numbers: np.ndarray) -> None:
-        cell = BY_NAME[kind]
-        nodes = nodes[:, cell.mirror] if cell.dim == 3 else nodes
-        nodes = nodes[:, np.argsort(_HEXA27)] if kind == "HEXA27" else nodes
-        cells.setdefault(cell.meshio, []).append(nodes)
-        tags.setdefault(cell.meshio, []).append(numbers)
-
+    blocks: list[tuple[str, np.ndarray]] = []
+    members: list[dict[str, np.ndarray]] = []
     for name, data in deck.cells.items():
-        families |= {-1 - n: [f"body_{n}"] for n in np.unique(deck.material[name]).tolist()}
-        add(name, data, -1 - deck.material[name])
-    for group, blocks in _surfaces(deck):
-        number = min(families) - 1
-        families[number] = [group]
-        for block in blocks:
-            add(block.type.name, block.nodes, np.full(len(block.nodes), number))
-    named = [(f"held_{i}", nodes) for i, (_, _, nodes) in enumerate(held)]
-    named += [(f"across_{of.node}", np.array([of.node])) for of in deck.oblique]
-    of_node: list[dict[str, None]] = [{} for _ in deck.points]
-    for name, nodes in named:
-        for node in nodes:
-            of_node[node][name] = None
-    codes = {names: i for i, names in enumerate(sorted({tuple(n) for n in of_node if n}), 1)}
-    together = np.array([codes.get(tuple(names), 0) for names in of_node])
-    points = {code: list(names) for names, code in codes.items()}
-    mesh = meshio.Mesh(
-        deck.points,
-        [(kind, np.concatenate(parts)) for kind, parts in cells.items()],
-        cell_data={"cell_tags": [np.concatenate(parts) for parts in tags.values()]},
-        point_data={"point_tags": together},
-    )
-    mesh.cell_tags, mesh.point_tags = families, points
-    meshio.write(path, mesh, file_format="med")
+        blocks.append((BY_NAME[name].meshio, data))
+        of = deck.material[name]
+        members.append({f"body_{n}": np.flatnonzero(of == n) for n in np.unique(of).tolist()})
+    for group, faces in _surfaces(deck):
+        for face in faces:
+            blocks.append((face.type.meshio, face.nodes))
+            members.append({group: np.arange(len(face.nodes))})
+    none = np.arange(0)
+    names = dict.fromkeys(name for groups in members for name in groups)
+    nodes = {f"held_{i}": nodes for i, (_, _, nodes) in enumerate(held)}
+    nodes |= {f"across_{of.node}": np.array([of.node]) for of in deck.oblique}
+    sets = {name: [groups.get(name, none) for groups in members] for name in names}
+    med.write(meshio.Mesh(deck.points, blocks, cell_sets=sets, point_sets=nodes), path)
 
 
 def _commands(deck: Deck, held: Held, lac: bool) -> str:

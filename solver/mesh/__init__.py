@@ -16,7 +16,6 @@ import meshio
 from meshio._mesh import topological_dimension
 
 from ..lac.cells.catalogue import BY_NAME
-from ..system.files import replacing
 
 # meshio knows the nodes of PENTA15 and PYRA13, but its table of dimensions has no line for them.
 for _kind in BY_NAME.values():
@@ -47,10 +46,10 @@ def read_mesh(path: str | os.PathLike[str]) -> meshio.Mesh:
 
 
 def write_mesh(mesh: meshio.Mesh, path: str | os.PathLike[str]) -> None:
-    """Write the mesh as VTKHDF, whole or not at all; the same mesh gives the same bytes."""
-    from .files import vtkhdf
+    """Write the mesh, by the extension, whole or not at all; see `formats`.
 
-    path = Path(path)
-    vtkhdf.check_name(path)
-    with replacing(path) as temporary:
-        vtkhdf.write(mesh, temporary)
+    The same mesh gives the same bytes as VTKHDF.
+    """
+    from .files import formats
+
+    formats.write(mesh, Path(path))

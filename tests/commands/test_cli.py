@@ -223,10 +223,11 @@ def test_check_judges_a_stored_result_again(small, capsys):
 
 
 def test_a_result_is_named_as_what_it_is(small, capsys):
-    for command in ("mesh", "solve"):
-        output = small / "out.vtu"
+    allowed = {"mesh": "allowed: .vtkhdf, .med, .msh, .vtu", "solve": "must be .vtkhdf"}
+    for command, said in allowed.items():
+        output = small / "out.stl"
         assert main([command, str(small / "c.yaml"), "-o", str(output)]) == 2
-        assert capsys.readouterr().err == f"{output}: extension = '.vtu': must be .vtkhdf\n"
+        assert capsys.readouterr().err == f"{output}: extension = '.stl': {said}\n"
         assert not output.exists()
 
 

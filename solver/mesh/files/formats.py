@@ -15,9 +15,11 @@ from pathlib import Path
 import meshio
 
 from ...system.errors import InputError
+from ...system.files import replacing
 from ..tidy import tidy
 from .apart import read_apart, read_here
 
+WRITTEN = (".vtkhdf", ".med", ".msh", ".vtu")
 # Modules with a function `read(path)` that returns the mesh as stored in the file.
 _READERS = {
     ".med": ".med",
@@ -44,3 +46,21 @@ def read(path: Path) -> meshio.Mesh:
         allowed = "the mesh must have named groups of cells or faces (docs/formats.md)"
         raise InputError(path, "groups", None, allowed)
     return mesh
+
+
+def write(mesh: meshio.Mesh, path: Path) -> None:
+    """Write the mesh with its groups, whole or not at all; the extension says how.
+
+    Raises InputError for an extension that is not one of `WRITTEN`.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in WRITTEN:
+        raise InputError(path, "extension", path.suffix, f"allowed: {', '.join(WRITTEN)}")
+    with replacing(path) as temporary:
+        # Programs go by the extension.
+        whole = temporary.with_name(f"{temporary.name}{suffix}")
+        try:
+            import_module(_READERS[suffix], __package__).write(mesh, whole)
+            whole.replace(temporary)
+        finally:
+            whole.unlink(missing_ok=True)

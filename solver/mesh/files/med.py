@@ -1,4 +1,4 @@
-"""MED files, read with plain h5py: a MED file is an HDF5 file of a documented layout.
+"""MED files, read with plain h5py (HDF5 files of a documented layout) and written by meshio.
 
 Read here and not by gmsh, which leaves the groups of nodes out and pads the names of the others.
 
@@ -13,9 +13,10 @@ import h5py
 import meshio
 import numpy as np
 
-from ...lac.cells.catalogue import BY_NAME
+from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...system.errors import InputError
 from ...system.hdf5 import read_file
+from .combinations import combinations
 
 _TYPES = {
     "SE2": "SEG2", "SE3": "SEG3", "TR3": "TRIA3", "TR6": "TRIA6",
@@ -124,3 +125,43 @@ def _connectivity(entry: h5py.Group, kind: str) -> np.ndarray:
 
 def _numbers(entry: h5py.Group, count: int) -> np.ndarray:
     return entry["NUM"][()] if "NUM" in entry else np.arange(1, count + 1)
+
+
+def write(mesh: meshio.Mesh, path: Path) -> None:
+    """Write the mesh; each combination of its groups is a family."""
+    from meshio.med import _med
+
+    _med.meshio_to_med_type.update(quad9="QU9", hexahedron27="H27")
+    sizes = [len(block.data) for block in mesh.cells]
+    starts = np.cumsum([0, *sizes])
+    whole = {
+        name: np.concatenate(
+            [s + np.asarray(i, dtype=int) for s, i in zip(starts, ids, strict=False)]
+        )
+        for name, ids in mesh.cell_sets.items()
+    }
+    of_cell, cell_names = combinations(int(starts[-1]), whole)
+    of_node, node_names = combinations(len(mesh.points), mesh.point_sets)
+    # Families of cells have negative numbers, those of nodes positive ones, and 0 is of no group.
+    cell_tag = np.array([-1 - i if names else 0 for i, names in enumerate(cell_names)])
+    node_tag = np.array([1 + i if names else 0 for i, names in enumerate(node_names)])
+    tags, cells, cell_tags = np.split(cell_tag[of_cell], starts[1:-1]), [], []
+    for kind in dict.fromkeys(block.type for block in mesh.cells):
+        mine = [i for i, block in enumerate(mesh.cells) if block.type == kind]
+        cells.append((kind, _as_in_med(kind, np.concatenate([mesh.cells[i].data for i in mine]))))
+        cell_tags.append(np.concatenate([tags[i] for i in mine]))
+    written = meshio.Mesh(
+        mesh.points,
+        cells,
+        cell_data={"cell_tags": cell_tags},
+        point_data={"point_tags": node_tag[of_node]},
+    )
+    written.cell_tags = {int(cell_tag[i]): n for i, n in enumerate(cell_names) if n}
+    written.point_tags = {int(node_tag[i]): n for i, n in enumerate(node_names) if n}
+    meshio.write(path, written, file_format="med")
+
+
+def _as_in_med(kind: str, nodes: np.ndarray) -> np.ndarray:
+    cell = BY_MESHIO[kind]
+    nodes = nodes[:, cell.mirror] if cell.dim == 3 else nodes
+    return nodes[:, np.argsort(_HEXA27)] if cell.name == "HEXA27" else nodes

@@ -1,13 +1,22 @@
-"""Mesh files of gmsh, versions 2 and 4, read by gmsh."""
+"""Mesh files of gmsh: versions 2 and 4 are read, 4 is written, by gmsh itself."""
 
 from pathlib import Path
 
 import gmsh
 import meshio
+import numpy as np
 
-from ...lac.cells.catalogue import BY_NAME
+from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...system.errors import InputError
-from ..recipes.gmsh_session import current_model, foreign_types, session
+from ..recipes.gmsh_session import (
+    POINT,
+    current_model,
+    foreign_types,
+    node_order,
+    number_of,
+    session,
+)
+from .combinations import combinations
 
 
 def read(path: Path) -> meshio.Mesh:
@@ -22,3 +31,33 @@ def read(path: Path) -> meshio.Mesh:
             allowed = f"allowed: {', '.join(BY_NAME)}"
             raise InputError(path, "cell type", ", ".join(foreign), allowed)
         return current_model()
+
+
+def write(mesh: meshio.Mesh, path: Path) -> None:
+    """Write the mesh; its groups are physical ones, those of nodes as points."""
+    numbers = np.arange(1, 1 + len(mesh.points))
+    places = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
+    members: dict[tuple[int, str], list[int]] = {}
+    with session(Mesh__SaveAll=1):
+        first = gmsh.model.addDiscreteEntity(mesh.points.shape[1])
+        gmsh.model.mesh.addNodes(mesh.points.shape[1], first, numbers, places.ravel())
+
+        def add(dim: int, kind: int, nodes: np.ndarray, names: list[str]) -> None:
+            entity = gmsh.model.addDiscreteEntity(dim)
+            gmsh.model.mesh.addElementsByType(entity, kind, [], numbers[nodes].ravel())
+            for name in names:
+                members.setdefault((dim, name), []).append(entity)
+
+        for i, block in enumerate(mesh.cells):
+            cell = BY_MESHIO[block.type]
+            theirs = block.data[:, np.argsort(node_order(cell.name))]
+            of, names = combinations(len(theirs), {n: ids[i] for n, ids in mesh.cell_sets.items()})
+            for k, each in enumerate(names):
+                add(cell.dim, number_of(cell.name), theirs[of == k], each)
+        of, names = combinations(len(numbers), mesh.point_sets)
+        for k, each in enumerate(names):
+            if each:
+                add(0, POINT, np.flatnonzero(of == k), each)
+        for (dim, name), entities in members.items():
+            gmsh.model.addPhysicalGroup(dim, entities, name=name)
+        gmsh.write(str(path))

@@ -1,4 +1,4 @@
-"""VTU files, read by meshio."""
+"""VTU files, by meshio."""
 
 import re
 from pathlib import Path
@@ -40,3 +40,20 @@ def read(path: Path) -> meshio.Mesh:
 
 def _is_mask(array: np.ndarray) -> bool:
     return array.ndim == 1 and array.dtype.kind in "iub" and bool(np.isin(array, (0, 1)).all())
+
+
+def write(mesh: meshio.Mesh, path: Path) -> None:
+    """Write the mesh; each group is an array of 0 and 1 on cells or points, of its name."""
+    cells = {
+        name: [_mask(len(block.data), i) for block, i in zip(mesh.cells, ids, strict=True)]
+        for name, ids in mesh.cell_sets.items()
+    }
+    nodes = {name: _mask(len(mesh.points), ids) for name, ids in mesh.point_sets.items()}
+    points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
+    meshio.vtu.write(path, meshio.Mesh(points, mesh.cells, cell_data=cells, point_data=nodes))
+
+
+def _mask(count: int, members: np.ndarray) -> np.ndarray:
+    mask = np.zeros(count, dtype=np.int8)
+    mask[np.asarray(members, dtype=int)] = 1
+    return mask

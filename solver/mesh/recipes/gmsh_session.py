@@ -18,7 +18,7 @@ _NUMBERS = {
     "PENTA6": 6, "PENTA15": 18, "PYRA5": 7, "PYRA13": 19,
 }  # fmt: skip
 _NAMES = {number: name for name, number in _NUMBERS.items()}
-_POINT = 15
+POINT = 15
 
 # The same mesh every time: one thread, no configuration of the user's, random numbers fixed.
 # Mid-nodes go to the middle of straight edges.
@@ -86,7 +86,7 @@ def node_order(cell_type: str) -> tuple[int, ...]:
 def foreign_types() -> list[str]:
     """Gmsh's names of the cell types in the current model that are not in the catalogue."""
     numbers = gmsh.model.mesh.getElementTypes()
-    foreign = [n for n in numbers if n != _POINT and n not in _NAMES]
+    foreign = [n for n in numbers if n != POINT and n not in _NAMES]
     return [gmsh.model.mesh.getElementProperties(number)[0] for number in foreign]
 
 
@@ -124,7 +124,7 @@ def _groups_of(dim: int, entity: int) -> list[str]:
 
 def _block(number: int, nodes: np.ndarray, n_cells: int) -> tuple[str, np.ndarray]:
     table = nodes.reshape(n_cells, -1)
-    if number == _POINT:
+    if number == POINT:
         return "vertex", table
     name = _NAMES[number]
     return BY_NAME[name].meshio, table[:, node_order(name)]
