@@ -194,7 +194,7 @@ def test_the_page_goes_from_problem_to_figure_to_verdict(file, tmp_path):
     command = ["report", *map(str, verdicts), "-o", str(tmp_path), "--families", str(file)]
     assert main(command) == 0
     html = (tmp_path / "blocks.html").read_text()
-    parts = ["id=problem", "id=reference", "id=pressure", "id=solves", "id=time", "Case by case"]
+    parts = ["id=pressure", "id=problem", "id=solves", "id=reference", "id=time", "Case by case"]
     assert [html.count(part) for part in parts] == [1] * len(parts)
     assert sorted(parts, key=html.index) == parts
     assert "<h1>Blocks &amp; &lt;b&gt;more&lt;/b&gt;</h1>" in html
