@@ -13,7 +13,6 @@ from .charts import (
     INK,
     MUTED,
     ORANGE,
-    PURPLE,
     RED,
     Axis,
     Chart,
@@ -24,19 +23,17 @@ from .charts import (
     round_off,
     series_chart,
 )
-from .families import CodeError
-from .html import KINDS
+from .families import CodeError, page_name
 from .rows import Row
 
-# One look for each kind of reference: they are not compared with one another.
-_LOOKS = {
-    "analytical": Look(BLUE),
-    "manufactured": Look(GREEN, "square"),
-    "refined": Look(PURPLE, "diamond"),
-    "other_code": Look(ORANGE, "triangle-up"),
-    "": Look(INK),
+# How strictly a solve is judged: what an error may be compared with.
+LOOKS = {
+    "exact": Look(GREEN),
+    "expected error": Look(BLUE, "square"),
+    "stated tolerance": Look(ORANGE, "diamond"),
+    "no reference": Look(INK, "triangle-up"),
+    "not passed": Look(RED, CROSS),
 }
-_BAD = "not passed"
 # The chart goes down to round-off where an error is below this one.
 _NEAR = 1e-9
 # A line has a label where the next one is this share of the chart's height above it, at least.
@@ -62,9 +59,7 @@ def _unknowns(rows: Sequence[Row]) -> int:
 def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Chart:
     """Marks of all solves with lines for the tolerance, the reference code and round-off."""
     shown = drawn(rows)
-    records = [_record(row) for row in shown]
-    looks = {KINDS.get(kind, "no reference"): look for kind, look in _LOOKS.items()}
-    looks[_BAD] = Look(RED, CROSS)
+    records = [mark(row) for row in shown]
     found = {record["series"] for record in records}
     allowed = sorted({row.allowed for row in shown if row.allowed})
     shares = [*(record["error"] for record in records), *allowed]
@@ -83,7 +78,7 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
         records,
         Axis("seconds", "wall time of the solve, s", log=True),
         Axis("error", "worst relative error", log=True, domain=(low, top)),
-        {name: look for name, look in looks.items() if name in found},
+        {name: look for name, look in LOOKS.items() if name in found},
         lines=False,
         tips={"case": "case", "check": "check", "verdict": "verdict", "stages": "stages"},
         layers=levels,
@@ -92,16 +87,23 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
     )
 
 
-def _record(row: Row) -> dict[str, Any]:
+def mark(row: Row) -> dict[str, Any]:
+    """What a chart shows of a solve that has both an error and a time."""
     error, check = row.accuracy  # type: ignore[misc]
-    kind = KINDS.get(row.verdict.reference_kind or "", "no reference")
     return {
         "case": row.name,
-        "series": kind if row.sound else _BAD,
+        "series": (row.verdict.judged or "no reference") if row.sound else "not passed",
         "seconds": row.total,
         "error": max(error, EPSILON / 4),
         "check": check,
         "verdict": row.word,
         "stages": stages.in_words(row.stages),
-        "url": f"#{quote(row.anchor)}",
+        "family": row.group,
+        "cells": " ".join(row.tags["cells"]),
+        "url": address(row),
     }
+
+
+def address(row: Row) -> str:
+    """Where a page of the report shows a solve."""
+    return f"{page_name(row.group)}#{quote(row.anchor)}"

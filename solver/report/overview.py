@@ -5,14 +5,11 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
-from urllib.parse import quote
 
 from . import formats
 from .charts import (
     BLUE,
-    CROSS,
     EPSILON,
-    GREEN,
     MUTED,
     ORANGE,
     RED,
@@ -23,19 +20,9 @@ from .charts import (
     level,
     series_chart,
 )
-from .errors import drawn
-from .families import page_name
+from .errors import LOOKS, address, drawn, mark
 from .rows import Row, ours
 
-_BAD = "not passed"
-# How strictly a solve is judged: what an error may be compared with.
-_LOOKS = {
-    "exact": Look(GREEN),
-    "expected error": Look(BLUE, "square"),
-    "stated tolerance": Look(ORANGE, "diamond"),
-    "no reference": Look(MUTED, "triangle-up"),
-    _BAD: Look(RED, CROSS),
-}
 _DIMENSIONS = {2: "2D", 3: "3D"}
 _DIGITS_OF_DOUBLE = -math.log10(EPSILON)
 # With fewer digits a result is unreliable (`solver.simulation.accuracy`).
@@ -80,19 +67,7 @@ def error_chart(rows: Sequence[Row]) -> Chart | None:
     shown = drawn(rows)
     if not shown:
         return None
-    records: list[dict[str, Any]] = [
-        {
-            "series": (row.verdict.judged or "no reference") if row.sound else _BAD,
-            "case": row.name,
-            "seconds": row.total,
-            "error": max(row.accuracy[0], EPSILON / 4),  # type: ignore[index]
-            "check": row.accuracy[1],  # type: ignore[index]
-            "family": row.group,
-            "cells": " ".join(row.tags["cells"]),
-            "url": _link(row),
-        }
-        for row in shown
-    ]
+    records = [mark(row) for row in shown]
     unknowns = max((row.verdict.dofs or 1 for row in shown), default=1)
     errors = [record["error"] for record in records]
     found = {record["series"] for record in records}
@@ -102,7 +77,7 @@ def error_chart(rows: Sequence[Row]) -> Chart | None:
         records,
         Axis("seconds", "wall time of the solve, s", log=True),
         Axis("error", "worst relative error", log=True, domain=(min(errors) / 3, max(errors) * 3)),
-        {name: look for name, look in _LOOKS.items() if name in found},
+        {name: look for name, look in LOOKS.items() if name in found},
         lines=False,
         tips={"case": "case", "check": "check", "family": "family", "cells": "cells"},
         layers=[floor_band(unknowns)],
@@ -133,7 +108,7 @@ def digit_chart(rows: Sequence[Row]) -> Chart | None:
             "unknowns": row.verdict.dofs,
             "digits": digits_kept(row),
             "cause": cause(row),
-            "url": _link(row),
+            "url": address(row),
         }
         for row in known
     ]
@@ -189,7 +164,3 @@ def _pick(field: str, names: Sequence[str]) -> dict[str, object]:
     """A list above the chart from which one value of a field is chosen."""
     choice = {"input": "select", "options": ["", *names], "labels": ["all", *names]}
     return {"name": f"pick_{field}", "value": "", "bind": choice | {"name": f"{field}: "}}
-
-
-def _link(row: Row) -> str:
-    return f"{page_name(row.group)}#{quote(row.anchor)}"
