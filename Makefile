@@ -40,7 +40,7 @@ test ! -f results/report/log || test results/report/log -nt .snakemake/begun \
 test $$status != 0 || ! test -s results/report/failures.txt || status=1; exit $$status
 endef
 
-.PHONY: help all-cases family case report summary compare bench orders study
+.PHONY: help all-cases family case report pictures summary compare bench orders study
 .PHONY: stability infsup scaling benchmark converge test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment code-environment test-environment lint-environment docs-environment
@@ -67,6 +67,9 @@ case: environment ## solve one case again, then report: make case CASE=ssnp170-e
 
 report: environment ## write the report again from existing results
 	$(call RUN,report)
+
+pictures: environment ## draw the README's pictures from the last batch
+	@.venv/bin/python docs/site/front.py
 
 summary: ## print the last report's table, as Markdown
 	@cat results/report/summary.md 2>/dev/null \
