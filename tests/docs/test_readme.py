@@ -19,6 +19,8 @@ import yaml
 ROOT = Path(__file__).resolve().parents[2]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorial.md"
+# CI runs these for themselves, whole quick studies; here they only plan their jobs.
+STUDIES = re.compile(r"^make (?:study|stability|scaling) LEVEL=quick", re.MULTILINE)
 LEFT_OUT = {".git", ".venv", ".snakemake", "cases", "results", "tests"}
 
 
@@ -74,6 +76,7 @@ def run_all(page: Path, project: Path, **variables: str) -> None:
             with (project / "my-cases" / "part.yaml").open("a") as case:
                 case.write(text)
             continue
+        text = STUDIES.sub(r"\g<0> ARGS=--dry-run", text)
         command = ["bash", "-ec"] if language == "sh" else [sys.executable, "-c"]
         run = subprocess.run(
             [*command, text],
