@@ -67,6 +67,11 @@ class Browser:
             button = {"button": "left", "clickCount": 1} if kind != "mouseMoved" else {}
             self._tool("Input.dispatchMouseEvent", type=kind, x=x, y=y, **button)
 
+    def wheel(self, x, y, ctrl=False):
+        """Turn the wheel by a notch towards oneself at a place in the window."""
+        turn = {"deltaX": 0, "deltaY": 120, "modifiers": 2 if ctrl else 0}
+        self._tool("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, **turn)
+
     def complaints(self):
         """What the console was told since the last time, without notices."""
         entries = self._ask("se/log", type="browser")

@@ -284,9 +284,13 @@ def series(looks: Mapping[str, Look], field: str = "series") -> Spec:
 
 
 def interaction(field: str = "series") -> list[Spec]:
-    """Zoom by wheel and drag; the legend switches series."""
+    """Zoom by wheel with Ctrl, which alone scrolls the page, move by drag; series by the legend."""
     return [
-        {"name": "zoom", "select": "interval", "bind": "scales"},
+        {
+            "name": "zoom",
+            "select": {"type": "interval", "zoom": "wheel![event.ctrlKey]"},
+            "bind": "scales",
+        },
         {"name": "shown", "select": {"type": "point", "fields": [field]}, "bind": "legend"},
     ]
 

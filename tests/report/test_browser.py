@@ -125,6 +125,24 @@ def test_the_chart_of_all_solves_shows_the_family_picked(pages, window):
     assert window.complaints() == []
 
 
+def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(pages, window):
+    window.open(pages / "summary.html")
+    window.wait("document.querySelector('#error-against-time svg')")
+    window.run("document.querySelector('#error-against-time').scrollIntoView({block: 'center'})")
+    ticks = """[...document.querySelectorAll('#error-against-time .role-axis-label text')]
+        .map((text) => text.textContent).join()"""
+    middle = """(({x, y, width, height}) => [x + width / 2, y + height / 3])(
+        document.querySelector('#error-against-time svg').getBoundingClientRect())"""
+    before, top = window.run(ticks), window.run("scrollY")
+    window.wheel(*window.run(middle), ctrl=True)
+    window.wait(f"{ticks} !== {before!r}")
+    assert window.run("scrollY") == top
+    zoomed = window.run(ticks)
+    window.wheel(*window.run(middle))
+    window.wait(f"scrollY > {top}")
+    assert window.run(ticks) == zoomed
+
+
 def test_failures_are_grouped_by_check_and_cause(pages, window):
     window.open(pages / "summary.html")
     heads = window.run("[...document.querySelectorAll('#failures h3')].map((h) => h.innerText)")

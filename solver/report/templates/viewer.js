@@ -51,7 +51,7 @@
       this.canvas = element(place, "canvas", { tabIndex: 0, ariaLabel: "result; arrow keys turn it, + and − zoom" });
       const below = element(place, "div", { className: "scale" });
       this.scale = { low: element(below, "span"), bar: element(below, "i"), high: element(below, "span") };
-      this.caption = element(place, "output", {}, `Drag to ${data.dim === 3 ? "turn (with Shift: move)" : "move"}, zoom by wheel or two fingers, point at a face for its value.`);
+      this.caption = element(place, "output", {}, `Drag to ${data.dim === 3 ? "turn (with Shift: move)" : "move"}, zoom by wheel (after a click, or with Ctrl) or two fingers, point at a face for its value.`);
       this.gl = this.canvas.getContext("webgl2", { alpha: true, antialias: true, preserveDrawingBuffer: true });
       if (!this.gl) { this.caption.textContent = "This browser has no WebGL 2."; return; }
       this.prepare();
@@ -281,7 +281,11 @@
         fingers.set(event.pointerId, event);
         this.draw();
       };
-      canvas.addEventListener("wheel", (event) => { event.preventDefault(); closer(Math.exp(-event.deltaY / 500)); }, { passive: false });
+      canvas.addEventListener("wheel", (event) => {
+        if (!event.ctrlKey && document.activeElement !== canvas) return; // the wheel scrolls the page
+        event.preventDefault();
+        closer(Math.exp(-event.deltaY / 500));
+      }, { passive: false });
       canvas.onkeydown = (event) => {
         const step = { ArrowLeft: [-15, 0], ArrowRight: [15, 0], ArrowUp: [0, -15], ArrowDown: [0, 15] }[event.key];
         if (step) (this.data.dim === 2 ? slide : turn)(...step);
