@@ -5,7 +5,10 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgspec import structs
+
 from .expressions import Expression
+from .file import ObservationKeys, ZoneKeys
 from .material import Material
 
 if TYPE_CHECKING:
@@ -98,28 +101,12 @@ class Load:
         return step.get(self.name, 1.0) if isinstance(step, dict) else step
 
 
-@dataclass(frozen=True)
-class Zone:
-    """One contact zone: its slave and master face groups, and how the interface is treated.
-
-    `points` each way on a slave face, for the treatment `quadrature`. `clearance` is the initial
-    gap; None: what lies between the faces as meshed. `recovery` of the pressure: none, linear,
-    quadratic, smooth or automatic, with so many `sweeps`; None: by the form. `stabilised`:
-    contact gives way to pressures that scatter.
-    """
+class Zone(ZoneKeys, frozen=True):
+    """A contact zone as the file has it, each side one group, the clearance evaluated."""
 
     slave: str
     master: str
-    name: str = "contact"
-    hexahedra: str = "pyramids"
-    treatment: str = "lac"
-    normal: str = "element"
-    interference: float = 0.0
-    points: int | None = None
-    clearance: Scalar | None = None
-    recovery: str = "none"
-    sweeps: int | None = None
-    stabilised: bool = False
+    clearance: float | Expression | None = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)
@@ -149,14 +136,6 @@ class Rigid:
     def moves(self) -> bool:
         """Whether it has a motion, imposed or free."""
         return bool(self.move or self.force)
-
-
-@dataclass(frozen=True)
-class Observation:
-    """The macro-element of a zone nearest to a point, to be reported at every step."""
-
-    zone: str
-    nearest: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -202,7 +181,7 @@ class Case:
     plane: str | None = None
     directions: str = "first"
     steps: tuple[Step, ...] = (1.0,)
-    observe: tuple[Observation, ...] = ()
+    observe: tuple[ObservationKeys, ...] = ()
     probes: tuple[Probe, ...] = ()
     reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
     reference_kind: str | None = None
@@ -260,7 +239,7 @@ class Case:
         other = recovery is not None and any(recovery != zone.recovery for zone in self.zones)
         found = replace(self, reference={}, tolerance={}, expected={}) if other else self
         zones = tuple(
-            replace(
+            structs.replace(
                 zone,
                 slave=zone.master if swapped else zone.slave,
                 master=zone.slave if swapped else zone.master,

@@ -26,7 +26,6 @@ from .model import (
     Case,
     Cyclic,
     Load,
-    Observation,
     Probe,
     Rigid,
     Selection,
@@ -120,7 +119,7 @@ class _Reader:
             directions=file.directions,
             steps=file.steps,
             probes=tuple(map(self.probe, file.probes)),
-            observe=tuple(Observation(item.zone, item.nearest) for item in file.observe),
+            observe=file.observe,
             reference={
                 key: self.value_or_exact("reference", key)
                 for key in self.content.get("reference", ())

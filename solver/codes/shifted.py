@@ -11,6 +11,7 @@ prescribes at each node; equations give each of its nodes the displacement of th
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 from scipy.spatial import cKDTree
 
 from ..case.material import Material
@@ -51,7 +52,7 @@ def _as_meshed(deck: Deck, pair: PairedFaces) -> PairedFaces:
     if abs(np.median(_meshed_gap(deck, pair)) - pair.zone.clearance) > _FIT * extent:
         problem = "initial gap on curved faces that is not the meshed one: not written for CalculiX"
         raise UnsupportedError(problem)
-    return replace(pair, zone=replace(pair.zone, clearance=None), gap=None)
+    return replace(pair, zone=structs.replace(pair.zone, clearance=None), gap=None)
 
 
 def _needs_layer(pair: PairedFaces) -> bool:
@@ -111,7 +112,7 @@ def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
                 local=np.full(len(rows), face),
             )
         )
-    zone = replace(pair.zone, clearance=None, interference=0.0)
+    zone = structs.replace(pair.zone, clearance=None, interference=0.0)
     pairs = [*deck.pairs]
     pairs[number] = replace(pair, zone=zone, slave=slave, gap=None)
     nothing = np.zeros_like(points)

@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from solver.case.expressions import Expression
+from solver.case.file import ObservationKeys
 from solver.case.material import Material
-from solver.case.model import Case, Load, Observation, Rigid, Support, Zone
+from solver.case.model import Case, Load, Rigid, Support, Zone
 from solver.case.reader import check_mesh_file, load_case, parse_case
 from solver.case.solutions.uniform import Hydrostatic
 from solver.system.errors import InputError
@@ -34,7 +35,7 @@ def test_every_key_arrives():
             Load("all", "body_force", (0.0, -1.0)),
         ),
         zones=(
-            Zone("S", "M", "interface", "hexahedra", "lac", "element", 1.0),
+            Zone("S", "M", "interface", "hexahedra", "lac", "element", interference=1.0),
             Zone("S2", "M2", "second"),
         ),
         rigid={"die": Rigid()},
@@ -42,7 +43,7 @@ def test_every_key_arrives():
         plane="strain",
         directions="first",
         steps=(0.5, 1.0),
-        observe=(Observation("interface", (25.0, 0.0)),),
+        observe=(ObservationKeys("interface", (25.0, 0.0)),),
         reference={
             "contact_pressure": 25.0,
             "gap": Expression("x*0"),

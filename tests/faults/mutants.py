@@ -17,6 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from msgspec import structs
 
 from solver.case.reader import load_case
 from solver.lac.errors import SolveError
@@ -312,7 +313,7 @@ MUTANTS = (
            "solver.simulation.operators:gap_operator", changed(more_covered)),
     Mutant("zone-interference", "every zone has the interference 0.02", TUBES,
            "solver.simulation.operators:_initial_gaps",
-           given(lambda zone, *rest: (replace(zone, interference=0.02), *rest))),
+           given(lambda zone, *rest: (structs.replace(zone, interference=0.02), *rest))),
     Mutant("mixed-weight", "the mixed form is 1 % too stiff against a change of volume", MIXED,
            "solver.mechanics.fem.mixed:_integrals",
            changed(lambda found: (*found[:2], 0.99 * found[2]))),
