@@ -11,12 +11,12 @@ from typing import Any, get_args, get_origin
 
 from msgspec import NODEFAULT
 
+from solver.case.checks import CHECKS, RELATIVE, Check
 from solver.case.file import CaseFile
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.typed import Section, described, is_section, titles_of
 from solver.case.typed import fields as keys_of
-from solver.report.html import MEANING
-from solver.verification.checks import CHECKS, RELATIVE, Check
+from solver.verification import scales
 
 _RECIPES = (
     "solver.mesh.recipes.blocks",
@@ -61,10 +61,10 @@ def checks() -> str:
 
 
 def _check(check: Check) -> tuple[str, ...]:
-    scale = (getdoc(check.scale) or "").rstrip(".").lower()
+    scale = (getdoc(getattr(scales, check.scale)) or "").rstrip(".").lower()
     return (
         f"`{check.name}`" + (f"<br>{check.alias}" if check.alias else ""),
-        MEANING[check.name],
+        check.what,
         f"`{check.key}`" if check.key else "always run",
         f"{RELATIVE:g}, or `tolerance`" if check.tolerance is None else f"{check.tolerance:g}",
         scale if check.fixed else f"the reference, or {scale}",

@@ -4,24 +4,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..system.errors import InputError, hint
+from .checks import BY_NAME, ERRORS
 from .expressions import Expression
 from .model import SWAPPED, Case, Load, Rigid, Scalar, Support
 
-# The errors of `solver.verification.norms`, and what a solution must have for each to be known.
-ERRORS: dict[str, str] = {
-    "displacement_l2": "displacement",
-    "displacement_h1": "gradient",
-    "stress_l2": "stress",
-    "stress_max": "stress",
-    "pressure_l2": "contact_pressure",
-    "pressure_max": "contact_pressure",
-    "pressure_means": "contact_pressure",
-    "pressure_total": "contact_pressure",
-    "pressure_oscillation": "contact_pressure",
-    "pressure_inner": "contact_pressure",
-    "half_width": "half_width",
-    "peak": "peak",
-}
 # Keys of the reference that need contact.
 _OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
 # Keys of the reference for values at probes.
@@ -129,8 +115,8 @@ def _check_errors(case: Case) -> None:
     for error in case.tolerance.keys() & ERRORS.keys():
         if case.solution is None:
             allowed = "needs an exact solution: reference.solution names none"
-        elif ERRORS[error] not in case.solution.quantities:
-            allowed = f"{case.solution.name} has no {ERRORS[error]}"
+        elif BY_NAME[error].needs not in case.solution.quantities:
+            allowed = f"{case.solution.name} has no {BY_NAME[error].needs}"
         else:
             continue
         raise InputError(case.path, f"tolerance.{error}", case.tolerance[error], allowed)
@@ -152,7 +138,7 @@ def _check_reference(case: Case) -> None:
         allowed = "gives no value to compare with, such as contact_pressure"
         raise InputError(case.path, "reference.kind", case.reference_kind, allowed)
     if case.solution and not case.reference and not case.tolerance.keys() & ERRORS.keys():
-        known = [name for name, what in ERRORS.items() if what in case.solution.quantities]
+        known = [name for name in ERRORS if BY_NAME[name].needs in case.solution.quantities]
         allowed = "nothing is compared with it; give a value (`contact_pressure: solution`) or a "
         allowed += f"tolerance for one of {', '.join(known)}"
         raise InputError(case.path, "reference.solution", case.solution.name, allowed)

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..case.checks import CHECKS, ERRORS, Check
 from ..case.expressions import evaluate
-from ..case.rules import ERRORS
 from ..mechanics.fem.stress import COMPONENTS, normal_stress
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution, ZoneResult
 from ..system.errors import InputError
 from ..verification import samples
-from ..verification.checks import CHECKS, Check
 from ..verification.norms import errors
 from ..verification.samples import Reference, Sample
 from ..verification.verdict import CheckResult

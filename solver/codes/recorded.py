@@ -21,10 +21,10 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from ..case import job_name
+from ..case.checks import RELATIVE
 from ..case.typed import ONCE, Positive, Section, Text, Version, read_as
 from ..case.yaml import read_mapping
 from ..system.errors import InputError, hint
-from ..verification.checks import RELATIVE
 from ..verification.verdict import SOLVED, CheckError, CheckResult, Verdict
 from .files.map import CodeName
 

@@ -13,8 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ..case.checks import ROUND_OFF
 from ..system.errors import InputError, hint
-from ..verification.checks import ROUND_OFF
 from ..verification.verdict import WORDS, CheckResult, Verdict, typed
 from . import formats, stages
 from .rows import Row, natural

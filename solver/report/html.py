@@ -11,49 +11,6 @@ from . import formats, stages
 from .charts import SCRIPT
 from .families import page_name, paragraphs
 
-# What each check looks at, in the order of the table of checks.
-MEANING = {
-    "multiplier": "contact pressure: the multiplier of every macro-element",
-    "nodal_stress": "normal stress at every node of both bodies",
-    "surface_stress_slave": "normal stress on the slave surface",
-    "surface_stress_master": "normal stress on the master surface",
-    "element_pressure": "pressure of every contact element, from the forces at the slave nodes",
-    "element_gap": "average gap of every contact element, relative to the block size",
-    "element_status": "contact status of every contact element: 1 in contact, 0 open",
-    "coverage": "intersected area over the area of the macro-element",
-    "covered_pressure": "coverage × pressure",
-    "displacement": "displacement at every node",
-    "stress_components": "the other components of stress at every node",
-    "integration_stress": "stress at the integration points, from the displacement alone",
-    "balance": "contact forces of both sides, and reactions against loads: forces and moments",
-    "force": "contact force on the surface listed as slave",
-    "contact_area": "area of contact",
-    "reaction": "forces that hold groups",
-    "moment": "moment of contact on rigid bodies, about their reference points",
-    "displacement_at": "displacement at probes",
-    "stress_at": "stress at probes",
-    "pressure_at": "contact pressure at probes",
-    "strain_energy": "strain energy of all bodies",
-    "counts": "cells and contact faces of the bodies before the cut",
-    "observation": "pressure of one contact element at every load step",
-    "observation_gap": "gap of one contact element at every load step",
-}
-# Errors against exact solutions, which are checks where a case gives them a tolerance.
-NORMS = {
-    "displacement_l2": "displacement, L2",
-    "displacement_h1": "displacement, H1",
-    "stress_l2": "stress, L2",
-    "pressure_l2": "pressure, L2",
-    "pressure_max": "pressure, maximum",
-    "pressure_means": "pressure, macro-element means",
-    "pressure_total": "pressure, its integral",
-    "pressure_oscillation": "pressure, second difference",
-    "pressure_inner": "pressure, two macro-elements inside",
-    "half_width": "half-width of contact",
-    "peak": "peak pressure",
-    "stress_max": "stress, largest at nodes",
-}
-MEANING |= {name: f"error of {what}, relative" for name, what in NORMS.items()}
 KINDS = {
     "analytical": "an exact solution",
     "manufactured": "a solution chosen first, with loads derived from it",

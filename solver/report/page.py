@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from ..case.checks import BY_NAME, ERRORS
 from . import overview, stages
 from .charts import Chart
-from .html import MEANING, NORMS, TEMPLATES, render
+from .html import TEMPLATES, render
 from .pictures import VIEWER, picture, profile
 from .rows import Row, causes, choices, ours
 from .sections import FamilySection
@@ -63,7 +64,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         families=sections,
         origin=_facts(rows),
         checks=[checks[name] for name in sorted(checks, key=_order)],
-        meaning=MEANING,
+        meaning={name: check.what for name, check in BY_NAME.items()},
         stages=_stages(rows),
         folder=folder,
     )
@@ -82,7 +83,7 @@ def family_page(section: FamilySection, folder: Path) -> str:
         section=section,
         choices=choices(section.rows),
         orders=(folder / f"orders-{section.name}.html").is_file(),
-        norms=NORMS,
+        norms=ERRORS,
         stages=_stages(section.rows),
         picture=lambda row: picture(row, section.pictures),
         pressure=lambda row: _pressure(row, section.pictures),
@@ -149,8 +150,8 @@ def _costs(row: Row) -> tuple[float | None, float | None]:
 
 
 def _order(name: str) -> tuple[int, str]:
-    known = list(MEANING)
-    return (known.index(name) if name in MEANING else len(known), name)
+    known = list(BY_NAME)
+    return (known.index(name) if name in BY_NAME else len(known), name)
 
 
 def _stages(rows: Sequence[Row]) -> dict[str, str]:

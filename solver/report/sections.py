@@ -7,11 +7,12 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from ..case.checks import ERRORS
 from . import formats
 from .charts import Chart
 from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
-from .html import KINDS, NORMS
+from .html import KINDS
 from .pictures import draw_all, picture, profile
 from .rows import Row, counted, families, ours
 from .tables import outcome
@@ -110,7 +111,7 @@ class FamilySection:
     @cached_property
     def norms(self) -> list[str]:
         """The errors against exact solutions that any row has."""
-        return [name for name in NORMS if any(name in row.norms for row in self.rows)]
+        return [name for name in ERRORS if any(name in row.norms for row in self.rows)]
 
     @cached_property
     def profiles(self) -> list[Profile]:

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver.case.checks import ERRORS
 from solver.case.reader import load_case
-from solver.case.rules import ERRORS
 from solver.simulation.simulate import simulate
 from solver.verification.checks import run_checks
 from solver.verification.norms import errors

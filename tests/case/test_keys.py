@@ -7,19 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.case.file import CaseFile, CheckName
+from solver.case.file import CaseFile
 from solver.case.model import Case
 from solver.case.reader import parse_case
 from solver.case.typed import described, fields, is_section
 from solver.case.yaml import parse_mapping
 from solver.commands.schemas import FOLDER
 from solver.system.errors import InputError
-from solver.verification.checks import CHECKS
 from tests.case.files import FULL, PATH
-
-
-def test_every_check_may_have_its_tolerance():
-    assert set(get_args(CheckName)) == {"all"} | {check.name for check in CHECKS}
 
 
 def sections(kind=CaseFile):

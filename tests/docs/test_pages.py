@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from solver.case.checks import CHECKS, ERRORS
 from solver.case.file import Pick
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.typed import fields
 from solver.mesh.keys import RECIPES
-from solver.report.html import NORMS
-from solver.verification.checks import CHECKS
 from tests.case.test_keys import sections
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -75,7 +74,7 @@ def test_every_check_solution_and_recipe_is_on_its_page(site):
     page = (ROOT / "docs" / "checks.md").read_text(encoding="utf-8")
     table = tables.checks()
     for check in CHECKS:
-        assert f"`{check.name}`" in (page if check.name in NORMS else table), check.name
+        assert f"`{check.name}`" in (page if check.name in ERRORS else table), check.name
     assert all(f"### `{name}`" in tables.solutions() for name in SOLUTIONS)
     assert all(f"recipe: {name}" in tables.recipes() for name in RECIPES)
     assert "perturb: {amplitude" in tables.transforms()

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from solver.case.checks import CHECKS
 from solver.case.features import features, used
 from solver.case.reader import load_case
 from solver.case.yaml import read_mapping
@@ -11,7 +12,6 @@ from solver.commands.jobs import case_files
 from solver.mesh.keys import RECIPES
 from solver.report.matrix import fits, matrix, matrix_page, reasons
 from solver.report.rows import read_rows
-from solver.verification.checks import CHECKS
 from tests.report.test_report import CHECK, verdict
 from tests.report.verdicts import put
 

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 import solver.lac.threads
 import solver.verification.samples
-from solver.case.rules import ERRORS
-from solver.verification.checks import CHECKS, Accepted, block_size, run_checks
+from solver.case.checks import CHECKS, ERRORS
+from solver.verification import scales
+from solver.verification.checks import Accepted, run_checks, sampler_of
+from solver.verification.scales import block_size
 from tests.handmade import PLANE, plane
 
 
@@ -25,6 +27,13 @@ def by_name(solution, accepted=None):
 
 def failing(solution):
     return {check.name for check in run_checks(solution) if not check.passed}
+
+
+def test_every_row_names_functions_that_are_there():
+    assert len({check.name for check in CHECKS}) == len(CHECKS)
+    for check in CHECKS:
+        assert callable(sampler_of(check)), check.name
+        assert callable(getattr(scales, check.scale)), check.name
 
 
 def test_the_exact_state_passes_every_check_of_the_table(solution):

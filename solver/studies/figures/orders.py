@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from ...case.checks import ERRORS
 from ...lac.cells.catalogue import BY_NAME
 from ...report.charts import (
     CROSS,
@@ -23,7 +24,6 @@ from ...report.charts import (
     slopes,
 )
 from ...report.formats import error as shown_error
-from ...report.html import NORMS
 from ..description import Series, Study
 from ..fits import LAST, Fit, fit_order, is_rounding
 from ..shown import MeasuredGroup, PageSection, Shown, Table, TableRow, why_not
@@ -143,7 +143,7 @@ class Curve:
         lines = [f"{p['name']}: {why_not(p)}" for p in self.points if p["outcome"] != "solved"]
         if not self.solved and not lines:
             lines.append("no errors against an exact solution")
-        for error, what in NORMS.items():
+        for error, what in ERRORS.items():
             if self.reached(error) is False:
                 slope = self.slope(error)
                 value = f"{slope.value:.3f} ± {slope.spread:.3f}" if slope else "not known"
@@ -172,7 +172,7 @@ def show(study: Study, groups: Sequence[MeasuredGroup]) -> Shown:
     if gains.rows:
         title = "Recovered pressure: order and gain"
         sections.append(PageSection("recovery", title, _GAINS, tables=[gains]))
-    below = sum(curve.is_below_theory(error) for curve in every for error in NORMS)
+    below = sum(curve.is_below_theory(error) for curve in every for error in ERRORS)
     if below or study.shortfalls:
         text = f"{below} slopes (▽) are below theory by more than their spread. " * bool(below)
         sections.insert(0, PageSection("shortfalls", "Below theory", text + study.shortfalls))
@@ -181,8 +181,8 @@ def show(study: Study, groups: Sequence[MeasuredGroup]) -> Shown:
 
 def _outcome(curves: Sequence[Curve]) -> str:
     """How many slopes and errors at the finest levels were asked for and reached."""
-    reached = [r for c in curves for e in NORMS if (r := c.reached(e)) is not None]
-    kept = [r for c in curves for e in NORMS if (r := c.kept(e)) is not None]
+    reached = [r for c in curves for e in ERRORS if (r := c.reached(e)) is not None]
+    kept = [r for c in curves for e in ERRORS if (r := c.kept(e)) is not None]
     lost = sum(len(curve.points) - len(curve.solved) for curve in curves)
     text = (
         f"{sum(reached)} of {len(reached)} slopes asked for are reached"
@@ -195,9 +195,9 @@ def _outcome(curves: Sequence[Curve]) -> str:
 
 
 def _section(group: MeasuredGroup, curves: Sequence[Curve]) -> PageSection:
-    errors = [error for error in NORMS if any(len(curve.errors(error)[0]) for curve in curves)]
+    errors = [error for error in ERRORS if any(len(curve.errors(error)[0]) for curve in curves)]
     head = ["Slave’s cells", "Levels", "Unknowns, finest", "Macro-elements, finest"]
-    head += [NORMS[error] for error in errors] + ["Estimated over true error, finest"]
+    head += [ERRORS[error] for error in errors] + ["Estimated over true error, finest"]
     solved = [curve for curve in curves if curve.solved]
     rows = [
         TableRow([*_head_cells(curve), *(_slope(curve, e) for e in errors), _effectivity(curve)])
@@ -254,10 +254,10 @@ def _panel(name: str, error: str, curves: Sequence[Curve]) -> Chart:
     orders = {order for theory in known for order in (theory.least, theory.best) if order}
     return series_chart(
         f"{name}-{error}",
-        f"Error of {NORMS[error]}, against macro-element size",
+        f"Error of {ERRORS[error]}, against macro-element size",
         records,
         Axis("h", "macro-element / interface", log=True),
-        Axis("error", f"relative error: {NORMS[error]}", log=True),
+        Axis("error", f"relative error: {ERRORS[error]}", log=True),
         distinct({curve.label: _look(curve) for curve in curves if curve.label in names}),
         layers=slopes(records, "h", "error", sorted(orders) or [1.0, 2.0]),
         width=460,

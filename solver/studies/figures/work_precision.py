@@ -7,6 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from ...case.checks import ERRORS as WORDS
 from ...report import stages
 from ...report.charts import (
     EPSILON,
@@ -21,7 +22,6 @@ from ...report.charts import (
 )
 from ...report.formats import duration
 from ...report.formats import error as shown_error
-from ...report.html import NORMS
 from ..description import Study
 from ..fits import ROUND_OFF, fit_order
 from ..shown import (
@@ -151,7 +151,7 @@ def show(_: Study, groups: Sequence[MeasuredGroup]) -> Shown:
 
 
 def _overview(panel: Panel) -> TableRow:
-    cells = [panel.group.title, NORMS[panel.error]]
+    cells = [panel.group.title, WORDS[panel.error]]
     for target in TARGETS:
         ways = [
             Markup("<strong>{}</strong> {}<span class=under>{}</span>").format(
@@ -207,7 +207,7 @@ def draw(panel: Panel, looks: Mapping[str, Look]) -> list[Chart]:
     errors = [max(point["errors"][panel.error], EPSILON / 4) for point in points]
     close = min(errors) < _NEAR
     low = EPSILON / 8 if close else min(LIMIT, *errors) / 2
-    name = NORMS[panel.error]
+    name = WORDS[panel.error]
     x = Axis("time", "time of a warm solve, s", True, (min(times) / 1.3, max(times) * 1.3))
     y = Axis("error", f"relative error: {name}", True, (low, max(1.0, 2 * max(errors))))
     unknowns = max(point["dofs"] for point in points)
@@ -260,7 +260,7 @@ def _ways(panel: Panel) -> Table:
             )
             cells.append(best.format(duration(time_of(point).median)) if point else "never")
         rows.append(TableRow(cells))
-    caption = f"{NORMS[panel.error]}: shortest time to an error of at most …"
+    caption = f"{WORDS[panel.error]}: shortest time to an error of at most …"
     return Table(["Treatment", *TARGETS.values()], rows, caption)
 
 
@@ -275,7 +275,7 @@ def _levels(panel: Panel) -> Table:
         cells = [shown_error(errors[k]) if k in errors else "–" for k in levels]
         rows.append(TableRow([line, *cells, str(order or ("rounding" if exact else "–"))]))
     return Table(
-        ["Line", *levels, "order"], rows, f"{NORMS[panel.error]}: error by level, observed order"
+        ["Line", *levels, "order"], rows, f"{WORDS[panel.error]}: error by level, observed order"
     )
 
 
