@@ -10,7 +10,7 @@ import numpy as np
 from solver.commands.cli import main
 from solver.lac.cells.catalogue import cell_type
 from solver.mesh import generate, write_mesh
-from solver.mesh.recipes.gmsh_session import number_of, session
+from solver.mesh.recipes.gmsh_session import session
 
 MESHES = ("mesh.med", "mesh.msh", "binary.msh", "mesh.inp", "mesh.vtu", "mesh.vtkhdf")
 CASE = """\
@@ -94,7 +94,7 @@ def _write_by_gmsh(mesh: meshio.Mesh, folder: Path) -> None:
                     kind = cell_type(block.type)
                     entity = gmsh.model.add_discrete_entity(kind.dim)
                     nodes = block.data[ids].ravel() + 1
-                    gmsh.model.mesh.add_elements_by_type(entity, number_of(kind.name), [], nodes)
+                    gmsh.model.mesh.add_elements_by_type(entity, kind.gmsh, [], nodes)
                     gmsh.model.add_physical_group(kind.dim, [entity], name=name)
         for name in ("mesh.med", "mesh.msh", "mesh.inp"):
             gmsh.write(str(folder / name))

@@ -12,7 +12,7 @@ import vtk
 from vtk.util.numpy_support import numpy_to_vtk
 
 from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME
-from solver.mesh.recipes.gmsh_session import number_of, session
+from solver.mesh.recipes.gmsh_session import session
 from tests.mesh.curved import Curved, ours
 
 _POINT = 15  # gmsh's number of the type
@@ -27,12 +27,12 @@ def write_by_gmsh(name: str, path: Path, **options: float) -> None:
         tags = np.arange(1, cell.n_nodes + 1)
         body = gmsh.model.addDiscreteEntity(cell.dim)
         gmsh.model.mesh.addNodes(cell.dim, body, tags, places.ravel())
-        gmsh.model.mesh.addElementsByType(body, number_of(name), [], tags)
+        gmsh.model.mesh.addElementsByType(body, BY_NAME[name].gmsh, [], tags)
         gmsh.model.addPhysicalGroup(cell.dim, [body], name="body")
         for face in cell.faces:
             side = gmsh.model.addDiscreteEntity(cell.dim - 1)
             nodes = _nearest(places, curved.face_places(face, _gmsh_nodes(face.type)))
-            gmsh.model.mesh.addElementsByType(side, number_of(face.type), [], tags[nodes])
+            gmsh.model.mesh.addElementsByType(side, BY_NAME[face.type].gmsh, [], tags[nodes])
         gmsh.model.addPhysicalGroup(cell.dim - 1, [side], name="side")
         point = gmsh.model.addDiscreteEntity(0)
         gmsh.model.mesh.addElementsByType(point, _POINT, [], tags[:1])
@@ -42,7 +42,7 @@ def write_by_gmsh(name: str, path: Path, **options: float) -> None:
 
 def _gmsh_nodes(name: str) -> np.ndarray:
     """Where gmsh's own cell of that type has its nodes, in our reference cell, (n, dim)."""
-    _, dim, _, count, flat, _ = gmsh.model.mesh.getElementProperties(number_of(name))
+    _, dim, _, count, flat, _ = gmsh.model.mesh.getElementProperties(BY_NAME[name].gmsh)
     return ours(name, np.reshape(flat, (count, dim)))
 
 

@@ -23,15 +23,17 @@ class Face:
 class CellType:
     """One cell type.
 
-    `nodes` (n_nodes, dim) are the reference coordinates; `owners` the vertices in whose middle each
-    node lies; `edges` the vertex pairs, in the order of the mid-edge nodes; `mirror` the node
-    permutation that reverses the orientation; `skeleton` the name of the linear type with the same
-    vertices.
+    `meshio`, `vtk`, `gmsh`, `med`: its name or number there; `nodes` (n_nodes, dim) are the
+    reference coordinates; `owners` the vertices in whose middle each node lies; `edges` the vertex
+    pairs, in the order of the mid-edge nodes; `mirror` the node permutation that reverses the
+    orientation; `skeleton` the name of the linear type with the same vertices.
     """
 
     name: str
     meshio: str
     vtk: int
+    gmsh: int
+    med: str
     order: int
     skeleton: str
     nodes: np.ndarray
@@ -122,24 +124,24 @@ _SHAPES = {
     ),
 }
 
-# name: (meshio's name, VTK's number, order, has face centres, has a cell centre)
+# name: (names in meshio, VTK, gmsh and MED, order, has face centres, has a cell centre)
 _TYPES = {
-    "SEG2": ("line", 3, 1, False, False),
-    "SEG3": ("line3", 21, 2, False, False),
-    "TRIA3": ("triangle", 5, 1, False, False),
-    "TRIA6": ("triangle6", 22, 2, False, False),
-    "QUAD4": ("quad", 9, 1, False, False),
-    "QUAD8": ("quad8", 23, 2, False, False),
-    "QUAD9": ("quad9", 28, 2, False, True),
-    "TETRA4": ("tetra", 10, 1, False, False),
-    "TETRA10": ("tetra10", 24, 2, False, False),
-    "HEXA8": ("hexahedron", 12, 1, False, False),
-    "HEXA20": ("hexahedron20", 25, 2, False, False),
-    "HEXA27": ("hexahedron27", 29, 2, True, True),
-    "PENTA6": ("wedge", 13, 1, False, False),
-    "PENTA15": ("wedge15", 26, 2, False, False),
-    "PYRA5": ("pyramid", 14, 1, False, False),
-    "PYRA13": ("pyramid13", 27, 2, False, False),
+    "SEG2": ("line", 3, 1, "SE2", 1, False, False),
+    "SEG3": ("line3", 21, 8, "SE3", 2, False, False),
+    "TRIA3": ("triangle", 5, 2, "TR3", 1, False, False),
+    "TRIA6": ("triangle6", 22, 9, "TR6", 2, False, False),
+    "QUAD4": ("quad", 9, 3, "QU4", 1, False, False),
+    "QUAD8": ("quad8", 23, 16, "QU8", 2, False, False),
+    "QUAD9": ("quad9", 28, 10, "QU9", 2, False, True),
+    "TETRA4": ("tetra", 10, 4, "TE4", 1, False, False),
+    "TETRA10": ("tetra10", 24, 11, "T10", 2, False, False),
+    "HEXA8": ("hexahedron", 12, 5, "HE8", 1, False, False),
+    "HEXA20": ("hexahedron20", 25, 17, "H20", 2, False, False),
+    "HEXA27": ("hexahedron27", 29, 12, "H27", 2, True, True),
+    "PENTA6": ("wedge", 13, 6, "PE6", 1, False, False),
+    "PENTA15": ("wedge15", 26, 18, "P15", 2, False, False),
+    "PYRA5": ("pyramid", 14, 7, "PY5", 1, False, False),
+    "PYRA13": ("pyramid13", 27, 19, "P13", 2, False, False),
 }
 
 
@@ -154,7 +156,7 @@ def _face_type(n_vertices: int, order: int, centred: bool) -> str:
 
 
 def _build(name: str) -> CellType:
-    meshio_name, vtk, order, face_centres, cell_centre = _TYPES[name]
+    meshio_name, vtk, gmsh, med, order, face_centres, cell_centre = _TYPES[name]
     shape = _SHAPES[_shape_of(name)]
     vertices = np.array(shape.vertices, dtype=float)
     # Each node is known by the set of vertices whose mean it is.
@@ -181,6 +183,8 @@ def _build(name: str) -> CellType:
         name=name,
         meshio=meshio_name,
         vtk=vtk,
+        gmsh=gmsh,
+        med=med,
         order=order,
         skeleton=next(t for t in _TYPES if _shape_of(t) == _shape_of(name)),
         nodes=np.array([vertices[sorted(owner)].mean(axis=0) for owner in owners]),

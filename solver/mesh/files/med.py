@@ -18,12 +18,7 @@ from ...system.errors import InputError
 from ...system.hdf5 import read_file
 from .combinations import combinations
 
-_TYPES = {
-    "SE2": "SEG2", "SE3": "SEG3", "TR3": "TRIA3", "TR6": "TRIA6",
-    "QU4": "QUAD4", "QU8": "QUAD8", "QU9": "QUAD9", "TE4": "TETRA4", "T10": "TETRA10",
-    "HE8": "HEXA8", "H20": "HEXA20", "H27": "HEXA27", "PE6": "PENTA6", "P15": "PENTA15",
-    "PY5": "PYRA5", "P13": "PYRA13",
-}  # fmt: skip
+_TYPES = {kind.med: name for name, kind in BY_NAME.items()}
 _NAME = 80  # characters of a group's name
 # MED's node order is the catalogue's with the orientation reversed, which `tidy` puts right; only
 # the face centres of HEXA27 have an order of their own.

@@ -13,7 +13,6 @@ from ..recipes.gmsh_session import (
     current_model,
     foreign_types,
     node_order,
-    number_of,
     session,
 )
 from .combinations import combinations
@@ -53,7 +52,7 @@ def write(mesh: meshio.Mesh, path: Path) -> None:
             theirs = block.data[:, np.argsort(node_order(cell.name))]
             of, names = combinations(len(theirs), {n: ids[i] for n, ids in mesh.cell_sets.items()})
             for k, each in enumerate(names):
-                add(cell.dim, number_of(cell.name), theirs[of == k], each)
+                add(cell.dim, cell.gmsh, theirs[of == k], each)
         of, names = combinations(len(numbers), mesh.point_sets)
         for k, each in enumerate(names):
             if each:

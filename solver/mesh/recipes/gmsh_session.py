@@ -11,13 +11,7 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_NAME
 
-# gmsh's own number of each cell type.
-_NUMBERS = {
-    "SEG2": 1, "SEG3": 8, "TRIA3": 2, "TRIA6": 9, "QUAD4": 3, "QUAD8": 16, "QUAD9": 10,
-    "TETRA4": 4, "TETRA10": 11, "HEXA8": 5, "HEXA20": 17, "HEXA27": 12,
-    "PENTA6": 6, "PENTA15": 18, "PYRA5": 7, "PYRA13": 19,
-}  # fmt: skip
-_NAMES = {number: name for name, number in _NUMBERS.items()}
+_NAMES = {kind.gmsh: name for name, kind in BY_NAME.items()}
 POINT = 15
 
 # The same mesh every time: one thread, no configuration of the user's, random numbers fixed.
@@ -62,11 +56,6 @@ def _without_home() -> Iterator[None]:
             os.environ["HOME"] = home
 
 
-def number_of(cell_type: str) -> int:
-    """Number in gmsh of the cell type of that name."""
-    return _NUMBERS[cell_type]
-
-
 @cache
 def node_order(cell_type: str) -> tuple[int, ...]:
     """Local nodes of gmsh's cell in the catalogue's order; needs an open session.
@@ -74,7 +63,7 @@ def node_order(cell_type: str) -> tuple[int, ...]:
     Found from where gmsh's own reference cell has its nodes, vertices being in the same order.
     """
     ours = BY_NAME[cell_type]
-    _, dim, _, n_nodes, flat, n_vertices = gmsh.model.mesh.getElementProperties(_NUMBERS[cell_type])
+    _, dim, _, n_nodes, flat, n_vertices = gmsh.model.mesh.getElementProperties(ours.gmsh)
     theirs = np.reshape(flat, (n_nodes, dim))
     corners = np.c_[ours.nodes[:n_vertices], np.ones(n_vertices)]
     to_theirs = np.linalg.lstsq(corners, theirs[:n_vertices], rcond=None)[0]

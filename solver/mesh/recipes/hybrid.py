@@ -20,7 +20,7 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_NAME, CellType
 from ..keys import BlockKeys, each
-from .gmsh_session import current_model, number_of, session
+from .gmsh_session import current_model, session
 from .sides import side_name
 
 _CUBE = BY_NAME["HEXA8"]
@@ -88,5 +88,5 @@ def _sides(name: str, cell: CellType, nodes: np.ndarray, pieces: np.ndarray) -> 
 
 def _fill(entity: int, dim: int, group: str, cells: _Cells) -> None:
     for kind, nodes in cells:
-        gmsh.model.mesh.addElementsByType(entity, number_of(kind), [], nodes.ravel() + 1)
+        gmsh.model.mesh.addElementsByType(entity, BY_NAME[kind].gmsh, [], nodes.ravel() + 1)
     gmsh.model.addPhysicalGroup(dim, [entity], name=group)

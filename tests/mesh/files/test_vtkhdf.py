@@ -154,9 +154,3 @@ def test_hdf5_of_others_is_refused(tmp_path):
         file.create_group("VTKHDF")
     with pytest.raises(InputError, match="no mesh that this program wrote"):
         read_mesh(path)
-
-
-def test_other_extensions_are_not_written(tmp_path):
-    mesh = generate({"recipe": "blocks", "size": 3.0} | RECIPES[0], "case.yaml")
-    with pytest.raises(InputError, match=r"extension = '\.vtu': must be \.vtkhdf"):
-        write_mesh(mesh, tmp_path / "mesh.vtu")
