@@ -112,6 +112,8 @@ def _log_gaps(scene: Scene) -> None:
 
 def _log_forces(solution: Solution) -> None:
     """Log the forces of each step, and the largest displacement and strain of the last."""
+    if units := solution.case.units:
+        _LOG.log(OUTCOME, "numbers in %s", " and ".join(units.values()))
     shown = partial(_without_noise, float(np.ptp(solution.mesh.points, axis=0).max()))
     for step, given in zip(solution.steps, solution.case.steps, strict=True):
         of_step = f"{_called(given, step.factor)}, " if len(solution.steps) > 1 else ""
