@@ -35,6 +35,8 @@ _COVERED = 1e-9
 _ROUND_OFF = 1e-10
 # A pivot stays on the diagonal down to this share of its column's largest: fewer entries fill in.
 _PIVOT = 0.01
+# How often a status that the recovered pressure changes is found anew.
+_ROUNDS = 3
 _SINGULAR = "the system is singular: a body may move freely"
 _SINGULAR_FROM = 1e14
 
@@ -248,6 +250,8 @@ class LocalAverageContact:
         ------
         ValueError
             For an unknown form.
+        RuntimeError
+            Where the contact status does not settle under the recovered pressure.
         """
         if form not in get_args(Recovered):
             raise ValueError(f"form = {form!r}: must be {', '.join(get_args(Recovered))}")
@@ -256,19 +260,22 @@ class LocalAverageContact:
         asked = RecoveryRequest(shape, near, np.zeros(len(self.area), dtype=int))
         recovery = gap_operator(*self._surfaces, asked=asked).recovery
         assert recovery is not None
-        system, closed = state._system, state.closed
-        fit, size = recovery.reconstruction(closed).matrix, len(system.force)
-        loads = _numbered(recovery.loads, self._unknown, size).T @ fit
-
-        def change(force: np.ndarray) -> np.ndarray:
-            return system.under(force).state(closed, 0).pressure - state.pressure
-
-        means = settled_means(
-            state.pressure, np.zeros(size), shape.sweeps, lambda p: loads @ p, change
-        )
-        found = system.under(loads @ means).state(closed, state.iterations)
-        coefficients = fit @ (means if shape.degree == 2 and shape.keeps_means else found.pressure)
-        return RecoveredState(found, recovery.error(coefficients), recovery, coefficients)
+        system, closed, size = state._system, state.closed, len(state._system.force)
+        added = _numbered(recovery.loads, self._unknown, size).T
+        touching = self.covered > _COVERED * self.area
+        for _ in range(_ROUNDS):
+            fit = recovery.reconstruction(closed).matrix
+            means = system.settled(closed, added @ fit, shape.sweeps)
+            corrected = system.under(added @ (fit @ means))
+            found = corrected.trial(closed)
+            if not (touching & (found.violation(closed) > 1)).any():
+                applied = shape.degree == 2 and shape.keeps_means
+                coefficients = fit @ (means if applied else found.pressure)
+                settled = corrected.state(closed, state.iterations)
+                return RecoveredState(settled, recovery.error(coefficients), recovery, coefficients)
+            settling = corrected.trial, closed, touching, self.area, corrected.stiffness
+            closed = find_status(*settling).closed
+        raise SolveError("the contact status does not settle under the recovered pressure")
 
 
 def _numbered(matrix: csr_matrix, unknown: np.ndarray, size: int) -> csr_matrix:
@@ -309,6 +316,15 @@ class _System:
         other = copy(self)
         other.load = self.load + force[self.free]
         return other
+
+    def settled(self, closed: np.ndarray, loads: csr_matrix, sweeps: int) -> np.ndarray:
+        """The pressures (k,) to be reconstructed; `loads` (N, k): forces that one of them adds."""
+        before = self.trial(closed).pressure
+
+        def change(force: np.ndarray) -> np.ndarray:
+            return np.asarray(self.under(force).trial(closed).pressure - before)
+
+        return settled_means(before, np.zeros(len(self.force)), sweeps, loads.dot, change)
 
     def state(self, closed: np.ndarray, iterations: int) -> ContactState:
         """The state with these facets closed."""

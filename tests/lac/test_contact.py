@@ -162,6 +162,11 @@ def test_contact_opens_and_carries_the_load():
     assert (state.gap >= 0).all()
     assert not (state.pressure * state.gap).any()
     assert state.pressure @ contact.covered == pytest.approx(100.0 * 12.5, rel=1e-12)
+    recovered = contact.recover(state, "linear").state
+    assert recovered.pressure @ contact.covered == pytest.approx(100.0 * 12.5, rel=1e-12)
+    assert (recovered.pressure >= 0).all()
+    assert (recovered.gap >= 0).all()
+    assert 0 < np.abs(recovered.pressure - state.pressure).max() < 0.2 * state.pressure.max()
 
 
 def test_a_given_gap_takes_the_place_of_the_meshed_one():
