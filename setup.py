@@ -1,4 +1,7 @@
-"""Installs the folder solver/ as the package mortarcheck; pyproject.toml has everything else."""
+"""Installs the folder solver/ as the package mortarcheck, with the cases in it.
+
+pyproject.toml has everything else.
+"""
 
 import shutil
 
@@ -7,6 +10,10 @@ from setuptools import find_packages, setup
 # What an earlier build left there would join the wheel.
 shutil.rmtree("build/lib", ignore_errors=True)
 setup(
-    package_dir={"mortarcheck": "solver"},
-    packages=["mortarcheck", *(f"mortarcheck.{name}" for name in find_packages("solver"))],
+    package_dir={"mortarcheck": "solver", "mortarcheck.cases": "cases"},
+    packages=[
+        "mortarcheck",
+        "mortarcheck.cases",
+        *(f"mortarcheck.{name}" for name in find_packages("solver")),
+    ],
 )

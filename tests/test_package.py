@@ -39,6 +39,7 @@ def installed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("installed")
     copied = folder / "sources"
     shutil.copytree(SOURCES, copied / "solver", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "cases", copied / "cases")
     (copied / "build" / "lib" / "mortarcheck").mkdir(parents=True)
     (copied / "build" / "lib" / "mortarcheck" / "removed.py").touch()  # of an earlier build
     for name in ("LICENSE", "README.md", "pyproject.toml", "setup.py"):
@@ -72,8 +73,13 @@ def fresh(installed, tmp_path):
 def test_the_wheel_holds_every_file_of_the_package(installed):
     (wheel,) = installed.glob("*.whl")
     held = {name for name in ZipFile(wheel).namelist() if name.startswith("mortarcheck/")}
-    files = (f for f in SOURCES.rglob("*") if f.is_file() and "__pycache__" not in f.parts)
-    assert held == {f"mortarcheck/{f.relative_to(SOURCES).as_posix()}" for f in files}
+    expected = {
+        f"mortarcheck/{prefix}{f.relative_to(folder).as_posix()}"
+        for prefix, folder in (("", SOURCES), ("cases/", ROOT / "cases"))
+        for f in folder.rglob("*")
+        if f.is_file() and "__pycache__" not in f.parts
+    }
+    assert held == expected
 
 
 def test_the_command_solves_checks_and_reports(installed, fresh, tmp_path):
@@ -93,6 +99,19 @@ def test_the_command_solves_checks_and_reports(installed, fresh, tmp_path):
     assert "block" in (tmp_path / "report" / "summary.html").read_text()
     validated = fresh("-m", "mortarcheck", "validate", "block.yaml")
     assert validated.stdout == "block.yaml: valid\n"
+
+
+def test_the_cases_come_with_it_and_are_solved_by_name(installed, fresh):
+    command = installed / "packages" / "bin" / "mortarcheck"
+    listed = fresh(command, "list").stdout
+    assert "ssnp170           33 cases  Patch test of two pressed blocks" in listed
+    assert "ssnp170-e-swapped" in fresh(command, "list", "ssnp170").stdout
+    solved = fresh(command, "solve", "ssnp170-e-swapped")
+    assert solved.returncode == 0, solved.stderr
+    assert "ssnp170-e-swapped: passed, largest checked error" in solved.stdout
+    refused = fresh(command, "solve", "ssnp170-ee")
+    assert refused.returncode == 2
+    assert "case = 'ssnp170-ee': no such case; did you mean ssnp170-e? (" in refused.stderr
 
 
 def test_the_import_solves_and_every_module_is_found(fresh):

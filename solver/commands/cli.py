@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..lac.errors import SolveError
 from ..system.errors import InputError, hint, of_machine
-from ..system.package import PROGRAM, PROJECT, project_version
+from ..system.package import PROGRAM, PROJECT, cases_folder, project_version
 from . import codes, completion, jobs, look, report, results, studies
 from .options import (
     BUG,
@@ -202,7 +202,12 @@ class _Version(argparse.Action):
 
 def _add_job(command: argparse.ArgumentParser) -> None:
     """Add the arguments that identify a solve: case, mesh, direction, variant."""
-    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument(
+        "case",
+        type=Path,
+        metavar="CASE",
+        help="a case file, or the name of a case that `list` lists",
+    )
     command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, used unchanged")
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
     command.add_argument(
@@ -232,7 +237,10 @@ def _job(options: argparse.Namespace) -> "Job":
 
     given = vars(options)
     chosen = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
-    return Job(swapped=options.swap, **chosen)
+    if options.case.suffix or options.case.exists():
+        return Job(swapped=options.swap, **chosen)
+    found = jobs.find_job(str(options.case), cases_folder())
+    return Job(swapped=options.swap != found.swap, **chosen | {"case": Path(found.file)})
 
 
 def _solve(options: argparse.Namespace) -> int:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..case import job_name
-from ..system.errors import InputError
+from ..system.errors import InputError, hint
 from .options import add_command
 
 if TYPE_CHECKING:
@@ -94,6 +94,24 @@ def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[ListedJob
         jobs += mine
         taken |= {job.key: job.file for job in mine}
     return jobs
+
+
+def families_in(cases: Path) -> dict[str, Path]:
+    """The folders of cases in a folder by name."""
+    folders = (f for f in sorted(cases.glob("*/")) if f.name not in _RESERVED)
+    return {folder.name: folder for folder in folders if case_files(folder)}
+
+
+def find_job(name: str, cases: Path) -> ListedJob:
+    """The job of that name in the families of a folder; InputError with near names."""
+    folders = sorted(families_in(cases).values(), key=lambda f: not name.startswith(f.name))
+    known: list[str] = []
+    for folder in folders:
+        for job in list_jobs([folder]):
+            if job.name == name:
+                return job
+            known.append(job.name)
+    raise InputError(cases, "case", name, f"no such case; {hint(name, known)}")
 
 
 def jobs_of(file: Path, variants: bool = False) -> Iterator[ListedJob]:

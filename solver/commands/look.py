@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError, hint
+from ..system.package import cases_folder
 from .options import add_command
 
 if TYPE_CHECKING:
@@ -15,7 +16,9 @@ def add_commands(commands: Any) -> None:
     """Add `list`, `inspect` and `plot`."""
     command = add_command(commands, "list", _list, "list families, or the cases of a family")
     command.add_argument("family", nargs="?", metavar="FAMILY", help="default: all families")
-    command.add_argument("--cases", type=Path, default=Path("cases"), metavar="DIR")
+    command.add_argument(
+        "--cases", type=Path, default=cases_folder(), metavar="DIR", help="default: the program's"
+    )
 
     command = add_command(
         commands, "inspect", _inspect, "show groups, cells and sizes of a mesh file"
@@ -38,13 +41,9 @@ def add_commands(commands: Any) -> None:
 
 def _list(options: argparse.Namespace) -> int:
     from ..report.families import read_family
-    from .jobs import case_files, list_jobs
+    from .jobs import case_files, families_in, list_jobs
 
-    folders = {
-        folder.name: folder
-        for folder in sorted(options.cases.glob("*/"))
-        if case_files(folder) and folder.name not in ("study", "scaling")
-    }
+    folders = families_in(options.cases)
     if not folders:
         allowed = "no folders with case files; name another folder with --cases"
         raise InputError(options.cases, "cases", None, allowed)

@@ -22,6 +22,11 @@ def in_project() -> bool:
     return (_SOURCES / "pyproject.toml").is_file()
 
 
+def cases_folder() -> Path:
+    """The cases that come with the program: those of the project, or of the installed package."""
+    return _SOURCES / "cases" if in_project() else Path(__file__).parents[1] / "cases"
+
+
 @cache
 def project_version() -> str:
     """The version in pyproject.toml: of the file itself, or as installed; else `unknown`."""
