@@ -38,7 +38,7 @@ def picture(row: Row, folder: Path, solution: Solution | None = None) -> Markup:
     """
     if row.result_file is None:
         return Markup("<p class=none>No result, no picture.</p>")
-    name, (width, height) = f"{folder.name}/{_name(row)}", SIZES.get(row.dim, SIZES[3])
+    name, (width, height) = f"{folder.name}/{name_of(row)}", SIZES.get(row.dim, SIZES[3])
     shown = _kept(row, folder, "picture", ".svg", lambda of: draw(of, row.name), solution)
     if not isinstance(shown, Markup):
         size = f"width={width} height={height}"
@@ -116,7 +116,7 @@ def _kept(
     """A drawing as kept in `folder`, or drawn and kept there; else a line with the reason."""
     if row.result_file is None:
         return Markup("<p class=none>No result, no {}.</p>").format(what)
-    kept = folder / f"{_name(row)}{ending}"
+    kept = folder / f"{name_of(row)}{ending}"
     if not _is_current(kept, row.result_file):
         try:
             drawing = draw(solution or _solution(row))
@@ -127,7 +127,8 @@ def _kept(
     return kept.read_text(encoding="utf-8")
 
 
-def _name(row: Row) -> str:
+def name_of(row: Row) -> str:
+    """The name of the files of a solve's pictures, without their endings."""
     return f"{row.group}-{row.folder.name}"
 
 

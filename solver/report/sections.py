@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from urllib.parse import quote
 
 from markupsafe import Markup
 
@@ -13,7 +14,7 @@ from .charts import Chart
 from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
 from .html import KINDS
-from .pictures import draw_all, picture, profile
+from .pictures import draw_all, name_of, picture, profile
 from .rows import Row, counted, families, ours
 from .tables import outcome
 
@@ -128,6 +129,11 @@ class FamilySection:
         """The solve whose picture shows the problem: the first of the profiles, or any."""
         with_result = [row for row in self.rows if row.result_file]
         return next((row for row, _ in self._figures), next(iter(with_result), None))
+
+    @property
+    def thumbnail(self) -> str:
+        """The file of that picture, from the folder of the pages; empty without a result."""
+        return f"{self.pictures.name}/{quote(name_of(self.model))}.svg" if self.model else ""
 
     @property
     def drawn(self) -> list[Row]:

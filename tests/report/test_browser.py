@@ -143,6 +143,14 @@ def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(pages, window):
     assert window.run(ticks) == zoomed
 
 
+def test_a_tile_shows_the_problem_with_its_pressure(pages, window):
+    window.open(pages / "summary.html")
+    window.run("document.querySelector('.tile img').scrollIntoView()")
+    window.wait("document.querySelector('.tile img').naturalWidth > 0")
+    alt = "[...document.querySelectorAll('.tile')].map((t) => t.querySelector('.under').innerText)"
+    assert any("largest error" in text for text in window.run(alt))
+
+
 def test_failures_are_grouped_by_check_and_cause(pages, window):
     window.open(pages / "summary.html")
     heads = window.run("[...document.querySelectorAll('#failures h3')].map((h) => h.innerText)")
