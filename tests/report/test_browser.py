@@ -143,6 +143,14 @@ def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(pages, window):
     assert window.run(ticks) == zoomed
 
 
+def test_tables_of_families_fold_and_failures_are_open(pages, window):
+    window.open(pages / "summary.html")
+    folds = "[...document.querySelectorAll('details.fold')].map((fold) => fold.open)"
+    assert window.run(folds) == [True, False]  # the first family has failures
+    window.open((pages / "summary.html").resolve().as_uri() + "?text=many-3")
+    assert window.run(folds) == [True, True]
+
+
 def test_a_tile_shows_the_problem_with_its_pressure(pages, window):
     window.open(pages / "summary.html")
     window.run("document.querySelector('.tile img').scrollIntoView()")

@@ -55,6 +55,8 @@ document.addEventListener("DOMContentLoaded", () => {
       for (const table of new Set(rows.map((row) => row.closest("table")))) {
         for (const body of table.tBodies) body.hidden = !body.querySelector("tr[data-verdict]:not([hidden])");
         table.closest("section").hidden = ![...table.tBodies].some((body) => !body.hidden);
+        const fold = table.closest("details.fold"); // what is looked for is seen, and failures always
+        if (fold) fold.open = wanted.length > 0 || "bad" in fold.dataset;
       }
       form.querySelector("output").value = `${shown} of ${rows.length} solves`;
       const query = new URLSearchParams(wanted).toString();
@@ -65,5 +67,5 @@ document.addEventListener("DOMContentLoaded", () => {
     form.addEventListener("reset", () => setTimeout(choose));
     choose();
   }
-  addEventListener("beforeprint", () => document.querySelectorAll("article > details").forEach((one) => { one.open = true; }));
+  addEventListener("beforeprint", () => document.querySelectorAll("article > details, details.fold").forEach((one) => { one.open = true; }));
 });
