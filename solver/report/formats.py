@@ -9,6 +9,8 @@ from markupsafe import Markup, escape
 from ..verification.verdict import Body
 
 NOTHING = "–"
+# Below this share of its scale a number is round-off, and shown as zero.
+ROUND_OFF = 1e-12
 
 
 def number(value: float | None) -> str:
@@ -22,7 +24,7 @@ def error(value: float | None) -> str:
 
 
 def extremes(pair: Sequence[float | None] | None, scale: float | None = None) -> str:
-    """Minimum … maximum; one number where both show alike; round-off of `scale` shown as such."""
+    """Minimum … maximum; one number where both show alike; zero for round-off of `scale`."""
     return " … ".join(both(pair, scale))
 
 
@@ -34,8 +36,9 @@ def both(pair: Sequence[float | None] | None, scale: float | None = None) -> lis
 
 
 def _near_zero(value: float | None, scale: float | None) -> str:
-    near = value is not None and scale and 0 < abs(value) < 1e-6 * scale
-    return f"{value:.1e}" if near else number(value)
+    if value is None or not scale or abs(value) >= 1e-6 * scale:
+        return number(value)
+    return "0" if abs(value) < ROUND_OFF * scale else f"{value:.1e}"
 
 
 def vector(values: Sequence[float], scale: float = 0.0) -> str:

@@ -71,6 +71,12 @@ class FamilySection:
         bodies = [body for row in self.rows for body in row.sides]
         return any((body.reference_cells, body.reference_faces) != (None, None) for body in bodies)
 
+    def is_one(self, name: str) -> bool:
+        """Whether a quantity is one everywhere in all solves: its column would say nothing."""
+        known = [getattr(row.verdict, name) for row in self.rows]
+        values = [x for pair in known for x in pair or () if x is not None]
+        return bool(values) and all(abs(x - 1) < formats.ROUND_OFF for x in values)
+
     @property
     def cpu(self) -> float:
         """Processor time of all solves, seconds, without the start of Python."""

@@ -4,8 +4,10 @@ import math
 
 import pytest
 
-from solver.report import overview
+from solver.report import formats, overview
+from solver.report.families import Family
 from solver.report.rows import Row
+from solver.report.sections import FamilySection
 from tests.report.test_report import CHECK, verdict
 from tests.report.verdicts import record
 
@@ -67,6 +69,17 @@ def test_an_estimate_of_nothing_keeps_all_digits_of_doubles(tmp_path):
 def test_work_left_out_is_counted_by_family(rows):
     found = overview.left_out_by_family(rows, ["status", "quadrature"])
     assert found == {"fam": (3, [2, 0]), "other": (1, [0, 0])}
+
+
+@pytest.mark.parametrize(("status", "is_one"), [([1, 1], True), ([0, 1], False), ([0, 0], False)])
+def test_a_column_of_ones_is_left_out(tmp_path, status, is_one):
+    section = FamilySection(Family("t", name="t"), [row("a", tmp_path, status=status)], tmp_path, False)
+    assert section.is_one("status") == is_one
+
+
+def test_round_off_of_a_gap_is_zero():
+    assert formats.both([-1e-16, 2e-16], 50.0) == ["0"]
+    assert formats.both([1e-9, 0.5], 50.0) == ["1.0e-09", "0.5"]
 
 
 def test_without_solves_there_is_nothing_to_show():
