@@ -129,7 +129,7 @@ def _add_cases(commands: Any) -> None:
     command.add_argument("--mesh", action="store_true", help="also mesh them and check the groups")
 
     command = add_command(commands, "mesh", _mesh, "write the mesh of a case, after its transform")
-    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument("case", type=Path, metavar="CASE", help="a case file, or a name")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="MESH")
 
     command = add_command(commands, "solve", _solve, "solve a case and check it")
@@ -228,7 +228,8 @@ def _mesh(options: argparse.Namespace) -> int:
     from ..mesh import write_mesh
     from ..verification.run import mesh_of
 
-    write_mesh(mesh_of(load_case(options.case), limited=True), options.output)
+    file, _ = _named(options.case)
+    write_mesh(mesh_of(load_case(file), limited=True), options.output)
     return PASSED
 
 
@@ -237,10 +238,16 @@ def _job(options: argparse.Namespace) -> "Job":
 
     given = vars(options)
     chosen = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
-    if options.case.suffix or options.case.exists():
-        return Job(swapped=options.swap, **chosen)
-    found = jobs.find_job(str(options.case), cases_folder())
-    return Job(swapped=options.swap != found.swap, **chosen | {"case": Path(found.file)})
+    file, swapped = _named(options.case)
+    return Job(swapped=options.swap != swapped, **chosen | {"case": file})
+
+
+def _named(case: Path) -> tuple[Path, bool]:
+    """The file of a case that is given by its file or its name, and whether it is swapped."""
+    if case.suffix or case.exists():
+        return case, False
+    found = jobs.find_job(str(case), cases_folder())
+    return Path(found.file), found.swap
 
 
 def _solve(options: argparse.Namespace) -> int:

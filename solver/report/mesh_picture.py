@@ -1,4 +1,4 @@
-"""The picture of a mesh file: its outer faces or plane cells, and its groups of faces by colour."""
+"""The picture of a mesh file: its groups of cells and of faces by colour."""
 
 from itertools import cycle
 
@@ -20,15 +20,33 @@ _COLORS = ("#2a78d6", "#eb6834", "#1a936f", "#8a4fbf", "#c2a000", "#c23b6b", "#4
 
 
 def draw_mesh(mesh: meshio.Mesh, title: str) -> Markup:
-    """The mesh, its groups of faces in colour, with a legend; in 3D what the eye sees."""
-    drawing, points, groups = Drawing(WIDTH, HEIGHT, title), three(mesh.points), _face_groups(mesh)
+    """The mesh, its groups in colour, with a legend; in 3D what the eye sees.
+
+    Groups of cells are pale, the last one on top where they share cells.
+    """
+    drawing, points, dim = Drawing(WIDTH, HEIGHT, title), three(mesh.points), mesh.points.shape[1]
+    bodies = _groups(mesh, dim)
+    groups = bodies | _groups(mesh, dim - 1)
     screen = FLAT if mesh.points.shape[1] == 2 else axonometry(np.eye(3)[2])
     view = View.of(drawing, screen, points @ screen.T, _FRAME)
     colors = dict(zip(groups, cycle(_COLORS), strict=False))
-    shades = [mixed(MUTED, PAPER, 0.85), *(mixed(color, PAPER, 0.4) for color in colors.values())]
-    rings = [(outlines(points, kind, nodes), 0) for kind, nodes in outside(mesh)]
+    pale = [0.8 if name in bodies else 0.4 for name in groups]
+    shades = [
+        mixed(c, PAPER, p) for c, p in zip((MUTED, *colors.values()), (0.85, *pale), strict=True)
+    ]
+    parts = {0: mesh.cells if not bodies else []}
+    parts |= dict(enumerate(bodies.values(), 1))
+    taken = [face for name, own in groups.items() if name not in bodies for face in own]
+    rings = [
+        (outlines(points, kind, _without(kind, nodes, taken)), n)
+        for n, own in parts.items()
+        for kind, nodes in outside(meshio.Mesh(mesh.points, list(own)))
+    ]
     faces = [
-        (outlines(points, k, f), n) for n, own in enumerate(groups.values(), 1) for k, f in own
+        (outlines(points, k, f), n)
+        for n, own in enumerate(groups.values(), 1)
+        for k, f in own
+        if n > len(bodies)
     ]
     solid = [(ring, np.full(len(ring), n)) for ring, n in [*rings, *faces] if ring.shape[1] > 2]
     view.faces(solid, lambda level, light: lit(shades[level], level, light), MUTED, not view.solid)
@@ -43,9 +61,19 @@ def draw_mesh(mesh: meshio.Mesh, title: str) -> Markup:
     return drawing.svg()
 
 
-def _face_groups(mesh: meshio.Mesh) -> dict[str, list[tuple[str, np.ndarray]]]:
-    """Faces of each group that has some, by type."""
-    dim = mesh.points.shape[1] - 1
+def _without(kind: str, nodes: np.ndarray, taken: list[tuple[str, np.ndarray]]) -> np.ndarray:
+    """Faces of a type (n, n_nodes) without those that are in a group: they have its colour."""
+
+    def keys(faces: np.ndarray) -> np.ndarray:
+        whole = np.ascontiguousarray(np.sort(faces, axis=1))
+        return whole.view([("", whole.dtype)] * whole.shape[1]).ravel()
+
+    others = [faces for other, faces in taken if BY_MESHIO[other].name == kind]
+    return nodes[~np.isin(keys(nodes), keys(np.concatenate(others)))] if others else nodes
+
+
+def _groups(mesh: meshio.Mesh, dim: int) -> dict[str, list[tuple[str, np.ndarray]]]:
+    """Cells of a dimension in each group that has some, by type."""
     found: dict[str, list[tuple[str, np.ndarray]]] = {}
     for name, parts in mesh.cell_sets.items():
         for block, part in zip(mesh.cells, parts, strict=True):

@@ -73,7 +73,9 @@ def test_work_left_out_is_counted_by_family(rows):
 
 @pytest.mark.parametrize(("status", "is_one"), [([1, 1], True), ([0, 1], False), ([0, 0], False)])
 def test_a_column_of_ones_is_left_out(tmp_path, status, is_one):
-    section = FamilySection(Family("t", name="t"), [row("a", tmp_path, status=status)], tmp_path, False)
+    section = FamilySection(
+        Family("t", name="t"), [row("a", tmp_path, status=status)], tmp_path, False
+    )
     assert section.is_one("status") == is_one
 
 
