@@ -249,6 +249,17 @@ def test_a_basis_that_does_not_fit_is_refused(basis, message):
         contact.matrix(basis(contact.mesh), basis_on(lower))
 
 
+def test_two_contacts_that_cut_one_mesh_are_refused():
+    """The second cut makes the mesh of the first stale: its basis is on another mesh."""
+    lower, upper = good()
+    halves = {"left": lambda x: np.isclose(x[1], 25) & (x[0] < 17), "side": lambda x: x[0] == 0}
+    upper = upper.with_boundaries(halves)
+    first = LocalAverageContact((upper, "left"), (lower, "top"))
+    second = LocalAverageContact((first.mesh, "bottom"), (lower, "top"))
+    with pytest.raises(ValueError, match="the mesh after the cut"):
+        first.matrix(basis_on(second.mesh), basis_on(lower))
+
+
 def test_a_body_that_moves_freely_ends_in_one_line():
     lower, upper = good()
     contact = LocalAverageContact((upper, "bottom"), (lower, "top"))
