@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from solver.case.material import Material
 from solver.case.reader import load_case
@@ -112,7 +113,9 @@ def test_displacements_converge_with_every_treatment(treatment):
     found = []
     for factor in (1, 2):
         case = refined(load_case(CASES / "manufactured/tria3.yaml"), factor)
-        case = replace(case, zones=tuple(replace(z, treatment=treatment) for z in case.zones))
+        case = replace(
+            case, zones=tuple(structs.replace(z, treatment=treatment) for z in case.zones)
+        )
         solution = simulate(case, mesh_of(case))
         found.append(errors(solution)["displacement_l2"])
         assert solution.zones[0].closed.all()
