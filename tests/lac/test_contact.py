@@ -1,9 +1,7 @@
 """LAC on scikit-fem's meshes: exact on every pair, equal to the batch, refused in one line."""
 
-import runpy
 import subprocess
 import sys
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,46 +13,9 @@ from solver.lac import LocalAverageContact
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.facets import facets
 from solver.lac.operator import gap_operator
+from tests.lac.blocks import FORM, PAIRS, basis_on, block, pressed
 
 ROOT = Path(__file__).resolve().parents[2]
-FORM = linear_elasticity(*lame_parameters(2000.0, 0.3))
-MESHES = {
-    2: [skfem.MeshTri1, skfem.MeshTri2, skfem.MeshQuad1, skfem.MeshQuad2],
-    3: [skfem.MeshTet1, skfem.MeshTet2, skfem.MeshHex1, skfem.MeshHex2],
-}
-PAIRS = [(dim, *pair) for dim, kinds in MESHES.items() for pair in product(kinds, repeat=2)]
-
-
-def block(kind, dim, n, low, size=50.0):
-    """A block of n cells each way that stands on the height `low`, half as high as wide."""
-    levels = n if dim == 2 else 1
-    axes = [np.linspace(0, size, n + 1)] * (dim - 1)
-    axes.append(np.linspace(low, low + size / 2, levels + 1))
-    linear = next(k for k in MESHES[dim] if issubclass(kind, k))
-    mesh = linear.init_tensor(*axes)
-    mesh = mesh if kind is linear else kind.from_mesh(mesh)
-    sides = {
-        "bottom": lambda x: np.isclose(x[-1], low),
-        "top": lambda x: np.isclose(x[-1], low + size / 2),
-    }
-    sides |= {f"side{k}": lambda x, k=k: np.isclose(x[k], 0) for k in range(dim - 1)}
-    return mesh.with_boundaries(sides)
-
-
-def basis_on(mesh):
-    return skfem.Basis(mesh, skfem.ElementVector(mesh.elem()))
-
-
-def pressed(contact, lower, dim, load=lambda x: 25.0 + 0 * x[0]):
-    """The state of two blocks, the upper one pressed by `load`, and both bases."""
-    a, b = basis_on(contact.mesh), basis_on(lower)
-    K = skfem.bmat([[FORM.assemble(a), None], [None, FORM.assemble(b)]], "csr")
-    push = skfem.LinearForm(lambda v, w: -load(w.x) * v[dim - 1])
-    f = np.concatenate([push.assemble(a.boundary("top")), b.zeros()])
-    held = [a.get_dofs(f"side{k}").all(f"u^{k + 1}") for k in range(dim - 1)]
-    held += [a.N + b.get_dofs(f"side{k}").all(f"u^{k + 1}") for k in range(dim - 1)]
-    held.append(a.N + b.get_dofs("bottom").all(f"u^{dim}"))
-    return contact.solve(K, f, contact.matrix(a, b), D=np.concatenate(held)), a, b
 
 
 @pytest.mark.parametrize(
@@ -357,51 +318,3 @@ def test_it_needs_nothing_else_of_the_program():
         print(ours, {{"meshio", "gmsh", "h5py", "msgspec", "numba"}} & {{*sys.modules}})"""
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.stdout.strip() == "set() set()", done.stderr
-
-
-def run(name):
-    return runpy.run_path(str(ROOT / "docs" / "examples" / "lac" / f"{name}.py"))
-
-
-def test_the_example_of_the_patch_test():
-    assert run("ex01_patch")["state"].pressure == pytest.approx([25.0] * 6, rel=1e-12)
-
-
-def test_the_example_of_hertz():
-    space = run("ex02_hertz")
-    _, pressure, coarse = space["hertz"](6)
-    _, finer, fine = space["hertz"](10)
-    assert np.log(coarse / fine) / np.log(10 / 6) > 0.6
-    for found in (pressure, finer):
-        assert found.max() == pytest.approx(space["P0"], rel=0.02)
-
-
-@pytest.mark.parametrize("name", ["ex01_patch", "ex02_hertz", "ex03_opening", "ex04_method"])
-def test_the_examples_have_pictures(name, monkeypatch):
-    monkeypatch.setenv("MPLBACKEND", "agg")
-    ax = run(name)["visualize"]()
-    assert ax.lines or ax.patches or ax.collections
-    lines = (ROOT / f"docs/examples/lac/{name}.py").read_text().count("\n")
-    assert lines <= (150 if name == "ex04_method" else 80)
-
-
-def test_the_example_that_opens_balances_its_forces():
-    space = run("ex03_opening")
-    assert 0 < space["state"].closed.sum() < 40
-    assert space["force"] + space["supports"] == pytest.approx(0.02 * 40, rel=1e-9)
-
-
-def test_the_method_in_one_file_is_the_package():
-    space = run("ex04_method")
-    upper, lower = space["upper"], space["lower"]
-    contact = LocalAverageContact((upper, "low"), (lower, "high"))
-    a, b = basis_on(contact.mesh), basis_on(lower)
-    K = skfem.bmat([[FORM.assemble(a), None], [None, FORM.assemble(b)]], "csr")
-    top = contact.mesh.facets_satisfying(lambda x: (x[1] == 1.0) & (x[0] < 2.0))
-    push = skfem.LinearForm(lambda v, w: -25.0 * v[1])
-    f = np.concatenate([push.assemble(a.boundary(top)), b.zeros()])
-    held = a.get_dofs("left").all("u^1"), a.N + b.get_dofs("left").all("u^1")
-    D = np.concatenate([*held, a.N + b.get_dofs("low").all("u^2")])
-    state = contact.solve(K, f, contact.matrix(a, b), D=D)
-    assert 0 < state.closed.sum() < 14
-    assert state.pressure == pytest.approx(space["pressure"], abs=1e-12 * 25)
