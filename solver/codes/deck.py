@@ -197,9 +197,11 @@ def _paired(case: Case, mesh: meshio.Mesh, number: int, flat: int) -> PairedFace
 
 def face_size(deck: Deck) -> float:
     """The size of a slave face, the median: a length, or the root of an area."""
-    sizes = [np.zeros(0)]
+    if not deck.pairs:
+        return 0.0
+    sizes = []
     for block in (block for pair in deck.pairs for block in pair.slave):
         corner = deck.points[block.nodes[:, : block.type.n_vertices]]
         area = np.linalg.norm(np.ptp(corner, axis=1), axis=1) / np.sqrt(block.type.dim)
         sizes.append(area)
-    return float(np.median(np.concatenate(sizes))) if len(sizes) > 1 else 0.0
+    return float(np.median(np.concatenate(sizes)))

@@ -154,7 +154,8 @@ class LocalAverageContact:
             raise ValueError("slave, master: the meshes must be of one dimension")
         if slave[0] is master[0] and slave[1] == master[1]:
             raise ValueError(f"master = {master[1]!r}: must be another boundary than the slave")
-        self.mesh, faces = cut_mesh(*slave)
+        whole = read_faces(*slave, "slave")
+        self.mesh, faces = cut_mesh(*slave, whole)
         self._whole = master[0] is slave[0]
         self._master = self.mesh if self._whole else master[0]
         other = read_faces(self._master, master[1], "master")
@@ -162,19 +163,19 @@ class LocalAverageContact:
         points = self.mesh.p.T if self._whole else np.hstack([self.mesh.p, master[0].p]).T
         count = int(faces.macro.max()) + 1
         slaves = [facets(points, faces.type, faces.nodes, faces.macro)]
-        masters = [facets(points, other.type, other.nodes + first, other.number * 0)]
+        masters = [facets(points, other.type, other.nodes + first, np.zeros_like(other.number))]
         if normal == "nodal":
             slaves = with_nodal_normals(slaves, points)
         elif normal == "master":
             slaves = with_master_normals(slaves, masters, points)
         self._surfaces = slaves, masters, count, len(points), search
-        whole = read_faces(*slave, "slave")
         self._vertices, self._order = whole.nodes[:, : whole.type.n_vertices], whole.type.order
         self._unknown = np.zeros(0, dtype=int)
         operator = gap_operator(*self._surfaces)
         self._matrix = operator.matrix
         self.area, self.covered = operator.area, operator.covered
-        if not (self.covered > _COVERED * self.area).any():
+        self._opposed = self.covered > _COVERED * self.area
+        if not self._opposed.any():
             raise ValueError(f"slave = {slave[1]!r}: no facet of {master[1]!r} is opposite to it")
         self.initial = operator.initial if gap is None else self._given(slaves, points, gap)
 
@@ -235,8 +236,8 @@ class LocalAverageContact:
             Where a body may move freely, and where no status fulfils the conditions.
         """
         system = _System(self, K.tocsr(), np.asarray(f, dtype=float), B, x, D)
-        touching = self.covered > _COVERED * self.area
-        found = find_status(system.trial, touching, touching, self.area, system.stiffness)
+        opposed = self._opposed
+        found = find_status(system.trial, opposed, opposed, self.area, system.stiffness)
         return system.state(found.closed, found.iterations)
 
     def recover(self, state: ContactState, form: Recovered = "automatic") -> RecoveredState:
@@ -262,18 +263,17 @@ class LocalAverageContact:
         assert recovery is not None
         system, closed, size = state._system, state.closed, len(state._system.force)
         added = _numbered(recovery.loads, self._unknown, size).T
-        touching = self.covered > _COVERED * self.area
         for _ in range(_ROUNDS):
             fit = recovery.reconstruction(closed).matrix
             means = system.settled(closed, added @ fit, shape.sweeps)
             corrected = system.under(added @ (fit @ means))
             found = corrected.trial(closed)
-            if not (touching & (found.violation(closed) > 1)).any():
+            if not (self._opposed & (found.violation(closed) > 1)).any():
                 applied = shape.degree == 2 and shape.keeps_means
                 coefficients = fit @ (means if applied else found.pressure)
                 settled = corrected.state(closed, state.iterations)
                 return RecoveredState(settled, recovery.error(coefficients), recovery, coefficients)
-            settling = corrected.trial, closed, touching, self.area, corrected.stiffness
+            settling = corrected.trial, closed, self._opposed, self.area, corrected.stiffness
             closed = find_status(*settling).closed
         raise SolveError("the contact status does not settle under the recovered pressure")
 
@@ -362,7 +362,7 @@ class _System:
         free, covered = len(self.free), self.contact.covered
         pressure = np.zeros(len(closed))
         pressure[closed] = -self.scale * found[free:]
-        seen = np.where(covered > _COVERED * self.contact.area, covered, np.inf)
+        seen = np.where(self.contact._opposed, covered, np.inf)
         self.displacement = self.imposed.copy()
         self.displacement[self.free] = found[:free]
         least = _ROUND_OFF * np.ones(len(closed))
@@ -375,8 +375,7 @@ class _System:
 
     def stiffness(self) -> np.ndarray:
         """The forces (e, e) on eligible facets that their average gaps bring up, one at a time."""
-        covered, area = self.contact.covered, self.contact.area
-        eligible = covered > _COVERED * area
+        covered, area, eligible = self.contact.covered, self.contact.area, self.contact._opposed
         factor, _ = self._factor(eligible)
         count = int(eligible.sum())
         right = np.zeros((len(self.free) + count, count))

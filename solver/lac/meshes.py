@@ -77,13 +77,14 @@ def read_faces(mesh: skfem.Mesh, names: Names, role: str) -> FaceBlock:
     return FaceBlock(face, nodes, np.arange(len(facets)), kind, cell, side)
 
 
-def cut_mesh(mesh: skfem.Mesh, names: Names) -> tuple[skfem.Mesh, SubFaces]:
+def cut_mesh(mesh: skfem.Mesh, names: Names, faces: FaceBlock) -> tuple[skfem.Mesh, SubFaces]:
     """The mesh after the cut, boundaries and subdomains carried over, and its slave sub-faces.
+
+    `faces` are those of `read_faces` at these boundaries.
 
     Each is of the facet, by its place in the boundaries, that its `macro` names. Facets that have a
     node inside, those of MeshQuad2 and MeshHex2, need no cut: the mesh is returned as it is.
     """
-    faces = read_faces(mesh, names, "slave")
     if not needs_cut(faces.type.name):
         return mesh, SubFaces(faces.type, faces.nodes, faces.number)
     kind, order, cells = read_cells(mesh)
@@ -111,7 +112,7 @@ def cut_mesh(mesh: skfem.Mesh, names: Names) -> tuple[skfem.Mesh, SubFaces]:
 
 
 def _facets_at(mesh: skfem.Mesh, corners: np.ndarray) -> np.ndarray:
-    """The number (n,) of the facet with each set of corners (n, k), or −1 if there is none."""
+    """For each set of corners (n, k), the number of the facet that has them; −1 where none has."""
     rows = np.concatenate([np.sort(mesh.facets.T), np.sort(corners)])
     label = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
     place = np.full(label.max() + 1, -1)

@@ -49,10 +49,11 @@ def drawn(rows: Sequence[Row]) -> list[Row]:
 def floor(rows: Sequence[Row]) -> tuple[float, float] | None:
     """The round-off floor, ε and ε√N for the largest N unknowns; None where no solve is near it."""
     near = any(row.accuracy and row.accuracy[0] < _NEAR for row in rows)
-    return round_off(_unknowns(rows)) if near else None
+    return round_off(unknowns(rows)) if near else None
 
 
-def _unknowns(rows: Sequence[Row]) -> int:
+def unknowns(rows: Sequence[Row]) -> int:
+    """The unknowns of the largest of these solves."""
     return max((row.verdict.dofs or 1 for row in rows), default=1)
 
 
@@ -60,30 +61,47 @@ def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Cha
     """Marks of all solves with lines for the tolerance, the reference code and round-off."""
     shown = drawn(rows)
     records = [mark(row) for row in shown]
-    found = {record["series"] for record in records}
     allowed = sorted({row.allowed for row in shown if row.allowed})
     shares = [*(record["error"] for record in records), *allowed]
     low = EPSILON / 8 if floor(shown) else min(shares) / 3
     top = max(1e-2, 3 * max(shares))
-    levels: list[Spec] = [floor_band(_unknowns(shown))] if floor(shown) else []
+    levels: list[Spec] = [floor_band(unknowns(shown))] if floor(shown) else []
     for value, above in zip(allowed, [*allowed[1:], float("inf")], strict=bool(allowed)):
         apart = above > value * (top / low) ** _APART
         levels.append(level(value, f"tolerance {formats.error(value)}" if apart else "", RED))
     for code in reference_code:
         label = f"{code.name} {code.version}: {formats.error(code.error)}"
         levels.append(level(code.error, label, MUTED, (6, 4)))
+    return against_time(
+        records,
+        domain=(low, top),
+        tips=("case", "check", "verdict", "stages"),
+        layers=levels,
+        size=(900, 400),
+    )
+
+
+def against_time(
+    records: Sequence[dict[str, Any]],
+    domain: tuple[float, float],
+    tips: Sequence[str],
+    layers: Sequence[Spec],
+    size: tuple[int, int],
+) -> Chart:
+    """The errors of `mark`s over their run times; pointed at, each shows the fields of `tips`."""
+    found = {record["series"] for record in records}
     return series_chart(
         "error-against-time",
         "Worst error of every solve against its run time",
         records,
         Axis("seconds", "wall time of the solve, s", log=True),
-        Axis("error", "worst relative error", log=True, domain=(low, top)),
+        Axis("error", "worst relative error", log=True, domain=domain),
         {name: look for name, look in LOOKS.items() if name in found},
         lines=False,
-        tips={"case": "case", "check": "check", "verdict": "verdict", "stages": "stages"},
-        layers=levels,
-        width=900,
-        height=400,
+        tips={name: name for name in tips},
+        layers=layers,
+        width=size[0],
+        height=size[1],
     )
 
 

@@ -1,7 +1,6 @@
 """The first screen of the report: how well, error against run time, digits kept, work left out."""
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -20,8 +19,8 @@ from .charts import (
     level,
     series_chart,
 )
-from .errors import LOOKS, address, drawn, mark
-from .rows import Row, ours
+from .errors import address, against_time, drawn, mark, unknowns
+from .rows import Row, families, ours
 
 _DIMENSIONS = {2: "2D", 3: "3D"}
 _DIGITS_OF_DOUBLE = -math.log10(EPSILON)
@@ -68,21 +67,13 @@ def error_chart(rows: Sequence[Row]) -> Chart | None:
     if not shown:
         return None
     records = [mark(row) for row in shown]
-    unknowns = max((row.verdict.dofs or 1 for row in shown), default=1)
     errors = [record["error"] for record in records]
-    found = {record["series"] for record in records}
-    chart = series_chart(
-        "error-against-time",
-        "Worst error of every solve against its run time",
+    chart = against_time(
         records,
-        Axis("seconds", "wall time of the solve, s", log=True),
-        Axis("error", "worst relative error", log=True, domain=(min(errors) / 3, max(errors) * 3)),
-        {name: look for name, look in LOOKS.items() if name in found},
-        lines=False,
-        tips={"case": "case", "check": "check", "family": "family", "cells": "cells"},
-        layers=[floor_band(unknowns)],
-        width=1200,
-        height=330,
+        domain=(min(errors) / 3, max(errors) * 3),
+        tips=("case", "check", "family", "cells"),
+        layers=[floor_band(unknowns(shown))],
+        size=(1200, 330),
     )
     families = list(dict.fromkeys(str(record["family"]) for record in records))
     cells = sorted({name for row in shown for name in row.tags["cells"]})
@@ -152,11 +143,9 @@ def left_out_by_family(
     """By family: how many solves, and how many of them left out the work of each switch."""
     found: dict[str, tuple[int, list[int]]] = {}
     solved = [row for row in ours(rows) if row.verdict.dofs]
-    for family, count in Counter(row.group for row in solved).items():
-        mine = [
-            {s for line in r.verdict.plan for s in line[2:]} for r in solved if r.group == family
-        ]
-        found[family] = count, [sum(switch in used for used in mine) for switch in switches]
+    for family, mine in families(solved).items():
+        left = [{switch for line in row.verdict.plan for switch in line[2:]} for row in mine]
+        found[family] = len(mine), [sum(switch in used for used in left) for switch in switches]
     return found
 
 

@@ -123,7 +123,7 @@ def _corrected(
         lambda force: problem.pressure_change(state.status.closed, force),
     )
     applied = [zone.coefficients(pressure) for zone in zones]
-    added = loads(pressure)
+    added = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
     correction = np.sum(added, axis=0).reshape(state.correction.shape)
     state = problem.corrected(state, correction)
     read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
