@@ -158,6 +158,9 @@ class MaterialKeys(Section, frozen=True):
             raise FieldError(("poisson",), "must be greater than 0 in the mixed form")
 
 
+Coefficient = Annotated[float, Meta(ge=0, le=10, description="a number from 0 to 10")]
+
+
 class ZoneKeys(Section, frozen=True):
     """A contact zone.
 
@@ -172,6 +175,7 @@ class ZoneKeys(Section, frozen=True):
     recovery: how a pressure of higher order is recovered from the constants
     sweeps: solves with the loads of the recovered pressure; each brings it nearer to their limit
     stabilised: contact gives way to pressures that scatter from face to face
+    friction: Coulomb's coefficient of friction; the steps are then a path
     interference: initial overlap of bodies that are modelled without it; subtracted from the gap
     clearance: the initial gap, which replaces the gap between the meshed faces
     """
@@ -187,6 +191,7 @@ class ZoneKeys(Section, frozen=True):
     recovery: Literal["none", "linear", "quadratic", "smooth", "automatic"] = "none"
     sweeps: Annotated[int, Meta(ge=2, le=100, description="a number from 2 to 100")] | None = None
     stabilised: bool = False
+    friction: Coefficient = 0.0
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
     clearance: Scalar | None = None
@@ -303,8 +308,8 @@ _TOLERANCE = (
     "numbers"
 )
 _OUT_OF_SCOPE = {
-    "friction is out of scope: frictionless contact only": (
-        "friction", "mu", "coulomb", "friction_coefficient", "stick"),
+    "the coefficient of friction is the key friction of a contact zone": (
+        "mu", "coulomb", "friction_coefficient", "stick"),
     "the keys of a material are young and poisson": ("e", "youngs_modulus", "nu", "poissons_ratio"),
     "contact that holds in tension is out of scope: it may open": (
         "tied", "glue", "glued", "bonded", "adhesion", "cohesive"),

@@ -24,6 +24,7 @@ from .partners import on_one_surface, uncovered
 from .recovery import Recovery, RecoveryRequest, recovery
 from .segments import Segments, intersect
 from .surface_points import Samples, Surface, face_samples
+from .tangential import slip_operator
 
 # Slave-side entries of nodal multipliers below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
@@ -44,7 +45,7 @@ class GapOperator:
     on how many faces the closure of integrals was used; `plain`: whether plain Gauss rules are
     exact on all of them. `at_nodes` (n, k): the values at `nodes`, then (n,), by multiplier, where
     some nodes have no multiplier of their own. `recovery`: what recovers the pressure, if asked
-    for.
+    for. `slip`: the `slip_operator` by tangent, if asked for.
     """
 
     matrix: sparse.csr_matrix
@@ -59,6 +60,7 @@ class GapOperator:
     plain: bool = False
     at_nodes: sparse.csr_matrix | None = None
     recovery: Recovery | None = None
+    slip: tuple[sparse.csr_matrix, ...] = ()
 
 
 def meet_in_segments(
@@ -93,7 +95,7 @@ class Scheme:
     `sample` gives points that measure whole slave faces, `meet` those where the surfaces meet,
     `space` the multipliers. `nearest`: the master has faces, and a macro-element meets the nearest
     surface of them. `lost`: measures the area that has no partner there, from slaves, masters,
-    samples, segments, the reach and the number of macro-elements.
+    samples, segments, the reach and the number of macro-elements. `slip`: the slip is measured too.
     """
 
     sample: Callable[[list[Facets]], list[Samples]] = face_samples
@@ -102,6 +104,7 @@ class Scheme:
     closure: bool = True
     nearest: bool = True
     lost: Callable[..., np.ndarray] | None = None
+    slip: bool = False
 
 
 LAC = Scheme()
@@ -167,6 +170,7 @@ def gap_operator(
         closed_faces=closed,
         plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
         recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
+        slip=slip_operator(parts, surface.normal, n_nodes) if scheme.slip else (),
     )
 
 

@@ -237,13 +237,15 @@ def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) 
     forces, known = np.repeat(_rounding_of_forces(iterate), dim), _rounding_of_gaps(iterate)
     moving, limit = constraints.moving, np.zeros(len(pressure))
     for zone in scene.zones:
-        mine, rows = zone.numbers, moving[zone.numbers]
+        mine = zone.numbers
         places = constraints.gaps[mine].indices
         stress = iterate.sizes.stress[places // dim].max(initial=0.0)
         scale = max(float(np.abs(pressure[mine]).max(initial=0.0)), float(stress))
         noise = forces + unbalanced[places].max(initial=0.0)
-        error = pressure_of_forces(rows, noise) + pressure_of_gaps(rows, known[mine], diagonal)
-        limit[mine] = _NOISE * scale + _ERRORS * error
+        for rows in (mine, *zone.slips):
+            error = pressure_of_forces(moving[rows], noise)
+            error += pressure_of_gaps(moving[rows], known[rows], diagonal)
+            limit[rows] = _NOISE * scale + _ERRORS * error
     motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)
     covered = np.where(constraints.eligible, constraints.covered, np.inf)
     return Trial(

@@ -29,7 +29,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     contact = np.zeros_like(points)
     by_zone = {}
     for zone in scene.zones:
-        forces = (zone.operator.matrix.T @ state.pressure[zone.numbers]).reshape(points.shape)
+        forces = zone.forces(state.pressure).reshape(points.shape)
         by_zone[zone.zone.name] = forces
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
@@ -93,8 +93,7 @@ def _contact(scene: Scene, state: Equilibrium) -> np.ndarray:
     """The contact forces (n, dim) of all zones."""
     contact = state.correction.copy()
     for zone in scene.zones:
-        force = zone.operator.matrix.T @ state.pressure[zone.numbers]
-        contact += force.reshape(contact.shape)
+        contact += zone.forces(state.pressure).reshape(contact.shape)
     return contact
 
 
@@ -206,8 +205,10 @@ def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | N
     determined[alone.indices[np.abs(alone.data) > _OWN]] = True
     if not determined.all():
         return nothing
-    known = state.force + state.correction
-    forces = rows @ (state.iterate.internal - known).astype(float).ravel()
+    known = (state.force + state.correction).ravel()
+    for zone in scene.zones:
+        known = known + zone.tangential_forces(state.pressure)
+    forces = rows @ (state.iterate.internal.ravel() - known).astype(float)
     matrix = integrals.T @ integrals + sparse.diags_array((size == 0).astype(float))
     pressure = factorise(matrix).solve(integrals.T @ forces) * scale
     return list(np.split(pressure, np.cumsum([zone.count for zone in scene.zones])[:-1]))

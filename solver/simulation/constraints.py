@@ -1,4 +1,4 @@
-"""The contact constraints of a scene: one row for each multiplier of all zones."""
+"""The contact constraints of a scene: a row for each multiplier of all zones, then for slips."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,8 +9,9 @@ from scipy import sparse
 from ..mechanics.fem.bodies import support_resistance, unheld_motion
 from ..mechanics.linear.condensation import choose_pivots
 from ..system.errors import InputError
+from .frames import without_round_off
 from .naming import body_names
-from .scene import Scene
+from .scene import Scene, ZoneScene
 
 # A macro-element covered by less than this share of its area is out of contact.
 MIN_COVERAGE = 0.01
@@ -22,12 +23,13 @@ _TWICE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class ContactConstraints:
-    """∫ gap = initial + gaps · u, seen by k multipliers.
+    """∫ gap = initial + gaps · u, seen by k multipliers; then ∫ slip along tangents, with friction.
 
     `gaps` (k, n_dofs); `on_free` (k, n_free) the same on free unknowns; `initial` (k,); `area`,
     `covered` (k,) whole and intersected; `eligible` (k,) may close; `inactive_multipliers` (k,)
     move nothing; `own` (n_free,) marks the free unknowns of slave nodes, `moving` (k, n_dofs) has
-    the coefficients of `gaps` on what supports leave free there.
+    the coefficients of `gaps` on what supports leave free there. `normal` (k,): not of slip;
+    `unloaded` (k,): see `Unloaded`.
     """
 
     gaps: sparse.csr_matrix
@@ -39,6 +41,13 @@ class ContactConstraints:
     inactive_multipliers: np.ndarray
     moving: sparse.csr_matrix
     own: np.ndarray
+    normal: np.ndarray
+    unloaded: np.ndarray
+
+    @property
+    def closable(self) -> np.ndarray:
+        """The multipliers (k,) of gaps that may close."""
+        return self.eligible & self.normal
 
     @cached_property
     def dependent(self) -> np.ndarray:
@@ -51,19 +60,28 @@ def contact_constraints(scene: Scene) -> ContactConstraints:
     """Those of all zones; raises InputError where a zone cannot be in contact."""
     operators = [zone.operator for zone in scene.zones]
     empty = sparse.csr_matrix((0, scene.n_dofs))
-    gaps = sparse.vstack([empty, *(o.matrix for o in operators)]).tocsr()
+    slips = [row for o in operators for row in o.slip]
+    gaps = sparse.vstack([empty, *(o.matrix for o in operators), *slips]).tocsr()
     on_free = (gaps @ scene.free.basis).tocsr()
+    if slips:
+        on_free = without_round_off(on_free)
+    repeated = [*operators, *(o for o in operators for _ in o.slip)]
     initial, area, covered = (
-        np.concatenate([np.empty(0), *(getattr(o, k) for o in operators)])
+        np.concatenate([np.empty(0), *(getattr(o, k) for o in repeated)])
         for k in ("initial", "area", "covered")
     )
+    normal = np.arange(len(area)) < scene.n_multipliers
+    initial = np.where(normal, initial, 0.0)
+    unloaded = np.zeros(len(area), dtype=bool)
+    unloaded[normal] = scene.rest.unloaded_multipliers
     touching = covered / area > MIN_COVERAGE
     _refuse_surfaces(scene, touching)
     # Supports may hold the nodes of both surfaces. Macro-elements that were cut to own a free
     # unknown all act, or are refused.
     active = _row_sizes(on_free) > _ACTIVE * _row_sizes(gaps)
     for zone in scene.zones:
-        active[zone.numbers] |= zone.treatment.cut
+        for rows in (zone.numbers, *zone.slips):
+            active[rows] |= zone.treatment.cut
     slave = _slave_dofs(scene)
     free = slave & (np.diff(scene.free.basis.indptr) > 0)
     moving = (gaps @ sparse.diags(free.astype(float))).tocsr()
@@ -74,10 +92,12 @@ def contact_constraints(scene: Scene) -> ContactConstraints:
         initial=initial,
         area=area,
         covered=covered,
-        eligible=touching & active & ~scene.rest.unloaded_multipliers,
+        eligible=touching & active & ~unloaded,
         inactive_multipliers=touching & ~active,
         moving=moving,
         own=np.asarray(abs(scene.free.basis).T @ slave.astype(float)) > 0,
+        normal=normal,
+        unloaded=unloaded,
     )
 
 
@@ -149,7 +169,7 @@ def refuse_unsolvable(scene: Scene, moves: str, constraints: ContactConstraints)
         raise InputError(scene.case.path, "supports", None, allowed)
     lost = constraints.dependent
     for zone in scene.zones:
-        mine = lost[(lost >= zone.numbers.start) & (lost < zone.numbers.stop)] - zone.first
+        mine = _macro_elements(zone, lost)
         if zone.treatment.cut and len(mine):
             place = zone.operator.surface.centre[mine[0]] + scene.origin
             at = ", ".join(f"{x:.6g}" for x in place)
@@ -158,6 +178,14 @@ def refuse_unsolvable(scene: Scene, moves: str, constraints: ContactConstraints)
                 f"{mine[0]}, at ({at})) have no free unknown of their own: {_holding(scene)}"
             )
             raise InputError(scene.case.path, "supports", None, allowed)
+
+
+def _macro_elements(zone: ZoneScene, rows: np.ndarray) -> np.ndarray:
+    """The macro-elements of a zone that some rows (n,) belong to."""
+    mine = [
+        rows[(rows >= r.start) & (rows < r.stop)] - r.start for r in (zone.numbers, *zone.slips)
+    ]
+    return np.unique(np.concatenate(mine))
 
 
 def _holding(scene: Scene) -> str:

@@ -26,7 +26,7 @@ def first_guess(
     while free_motion(guess) and nearer < _NEAREST:
         nearer *= _NEARER
         guess = _likely(scene, constraints, step, nearer)
-    return constraints.eligible if free_motion(guess) else guess
+    return constraints.closable if free_motion(guess) else guess
 
 
 def moved(
@@ -51,7 +51,7 @@ def _likely(
     scene: Scene, constraints: ContactConstraints, step: Step, nearer: float = 1.0
 ) -> np.ndarray:
     """See `likely_closed`, for bodies that loads bring so many times `nearer`."""
-    eligible = constraints.eligible
+    eligible = constraints.closable
     acting, offset = scene.acting(step)
     imposed = np.abs(offset).max(initial=0.0)
     moduli = 2 * np.concatenate([block.shear for block in scene.blocks])

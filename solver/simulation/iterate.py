@@ -68,7 +68,7 @@ class ContactIterate:
     @property
     def gap(self) -> np.ndarray:
         """The average gap (k,); zero for multipliers that are out of contact."""
-        known = self.constraints.eligible | self.scene.rest.unloaded_multipliers
+        known = self.constraints.eligible | self.constraints.unloaded
         covered = np.where(known, self.constraints.covered, np.inf)
         return (self.constraints.initial + self._opening(self.constraints.gaps)) / covered
 

@@ -46,7 +46,8 @@ def operator_of(
     if zone.normal == "nodal":
         slaves = with_nodal_normals(slaves, points)
     scheme = scheme_of(zone.treatment, zone.points)
-    scheme = replace(scheme, closure=scheme.closure and options.safeguards.closure)
+    closure = scheme.closure and options.safeguards.closure
+    scheme = replace(scheme, closure=closure, slip=zone.friction > 0)
     if surface := quadric_of(groups.case, zone.master, groups.origin):
         masters = [frame(points, groups.nodes(zone.master, "contact"))]
         if zone.normal == "master":

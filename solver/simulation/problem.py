@@ -10,6 +10,7 @@ from scipy import sparse
 
 from ..case.model import Step
 from ..lac.errors import SolveError
+from ..lac.friction import Slip
 from ..lac.status import StatusResult, Trial, find_status
 from ..mechanics.fem.bodies import (
     rigid_motions,
@@ -17,6 +18,7 @@ from ..mechanics.fem.bodies import (
 )
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ..mechanics.linear.stabilised import Compliance
+from ..mechanics.linear.stiffened import Stiffness
 from ..mechanics.linear.systems import Systems, parts_of
 from ..system.memory import release
 from .accuracy import Accuracy, Roughness, estimate, judged, roughness
@@ -58,13 +60,32 @@ _ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
 _AT_ONCE = 1 << 23
 
 
+@dataclass(frozen=True)
+class Friction:
+    """The state of friction after a step.
+
+    `slip`: see `lac.friction`; `slipping` (k,) of the multipliers of gaps; `jump`, `total` (k,) in
+    the rows of slip: the mean jump between the surfaces, and what they slipped in all steps;
+    `dissipation`: the work of friction in this step, `contraction`: by what the last iteration
+    changed the bounds, over the one before (0: not at all).
+    """
+
+    slip: Slip
+    slipping: np.ndarray
+    jump: np.ndarray
+    total: np.ndarray
+    dissipation: float
+    contraction: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Equilibrium:
     """A solved load factor: pressure (k,) and gap with their round-off, status, residual.
 
     `residual` is relative to `force_scale`, the size of the forces at work. Fields are those of the
     `iterate`. `correction` (n, dim) are the contact forces beside those of the pressures, of a
-    recovered pressure.
+    recovered pressure. With `friction`, the rows of slip have the tractions on the master as
+    pressures, and the slips of the step as gaps.
     """
 
     iterate: ContactIterate
@@ -74,6 +95,7 @@ class Equilibrium:
     force_scale: float
     accuracy: Accuracy
     correction: np.ndarray
+    friction: Friction | None = None
 
     @property
     def pressure(self) -> np.ndarray:
@@ -106,6 +128,7 @@ class ContactProblem:
         motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         self._motions = RigidMotions.of(scene, self.constraints, motions)
         self._moves: dict[bytes, str] = {}
+        self._without: tuple[Scene, Stiffness, Systems] | None = None
         refuse_unsolvable(scene, self._free_motion(self.constraints.eligible), self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
         loose = unsupported(motions, self._motions.supports)
@@ -128,7 +151,15 @@ class ContactProblem:
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
         soft = self._compliance if stabilised else None
-        self._systems = Systems(self.matrix, on_free, own, unknowns, self.parts, soft)
+        self._systems_of = partial(
+            Systems,
+            constraints=on_free,
+            own=own,
+            unknowns=unknowns,
+            parts=self.parts,
+            compliance=soft,
+        )
+        self._systems = self._systems_of(self.matrix)
 
     @cached_property
     def _rough(self) -> Roughness:
@@ -169,10 +200,9 @@ class ContactProblem:
         `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0, or a system
         is singular.
         """
-        scene, eligible = self.scene, self.constraints.eligible
+        scene, eligible = self.scene, self.constraints.closable
         if bilateral:
-            first = self._at_rest(eligible, step, correction)
-            return self._solve_closed(first, correction, _force_scale(first))
+            return self.equilibrium(step, eligible, correction)
         guess: Callable[[], np.ndarray] | None
         guess = partial(first_guess, scene, self.constraints, step, self._free_motion)
         if not scene.options.shortcuts.status:
@@ -206,8 +236,35 @@ class ContactProblem:
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
         status = find_status(attempt, start, eligible, area, stiffness, confirm, guess)
         trial = latest[0].trial
-        touching = scene.rest.unloaded_multipliers & (trial.gap <= trial.gap_limit)
+        touching = self.constraints.unloaded & (trial.gap <= trial.gap_limit)
         return replace(latest[0], status=replace(status, closed=status.closed | touching))
+
+    def equilibrium(
+        self, step: Step, closed: np.ndarray, correction: np.ndarray | float
+    ) -> Equilibrium:
+        """Equilibrium with the rows `closed` (k,) and no others, under further forces (n, dim)."""
+        first = self._at_rest(closed, step, correction)
+        return self._solve_closed(first, correction, _force_scale(first))
+
+    def count_slip_from(self, jump: np.ndarray) -> None:
+        """Slip is what the jump of displacement (k,) has more than this, in the rows of slip."""
+        constraints = self.constraints
+        initial = np.where(constraints.normal, constraints.initial, -jump * constraints.covered)
+        self.constraints = replace(constraints, initial=initial)
+
+    def hold_across(self, springs: sparse.csr_matrix | None) -> None:
+        """Add springs (n_dofs, n_dofs) to those of the scene, in place of any added before."""
+        if springs is None and self._without is None:
+            return
+        if self._without is None:
+            self._without = self.scene, self.matrix, self._systems
+        self.scene, self.matrix, self._systems = self._without
+        if springs is None:
+            self._without = None
+            return
+        self.scene = replace(self.scene, springs=self.scene.springs + springs)
+        self.matrix = self.matrix + self.scene.free.reduced(springs)
+        self._systems = self._systems_of(self.matrix)
 
     def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
         """The state with another `correction` (n, dim), its status kept.
@@ -358,7 +415,7 @@ class ContactProblem:
         """
         from scipy.optimize import nnls  # only where status search needs it: it loads slowly
 
-        eligible = self.constraints.eligible
+        eligible = self.constraints.closable
         push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
         # Up to round-off initial strain has no resultant.
         strained = self.scene.straining(step, self.scene.initial.force)
@@ -366,7 +423,11 @@ class ContactProblem:
         largest = np.abs(loads).max(initial=0.0)
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")
-        system, area = self._systems.factored(eligible), self.constraints.covered[eligible]
+        return self.stiffness_of(eligible)
+
+    def stiffness_of(self, rows: np.ndarray) -> np.ndarray:
+        """The forces (e, e) that average gaps and slips in e `rows` bring up, all others closed."""
+        system, area = self._systems.factored(rows), self.constraints.covered[rows]
         found, size = np.zeros((len(area), len(area))), self.matrix.shape[0]
         for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
             imposed = np.zeros((len(area), len(some)))

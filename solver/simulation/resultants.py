@@ -22,7 +22,7 @@ def resultants(
     """Area and edges of the `closed` macro-elements (m,), and the forces on the slave."""
     mean = zone.by_macro_element(state.pressure)
     edges, area = _extent(scene, zone, mean, closed)
-    forces = zone.operator.matrix.T @ state.pressure[zone.numbers]
+    forces = zone.forces(state.pressure)
     if field is not None:
         forces = forces + field.force
     nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
@@ -33,7 +33,26 @@ def resultants(
         moment=moment(scene, nodes, force),
         edges=edges,
         pressure=np.array([mean.min(), mean.max()]),
+        **_friction(scene, zone, state, mean, nodes),
     )
+
+
+def _friction(
+    scene: Scene, zone: ZoneScene, state: Equilibrium, mean: np.ndarray, nodes: np.ndarray
+) -> dict[str, np.ndarray]:
+    """The force of friction on the slave, and the area that sticks; nothing without friction.
+
+    What the traction leaves of the bound, μp − |q|, ends where slip begins, as a pressure ends
+    where contact does: the edge of the sticking area is found in the same way.
+    """
+    if not zone.slips or state.friction is None:
+        return {}
+    forces = zone.tangential_forces(state.pressure).reshape(scene.points.shape)
+    traction = np.linalg.norm([state.pressure[rows] for rows in zone.slips], axis=0)
+    sticks = state.status.closed[zone.numbers] & ~state.friction.slipping[zone.numbers]
+    rest = np.where(sticks, zone.zone.friction * mean - traction, 0.0)
+    _, area = _extent(scene, zone, rest, sticks)
+    return {"friction": forces[nodes].sum(axis=0), "stick": area}
 
 
 def _extent(

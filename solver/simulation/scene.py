@@ -1,7 +1,7 @@
 """From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import meshio
@@ -23,6 +23,7 @@ from ..system.clock import Clock
 from ..system.progress import stage
 from .attributes import Attributes
 from .cut_groups import CutZone
+from .frames import with_contact_frames
 from .groups import ON_AXIS, check_groups, named_parts
 from .initial import strain_factors, strain_loads_of
 from .operators import operator_of
@@ -42,7 +43,8 @@ class ZoneScene:
 
     `slave_faces`, `master_faces` as meshed, `sub_faces` after the cut (their `macro` counts from 0
     within the zone). `count` macro-elements; the zone's multipliers, of which a treatment may have
-    others than one for each of these, start at `first` among all.
+    others than one for each of these, start at `first` among all. `slips`: where its rows of slip
+    are, by tangent, after the multipliers of all zones; none without friction.
     """
 
     zone: Zone
@@ -52,6 +54,7 @@ class ZoneScene:
     master_faces: list[FaceBlock]
     sub_faces: list[SubFaces]
     operator: GapOperator
+    slips: tuple[slice, ...] = ()
 
     @property
     def treatment(self) -> Treatment:
@@ -67,6 +70,18 @@ class ZoneScene:
         """Values (k,) of all multipliers at the nodes (n,) that the zone's ones belong to."""
         mine, nodes = values[self.numbers], self.operator.at_nodes
         return mine if nodes is None else nodes @ mine
+
+    def forces(self, values: np.ndarray) -> np.ndarray:
+        """The contact forces (n_dofs,) of all rows (k,), those of tractions included."""
+        found = self.operator.matrix.T @ values[self.numbers] + self.tangential_forces(values)
+        return np.asarray(found)
+
+    def tangential_forces(self, values: np.ndarray) -> np.ndarray:
+        """Those of the tractions alone."""
+        found = np.zeros(self.operator.matrix.shape[1])
+        for matrix, rows in zip(self.operator.slip, self.slips, strict=True):
+            found += matrix.T @ values[rows]
+        return found
 
     def by_macro_element(self, values: np.ndarray) -> np.ndarray:
         """Values (k,) of all multipliers averaged over each macro-element of the zone (m,)."""
@@ -164,6 +179,11 @@ class Scene:
         """Number of bodies."""
         return len(self.rest.unloaded_bodies)
 
+    @property
+    def n_multipliers(self) -> int:
+        """Number of multipliers of all zones, those of friction left out."""
+        return len(self.rest.unloaded_multipliers)
+
 
 def build_scene(
     case: Case, mesh: meshio.Mesh, options: Options = LEAN, clock: Clock | None = None
@@ -200,6 +220,10 @@ def build_scene(
         force, springs = groups.forces(), springs_of(groups)
         initial = strain_loads_of(groups, blocks, mean)
         zones = _zones(case, cut_zones, surfaces, operators, free)
+        slave = np.zeros(len(cut_mesh.points), dtype=bool)
+        for block in (block for faces in sub_faces for block in faces):
+            slave[block.nodes] = True
+        free = with_contact_frames(free, operators, slave)
     n_bodies = int(groups.body.max()) + 1
     n_multipliers = sum(len(z.operator.initial) for z in zones)
     return Scene(
@@ -267,6 +291,17 @@ def _zones(
             )
         )
         first += len(operator.initial)
+    return _with_slips(found, first)
+
+
+def _with_slips(zones: list[ZoneScene], first: int) -> list[ZoneScene]:
+    """The zones with their rows of slip, counted from `first` on."""
+    found = []
+    for zone in zones:
+        count = len(zone.operator.initial)
+        ends = [first + count * k for k in range(len(zone.operator.slip) + 1)]
+        found.append(replace(zone, slips=tuple(slice(*pair) for pair in pairwise(ends))))
+        first = ends[-1]
     return found
 
 

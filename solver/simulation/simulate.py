@@ -26,6 +26,7 @@ from .balance import (
     strain_energy,
 )
 from .consistency import inconsistency
+from .friction import solve_with_friction, zone_friction
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
@@ -159,13 +160,16 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
     for factor, step in zip(case.factors, case.steps, strict=True):
         start = states[-1].status.closed if states else None
         before = case.steps[len(states) - 1] if states else None
-        state = problem.solve(step, start, before=before)
+        if any(zone.slips for zone in problem.scene.zones):
+            state = solve_with_friction(problem, step, states[-1] if states else None)
+        else:
+            state = problem.solve(step, start, before=before)
         if (state.trial.violation(state.iterate.closed) > 1).any():
             raise SolveError(f"{_called(step, factor)}: contact bears tension or surfaces overlap")
         state, field = recovered(problem, state, step)
         states.append(state)
         fields.append(field)
-        closed = int(state.status.closed.sum())
+        closed = int(state.status.closed[: problem.scene.n_multipliers].sum())
         count = state.status.iterations
         values = _called(step, factor), count, "" if count == 1 else "s", closed, state.residual
         _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *values)
@@ -285,6 +289,7 @@ def _zone_result(
         pressure_error=None if field is None else field.error,
         recovered=_recovered_pressure(scene, zone, state, field),
         resultants=step.resultants[zone.zone.name],
+        friction=zone_friction(zone, state),
     )
 
 
@@ -360,7 +365,8 @@ def _step_results(
                 }
             )
         held, at_nodes = reactions(scene, state)
-        product = float(np.abs(state.pressure * state.gap).max(initial=0.0))
+        n = scene.n_multipliers
+        product = float(np.abs(state.pressure * state.gap)[:n].max(initial=0.0))
         results.append(
             StepResult(
                 factor=factor,
@@ -377,6 +383,8 @@ def _step_results(
                 },
                 reactions=held,
                 rigid=rigid_bodies(scene, state),
+                dissipation=state.friction.dissipation if state.friction else 0.0,
+                contraction=state.friction.contraction if state.friction else 0.0,
             )
         )
     return results, at_nodes

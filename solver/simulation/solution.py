@@ -89,6 +89,20 @@ class RecoveredPressure:
 
 
 @dataclass
+class ZoneFriction:
+    """Friction by macro-element (m,) in the last step.
+
+    `friction_traction` (m, dim) on the slave; `slip` (m, dim) of the master relative to the slave
+    in the step, `slip_total` in all steps; `status` (m,): 0 open, 1 stick, 2 slip.
+    """
+
+    friction_traction: np.ndarray
+    slip: np.ndarray
+    slip_total: np.ndarray
+    status: np.ndarray
+
+
+@dataclass
 class Reaction:
     """What holds a group: `force` (dim,) on the bodies, `moment` (3,) about the origin.
 
@@ -139,7 +153,8 @@ class Resultants:
     `moment` (3,) about the origin of the coordinates; `edges`: where contact ends in 2D. In 3D the
     edge is known to one macro-element only: the area is that of the closed ones, its bounds those
     without their rim and with the open ones around it. `pressure` (2,): the smallest and the
-    largest of the macro-elements; None in files of earlier versions.
+    largest of the macro-elements; None in files of earlier versions. With friction: `friction`
+    (dim,), its part of the force, and `stick` (3,), the area that sticks as that of contact.
     """
 
     area: np.ndarray
@@ -147,12 +162,17 @@ class Resultants:
     moment: np.ndarray
     edges: Edges | None = None
     pressure: np.ndarray | None = None
+    friction: np.ndarray | None = None
+    stick: np.ndarray | None = None
 
     def __str__(self) -> str:
         area, *bounds = (f"{value:.5g}" for value in self.area)
         within = "" if {*bounds} == {area} else f" (between {' and '.join(bounds)})"
         force, moment = (", ".join(f"{x:.6g}" for x in v) for v in (self.force, self.moment))
         text = f"contact area {area}{within}, force ({force}) on the slave, "
+        if self.friction is not None and self.stick is not None:
+            friction = ", ".join(f"{x:.6g}" for x in self.friction)
+            text += f"of which friction ({friction}), sticking area {self.stick[0]:.5g}, "
         text += f"moment ({moment})"
         if self.pressure is not None:
             low, high = (f"{value:.6g}" for value in self.pressure)
@@ -205,7 +225,8 @@ class ZoneResult:
     these do not determine it (see `solver.simulation.balance`). `pressure_error` (m,) estimates the
     L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
     where multipliers belong to nodes. `recovered` is p* where the case asks for one. `resultants`:
-    area, force, moment and edges of contact; None in files of earlier versions.
+    area, force, moment and edges of contact; None in files of earlier versions. `friction`: see
+    there; None without.
     """
 
     name: str
@@ -227,6 +248,12 @@ class ZoneResult:
     pressure_error: np.ndarray | None = None
     recovered: RecoveredPressure | None = None
     resultants: Resultants | None = None
+    friction: ZoneFriction | None = None
+
+    @property
+    def shown_status(self) -> np.ndarray:
+        """0 open, 1 in contact; with friction 1 stick, 2 slip (m,)."""
+        return self.closed.astype(int) if self.friction is None else self.friction.status
 
     @property
     def pressure_error_estimate(self) -> np.ndarray:
@@ -284,6 +311,7 @@ class StepResult:
     `observations` holds one mapping per observed macro-element, in the order of the case file:
     zone, macro_element (number), pressure, gap, status (0 or 1), coverage. `resultants` of contact
     by zone, `reactions` and motions of `rigid` bodies; all empty in files of earlier versions.
+    `dissipation`: the work of friction in the step; `contraction`: see `problem.Friction`.
     """
 
     factor: float
@@ -295,6 +323,8 @@ class StepResult:
     resultants: dict[str, Resultants] = field(default_factory=dict)
     reactions: list[Reaction] = field(default_factory=list)
     rigid: list[RigidMotion] = field(default_factory=list)
+    dissipation: float = 0.0
+    contraction: float = 0.0
 
 
 @dataclass

@@ -10,8 +10,9 @@ that the checks need, so that it can be judged without solving:
     /mean_stress   by cell type, that of cells in mixed form at their nodes
     /contact/ZONE  arrays by macro-element, stress on both surfaces, master faces; in `nodal` those
                    of nodes where the treatment has its multipliers there; in `recovered` the
-                   coefficients of a recovered pressure and its values at nodes; in `resultants`
-                   area, force and moment of contact, in `edges` where it ends in 2D
+                   coefficients of a recovered pressure and its values at nodes; in `friction` its
+                   traction on the slave, slip and status; in `resultants` area, force and moment of
+                   contact, in `edges` where it ends in 2D
     /reactions /resultants /rigid
                    what holds each group; area, force and moment of contact in each zone; motion of
                    rigid bodies and contact on them; by step (counted from 0)
@@ -48,6 +49,7 @@ from ..simulation.solution import (
     Line,
     Solution,
     Validity,
+    ZoneResult,
 )
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
@@ -73,7 +75,7 @@ _SCALARS = (
 _ON_FACES = {
     "pressure": "multiplier",
     "gap": "gap",
-    "status": "closed",
+    "status": "shown_status",
     "coverage": "coverage",
     "pressure_error_estimate": "pressure_error_estimate",
 }
@@ -223,7 +225,8 @@ def _write_grid(group: h5py.Group, solution: Solution) -> None:
     n_volumes = sum(len(data) for _, data in cells)
     for name, values in cell_data.items():
         nothing = np.nan if values.dtype.kind == "f" else -1
-        cell_data[name] = np.concatenate([np.full(n_volumes, nothing), values])
+        none_there = np.full((n_volumes, *values.shape[1:]), nothing)
+        cell_data[name] = np.concatenate([none_there, values])
     none = [np.empty(0, dtype=int)] * len(faces)
     sets = {name: [of[i] for i in volumes] + none for name, of in mesh.cell_sets.items()}
     point_data = {
@@ -272,7 +275,18 @@ def _face_blocks(
     for name, attribute in _ON_FACES.items():
         values = [getattr(solution.zones[n], attribute)[owner] for _, _, owner, n in parts]
         data[name] = np.concatenate([np.empty(0), *values]).astype(float)
+    if any(zone.friction for zone in solution.zones):
+        for name in ("friction_traction", "slip", "slip_total"):
+            values = [_of_friction(solution.zones[n], name)[owner] for _, _, owner, n in parts]
+            data[name] = np.concatenate(values)
     return blocks, data
+
+
+def _of_friction(zone: ZoneResult, name: str) -> np.ndarray:
+    """A vector (m, 3) of friction; zero in a zone without."""
+    m, dim = zone.centre.shape
+    values = np.zeros((m, dim)) if zone.friction is None else getattr(zone.friction, name)
+    return np.pad(values, ((0, 0), (0, 3 - dim)))
 
 
 def _sub_faces(

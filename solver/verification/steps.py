@@ -9,8 +9,11 @@ import numpy as np
 from ..simulation.solution import ProbeResult, Reaction, Resultants, RigidMotion, StepResult
 from ..system.hdf5 import column, read_table, write_table
 
-_OF_STEP = ("factor", "iterations", "status_changes", "residual", "complementarity")
-_RESULTANTS = ("area", "force", "moment", "pressure")
+_OF_STEP = (
+    *("factor", "iterations", "status_changes", "residual", "complementarity"),
+    *("dissipation", "contraction"),
+)
+_RESULTANTS = ("area", "force", "moment", "pressure", "friction", "stick")
 _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 

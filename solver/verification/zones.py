@@ -7,12 +7,23 @@ import h5py
 import numpy as np
 
 from ..mechanics.mortar.edge import Edges
-from ..simulation.solution import NodalContact, RecoveredPressure, Resultants, ZoneResult
+from ..simulation.solution import (
+    NodalContact,
+    RecoveredPressure,
+    Resultants,
+    ZoneFriction,
+    ZoneResult,
+)
 
 T = TypeVar("T")
 # Data sets that are not named as their field.
 _NAMES = {"closed": "status"}
-_PARTS = {"nodal": NodalContact, "recovered": RecoveredPressure, "resultants": Resultants}
+_PARTS = {
+    "nodal": NodalContact,
+    "recovered": RecoveredPressure,
+    "resultants": Resultants,
+    "friction": ZoneFriction,
+}
 
 
 def write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:

@@ -1,0 +1,66 @@
+"""The slip operator of a zone: the jump of displacement along the tangents of macro-elements.
+
+The slip of macro-element i along its tangent t is w = (row i · u) / covered area, master relative
+to slave. A traction q on the master does the work q · w per area: its nodal forces are rowᵀ q.
+Rows are integrated at the points of the gap operator. Where a segment is flat they are its closed
+integrals ∫ N times t, so that a uniform shear acts on both sides as on whole faces.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import sparse
+
+from .closure import MASTER, SLAVE, Integrals
+from .facets import tangents_of
+
+# Normals that differ by less within a segment are one normal.
+_FLAT = 1e-12
+
+
+def slip_operator(
+    parts: Sequence[Integrals], normal: np.ndarray, n_nodes: int
+) -> tuple[sparse.csr_matrix, ...]:
+    """The dim − 1 matrices (m, n_dofs) ∫ (N_master − N_slave) t, by tangent.
+
+    `parts`: the closed integrals of m macro-elements; `normal` (m, dim): their mean normals, whose
+    `tangents_of` are the frames.
+
+    A slave edge of length 2, whose tangent is −x, under two master edges:
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
+    >>> part = integrals(constants(data), segments)
+    >>> (along,) = slip_operator([part], np.array([[0.0, 1.0]]), len(points))
+    >>> along.toarray().reshape(5, 2)[:, 0].round(15).tolist()
+    [1.0, 1.0, -0.5, -1.0, -0.5]
+    """
+    dim = normal.shape[1]
+    found = []
+    for tangents in np.swapaxes(tangents_of(normal), 0, 1):
+        total = sparse.csr_matrix((len(normal), dim * n_nodes))
+        for part in parts:
+            for side, sign in ((SLAVE, -1.0), (MASTER, 1.0)):
+                values = sign * _along(part, side, tangents)
+                dofs = dim * part.segments.sides[side].nodes[..., None] + np.arange(dim)
+                rows = np.broadcast_to(part.segments.macro[:, None, None], dofs.shape)
+                entries = (values.ravel(), (rows.ravel(), dofs.ravel()))
+                total = total + sparse.coo_matrix(entries, shape=total.shape).tocsr()
+        total.eliminate_zeros()
+        found.append(total)
+    return tuple(found)
+
+
+def _along(part: Integrals, side: int, tangents: np.ndarray) -> np.ndarray:
+    """∫ N t (s, n_nodes, dim) over segments; t is the tangent in the face at each point."""
+    segments = part.segments
+    normal, tangent = segments.normal, tangents[segments.macro][:, None]
+    t = tangent - (tangent * normal).sum(axis=-1, keepdims=True) * normal
+    t /= np.linalg.norm(t, axis=-1, keepdims=True)
+    flat = np.abs(normal - normal[:, :1]).max(axis=(1, 2), initial=0.0) <= _FLAT
+    scalar = np.einsum("sad,sd->sa", part.vectors[side][:, 0], normal[:, 0])
+    exact = scalar[..., None] * t[:, :1]
+    values = segments.sides[side].values
+    return np.where(
+        flat[:, None, None], exact, np.einsum("sqa,sq,sqd->sad", values, segments.weight, t)
+    )
