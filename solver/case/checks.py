@@ -84,6 +84,7 @@ _NORMS = (
     ("pressure_inner", "pressure, two macro-elements inside", "contact_pressure"),
     ("half_width", "half-width of contact", "half_width"),
     ("peak", "peak pressure", "peak"),
+    ("traction_means", "friction traction, macro-element means", "friction_traction"),
 )
 CHECKS: tuple[Check, ...] = (
     Check(
@@ -199,6 +200,39 @@ CHECKS: tuple[Check, ...] = (
         scale="unit",
         tolerance=1e-10,
         fixed=True,
+        by_zone=False,
+    ),
+    Check(
+        "friction_law",
+        "Coulomb's law: traction within μp, along the slip, none without contact; work of friction",
+        sample="friction_law",
+        scale="unit",
+        tolerance=1e-09,
+        fixed=True,
+    ),
+    Check(
+        "friction_traction",
+        "traction of friction on every contact element of the slave",
+        key="friction_traction",
+        sample="friction",
+        of="friction_traction",
+        scale="load",
+    ),
+    Check(
+        "slip",
+        "slip of the master on every contact element, in the last step",
+        key="slip",
+        sample="friction",
+        of="slip",
+        scale="elongation",
+    ),
+    Check("stick_area", "area that sticks", key="stick_area", sample="stick_area", scale="unit"),
+    Check(
+        "dissipation",
+        "work of friction in each step",
+        key="dissipation",
+        sample="dissipation",
+        scale="unit",
         by_zone=False,
     ),
     Check(

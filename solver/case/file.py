@@ -245,6 +245,10 @@ class ReferenceKeys(Section, frozen=True):
     force: contact force on the surface that is listed as slave, around the full circle if
       axisymmetric
     contact_area: area of contact of each zone
+    friction_traction: traction of friction on the slave faces
+    slip: slip of the master relative to the slave, in the last step
+    stick_area: area of each zone that sticks
+    dissipation: work of friction in each step
     coverage: covered share of the slave faces, at their centres; left out: covered in full
     reaction: the forces with which supports hold groups
     moment: the moment of contact on rigid bodies about their reference points; one number in 2D,
@@ -267,6 +271,12 @@ class ReferenceKeys(Section, frozen=True):
     displacement: Scalars | None = None
     force: Vector | None = None
     contact_area: Number | None = None
+    friction_traction: Scalars | None = None
+    slip: Scalars | None = None
+    stick_area: Number | Literal["solution"] | None = None
+    dissipation: Annotated[tuple[Number, ...], Meta(min_length=1)] | Literal["solution"] | None = (
+        None
+    )
     coverage: Scalar | None = None
     reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
     moment: Annotated[dict[Group, _Moment], Meta(min_length=1)] | None = None

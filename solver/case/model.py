@@ -28,6 +28,8 @@ Vector = tuple[Scalar, ...]
 Step = float | dict[str, float]
 LOAD_KINDS = ("pressure", "traction", "body_force", "force", "strain", "temperature")
 SWAPPED = "-swapped"
+STATE = "state "
+"""How the names of the states of an exact solution begin; no name in a file has a space."""
 # A discretisation error may exceed the expected one by this factor.
 MARGIN = 1.5
 
@@ -215,6 +217,12 @@ class Case:
         return tuple(float(n) if isinstance(step, dict) else step for n, step in numbered)
 
     @property
+    def states(self) -> "dict[str, ExactSolution]":
+        """The states of an exact solution that has one for each step, by the name of the step."""
+        states = self.solution.states if self.solution else ()
+        return dict(zip(self.histories, states, strict=True)) if states else {}
+
+    @property
     def acting(self) -> dict[str, str]:
         """The groups of supports and of the sides they copy, and of loads on surfaces, by key."""
         held = {f"supports[{i}].group": s.group for i, s in enumerate(self.supports)}
@@ -224,7 +232,7 @@ class Case:
 
     @property
     def histories(self) -> tuple[str, ...]:
-        """The names of loads and supports that have factors of their own."""
+        """The names of loads and supports that have factors of their own, or of states."""
         return tuple(self.steps[0]) if isinstance(self.steps[0], dict) else ()
 
     def as_solved(

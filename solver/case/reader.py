@@ -23,12 +23,14 @@ from .model import (
     EXACT,
     LOAD_KINDS,
     MARGIN,
+    STATE,
     Case,
     Cyclic,
     Load,
     Probe,
     Rigid,
     Selection,
+    Step,
     Support,
     Zone,
 )
@@ -45,6 +47,10 @@ _QUANTITY = {
     "normal_stress": "stress",
     "gap": "gap",
     "displacement": "displacement",
+    "friction_traction": "friction_traction",
+    "slip": "slip",
+    "stick_area": "stick_area",
+    "dissipation": "dissipation",
     "stress": "stress",
     "pressure": "stress",
     "traction": "stress",
@@ -117,7 +123,7 @@ class _Reader:
             transform=self.content.get("transform"),
             plane=file.plane,
             directions=file.directions,
-            steps=file.steps,
+            steps=self.steps(),
             probes=tuple(map(self.probe, file.probes)),
             observe=file.observe,
             reference={
@@ -136,6 +142,17 @@ class _Reader:
             units=self.content.get("units", {}),
             selections=tuple(self.selections.values()),
         )
+
+    def steps(self) -> tuple[Step, ...]:
+        """The load steps; those of an exact solution with a state for each."""
+        states = self.solution.states if self.solution else ()
+        if not states:
+            return self.file.steps
+        if "steps" in self.content:
+            allowed = "must be left out: the exact solution has a state for each step"
+            raise InputError(self.path, "steps", None, allowed)
+        names = [f"{STATE}{i + 1}" for i in range(len(states))]
+        return tuple({name: float(name == now) for name in names} for now in names)
 
     def tolerances(self) -> tuple[dict[str, float], dict[str, float]]:
         """The tolerances by check, and the expected errors from which some of them follow."""
@@ -247,6 +264,7 @@ class _Reader:
             axisymmetric=self.file.plane == "axisymmetric",
             pressure=_only(load.pressure for load in self.file.loads),
             interference=_only(zone.interference for zone in self.zones),
+            friction=_only(zone.friction for zone in self.zones),
         )
         return build(given, known)
 

@@ -10,6 +10,8 @@ from .model import SWAPPED, Case, Load, Rigid, Scalar, Support
 
 # Keys of the reference that need contact.
 _OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
+# Those that need friction.
+_OF_FRICTION = {"friction_traction", "slip", "stick_area", "dissipation"}
 # Keys of the reference for values at probes.
 PROBED = ("displacement_at", "stress_at", "pressure_at")
 # The vectors of a selection.
@@ -49,7 +51,7 @@ def _check_steps(case: Case) -> None:
         if isinstance(step, dict) != isinstance(case.steps[0], dict):
             allowed = "steps are factors, or mappings of names to factors, not both"
             raise InputError(case.path, f"steps[{i}]", step, allowed)
-        if given - names:
+        if given - names and not case.states:
             name = min(given - names)
             allowed = f"no load, support or rigid body has this name; {hint(name, names)}"
             raise InputError(case.path, f"steps[{i}].{name}", None, allowed)
@@ -84,11 +86,35 @@ def _check_names(case: Case) -> None:
             allowed = f"the treatment {zone.treatment} has no pressure that could be stabilised; "
             allowed += "allowed there: lac, quadrature"
             raise InputError(case.path, f"contact[{i}].stabilised", "true", allowed)
+        _check_friction(case, i)
         names.add(zone.name)
     for i, item in enumerate(case.observe):
         if item.zone not in names:
             allowed = f"no such zone; {hint(item.zone, names)}"
             raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
+
+
+def _frictional(case: Case) -> bool:
+    return any(zone.friction for zone in case.zones)
+
+
+def _check_friction(case: Case, number: int) -> None:
+    """Friction is that of constants by macro-element, along the normals of their own faces."""
+    zone, key = case.zones[number], f"contact[{number}]"
+    if not zone.friction:
+        return
+    allowed = "a zone with friction must have the {} {}"
+    if zone.treatment != "lac":
+        raise InputError(
+            case.path, f"{key}.treatment", zone.treatment, allowed.format("treatment", "lac")
+        )
+    if zone.normal != "element":
+        raise InputError(
+            case.path, f"{key}.normal", zone.normal, allowed.format("normal", "element")
+        )
+    if zone.stabilised:
+        allowed = "a zone with friction cannot be stabilised; allowed: false"
+        raise InputError(case.path, f"{key}.stabilised", "true", allowed)
 
 
 def _check_probes(case: Case) -> None:
@@ -131,6 +157,13 @@ def _check_reference(case: Case) -> None:
     for key in case.reference.keys() & _OF_CONTACT if not case.zones else ():
         allowed = "cannot be compared: the case has no contact"
         raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+    for key in case.reference.keys() & _OF_FRICTION if not _frictional(case) else ():
+        allowed = "cannot be compared: no contact zone has friction"
+        raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+    given = case.reference.get("dissipation")
+    if isinstance(given, tuple) and len(given) != len(case.steps):
+        allowed = f"must have a number for each of the {len(case.steps)} steps"
+        raise InputError(case.path, "reference.dissipation", list(given), allowed)
     if "coverage" in case.reference and "contact_pressure" not in case.reference:
         allowed = "needs contact_pressure: it says where that acts"
         raise InputError(case.path, "reference.coverage", case.reference["coverage"], allowed)
@@ -246,7 +279,7 @@ def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
         if isinstance(load.value, tuple):
             yield f"loads[{i}].{load.kind}", load.value
     for key, value in case.reference.items():
-        if isinstance(value, tuple):
+        if isinstance(value, tuple) and key != "dissipation":
             yield f"reference.{key}", value
         if key in ("reaction", "displacement_at") and isinstance(value, dict):
             for name, vector in value.items():

@@ -48,6 +48,8 @@ def _refuse(deck: Deck) -> None:
     if deck.forces.any():
         raise UnsupportedError("loads other than constant pressures: not written for code_aster")
     for pair in deck.pairs:
+        if pair.zone.friction:
+            raise UnsupportedError("friction: code_aster has none with the LAC method")
         if pair.gap is not None or pair.zone.interference:
             raise UnsupportedError(
                 "an initial gap other than as meshed: not written for code_aster"

@@ -74,19 +74,19 @@ def without_friction(closed: np.ndarray, k: int) -> Slip:
     return replace(sticking(closed, k), slips=closed.copy())
 
 
-def violation(slip: Slip, found: Response, coefficient: np.ndarray) -> np.ndarray:
-    """By how many limits (m,) a response breaks |q| ≤ μp where stuck, q · w ≤ 0 where slipping.
+def violation(slip: Slip, found: Response, bound: np.ndarray) -> np.ndarray:
+    """By how many limits (m,) a response breaks |q| ≤ `bound` where stuck, q · w ≤ 0 elsewhere.
 
     A stuck macro-element bears twice what friction of 0.5 at a pressure of 2 can:
 
     >>> one, tiny = np.ones((1, 1)), np.array([0.1])
     >>> response = Response(closed=np.array([True]), pressure=2 * one[0], traction=2 * one,
     ...     slip=0 * one, traction_limit=tiny, slip_limit=tiny)
-    >>> violation(sticking(response.closed, 1), response, np.array([0.5])).round(9).tolist()
+    >>> violation(sticking(response.closed, 1), response, np.array([1.0])).round(9).tolist()
     [10.0]
     """
     size = np.linalg.norm(found.traction, axis=1)
-    over = (size - coefficient * np.maximum(found.pressure, 0.0)) / _positive(found.traction_limit)
+    over = (size - bound) / _positive(found.traction_limit)
     back = -(found.slip * slip.direction).sum(axis=1) / _positive(found.slip_limit)
     # Without friction so far, and still where it was: it may as well stick.
     rests = (slip.direction == 0).all(axis=1) & ~_moves(found)
@@ -95,15 +95,14 @@ def violation(slip: Slip, found: Response, coefficient: np.ndarray) -> np.ndarra
 
 
 def following(
-    slip: Slip, found: Response, coefficient: np.ndarray, change: np.ndarray, softness: float
+    slip: Slip, found: Response, fresh: np.ndarray, change: np.ndarray, softness: float
 ) -> tuple[Slip, float]:
-    """The slips of the next iteration, those in `change` (m,) stuck or slipping in turn.
+    """The slips of the next iteration with bounds `fresh` (m,), those in `change` turned over.
 
     Also the largest change of a bound or of b d where slips go on, a traction. `softness`: slip per
     traction, for a first guess of how far a macro-element goes that begins to slip.
     """
     size, far = np.linalg.norm(found.traction, axis=1), np.linalg.norm(found.slip, axis=1)
-    fresh = coefficient * np.maximum(found.pressure, 0.0)
     slips = found.closed & (slip.slips ^ change)
     begins, goes_on = slips & change, slips & slip.slips
     direction, distance = slip.direction.copy(), slip.distance.copy()
@@ -118,6 +117,27 @@ def following(
     changed = max(changed, np.abs(turned[goes_on]).max(initial=0.0))
     new = Slip(slips=slips, bound=fresh, direction=direction, distance=distance)
     return new, float(changed)
+
+
+def extrapolated(
+    bounds: tuple[np.ndarray, np.ndarray], before: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Bounds (m,) nearer to the fixed point b = μp, from two iterations with the same status.
+
+    Of each, the bounds that it was solved with and those that its pressures yield: the secant
+    method for what is between them, Anderson's of depth one. Source: H. Walker, P. Ni, Anderson
+    acceleration for fixed-point iterations, SIAM J. Numer. Anal. 49 (2011) 1715–1735.
+
+    b ← 1 + b/2 has the fixed point 2:
+
+    >>> at = lambda b: (np.array([b]), np.array([1 + b / 2]))
+    >>> extrapolated(at(1.0), at(0.0)).tolist()
+    [2.0]
+    """
+    now, last = bounds[1] - bounds[0], before[1] - before[0]
+    turned = now - last
+    share = float(now @ turned / (turned @ turned)) if turned.any() else 0.0
+    return np.maximum(bounds[1] - share * (bounds[1] - before[1]), 0.0)
 
 
 def _moves(found: Response) -> np.ndarray:

@@ -195,7 +195,14 @@ class Attributes(CutGroups):
         """Forces (n, dim) and displacements (n_dofs,) of each name in `steps`; of no name too."""
         if not self.case.histories:
             return {}
+        if states := self.case.states:
+            return {name: self._state(solution) for name, solution in states.items()}
         return {name: self._history(name) for name in ("", *self.case.histories)}
+
+    def _state(self, solution: ExactSolution) -> tuple[np.ndarray, np.ndarray]:
+        case = replace(self.case, solution=solution)
+        then = Attributes(case, self.mesh, self.cut, self.zones, self.origin)
+        return then.forces(), then.supports().offset
 
     def _history(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         mine = [f"supports[{i}]." for i, s in enumerate(self.case.supports) if s.name == name]

@@ -122,6 +122,14 @@ class ExactValues:
         [mean] = self._means(zone, lambda place: self.exact.gap(place)[None])
         return mean
 
+    def of_friction(self, zone: ZoneResult, quantity: str) -> np.ndarray:
+        """The mean friction traction on the slave, or slip of the master, (m, dim).
+
+        The solution has them for its first part: for the other one both change their sign.
+        """
+        mean = self._means(zone, lambda place: getattr(self.exact, quantity)(place).T).T
+        return mean if self.part[zone.slave_nodes[0]] == 0 else -mean
+
     def ends_within(self, zone: ZoneResult) -> np.ndarray:
         """Which macro-elements (m,) the contact area covers in part only."""
         share = self._of_contact(zone)[1]

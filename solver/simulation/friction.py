@@ -18,7 +18,15 @@ from scipy import sparse
 from ..case.model import Step
 from ..lac.errors import SolveError
 from ..lac.facets import tangents_of
-from ..lac.friction import Response, Slip, following, sticking, violation, without_friction
+from ..lac.friction import (
+    Response,
+    Slip,
+    extrapolated,
+    following,
+    sticking,
+    violation,
+    without_friction,
+)
 from ..lac.status import StatusResult
 from ..mechanics.mortar.tresca import coulomb_by_cones
 from .problem import ContactProblem, Equilibrium, Friction
@@ -30,8 +38,14 @@ _LOG = logging.getLogger(__name__)
 _SETTLED, _STALLED = 1e-13, 1e-10
 # A change that falls by less is a stall, and so many of them without a record are no progress.
 _SLOW, _PATIENCE = 0.5, 12
+# Changes below this share of the bounds are too small to tell by what they contract.
+_MEASURED = 1e-9
 # More macro-elements than this make the matrix of the cone program too large.
 _MOST_CONES = 3000
+
+
+# Bounds that a solve has, and those that its pressures yield.
+_Bounds = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -66,6 +80,9 @@ class _Search:
         self.jump = last.jump if last else np.zeros(len(numbers))
         self.total = last.total if last else np.zeros(len(numbers))
         self.count, self.changes = 0, list[int]()
+        # Whether bounds stay until no status changes: Tresca's problem is solved for each.
+        self.held = False
+        self.contraction = 0.0
         problem.count_slip_from(self.jump)
 
     def starts(self) -> Iterator[_Status]:
@@ -78,6 +95,7 @@ class _Search:
         try:
             problem.hold_across(None)
             free = problem.solve(self.step)
+            self.count += free.status.iterations
             closed = free.status.closed & closable
             yield self._between(closed, free.pressure[self.gaps])
             yield _Status(closed, without_friction(closed[self.gaps], k))
@@ -85,15 +103,16 @@ class _Search:
             _LOG.info("no equilibrium without friction: %s", error)
         yield _Status(closable, sticking(closable[self.gaps], k))
         if len(self.gaps) <= _MOST_CONES:
-            yield self._by_cones()
+            start, self.held = self._by_cones(), True
+            yield start
 
     def _between(self, closed: np.ndarray, pressure: np.ndarray) -> _Status:
         """What slips by the tractions of a stuck contact, under the `pressure` without friction."""
         stuck = sticking(closed[self.gaps], len(self.rows))
         _, response, _ = self.solve(_Status(closed, stuck))
-        response = replace(response, pressure=pressure)
-        slips = violation(stuck, response, self.coefficient) > 1
-        slip, _ = following(stuck, response, self.coefficient, slips, self.softness)
+        bounds = self._bounds(pressure)
+        slips = violation(stuck, response, bounds) > 1
+        slip, _ = following(stuck, response, bounds, slips, self.softness)
         return _Status(closed, slip)
 
     def solve(self, status: _Status) -> tuple[Equilibrium, Response, np.ndarray]:
@@ -138,13 +157,20 @@ class _Search:
     def from_status(self, status: _Status) -> Equilibrium | None:
         """Equilibrium from a first status; None where statuses repeat and bounds do not settle."""
         seen, single, best, without, last = {status.key}, False, np.inf, 0, np.inf
+        earlier = None
         while without < _PATIENCE:
             found, response, force = self.solve(status)
             following, count, moved = self._following(status, found, response, single)
             settled = moved <= _SETTLED or _SLOW * last < moved <= _STALLED
+            bounds = status.slip.bound, following.slip.bound
+            if earlier and not count:
+                self._measure(bounds, earlier)
             if not count and settled:
-                rate = moved / last if 0 < moved < last < np.inf else 0.0
-                return self._equilibrium(status, found, response, force, rate)
+                return self._equilibrium(status, found, response, force)
+            if earlier and not count:
+                slip = replace(following.slip, bound=extrapolated(bounds, earlier))
+                following = replace(following, slip=slip)
+            earlier = None if count else bounds
             self.changes.append(count)
             best, without = min(best, moved + count), 0 if moved + count < best else without + 1
             single = single or (count > 0 and following.key in seen)
@@ -159,24 +185,38 @@ class _Search:
 
         `single`: only the worst macro-element changes, which breaks a cycle.
         """
-        closable = self.problem.constraints.closable
+        closable, slip = self.problem.constraints.closable, status.slip
+        fresh = self._bounds(response.pressure)
         wrong = np.where(closable, found.trial.violation(status.closed), 0.0)
-        slipping = violation(status.slip, response, self.coefficient)
+        slipping = violation(slip, response, slip.bound if self.held else fresh)
         change, change_slip = wrong > 1, slipping > 1
         count = int(change.sum() + change_slip.sum())
         if single and count:
             change, change_slip = _worst(wrong, slipping)
         closed = status.closed ^ change
         kept = closed[self.gaps]
-        slip, moved = following(
-            status.slip, response, self.coefficient, change_slip & kept, self.softness
-        )
-        moved /= float((self.coefficient * response.pressure).max(initial=0.0)) or 1.0
+        bounds = slip.bound if self.held and count else fresh
+        new, moved = following(slip, response, bounds, change_slip & kept, self.softness)
+        if self.held and not count:
+            moved = max(moved, float(np.abs(fresh - slip.bound)[response.closed].max(initial=0.0)))
+        moved /= float(fresh.max(initial=0.0)) or 1.0
         _LOG.info(
             "friction: solve %d, %d closed, %d slip, %d change, bounds by %.1e",
-            *(self.count, status.closed.sum(), status.slip.slips.sum(), count, moved),
+            *(self.count, status.closed.sum(), slip.slips.sum(), count, moved),
         )
-        return _Status(closed, replace(slip, slips=slip.slips & kept)), count, moved
+        return _Status(closed, replace(new, slips=new.slips & kept)), count, moved
+
+    def _measure(self, bounds: _Bounds, earlier: _Bounds) -> None:
+        """Note by what bounds contract, as long as they change by more than round-off."""
+        given, found = (
+            float(np.abs(a - b).max(initial=0.0)) for a, b in zip(bounds, earlier, strict=True)
+        )
+        if given > _MEASURED * float(bounds[1].max(initial=0.0)):
+            self.contraction = found / given
+
+    def _bounds(self, pressure: np.ndarray) -> np.ndarray:
+        """μp (f,)."""
+        return self.coefficient * np.maximum(pressure, 0.0)
 
     def _equilibrium(
         self,
@@ -184,7 +224,6 @@ class _Search:
         found: Equilibrium,
         response: Response,
         force: np.ndarray,
-        rate: float,
     ) -> Equilibrium:
         """The state with its tractions among the pressures, and the history for the next step."""
         self.problem.hold_across(None)
@@ -213,7 +252,7 @@ class _Search:
             ),
             status=StatusResult(found.status.closed, self.count, self.changes),
             correction=np.zeros_like(force),
-            friction=Friction(status.slip, slipping, jump, total, lost, rate),
+            friction=Friction(status.slip, slipping, jump, total, lost, self.contraction),
         )
 
     def _by_cones(self) -> _Status:
@@ -235,8 +274,7 @@ class _Search:
         forces[rows], moved[rows] = found, jump
         closed = problem.constraints.closable & (forces > 0)
         far = np.linalg.norm(moved[self.rows], axis=0) / self.area
-        bound = self.coefficient * np.maximum(forces[self.gaps], 0.0)
-        traction = forces[self.rows].T
+        bound, traction = self._bounds(forces[self.gaps]), forces[self.rows].T
         size = np.linalg.norm(traction, axis=1)
         slips = closed[self.gaps] & (far > 1e-7 * far.max(initial=0.0))
         slip = Slip(

@@ -109,6 +109,10 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> R
     material = np.zeros(count, dtype=int)
     for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
         material[block.number] = number
+    if zone.recovery != "none" and any(other.friction for other in groups.case.zones):
+        key = f"contact[{groups.case.zones.index(zone)}].recovery"
+        allowed = "a case with friction has constant pressures; allowed: none"
+        raise InputError(groups.case.path, key, zone.recovery, allowed)
     form = form_of(zone.recovery, order, corners)
     if form.sweeps and zone.sweeps:
         form = replace(form, sweeps=zone.sweeps)

@@ -66,8 +66,8 @@ class Friction:
 
     `slip`: see `lac.friction`; `slipping` (k,) of the multipliers of gaps; `jump`, `total` (k,) in
     the rows of slip: the mean jump between the surfaces, and what they slipped in all steps;
-    `dissipation`: the work of friction in this step, `contraction`: by what the last iteration
-    changed the bounds, over the one before (0: not at all).
+    `dissipation`: the work of friction in this step, `contraction`: the change of the bounds
+    that pressures yield, over that of the bounds solved with (0: nothing slips).
     """
 
     slip: Slip

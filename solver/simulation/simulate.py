@@ -9,7 +9,7 @@ from typing import Any
 import meshio
 import numpy as np
 
-from ..case.model import Case, Step
+from ..case.model import STATE, Case, Step
 from ..lac.cells.catalogue import BY_NAME
 from ..lac.cells.faces import nodal_normals
 from ..lac.errors import SolveError
@@ -179,6 +179,8 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
 def _called(step: Step, factor: float) -> str:
     if not isinstance(step, dict):
         return f"load factor {factor:g}"
+    if all(name.startswith(STATE) for name in step):
+        return f"step {factor:g}"
     return f"step {factor:g} ({', '.join(f'{name} {value:g}' for name, value in step.items())})"
 
 

@@ -19,7 +19,7 @@ from ..case.checks import CHECKS, Check
 from ..case.model import Exact
 from ..simulation.exact import ExactValues
 from ..simulation.solution import Solution, ZoneResult
-from . import numbers, samples, scales
+from . import friction, numbers, samples, scales
 from .verdict import CheckResult, Regression
 
 
@@ -64,7 +64,8 @@ def run_checks(
 
 def sampler_of(check: Check) -> samples.Sampler:
     """The function that gives the values of a check."""
-    found: Any = getattr(samples, check.sample, None) or getattr(numbers, check.sample)
+    rooms = (samples, numbers, friction)
+    found: Any = next(getattr(r, check.sample) for r in rooms if hasattr(r, check.sample))
     sampler: samples.Sampler = found(check.of) if check.of else found
     return sampler
 

@@ -81,6 +81,29 @@ class ExactSolution:
         """Where (n,) the contact pressure is smooth: away from the ends of a contact area."""
         return np.ones(len(x), dtype=bool)
 
+    def friction_traction(self, x: np.ndarray) -> np.ndarray:
+        """Traction of friction (n, dim) on the first part, at points of the interface."""
+        raise self._missing("friction_traction")
+
+    def slip(self, x: np.ndarray) -> np.ndarray:
+        """Slip (n, dim) of the second part relative to the first in the last step."""
+        raise self._missing("slip")
+
+    @property
+    def states(self) -> "tuple[ExactSolution, ...]":
+        """The solution of each step, where its fields do not grow with the load factor."""
+        return ()
+
+    @property
+    def stick_area(self) -> float:
+        """The area that sticks."""
+        raise self._missing("stick_area")
+
+    @property
+    def dissipation(self) -> tuple[float, ...]:
+        """The work of friction in each step."""
+        raise self._missing("dissipation")
+
     @property
     def half_width(self) -> float:
         """Half the width, or the radius, of the contact."""

@@ -21,6 +21,7 @@ from .base import (
     ParameterError,
 )
 from .bending import Bending
+from .frictional import Sheared, ShearedBlocks
 from .half_planes import ContactEdge
 from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .indenter import Indenter
@@ -59,6 +60,8 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     RecedingLayer,
     PolynomialPressure2d,
     PolynomialPressure3d,
+    ShearedBlocks,
+    Sheared,
 )
 SOLUTIONS: dict[str, type[ExactSolution]] = {c.name: c for c in _CLASSES}
 _ALL, _RIGID = "all", "rigid"
@@ -68,7 +71,7 @@ _ALL, _RIGID = "all", "rigid"
 class Known:
     """Values known from the case: its file, materials by group, dimension, and single values.
 
-    `pressure` and `interference` are None where the case has none, or more than one.
+    `pressure`, `interference` and `friction` are None where the case has none, or more than one.
     `plane_stress`: so is the solution. `axisymmetric`: a solution of three dimensions is seen in
     one meridian plane.
     """
@@ -78,6 +81,7 @@ class Known:
     dimension: int
     pressure: float | None = None
     interference: float | None = None
+    friction: float | None = None
     axisymmetric: bool = False
     plane_stress: bool = False
 
@@ -87,12 +91,13 @@ class Known:
         return 2 if self.axisymmetric else self.dimension
 
 
-def build(given: str | Mapping[str, Any], known: Known) -> ExactSolution:
-    """The solution that a case file names, alone or with parameters.
+def build(
+    given: str | Mapping[str, Any], known: Known, key: str = "reference.solution"
+) -> ExactSolution:
+    """The solution that a case file names under a `key`, alone or with parameters.
 
     Raises InputError for an unknown name or parameter, and for a value not allowed.
     """
-    key = "reference.solution"
     values = {"name": given} if isinstance(given, str) else dict(given)
     name = values.pop("name", None)
     if not isinstance(name, str) or name not in SOLUTIONS:
@@ -130,6 +135,8 @@ class _ParameterReader:
         source, name = parameter.metadata["source"], parameter.name
         if source == "material":
             return self.material(name, given)
+        if source == "solution":
+            return build(given, self.known, f"{self.key}.{name}")
         if given is None and source:
             given = getattr(self.known, source)
         if given is None:

@@ -73,7 +73,7 @@ class HalfPlanes(ElasticSolution):
 
     def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
         """Displacement u, v of each body, v with the sign of its side."""
-        side, height, (whole, stress, _), (shear, poisson) = self._at(x, part)
+        side, height, (whole, stress, _), (shear, poisson) = self.at(x, part)
         u = (1 - 2 * poisson) * whole.real - height * stress.imag
         v = 2 * (1 - poisson) * whole.imag - height * stress.real
         found = np.zeros((len(x), self.dim))
@@ -82,7 +82,7 @@ class HalfPlanes(ElasticSolution):
 
     def gradient(self, x: np.ndarray, part: Part = None) -> np.ndarray:
         """By differentiation."""
-        side, _, (_, stress, rest), (shear, poisson) = self._at(x, part)
+        side, _, (_, stress, rest), (shear, poisson) = self.at(x, part)
         both = 2 * (1 - poisson) * stress.imag
         found = np.zeros((len(x), self.dim, self.dim))
         found[:, 0, 0] = (1 - 2 * poisson) * stress.real - rest.imag
@@ -91,9 +91,7 @@ class HalfPlanes(ElasticSolution):
         found[:, -1, -1] = (1 - 2 * poisson) * stress.real + rest.imag
         return found / (2 * shear[:, None, None])
 
-    def _at(
-        self, x: np.ndarray, part: Part
-    ) -> tuple[np.ndarray, np.ndarray, Functions, np.ndarray]:
+    def at(self, x: np.ndarray, part: Part) -> tuple[np.ndarray, np.ndarray, Functions, np.ndarray]:
         """Side (n,), height (n,), Ẑ, Z and |y| Z′ (n,), and μ, ν (2, n) of points."""
         upper = self.part_of(x, part)
         side = np.where(upper == 1, 1.0, -1.0)
