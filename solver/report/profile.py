@@ -24,6 +24,7 @@ from .charts import (
     GREEN,
     INK,
     ORANGE,
+    RED,
     Axis,
     Chart,
     Look,
@@ -37,6 +38,7 @@ from .layout import extents, plan_axes, tangent
 CONSTANT, MEANS, NODES = "p, constant by macro-element", "means of p by face", "p at nodes"
 RECOVERED, REFERENCE = "p*, recovered", "reference"
 SLAVE, MASTER = "−σₙ, slave", "−σₙ, master"
+BOUND, TRACTION, SHEAR = "±μp", "friction on the slave", "its reference"
 _LOOKS = {
     CONSTANT: Look(BLUE),
     MEANS: Look(BLUE),
@@ -45,6 +47,9 @@ _LOOKS = {
     REFERENCE: Look(INK, CROSS),
     SLAVE: Look(BLUE),
     MASTER: Look(ORANGE, "square"),
+    BOUND: Look(INK),
+    TRACTION: Look(RED),
+    SHEAR: Look(INK, "triangle-down"),
 }
 # Where less than this share of the interface is pressed, only that and what is next to it is drawn.
 PRESSED = 0.6
@@ -82,10 +87,12 @@ def draw_profile(
     elif means is not None:
         records += _records(REFERENCE, s=place(zone.centre), p=means)
     low, high = _range(zone, records, means)
+    records += _of_friction(solution, zone, place)
     records = [r for r in records if r.get("end", r["s"]) >= low and r["s"] <= high]
     margin = _MARGIN * (high - low)
     x = Axis("s", where, domain=(low - margin, high + margin))
-    pressure = Axis("p", with_unit("contact pressure", units.get("stress")), zero=True)
+    what = "contact pressure" if zone.friction is None else "contact pressure, friction"
+    pressure = Axis("p", with_unit(what, units.get("stress")), zero=True)
     looks = _looks(records, flat)
     views = [_view(records, x, pressure, looks, flat, 170, first=True)]
     if means is not None:
@@ -103,7 +110,7 @@ def _looks(records: Sequence[Any], flat: bool) -> dict[str, Look]:
     """The looks of the series found; in the legend, what is drawn as a line is one."""
     found = {record["series"] for record in records}
     looks = {name: look for name, look in _LOOKS.items() if name in found}
-    lines = (CONSTANT, MEANS, RECOVERED, REFERENCE) if flat else ()
+    lines = (CONSTANT, MEANS, RECOVERED, REFERENCE, BOUND, TRACTION) if flat else ()
     return looks | {n: replace(looks[n], shape="stroke") for n in lines if n in found}
 
 
@@ -119,7 +126,7 @@ def _view(
     """One view: steps and lines where the interface is a line, else marks."""
     found = list(dict.fromkeys(record["series"] for record in records))
     lines = [name for name in (REFERENCE, NODES, RECOVERED) if name in found and flat]
-    steps = [name for name in (CONSTANT, MEANS) if name in found and flat]
+    steps = [name for name in (CONSTANT, MEANS, BOUND, TRACTION) if name in found and flat]
     channels = series(looks)
     shape, _ = channels.pop("shape"), channels.pop("strokeDash")
     shared = {"x": x.channel(), "y": y.channel()} | channels
@@ -175,6 +182,34 @@ def _of_elements(
     else:
         columns["s"] = place(zone.centre)
     return _records(MEANS if zone.nodal else CONSTANT, **columns)
+
+
+def _of_friction(solution: Solution, zone: ZoneResult, place: Place) -> list[dict[str, Any]]:
+    """The traction on the slave and ±μp; in 2D along the interface, else the size of both."""
+    if zone.friction is None:
+        return []
+    mu = next(z.friction for z in solution.case.zones if z.name == zone.name)
+    columns = {"number": np.arange(len(zone.centre)), "s": place(zone.centre)}
+    along = np.column_stack([zone.normal[:, 1], -zone.normal[:, 0]])
+    flat = zone.centre.shape[1] == 2
+    if flat:
+        start, end = extents(zone, place(solution.mesh.points))
+        columns |= {"s": start, "end": end}
+        step = 1e-6 * np.sqrt(zone.area)[:, None] * along
+        along *= np.sign(place(zone.centre + step) - place(zone.centre - step))[:, None]
+
+    def signed(vectors: np.ndarray) -> np.ndarray:
+        return (vectors * along).sum(1) if flat else np.linalg.norm(vectors, axis=1)
+
+    found = []
+    for sign in (1.0, -1.0)[: 1 + flat]:
+        found += _records(BOUND, **columns, p=sign * mu * zone.multiplier)
+    found += _records(TRACTION, **columns, p=signed(zone.friction.friction_traction))
+    exact = solution.case.solution
+    if exact and "friction_traction" in exact.quantities:
+        values = ExactValues(solution, exact).of_friction(zone, "friction_traction")
+        found += _records(SHEAR, s=place(zone.centre), p=signed(values))
+    return found
 
 
 def _of_nodes(

@@ -125,6 +125,10 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
             yield from _values(name.replace("_", " "), values, (m,))
     if zone.nodal:
         yield from _nodal(zone.nodal, n)
+    if zone.friction:
+        for name in ("friction_traction", "slip", "slip_total"):
+            yield from _values(name.replace("_", " "), getattr(zone.friction, name), (m, dim))
+        yield from _numbers("status of friction", zone.friction.status, (m,), 3)
 
 
 def _recovered(field: RecoveredPressure, n: int, m: int, dim: int) -> Iterator[str]:
@@ -143,6 +147,9 @@ def _resultants(where: str, found: Resultants, dim: int) -> Iterator[str]:
         yield from _values(f"{name} {where}", getattr(found, name), shape)
     if found.pressure is not None:
         yield from _values(f"pressure {where}", found.pressure, (2,))
+    for name, size in (("friction", dim), ("stick", 3)):
+        if (given := getattr(found, name)) is not None:
+            yield from _values(f"{name} {where}", given, (size,))
 
 
 def _edges(zone: ZoneResult, dim: int) -> Iterator[str]:

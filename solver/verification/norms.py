@@ -17,6 +17,7 @@ in cells in mixed form):
                                                              at nodes (see `oscillation`)
     pressure_inner        largest |p_h − p̄| / largest p      except on the last two macro-elements
                                                              at each end of the contact
+    traction_means        |t_h − t̄| / |t̄|                    t: traction of friction
     half_width, peak      of the half ellipse of p_h (Hertz): from its second moment, and fitted
                           within 0.8 of the half-width found; of other shapes from the moment alone
 
@@ -182,9 +183,23 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
         "pressure_oscillation": _over(second, highest),
         "pressure_inner": _over(inner, highest),
     }
+    if "friction_traction" in exact.quantities:
+        found["traction_means"] = _traction_error(solution, exact)
     if "half_width" in exact.quantities:
         found |= _ellipse_errors(solution, exact)
     return found
+
+
+def _traction_error(solution: Solution, exact: ExactSolution) -> float:
+    squares = np.zeros(2)
+    for zone in solution.zones:
+        if zone.friction is None:
+            continue
+        mean = ExactValues(solution, exact).of_friction(zone, "friction_traction")
+        weight = zone.area * zone.coverage
+        error = zone.friction.friction_traction - mean
+        squares += _integral(weight, error), _integral(weight, mean)
+    return _root(*squares)
 
 
 def _pressures(

@@ -36,9 +36,9 @@ FACE_LIMIT = 0.2
 """The same for the pressures of single faces: what averages out leaves forces and means right."""
 # The checks of a pressure along the surface whose tolerance may be wider.
 _ALLOWED = ("multiplier", "pressure_l2", "pressure_means", "pressure_max", "pressure_oscillation")
-# So many macro-elements have to oscillate, and fewer where fewer than `_ENOUGH` could: a kink of
-# the exact pressure is at one place.
-_PLACES, _FEWEST, _ENOUGH = 3, 2, 6
+# So many macro-elements have to oscillate, or half of those that could, at least the second number:
+# a kink of the exact pressure, or the tip of a wedge, is at one place.
+_PLACES, _FEWEST, _ENOUGH = 5, 2, 6
 # Neighbours are nearer than this share of the distance looked at, which is at most so many faces.
 _REACH, _FARTHEST = 1.3, 4.0
 # Neighbours' normals differ by less than 30°: across a kink the pressure may jump.
@@ -127,7 +127,7 @@ def _oscillation(near: _Near, values: np.ndarray, inside: np.ndarray, rim: np.nd
     if (candidates & ~rim).sum() >= _ENOUGH:
         candidates &= ~rim
     sizes = np.sort(np.sqrt(np.maximum(-off * mean, 0.0))[candidates])
-    places = _PLACES if len(sizes) >= _ENOUGH else _FEWEST
+    places = min(max(_FEWEST, len(sizes) // 2), _PLACES)
     return float(sizes[-places]) if len(sizes) >= places else 0.0
 
 

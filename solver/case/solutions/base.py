@@ -15,6 +15,8 @@ import numpy as np
 from ..material import Material
 
 Part = np.ndarray | int | None
+FRICTION = frozenset({"friction_traction", "slip"})
+"""The quantities of solutions with friction."""
 
 
 class ParameterError(ValueError):

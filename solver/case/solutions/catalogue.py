@@ -27,11 +27,12 @@ from .hertz import HertzApproach, HertzCylinder, HertzSphere
 from .indenter import Indenter
 from .manufactured import Parabola2d, Paraboloid3d
 from .meridian import Meridian
-from .nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes
+from .nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes, PulledTubes
 from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
 from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
 from .receding import RecedingLayer
+from .sliding_waves import SlidingWaves
 from .uniform import Hydrostatic, UniformCompression
 from .waves import Waves2d, Waves3d
 
@@ -62,6 +63,8 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     PolynomialPressure3d,
     ShearedBlocks,
     Sheared,
+    PulledTubes,
+    SlidingWaves,
 )
 SOLUTIONS: dict[str, type[ExactSolution]] = {c.name: c for c in _CLASSES}
 _ALL, _RIGID = "all", "rigid"

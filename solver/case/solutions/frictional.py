@@ -23,14 +23,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..material import Material
-from .base import ElasticSolution, Part, parameter
+from .base import FRICTION, ElasticSolution, Part, parameter
 from .pressed import PartialWaves, Pressed
 
 # Points of a rule over the contact, in θ of x = a sin θ.
 _POINTS = 4000
 # Bodies whose compliances differ by less are equal in this.
 _SAME = 1e-12
-FRICTION = frozenset({"friction_traction", "slip"})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -39,6 +39,14 @@ class Meridian(ElasticSolution):
         """The gap (n,) of the whole at points (n, 2)."""
         return self.whole.gap(_around(x))
 
+    def friction_traction(self, x: np.ndarray) -> np.ndarray:
+        """Traction of friction (n, 2) along r and z at points (n, 2)."""
+        return self.whole.friction_traction(_around(x))[:, _AXES[:2]]
+
+    def slip(self, x: np.ndarray) -> np.ndarray:
+        """Slip (n, 2) along r and z at points (n, 2)."""
+        return self.whole.slip(_around(x))[:, _AXES[:2]]
+
     def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
         """Displacement (n, 2) along r and z at points (n, 2)."""
         return self.whole.displacement(_around(x), part)[:, _AXES[:2]]

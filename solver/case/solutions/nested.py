@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..material import Material
-from .base import ElasticSolution, Part, lame_of, parameter
+from .base import FRICTION, ElasticSolution, Part, lame_of, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,3 +247,53 @@ class NestedSpheres(NestedCylinders):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require("spheres do not rotate here: must be left out", spin=self.spin == 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PulledTubes(NestedTubes):
+    """The nested tubes, of which the outer one is pulled along the axis against friction.
+
+    The tractions τ = μp along the axis make the shear τ b/r of both tubes, b the radius of the
+    interface, and move them by (τ b/μ) ln(r/b); the outer one slides by `slide` besides.
+    """
+
+    name: ClassVar[str] = "pulled_tubes"
+    quantities: ClassVar[frozenset[str]] = ElasticSolution.quantities | FRICTION
+
+    friction: float = parameter("coefficient", source="friction", positive=True)
+    slide: float = parameter("by how much the outer tube slides along the axis", positive=True)
+
+    def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        """The shear and the slide beside the nested tubes'."""
+        part = self.part_of(x, part)
+        found = super().displacement(x, part)
+        radius = np.linalg.norm(x[:, :2], axis=1)
+        found[:, 2] += self._shear(part) * np.log(radius / self.radii[1])
+        found[:, 2] += np.where(part == 1, self.slide, 0.0)
+        return found
+
+    def gradient(self, x: np.ndarray, part: Part = None) -> np.ndarray:
+        """By differentiation."""
+        part = self.part_of(x, part)
+        found = super().gradient(x, part)
+        square = (x[:, :2] ** 2).sum(axis=1)
+        found[:, 2, :2] += (self._shear(part) / square)[:, None] * x[:, :2]
+        return found
+
+    def friction_traction(self, x: np.ndarray) -> np.ndarray:
+        """μp along the axis on the inner tube."""
+        found = np.zeros(x.shape)
+        found[:, 2] = self.friction * self.contact_pressure(x)
+        return found
+
+    def slip(self, x: np.ndarray) -> np.ndarray:
+        """The slide."""
+        found = np.zeros(x.shape)
+        found[:, 2] = self.slide
+        return found
+
+    def _shear(self, part: np.ndarray) -> np.ndarray:
+        """τ b/μ (n,) of parts (n,)."""
+        b = self.radii[1]
+        traction = self.friction * self.contact_pressure(np.array([[b, 0.0, 0.0]]))[0]
+        return traction * b / np.array([lame_of(m)[1] for m in self.materials])[part]
