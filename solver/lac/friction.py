@@ -70,7 +70,11 @@ def sticking(closed: np.ndarray, k: int) -> Slip:
 
 
 def without_friction(closed: np.ndarray, k: int) -> Slip:
-    """All that is `closed` (m,) slips, and nothing resists."""
+    """All that is `closed` (m,) slips, and nothing resists.
+
+    >>> without_friction(np.array([True, False]), 1).slips.tolist()
+    [True, False]
+    """
     return replace(sticking(closed, k), slips=closed.copy())
 
 
@@ -101,6 +105,15 @@ def following(
 
     Also the largest change of a bound or of b d where slips go on, a traction. `softness`: slip per
     traction, for a first guess of how far a macro-element goes that begins to slip.
+
+    Pulled by 2 along the tangent, it begins to slip the other way where it bears 1 only:
+
+    >>> one, tiny = np.ones((1, 1)), np.array([0.1])
+    >>> response = Response(closed=np.array([True]), pressure=2 * one[0], traction=2 * one,
+    ...     slip=0 * one, traction_limit=tiny, slip_limit=tiny)
+    >>> slip, _ = following(sticking(response.closed, 1), response, one[0], response.closed, 0.5)
+    >>> slip.traction.tolist(), slip.direction.tolist(), slip.distance.tolist()
+    ([[1.0]], [[-1.0]], [0.5])
     """
     size, far = np.linalg.norm(found.traction, axis=1), np.linalg.norm(found.slip, axis=1)
     slips = found.closed & (slip.slips ^ change)

@@ -7,9 +7,9 @@ from ..mechanics.fem.faces import face_integrals
 from ..mechanics.fem.supports import DEPENDENT
 from ..mechanics.linear.direct import factorise
 from .accuracy import stress_of_motion
-from .problem import Equilibrium
+from .equilibrium import Equilibrium
+from .forces import Reaction, RigidMotion
 from .scene import Scene, ZoneScene
-from .solution import Reaction, RigidMotion
 
 # A macro-element is covered in full where its segments miss less than this share.
 _COVERED = 1e-6

@@ -11,7 +11,8 @@ from itertools import chain, product
 import numpy as np
 
 from ..lac.reconstruction import FORMS
-from .solution import NodalContact, RecoveredPressure, Resultants, Solution, ZoneResult
+from .forces import Resultants
+from .solution import NodalContact, RecoveredPressure, Solution, ZoneFriction, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
 # roundings of coordinates and displacements, a pressure by its estimated error and by what so many
@@ -113,11 +114,7 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
         nodes = getattr(zone, f"{side}_nodes")
         yield from _numbers(f"{side}_nodes", nodes, (len(nodes),), n)
         yield from _values(f"stress_{side}", getattr(zone, f"stress_{side}"), (len(nodes),))
-    for kind, faces, owner in zone.faces:
-        yield from _numbers(f"slave faces {kind}", faces, (len(owner), None), n)
-        yield from _numbers(f"macro-elements of {kind}", owner, (len(owner),), m)
-    for kind, faces in zone.master_faces:
-        yield from _numbers(f"master faces {kind}", faces, (len(faces), None), n)
+    yield from _faces(zone, n, m)
     if zone.recovered:
         yield from _recovered(zone.recovered, n, m, dim)
     for name in ("pressure_error", "pressure_of_forces"):
@@ -126,9 +123,21 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
     if zone.nodal:
         yield from _nodal(zone.nodal, n)
     if zone.friction:
-        for name in ("friction_traction", "slip", "slip_total"):
-            yield from _values(name.replace("_", " "), getattr(zone.friction, name), (m, dim))
-        yield from _numbers("status of friction", zone.friction.status, (m,), 3)
+        yield from _friction(zone.friction, m, dim)
+
+
+def _faces(zone: ZoneResult, n: int, m: int) -> Iterator[str]:
+    for kind, faces, owner in zone.faces:
+        yield from _numbers(f"slave faces {kind}", faces, (len(owner), None), n)
+        yield from _numbers(f"macro-elements of {kind}", owner, (len(owner),), m)
+    for kind, faces in zone.master_faces:
+        yield from _numbers(f"master faces {kind}", faces, (len(faces), None), n)
+
+
+def _friction(found: ZoneFriction, m: int, dim: int) -> Iterator[str]:
+    for name in ("friction_traction", "slip", "slip_total"):
+        yield from _values(name.replace("_", " "), getattr(found, name), (m, dim))
+    yield from _numbers("status of friction", found.status, (m,), 3)
 
 
 def _recovered(field: RecoveredPressure, n: int, m: int, dim: int) -> Iterator[str]:

@@ -29,7 +29,8 @@ from ..lac.friction import (
 )
 from ..lac.status import StatusResult
 from ..mechanics.mortar.tresca import coulomb_by_cones
-from .problem import ContactProblem, Equilibrium, Friction
+from .equilibrium import Equilibrium, Friction
+from .problem import ContactProblem
 from .scene import ZoneScene
 from .solution import ZoneFriction
 
@@ -103,8 +104,9 @@ class _Search:
             _LOG.info("no equilibrium without friction: %s", error)
         yield _Status(closable, sticking(closable[self.gaps], k))
         if len(self.gaps) <= _MOST_CONES:
-            start, self.held = self._by_cones(), True
-            yield start
+            self.held = True
+            if start := self._by_cones():
+                yield start
 
     def _between(self, closed: np.ndarray, pressure: np.ndarray) -> _Status:
         """What slips by the tractions of a stuck contact, under the `pressure` without friction."""
@@ -237,7 +239,6 @@ class _Search:
         total[self.rows] += response.slip.T
         slipping = np.zeros(len(pressure), dtype=bool)
         slipping[self.gaps] = status.slip.slips
-        lost = float(-(response.traction * response.slip).sum(axis=1) @ self.area) + 0.0
         return replace(
             found,
             iterate=replace(found.iterate, scene=self.problem.scene).under(
@@ -252,11 +253,13 @@ class _Search:
             ),
             status=StatusResult(found.status.closed, self.count, self.changes),
             correction=np.zeros_like(force),
-            friction=Friction(status.slip, slipping, jump, total, lost, self.contraction),
+            friction=Friction(
+                status.slip, slipping, jump, total, _work(response, self.area), self.contraction
+            ),
         )
 
-    def _by_cones(self) -> _Status:
-        """The status that cone programs find; SolveError where their bounds do not settle."""
+    def _by_cones(self) -> _Status | None:
+        """The status that cone programs find; None where their bounds do not settle."""
         problem, k = self.problem, len(self.rows)
         _LOG.info("friction: cone programs of %d macro-elements", len(self.gaps))
         problem.hold_across(None)
@@ -269,7 +272,7 @@ class _Search:
             stiffness, start.pressure[rows], self.coefficient[there], number[self.gaps[there]], k
         )
         if not settled:
-            raise SolveError("no frictional equilibrium found")
+            return None
         forces, moved = np.zeros((2, len(rows)))
         forces[rows], moved[rows] = found, jump
         closed = problem.constraints.closable & (forces > 0)
@@ -294,6 +297,11 @@ def _worst(wrong: np.ndarray, slipping: np.ndarray) -> tuple[np.ndarray, np.ndar
     else:
         change_slip[slipping.argmax()] = True
     return change, change_slip
+
+
+def _work(found: Response, area: np.ndarray) -> float:
+    """The work of friction, which resists the slip."""
+    return float(-(found.traction * found.slip).sum(axis=1) @ area) + 0.0
 
 
 def zone_friction(zone: ZoneScene, state: Equilibrium) -> ZoneFriction | None:
@@ -321,12 +329,12 @@ def solve_with_friction(
 
     Raises SolveError where none is found, or a body moves freely once its contact slips.
     """
-    search, failure = _Search(problem, step, before), SolveError("no frictional equilibrium found")
+    search, failure = _Search(problem, step, before), None
     for start in search.starts():
         try:
             if found := search.from_status(start):
                 return found
         except SolveError as error:
-            failure = error
+            failure = failure or error
     problem.hold_across(None)
-    raise failure
+    raise failure or SolveError("no frictional equilibrium found")

@@ -11,9 +11,10 @@ import numpy as np
 from ..lac.cut import needs_cut
 from ..mechanics.fem.mixed import AUTOMATIC_ABOVE
 from .constraints import MIN_COVERAGE
+from .equilibrium import Equilibrium
 from .naming import body_names
 from .options import Options
-from .problem import ContactProblem, Equilibrium
+from .problem import ContactProblem
 from .scene import Scene, ZoneScene
 from .solution import Line, Solution
 

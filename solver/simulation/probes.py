@@ -10,8 +10,9 @@ from ..case.model import Probe
 from ..mechanics.fem.locate import Located, locate
 from ..system.errors import InputError
 from .exact import pressure_on
+from .forces import ProbeResult
 from .scene import Scene
-from .solution import ProbeResult, ZoneResult
+from .solution import ZoneResult
 
 # A point is in a body, and in two of them, to this share of the model's length; and on a contact
 # surface, which its faces only approximate, to the second.

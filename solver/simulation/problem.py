@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -10,7 +10,6 @@ from scipy import sparse
 
 from ..case.model import Step
 from ..lac.errors import SolveError
-from ..lac.friction import Slip
 from ..lac.status import StatusResult, Trial, find_status
 from ..mechanics.fem.bodies import (
     rigid_motions,
@@ -21,7 +20,7 @@ from ..mechanics.linear.stabilised import Compliance
 from ..mechanics.linear.stiffened import Stiffness
 from ..mechanics.linear.systems import Systems, parts_of
 from ..system.memory import release
-from .accuracy import Accuracy, Roughness, estimate, judged, roughness
+from .accuracy import Roughness, estimate, judged, roughness
 from .constraints import (
     RigidMotions,
     contact_constraints,
@@ -30,6 +29,7 @@ from .constraints import (
     unit_springs,
 )
 from .displacement import Displacement
+from .equilibrium import Equilibrium
 from .first_status import first_guess, moved
 from .free_stiffness import free_stiffness, free_unknowns
 from .iterate import ContactIterate
@@ -58,64 +58,6 @@ _LARGE = 100_000
 _ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
 _AT_ONCE = 1 << 23
-
-
-@dataclass(frozen=True)
-class Friction:
-    """The state of friction after a step.
-
-    `slip`: see `lac.friction`; `slipping` (k,) of the multipliers of gaps; `jump`, `total` (k,) in
-    the rows of slip: the mean jump between the surfaces, and what they slipped in all steps;
-    `dissipation`: the work of friction in this step, `contraction`: the change of the bounds
-    that pressures yield, over that of the bounds solved with (0: nothing slips).
-    """
-
-    slip: Slip
-    slipping: np.ndarray
-    jump: np.ndarray
-    total: np.ndarray
-    dissipation: float
-    contraction: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Equilibrium:
-    """A solved load factor: pressure (k,) and gap with their round-off, status, residual.
-
-    `residual` is relative to `force_scale`, the size of the forces at work. Fields are those of the
-    `iterate`. `correction` (n, dim) are the contact forces beside those of the pressures, of a
-    recovered pressure. With `friction`, the rows of slip have the tractions on the master as
-    pressures, and the slips of the step as gaps.
-    """
-
-    iterate: ContactIterate
-    trial: Trial
-    status: StatusResult
-    residual: float
-    force_scale: float
-    accuracy: Accuracy
-    correction: np.ndarray
-    friction: Friction | None = None
-
-    @property
-    def pressure(self) -> np.ndarray:
-        """Contact pressure (k,)."""
-        return self.trial.pressure
-
-    @property
-    def gap(self) -> np.ndarray:
-        """Average gap (k,)."""
-        return self.trial.gap
-
-    @property
-    def displacement(self) -> np.ndarray:
-        """Displacement (n, dim)."""
-        return self.iterate.displacement.total.reshape(self.force.shape)
-
-    @property
-    def force(self) -> np.ndarray:
-        """Loads (n, dim)."""
-        return self.iterate.force - self.correction
 
 
 class ContactProblem:
@@ -299,8 +241,7 @@ class ContactProblem:
         """The start of a solve with the given multipliers closed."""
         scene = self.scene
         if moves := self._free_motion(closed):
-            opened = f"{moves} once {int((~closed).sum())} macro-elements are open"
-            raise SolveError(f"{opened}: the loads part the bodies, or a support is missing")
+            raise SolveError(f"{moves} {self._loose(closed)}, or a support is missing")
         acting, offset = scene.acting(step)
         return ContactIterate(
             scene=scene,
@@ -311,6 +252,19 @@ class ContactProblem:
             mean_stress=np.zeros(scene.mean.size),
             swelling=scene.straining(step, scene.initial.swelling),
         )
+
+    def _loose(self, closed: np.ndarray) -> str:
+        """How many macro-elements do not hold, and what the loads have done."""
+        loose, slips = ~closed[self.constraints.normal], False
+        for zone in self.scene.zones:
+            for rows in zone.slips[:1]:
+                loose[zone.numbers] |= ~closed[rows]
+                slips = True
+        count = int(loose.sum())
+        if not slips:
+            return f"once {count} macro-elements are open: the loads part the bodies"
+        words = "the loads part the bodies or overcome friction"
+        return f"once {count} macro-elements are open or slip: {words}"
 
     def _solve_closed(
         self, start: ContactIterate, correction: np.ndarray | float, scale: float

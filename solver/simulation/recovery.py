@@ -12,7 +12,8 @@ import numpy as np
 from ..case.model import Step
 from ..lac.reconstruction import Reconstruction
 from ..lac.recovery import Recovery, settled_means
-from .problem import ContactProblem, Equilibrium
+from .equilibrium import Equilibrium
+from .problem import ContactProblem
 from .scene import ZoneScene
 
 _LOG = logging.getLogger(__name__)

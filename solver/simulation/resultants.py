@@ -6,10 +6,10 @@ from ..lac.cells.faces import surface_points
 from ..lac.reconstruction import vertex_neighbours
 from ..mechanics.mortar.edge import Edges, contact_edges
 from .balance import moment
-from .problem import Equilibrium
+from .equilibrium import Equilibrium
+from .forces import Resultants
 from .recovery import RecoveredZone
 from .scene import Scene, ZoneScene
-from .solution import Resultants
 
 
 def resultants(

@@ -21,20 +21,18 @@ from ..system.progress import OUTCOME, stage
 from .balance import (
     imbalances,
     pressures_of_forces,
-    reactions,
-    rigid_bodies,
     strain_energy,
 )
 from .consistency import inconsistency
+from .equilibrium import Equilibrium
 from .friction import solve_with_friction, zone_friction
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
 from .plan import decided, estimated, plan_notes, softness_notes
 from .probes import probed
-from .problem import ContactProblem, Equilibrium
+from .problem import ContactProblem
 from .recovery import Recovered, RecoveredZone, recovered
-from .resultants import resultants
 from .scene import Scene, ZoneScene, build_scene
 from .solution import (
     Line,
@@ -44,6 +42,7 @@ from .solution import (
     StepResult,
     ZoneResult,
 )
+from .step_results import closed_of, step_results, stress_scale
 from .unloaded import without_unloaded
 from .validity import remarks, validity
 
@@ -196,8 +195,8 @@ def _recover(
     stress -= scene.straining(scene.case.steps[-1], scene.initial.stress)
     if scene.case.thin:
         stress[:, 2] = 0.0
-    scale = _stress_scale(scene, states, stress)
-    steps, at_nodes = _step_results(scene, states, fields, scale)
+    scale = stress_scale(scene, states, stress)
+    steps, at_nodes = step_results(scene, states, fields, scale)
     zones = [
         _zone_result(scene, zone, last, stress, forces, fields[-1].get(zone.zone.name), steps[-1])
         for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
@@ -280,7 +279,7 @@ def _zone_result(
         area=surface.area,
         multiplier=zone.by_macro_element(state.pressure),
         gap=zone.by_macro_element(state.gap),
-        closed=_closed(zone, state),
+        closed=closed_of(zone, state),
         coverage=surface.covered / surface.area,
         stress_slave=normal_stress(stress[slave_nodes], slave_normal),
         stress_master=normal_stress(stress[master_nodes], master_normal),
@@ -330,11 +329,6 @@ def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
     return NodalContact(nodes, zone.at_nodes(state.pressure), zone.at_nodes(state.gap), closed)
 
 
-def _closed(zone: ZoneScene, state: Equilibrium) -> np.ndarray:
-    """The macro-elements (m,) with at least half of their multipliers closed."""
-    return zone.by_macro_element(state.status.closed.astype(float)) >= _HALF
-
-
 def _nodal_normals(
     scene: Scene, faces: list[tuple[str, np.ndarray]]
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -342,66 +336,3 @@ def _nodal_normals(
     total = nodal_normals(scene.points, faces)
     nodes = np.unique(np.concatenate([nodes.ravel() for _, nodes in faces]))
     return nodes, total[nodes]
-
-
-def _step_results(
-    scene: Scene, states: list[Equilibrium], fields: list[Recovered], scale: float
-) -> tuple[list[StepResult], np.ndarray]:
-    """The steps, and the reactions at nodes (n, dim) in the last one."""
-    results, at_nodes = [], np.zeros(0)
-    for factor, state, field in zip(scene.case.factors, states, fields, strict=True):
-        seen = []
-        for wanted in scene.case.observe:
-            zone = next(z for z in scene.zones if z.zone.name == wanted.zone)
-            surface = zone.operator.surface
-            offset = surface.centre + scene.origin - np.array(wanted.nearest)
-            local = int(np.linalg.norm(offset, axis=1).argmin())
-            seen.append(
-                {
-                    "zone": wanted.zone,
-                    "macro_element": local,
-                    "pressure": float(zone.by_macro_element(state.pressure)[local]),
-                    "gap": float(zone.by_macro_element(state.gap)[local]),
-                    "status": int(_closed(zone, state)[local]),
-                    "coverage": float(surface.covered[local] / surface.area[local]),
-                }
-            )
-        held, at_nodes = reactions(scene, state)
-        n = scene.n_multipliers
-        product = float(np.abs(state.pressure * state.gap)[:n].max(initial=0.0))
-        results.append(
-            StepResult(
-                factor=factor,
-                iterations=state.status.iterations,
-                status_changes=sum(state.status.changes),
-                residual=state.residual,
-                complementarity=product / (scale * scene.length),
-                observations=seen,
-                resultants={
-                    (name := zone.zone.name): resultants(
-                        scene, zone, state, _closed(zone, state), field.get(name)
-                    )
-                    for zone in scene.zones
-                },
-                reactions=held,
-                rigid=rigid_bodies(scene, state),
-                dissipation=state.friction.dissipation if state.friction else 0.0,
-                contraction=state.friction.contraction if state.friction else 0.0,
-            )
-        )
-    return results, at_nodes
-
-
-def _stress_scale(scene: Scene, states: list[Equilibrium], stress: np.ndarray) -> float:
-    """The largest pressure of any step among the loads (as a number).
-
-    Else the largest contact pressure of any step or `stress` (n, 6), else 1.
-    """
-    values = [
-        abs(load.value * load.factor(step))
-        for load in scene.case.loads
-        for step in scene.case.steps
-        if load.kind == "pressure" and isinstance(load.value, float)
-    ]
-    largest = [np.abs(field).max(initial=0.0) for field in (stress, *(s.pressure for s in states))]
-    return max(values, default=0.0) or float(max(largest)) or 1.0

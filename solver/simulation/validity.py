@@ -16,7 +16,7 @@ from ..lac.cells.faces import circumference
 from ..mechanics.fem.cell_sizes import largest_strain
 from ..mechanics.mortar.overlap import inside_others
 from .constraints import MIN_COVERAGE
-from .problem import Equilibrium
+from .equilibrium import Equilibrium
 from .scene import Scene, ZoneScene
 from .solution import Line, Validity
 

@@ -1,12 +1,13 @@
 """Load steps and probes in a result file: see `solver.verification.results`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import h5py
 import numpy as np
 
-from ..simulation.solution import ProbeResult, Reaction, Resultants, RigidMotion, StepResult
+from ..simulation.forces import ProbeResult, Reaction, Resultants, RigidMotion
+from ..simulation.solution import StepResult
 from ..system.hdf5 import column, read_table, write_table
 
 _OF_STEP = (
@@ -25,12 +26,7 @@ def write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
     for name in ("reactions", "rigid"):
         forces = [{"step": i, **vars(one)} for i, s in enumerate(steps) for one in getattr(s, name)]
         write_table(file.create_group(name), forces)
-    contact = [
-        {"step": i, "zone": zone} | {name: getattr(one, name) for name in _RESULTANTS}
-        for i, step in enumerate(steps)
-        for zone, one in step.resultants.items()
-    ]
-    write_table(file.create_group("resultants"), contact)
+    write_table(file.create_group("resultants"), list(_resultants(steps)))
     group = file.create_group("observation")
     group["factor"] = [step.factor for step in steps]
     first = observed[0] if observed else []
@@ -39,6 +35,20 @@ def write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
     for name in _OBSERVED:
         values = [[float(o[name]) for o in row] for row in observed]
         group[name] = np.reshape(values, (len(steps), len(first)))
+
+
+def _resultants(steps: Sequence[StepResult]) -> Iterator[dict[str, Any]]:
+    """Rows with the same columns: NaN where a zone has no friction and another one has."""
+    found = [(i, zone, one) for i, s in enumerate(steps) for zone, one in s.resultants.items()]
+    for i, zone, one in found:
+        row: dict[str, Any] = {"step": i, "zone": zone}
+        for name in _RESULTANTS:
+            values = [getattr(other, name) for _, _, other in found]
+            known = next((value for value in values if value is not None), None)
+            if known is not None:
+                mine = getattr(one, name)
+                row[name] = np.full(known.shape, np.nan) if mine is None else mine
+        yield row
 
 
 def read_steps(file: h5py.File) -> list[StepResult]:
@@ -58,10 +68,17 @@ def read_steps(file: h5py.File) -> list[StepResult]:
             ],
             reactions=[Reaction(**row) for row in reactions.get(i, ())],
             rigid=[RigidMotion(**row) for row in rigid.get(i, ())],
-            resultants={row.pop("zone"): Resultants(**row) for row in resultants.get(i, ())},
+            resultants={
+                row.pop("zone"): Resultants(**{k: v for k, v in row.items() if _known(v)})
+                for row in resultants.get(i, ())
+            },
         )
         for i, row in enumerate(read_table(file["steps"]))
     ]
+
+
+def _known(values: Any) -> bool:
+    return not np.isnan(values).all()
 
 
 def _read_forces(file: h5py.File, table: str) -> dict[int, list[dict[str, Any]]]:

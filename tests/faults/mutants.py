@@ -35,11 +35,13 @@ from tests.faults.patches import (
     every_third_off,
     factor_of_half,
     first_guess_kept,
+    first_kept,
     first_nodes_exchanged,
     first_scaled,
     first_status_kept,
     first_system_kept,
     given,
+    integrals_of,
     last_cell_lost,
     last_opened,
     lower_half_softer,
@@ -77,6 +79,12 @@ CURVED, CUP = "rigid/curved-face", "rigid/hollow-sphere"
 ROLLER = "rigid/cylinder"
 DIE, SHAFT, LINES = "rigid/tilted-die", "rigid/shaft-in-tube", "rigid/lines-of-the-mesh"
 STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
+STUCK, SLIDING, STEPWISE = (f"friction-patch/{n}" for n in ("n-stick", "e-slip", "two-steps"))
+UNLOADED, PULLED, RIGHT = (
+    "friction/unloaded-quad8",
+    "friction/pulled-quad8",
+    "friction-patch/t-slip",
+)
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 
@@ -325,7 +333,7 @@ MUTANTS = (
     Mutant("first-status", "what is open in the first step stays open", SIDES,
            "solver.simulation.problem:find_status", first_status_kept),
     Mutant("moment-sign", "moments on rigid bodies have the wrong sign", DIE,
-           "solver.simulation.simulate:rigid_bodies",
+           "solver.simulation.step_results:rigid_bodies",
            changed(lambda bodies: [replace(body, moment=-body.moment) for body in bodies])),
     Mutant("reference-point", "rigid bodies turn about another point", DIE,
            "solver.simulation.rigid:_frame",
@@ -342,6 +350,27 @@ MUTANTS = (
     Mutant("normal-of-slave", "contact follows the slave's normals, not the master's", OBSTACLE,
            "solver.simulation.operators:with_master_normals",
            lambda _: lambda slaves, masters, points: slaves),
+    Mutant("open-slips", "integrals of slip are not closed on bent faces", STUCK,
+           "solver.lac.operator:slip_operator",
+           given(lambda parts, *rest: ([integrals_of(part) for part in parts], *rest))),
+    Mutant("slip-direction", "friction pulls along the slip", SLIDING,
+           "solver.simulation.friction:following",
+           changed(lambda found: (replace(found[0], direction=-found[0].direction), found[1]))),
+    Mutant("bound-kept", "the bound of friction stays that of the first step", STEPWISE,
+           "solver.simulation.friction:_Search._bounds", first_kept),
+    Mutant("slip-history", "slip is counted from the undeformed state in each step", UNLOADED,
+           "solver.simulation.problem:ContactProblem.count_slip_from",
+           given(lambda problem, jump: (problem, 0 * jump))),
+    Mutant("traction-side", "the traction of friction is that on the master", SLIDING,
+           "solver.simulation.simulate:zone_friction",
+           changed(lambda f: f and replace(f, friction_traction=-f.friction_traction))),
+    Mutant("tangents-exchanged", "the two tangents are exchanged", RIGHT,
+           "solver.lac.operator:slip_operator", changed(lambda rows: rows[::-1])),
+    Mutant("slip-without-rings", "slip is weighted as in the plane around an axis", PULLED,
+           "solver.lac.operator:slip_operator",
+           changed(lambda rows: tuple(0.9 * row for row in rows))),
+    Mutant("work-halved", "friction does half the work, as if it grew with the slip", STEPWISE,
+           "solver.simulation.friction:_work", changed(lambda work: work / 2)),
 )  # fmt: skip
 
 

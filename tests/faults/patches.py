@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import diags_array
 
 from solver.case.model import Material
+from solver.lac.closure import integrals
 
 # A segment below this share of the largest is round-off of the intersection.
 _SLIVER = 1e-6
@@ -194,3 +195,23 @@ def springs_counted(true: Wrapped) -> Wrapped:
         return float(true(scene, state) + (state.displacement * state.iterate.springs).sum() / 2)
 
     return energy
+
+
+def integrals_of(part: Any) -> Any:
+    """The integrals of a part's segments as quadrature has them, before the closure."""
+    space = SimpleNamespace(at=lambda *_: np.ones((*part.segments.weight.shape, 1)))
+    space.number = {part.segments.slave.index: part.segments.slave.faces.number[:, None]}
+    return integrals(space, part.segments)
+
+
+def first_kept(true: Wrapped) -> Wrapped:
+    """The first result that is more than zero, whatever comes later."""
+    kept: list[Any] = []
+
+    def faulty(*arguments: Any) -> Any:
+        found = true(*arguments)
+        if not kept and np.any(found):
+            kept.append(found)
+        return kept[0] if kept else found
+
+    return faulty

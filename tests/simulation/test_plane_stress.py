@@ -74,7 +74,7 @@ def test_the_mixed_form_is_refused():
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        (("name: interface", "name: interface, friction: 0.3"), "frictionless contact only"),
+        (("name: interface", "name: interface, mu: 0.3"), "the key friction of a contact zone"),
         (("poisson: 0.3", "poisson: 0.3, alpha: 1.2e-5"), "initial strain is a load"),
         (("name: interface", "name: interface, tied: true"), "holds in tension is out of scope"),
         (("poisson: 0.3", "poisson: 0.3, yield_stress: 9"), "linear elasticity only"),

@@ -12,8 +12,9 @@ from solver.mechanics.linear.choice import LinearSolver
 from solver.mechanics.linear.direct import force_solver
 from solver.mesh import generate
 from solver.simulation import problem
+from solver.simulation.equilibrium import Equilibrium
 from solver.simulation.options import LEAN
-from solver.simulation.problem import ContactProblem, Equilibrium
+from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import Scene, build_scene
 from solver.system.clock import Clock
 

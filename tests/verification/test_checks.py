@@ -40,6 +40,7 @@ def test_the_exact_state_passes_every_check_of_the_table(solution):
     checks = run_checks(solution)
     given = {None, *solution.case.reference}
     named = [c.name for c in CHECKS if c.name not in ERRORS and c.key in given]
+    named.remove("friction_law")  # of zones with friction
     assert [check.name for check in checks] == named
     assert len(named) > 15
     assert all(check.passed for check in checks)
