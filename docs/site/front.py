@@ -1,15 +1,17 @@
 """The README's pictures from the last batch: `python docs/site/front.py` (`make pictures`).
 
 `docs/front.svg`: meshes and contact pressure of three solves. `docs/error-against-time.svg`: the
-error of every solve over its run time.
+error of every solve over its run time. `docs/cattaneo.svg`: pressure and friction of a cylinder.
 """
 
 import sys
 from pathlib import Path
 
 from solver.report.overview import error_chart
+from solver.report.profile import draw_profile
 from solver.report.rows import read_rows
 from solver.system.files import write_text
+from solver.verification.results import read_result
 
 ROOT = Path(__file__).resolve().parents[2]
 SHOWN = {
@@ -17,11 +19,12 @@ SHOWN = {
     "hertz/hertz-sphere-hexa8": "A sphere on a plane: Hertz's pressure",
     "lame/lame-spheres-tetra10": "Nested spheres under pressure: Lamé's solution",
 }
+CATTANEO = "friction-cylinder-tria6"
 WIDTH, HEIGHT, LINE = 1040, 400, 34
 
 
 def main() -> None:
-    """Write both pictures."""
+    """Write the pictures."""
     results = ROOT / "results"
     parts = []
     for i, (job, caption) in enumerate(SHOWN.items()):
@@ -43,7 +46,10 @@ def main() -> None:
     chart = error_chart(read_rows(sorted(results.glob("*/*/verdict.json"))))
     assert chart is not None
     write_text(ROOT / "docs" / "error-against-time.svg", chart.svg())
-    print("docs/front.svg, docs/error-against-time.svg")
+    solution = read_result(results / "friction" / CATTANEO / "result.vtkhdf").solution
+    drawn = draw_profile(solution, solution.zones[0], CATTANEO, "Cattaneo's problem")
+    write_text(ROOT / "docs" / "cattaneo.svg", drawn.svg())
+    print("docs/front.svg, docs/error-against-time.svg, docs/cattaneo.svg")
 
 
 if __name__ == "__main__":

@@ -119,6 +119,13 @@ def zone_fields(solution: Solution, zone: ZoneResult) -> dict[str, np.ndarray]:
         with_unit("contact pressure p", units.get("stress")): zone.multiplier,
         with_unit("gap", units.get("length")): zone.gap,
     }
+    if zone.friction is not None:
+        size = np.linalg.norm(zone.friction.friction_traction, axis=1)
+        found |= {
+            with_unit("friction |t|", units.get("stress")): size,
+            with_unit("slip", units.get("length")): np.linalg.norm(zone.friction.slip, axis=1),
+            "status: 0 open, 1 stick, 2 slip": zone.friction.status.astype(float),
+        }
     means = expected(solution, zone)
     if means is not None:
         found[RELATIVE] = (zone.multiplier - means) / (np.abs(means).max() or 1.0)

@@ -122,6 +122,8 @@ def _log_forces(solution: Solution) -> None:
         most = max((float(np.abs(force).max()) for force in forces), default=0.0)
         for name, contact in step.resultants.items():
             _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, shown(most, contact))
+        if any(zone.friction for zone in solution.zones):
+            _LOG.log(OUTCOME, "%swork of friction %.6g", of_step, step.dissipation)
         for reaction in step.reactions:
             text = "%sreaction of %s: %s"
             _LOG.log(OUTCOME, text, of_step, reaction.group, shown(most, reaction))

@@ -49,6 +49,8 @@ ACCURACY = (
     "surface_stress_slave",
     "surface_stress_master",
     "displacement",
+    "friction_traction",
+    "slip",
     "stress_components",
     "integration_stress",
     "covered_pressure",
@@ -115,6 +117,7 @@ def judge(
         plan=[list(entry) for entry in solution.plan],
         checks=list(checks),
         forces=list(_forces(solution)),
+        dissipation=_dissipation(solution),
         probes=list(_probes(solution)),
         largest_displacement=solution.largest_displacement[0],
         attainable=accuracy.estimate,
@@ -195,10 +198,16 @@ def _forces(solution: Solution) -> Iterator[Force]:
         named += [(held.group, held) for held in step.reactions]
         named += [(f"{one.body}, about its reference point", one) for one in step.rigid]
         for name, one in named:
-            keys = ("force", "moment", "area", "pressure")
+            keys = ("force", "moment", "area", "pressure", "friction", "stick")
             given = ((key, getattr(one, key, None)) for key in keys)
             lists = {key: value.tolist() for key, value in given if value is not None}
             yield Force(step=number, factor=step.factor, name=name, **lists)
+
+
+def _dissipation(solution: Solution) -> list[float]:
+    """The work of friction in each step; empty without friction."""
+    frictional = any(zone.friction for zone in solution.zones)
+    return [step.dissipation for step in solution.steps] if frictional else []
 
 
 def _probes(solution: Solution, most: int = 10) -> Iterator[Probed]:

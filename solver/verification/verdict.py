@@ -29,6 +29,7 @@ EXACT, EXPECTED, STATED = "exact", "expected error", "stated tolerance"
 WORDS = (CRASHED, REFUSED, FAILED, UNRELIABLE, PARTIAL, SOLVED, PASSED)
 NUMBERS = (
     *("force", "reaction", "moment", "contact_area", "strain_energy"),
+    *("stick_area", "dissipation"),
     *("displacement_at", "stress_at", "pressure_at"),
 )
 """The checks of single numbers."""
@@ -112,7 +113,8 @@ class Force:
     """A force of a step: on the slave of a zone, of what holds a group, or on a rigid body.
 
     `moment` (3,) about the origin, or a rigid body's reference point; `area` (3,) of contact with
-    its bounds, and `pressure` (2,), the smallest and the largest of the macro-elements, of zones.
+    its bounds, and `pressure` (2,), the smallest and the largest of the macro-elements, of zones;
+    with friction its part `friction` (dim,) of the force, and the area that sticks `stick` (3,).
     """
 
     step: int
@@ -122,6 +124,8 @@ class Force:
     moment: list[float]
     area: list[float] | None = None
     pressure: list[float] | None = None
+    friction: list[float] | None = None
+    stick: list[float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,6 +240,7 @@ class Verdict:
     plan: list[list[str]] = field(default_factory=list)
     checks: list[CheckResult] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
+    dissipation: list[float] = field(default_factory=list)
     probes: list[Probed] = field(default_factory=list)
     largest_displacement: float | None = None
     strain_energy: float | None = None
