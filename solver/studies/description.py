@@ -37,6 +37,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from msgspec import Meta, field, structs
 
+from ..case.checks import ERRORS
 from ..case.typed import (
     FieldError,
     Number,
@@ -83,11 +84,7 @@ if TYPE_CHECKING:  # errors and degrees are looked up by text
     ErrorName: TypeAlias = str
     Degree: TypeAlias = str
 else:
-    ErrorName = Literal[
-        "displacement_l2", "displacement_h1", "stress_l2", "stress_max", "pressure_l2",
-        "pressure_max", "pressure_means", "pressure_total", "pressure_oscillation",
-        "pressure_inner", "half_width", "peak",
-    ]  # fmt: skip
+    ErrorName = Literal[tuple(ERRORS)]
     Degree = Literal["linear", "quadratic"]
 Slopes = dict[ErrorName, Number]
 _Orders = Annotated[
