@@ -2,8 +2,8 @@
 
 Contact is CalculiX's surface-to-surface penalty (`*CONTACT PAIR, TYPE=SURFACE TO SURFACE`; Dhondt,
 The Finite Element Method for Three-Dimensional Thermomechanical Applications, Wiley 2004, and the
-manual of version 2.20), without friction, its pressure linear in the overlap. A plane case is one
-layer of cells.
+manual of version 2.20), its pressure linear in the overlap, and its friction in the slip, up to μp.
+A plane case is one layer of cells.
 """
 
 import re
@@ -60,7 +60,7 @@ class CalculiX:
     def settings(self) -> Mapping[str, str]:
         """Its main settings, to be shown."""
         return {
-            "contact": "SURFACE TO SURFACE, frictionless",
+            "contact": "SURFACE TO SURFACE",
             "pressure-overclosure": f"LINEAR, {self.stiffness:g} E / face size, "
             f"{min(self.stiffness, ON_CURVES):g} on curved surfaces",
             "curved faces": "gaps as meshed: the overlap of facets is pressure",
@@ -305,13 +305,19 @@ def _flat(deck: Deck) -> bool:
 
 
 def _contact(deck: Deck, stiffness: float) -> Iterator[str]:
-    if deck.pairs:
-        yield "*SURFACE INTERACTION, NAME=SMOOTH"
+    stiffness = stiffness if not deck.pairs or _flat(deck) else min(stiffness, ON_CURVES)
+    slope = stiffness * deck.softest / face_size(deck) if deck.pairs else 0.0
+    names: dict[float, str] = {}
+    for friction in {pair.zone.friction: None for pair in deck.pairs}:
+        names[friction] = f"FRICTION{len(names)}" if friction else "SMOOTH"
+        yield f"*SURFACE INTERACTION, NAME={names[friction]}"
         yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
-        stiffness = stiffness if _flat(deck) else min(stiffness, ON_CURVES)
-        yield f"{stiffness * deck.softest / face_size(deck)!r}"
+        yield f"{slope!r}"
+        if friction:  # the slope of the traction over the slip while it sticks
+            yield "*FRICTION"
+            yield f"{friction!r}, {slope!r}"
     for zone in (pair.zone for pair in deck.pairs):
-        yield "*CONTACT PAIR, INTERACTION=SMOOTH, TYPE=SURFACE TO SURFACE"
+        yield f"*CONTACT PAIR, INTERACTION={names[zone.friction]}, TYPE=SURFACE TO SURFACE"
         yield f"{zone.slave}, {zone.master}"
         if isinstance(zone.clearance, float):
             value = zone.clearance - zone.interference

@@ -169,6 +169,8 @@ def _is_constant(load: Load) -> bool:
 def _refuse(case: Case) -> None:
     if case.histories:
         raise UnsupportedError("factors of single loads in steps: not written for codes")
+    if len(case.steps) > 1 and any(zone.friction for zone in case.zones):
+        raise UnsupportedError("a path of steps with friction: not written for codes")
     if any(load.strains for load in case.loads):
         raise UnsupportedError("initial strain and change of temperature: not written for codes")
     if any(support.together or support.cyclic for support in case.supports):

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..lac.cells.faces import FaceBlock
 from ..lac.errors import SolveError
-from .deck import Deck, PairedFaces, face_size, refuse_rings
+from .deck import Deck, PairedFaces, UnsupportedError, face_size, refuse_rings
 from .foreign import Field, ForeignResult
 
 FILE, RESULT = "deck.json", "result.json"
@@ -40,8 +40,10 @@ class Plain:
         return ""
 
     def write(self, deck: Deck, folder: Path) -> None:
-        """Write `deck.json` into `folder`; UnsupportedError for axisymmetric bodies."""
+        """Write `deck.json`; UnsupportedError for friction and axisymmetric bodies."""
         refuse_rings(deck, "deck.json")
+        if any(pair.zone.friction for pair in deck.pairs):
+            raise UnsupportedError("friction: not written for deck.json")
         text = json.dumps(content(deck))
         (folder / FILE).write_text(text, encoding="ascii")
 

@@ -117,8 +117,6 @@ class PluginCode:
         for feature, words in self.file.lacks.items():
             if _HAS[feature](deck):
                 raise UnsupportedError(words)
-        if any(pair.zone.friction for pair in deck.pairs):
-            raise UnsupportedError(f"friction: not written for {self.name}")
         self.base.write(deck, folder)
 
     def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
