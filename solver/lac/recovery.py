@@ -25,6 +25,7 @@ from .facets import tangents_of
 from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
 from .surface_points import Surface
+from .tangential import along_faces
 
 # The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
 _RELAXATION = 0.87
@@ -37,12 +38,14 @@ class RecoveryRequest:
     `near` (m, m): which share a vertex; `material` (m,): a number of that of the slave's cells. The
     master's faces have theirs as the number of their `Facets`. `stabilise`: makes what stabilises
     contact, if asked for, of the segments, the moments, neighbours (m, m) and covered areas (m,).
+    `slip`: tractions along the tangents are recovered too.
     """
 
     form: Form
     near: sparse.csr_matrix
     material: np.ndarray
     stabilise: Callable[..., Any] | None = None
+    slip: bool = False
 
 
 def moments(found: Sequence[Segments], surface: Surface) -> Moments:
@@ -84,7 +87,8 @@ class Recovery:
     """The recovery of the pressure on m macro-elements by functions ψ, k on each.
 
     `near` (m, m): which of them may be neighbours; `loads` (m · k, n_dofs): ∫ ψ (N_master −
-    N_slave) n dS, none for a constant ψ; `products` (m, k, k): ∫ ψ ψᵀ dS.
+    N_slave) n dS, none for a constant ψ; `slip_loads`: the same with each tangent in place of n;
+    `products` (m, k, k): ∫ ψ ψᵀ dS.
     """
 
     form: Form
@@ -93,6 +97,7 @@ class Recovery:
     loads: sparse.csr_matrix
     products: np.ndarray
     stabilisation: Any = None
+    slip_loads: tuple[sparse.csr_matrix, ...] = ()
 
     def reconstruction(self, closed: np.ndarray) -> Reconstruction:
         """The reconstruction among closed macro-elements (m,)."""
@@ -127,33 +132,48 @@ def recovery(
     at, (m, dim) = moments(found, surface), surface.centre.shape
     k = form.count(dim)
     products = np.zeros((m, k, k))
-    rows, columns, values = [], [], []
     for segments in found:
         psi = at.local.shapes(segments.macro, segments.points, form)
         weighted = segments.weight[..., None] * psi
         np.add.at(products, segments.macro, np.einsum("sqk,sql->skl", weighted, psi))
-        if not form.sweeps:
-            continue
-        applied = weighted[..., : k - (not form.keeps_means)]
+    tangents = np.swapaxes(tangents_of(surface.normal), 0, 1) if asked.slip else ()
+    near = _same_materials(asked, found)
+    stabilise, shape = asked.stabilise, (m * k, dim * n_nodes)
+    return Recovery(
+        form=form,
+        moments=at,
+        near=near,
+        loads=_loads(found, at.local, form, shape),
+        products=products,
+        slip_loads=tuple(_loads(found, at.local, form, shape, t) for t in tangents),
+        stabilisation=stabilise and stabilise(found, at, near, surface.covered),
+    )
+
+
+def _loads(
+    found: Sequence[Segments],
+    local: Local,
+    form: Form,
+    shape: tuple[int, int],
+    tangents: np.ndarray | None = None,
+) -> sparse.csr_matrix:
+    """∫ ψ (N_master − N_slave) n dS (m · k, n_dofs), or with `tangents` (m, dim) in place of n."""
+    rows, columns, values = [], [], []
+    dim = local.centre.shape[1]
+    k = form.count(dim)
+    for segments in found if form.sweeps else ():
+        psi = local.shapes(segments.macro, segments.points, form)
+        applied = segments.weight[..., None] * psi[..., : k - (not form.keeps_means)]
+        along = segments.normal if tangents is None else along_faces(segments, tangents)
         row = segments.macro[:, None] * k + np.arange(applied.shape[-1])
         for sign, side in zip((-1.0, 1.0), segments.sides, strict=True):
-            part = np.einsum("sqk,sqa,sqd->skad", sign * applied, side.values, segments.normal)
+            part = np.einsum("sqk,sqa,sqd->skad", sign * applied, side.values, along)
             column = dim * side.nodes[:, :, None] + np.arange(dim)
             rows.append(np.broadcast_to(row[:, :, None, None], part.shape).ravel())
             columns.append(np.broadcast_to(column[:, None], part.shape).ravel())
             values.append(part.ravel())
     entries = [np.concatenate(part or [np.empty(0, int)]) for part in (values, rows, columns)]
-    loads = sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=(m * k, dim * n_nodes))
-    near = _same_materials(asked, found)
-    stabilise = asked.stabilise
-    return Recovery(
-        form=form,
-        moments=at,
-        near=near,
-        loads=loads.tocsr(),
-        products=products,
-        stabilisation=stabilise and stabilise(found, at, near, surface.covered),
-    )
+    return sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=shape).tocsr()
 
 
 def _same_materials(asked: RecoveryRequest, found: Sequence[Segments]) -> sparse.csr_matrix:

@@ -13,6 +13,7 @@ from scipy import sparse
 
 from .closure import MASTER, SLAVE, Integrals
 from .facets import tangents_of
+from .segments import Segments
 
 # Normals that differ by less within a segment are one normal.
 _FLAT = 1e-12
@@ -51,12 +52,22 @@ def slip_operator(
     return tuple(found)
 
 
+def along_faces(segments: Segments, tangents: np.ndarray) -> np.ndarray:
+    """Unit tangents (s, q, dim) in the face at the points of segments, next to `tangents` (m, dim).
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> along_faces(segments, np.array([[0.6, 0.8]]))[0, 0].tolist()
+    [1.0, 0.0]
+    """
+    normal, tangent = segments.normal, tangents[segments.macro][:, None]
+    found = tangent - (tangent * normal).sum(axis=-1, keepdims=True) * normal
+    return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+
+
 def _along(part: Integrals, side: int, tangents: np.ndarray) -> np.ndarray:
     """∫ N t (s, n_nodes, dim) over segments; t is the tangent in the face at each point."""
     segments = part.segments
-    normal, tangent = segments.normal, tangents[segments.macro][:, None]
-    t = tangent - (tangent * normal).sum(axis=-1, keepdims=True) * normal
-    t /= np.linalg.norm(t, axis=-1, keepdims=True)
+    normal, t = segments.normal, along_faces(segments, tangents)
     flat = np.abs(normal - normal[:, :1]).max(axis=(1, 2), initial=0.0) <= _FLAT
     scalar = np.einsum("sad,sd->sa", part.vectors[side][:, 0], normal[:, 0])
     exact = scalar[..., None] * t[:, :1]

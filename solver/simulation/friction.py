@@ -50,7 +50,7 @@ _Bounds = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
-class _Status:
+class Status:
     """`closed` (k,): multipliers of gaps that are so; `slip` of macro-elements with friction."""
 
     closed: np.ndarray
@@ -58,11 +58,15 @@ class _Status:
 
     @property
     def key(self) -> bytes:
+        """Two with the same one are the same but for bounds and directions."""
         return self.closed.tobytes() + self.slip.slips.tobytes()
 
 
-class _Search:
-    """One step of a problem: the rows of its f macro-elements with friction, and its solves."""
+class Search:
+    """One step of a problem: the rows of its f macro-elements with friction, and its solves.
+
+    `correction` (n, dim): the forces of a recovered pressure beside those of the constants.
+    """
 
     def __init__(self, problem: ContactProblem, step: Step, before: Equilibrium | None):
         zones = [zone for zone in problem.scene.zones if zone.slips]
@@ -84,40 +88,40 @@ class _Search:
         # Whether bounds stay until no status changes: Tresca's problem is solved for each.
         self.held = False
         self.contraction = 0.0
+        self.correction = np.zeros(problem.scene.force.shape)
         problem.count_slip_from(self.jump)
 
-    def starts(self) -> Iterator[_Status]:
+    def starts(self) -> Iterator[Status]:
         """Statuses to start from; each is made when the search from the one before fails."""
         problem, k = self.problem, len(self.rows)
         closable = problem.constraints.closable
         if self.before and self.before.friction:
-            closed = self.before.status.closed & closable
-            yield _Status(closed, self.before.friction.slip)
+            yield status_of(problem, self.before)
         try:
             problem.hold_across(None)
-            free = problem.solve(self.step)
+            free = problem.solve(self.step, correction=self.correction)
             self.count += free.status.iterations
             closed = free.status.closed & closable
             yield self._between(closed, free.pressure[self.gaps])
-            yield _Status(closed, without_friction(closed[self.gaps], k))
+            yield Status(closed, without_friction(closed[self.gaps], k))
         except SolveError as error:
             _LOG.info("no equilibrium without friction: %s", error)
-        yield _Status(closable, sticking(closable[self.gaps], k))
+        yield Status(closable, sticking(closable[self.gaps], k))
         if len(self.gaps) <= _MOST_CONES:
             self.held = True
             if start := self._by_cones():
                 yield start
 
-    def _between(self, closed: np.ndarray, pressure: np.ndarray) -> _Status:
+    def _between(self, closed: np.ndarray, pressure: np.ndarray) -> Status:
         """What slips by the tractions of a stuck contact, under the `pressure` without friction."""
         stuck = sticking(closed[self.gaps], len(self.rows))
-        _, response, _ = self.solve(_Status(closed, stuck))
+        _, response, _ = self.solve(Status(closed, stuck))
         bounds = self._bounds(pressure)
         slips = violation(stuck, response, bounds) > 1
         slip, _ = following(stuck, response, bounds, slips, self.softness)
-        return _Status(closed, slip)
+        return Status(closed, slip)
 
-    def solve(self, status: _Status) -> tuple[Equilibrium, Response, np.ndarray]:
+    def solve(self, status: Status) -> tuple[Equilibrium, Response, np.ndarray]:
         """Equilibrium with a status; the response, and the forces (n, dim) of what slips."""
         problem, slip = self.problem, status.slip
         stuck = status.closed[self.gaps] & ~slip.slips
@@ -127,7 +131,7 @@ class _Search:
         values[self.rows] = slip.traction.T
         across, stiff, rest = self._across(slip)
         force = (problem.constraints.gaps.T @ values + rest).reshape(problem.scene.force.shape)
-        found = problem.equilibrium(self.step, rows, force)
+        found = problem.equilibrium(self.step, rows, force + self.correction)
         self.count += 1
         moved = np.where(status.closed[self.gaps], found.gap[self.rows], 0.0).T
         traction = found.pressure[self.rows].T + slip.traction
@@ -156,7 +160,7 @@ class _Search:
         at_rest = self.area * (across * self.jump[self.rows].T).sum(axis=1)
         return across, stiff, along.T @ (weight * at_rest)
 
-    def from_status(self, status: _Status) -> Equilibrium | None:
+    def from_status(self, status: Status) -> Equilibrium | None:
         """Equilibrium from a first status; None where statuses repeat and bounds do not settle."""
         seen, single, best, without, last = {status.key}, False, np.inf, 0, np.inf
         earlier = None
@@ -181,8 +185,8 @@ class _Search:
         return None
 
     def _following(
-        self, status: _Status, found: Equilibrium, response: Response, single: bool
-    ) -> tuple[_Status, int, float]:
+        self, status: Status, found: Equilibrium, response: Response, single: bool
+    ) -> tuple[Status, int, float]:
         """The status of the next solve, how many changed, and by what share the bounds did.
 
         `single`: only the worst macro-element changes, which breaks a cycle.
@@ -206,7 +210,7 @@ class _Search:
             "friction: solve %d, %d closed, %d slip, %d change, bounds by %.1e",
             *(self.count, status.closed.sum(), slip.slips.sum(), count, moved),
         )
-        return _Status(closed, replace(new, slips=new.slips & kept)), count, moved
+        return Status(closed, replace(new, slips=new.slips & kept)), count, moved
 
     def _measure(self, bounds: _Bounds, earlier: _Bounds) -> None:
         """Note by what bounds contract, as long as they change by more than round-off."""
@@ -222,7 +226,7 @@ class _Search:
 
     def _equilibrium(
         self,
-        status: _Status,
+        status: Status,
         found: Equilibrium,
         response: Response,
         force: np.ndarray,
@@ -252,19 +256,19 @@ class _Search:
                 gap_limit=limits[1],
             ),
             status=StatusResult(found.status.closed, self.count, self.changes),
-            correction=np.zeros_like(force),
+            correction=self.correction,
             friction=Friction(
                 status.slip, slipping, jump, total, _work(response, self.area), self.contraction
             ),
         )
 
-    def _by_cones(self) -> _Status | None:
+    def _by_cones(self) -> Status | None:
         """The status that cone programs find; None where their bounds do not settle."""
         problem, k = self.problem, len(self.rows)
         _LOG.info("friction: cone programs of %d macro-elements", len(self.gaps))
         problem.hold_across(None)
         rows = problem.constraints.eligible
-        start = problem.equilibrium(self.step, rows, np.zeros(problem.scene.force.shape))
+        start = problem.equilibrium(self.step, rows, self.correction)
         stiffness = problem.stiffness_of(rows)
         number = np.cumsum(rows) - 1
         there = rows[self.gaps]
@@ -286,7 +290,13 @@ class _Search:
             direction=-traction / np.where(size > 0, size, 1.0)[:, None],
             distance=np.where(slips, far, np.inf),
         )
-        return _Status(closed, slip)
+        return Status(closed, slip)
+
+
+def status_of(problem: ContactProblem, state: Equilibrium) -> Status:
+    """The status of a state with friction."""
+    assert state.friction is not None
+    return Status(state.status.closed & problem.constraints.closable, state.friction.slip)
 
 
 def _worst(wrong: np.ndarray, slipping: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -329,7 +339,7 @@ def solve_with_friction(
 
     Raises SolveError where none is found, or a body moves freely once its contact slips.
     """
-    search, failure = _Search(problem, step, before), None
+    search, failure = Search(problem, step, before), None
     for start in search.starts():
         try:
             if found := search.from_status(start):

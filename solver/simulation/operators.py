@@ -109,10 +109,6 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> R
     material = np.zeros(count, dtype=int)
     for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
         material[block.number] = number
-    if zone.recovery != "none" and any(other.friction for other in groups.case.zones):
-        key = f"contact[{groups.case.zones.index(zone)}].recovery"
-        allowed = "a case with friction has constant pressures; allowed: none"
-        raise InputError(groups.case.path, key, zone.recovery, allowed)
     form = form_of(zone.recovery, order, corners)
     if form.sweeps and zone.sweeps:
         form = replace(form, sweeps=zone.sweeps)
@@ -120,7 +116,8 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> R
     if zone.stabilised:
         softness = np.array([1 / m.young for m in groups.case.materials.values()] + [0.0])
         stabilise = partial(stabilisation, soft_of=(softness[material], softness))
-    return RecoveryRequest(form, vertex_neighbours(vertices, count), material, stabilise)
+    near, slip = vertex_neighbours(vertices, count), zone.friction > 0
+    return RecoveryRequest(form, near, material, stabilise, slip)
 
 
 def _as_bent(block: Facets) -> Facets:

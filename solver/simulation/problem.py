@@ -79,7 +79,9 @@ class ContactProblem:
         if scene.springs.nnz:
             self.unsupported = unsupported(motions, self._motions.supports, unit_springs(scene))
         refined = scene.options.safeguards.refinement
-        self.single = refined and scene.n_dofs >= SINGLE_FROM
+        # Springs of friction are added to a matrix in double precision.
+        friction = any(zone.slips for zone in scene.zones)
+        self.single = refined and scene.n_dofs >= SINGLE_FROM and not friction
         del motions  # memory for the stiffness
         self._assemble()
 

@@ -22,7 +22,7 @@ _ROUNDS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Zone:
+class ZoneFit:
     """A zone's reconstruction among the macro-elements that are closed."""
 
     numbers: slice
@@ -78,7 +78,7 @@ def recovered(
         return state, {}
     found = state
     for _ in range(_ROUNDS):
-        zones = [_zone(zone, found.status.closed) for zone in given]
+        zones = [fit_of(zone, found.status.closed) for zone in given]
         found, read, forces = _corrected(problem, found, zones)
         wrong = found.trial.violation(found.status.closed) > 1
         if not (wrong & problem.constraints.eligible).any():
@@ -97,15 +97,16 @@ def recovered(
     return state, {}
 
 
-def _zone(zone: ZoneScene, closed: np.ndarray) -> _Zone:
+def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
+    """The reconstruction of a zone among the `closed` (k,) of all multipliers."""
     recovery = zone.operator.recovery
     assert recovery is not None
     reconstruction = recovery.reconstruction(closed[zone.numbers])
-    return _Zone(numbers=zone.numbers, recovery=recovery, reconstruction=reconstruction)
+    return ZoneFit(numbers=zone.numbers, recovery=recovery, reconstruction=reconstruction)
 
 
 def _corrected(
-    problem: ContactProblem, state: Equilibrium, zones: list[_Zone]
+    problem: ContactProblem, state: Equilibrium, zones: list[ZoneFit]
 ) -> tuple[Equilibrium, list[np.ndarray], list[np.ndarray]]:
     """The state with the loads of its reconstruction; coefficients and loads (n_dofs,) by zone."""
     size = state.correction.size

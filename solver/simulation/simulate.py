@@ -26,6 +26,7 @@ from .balance import (
 from .consistency import inconsistency
 from .equilibrium import Equilibrium
 from .friction import solve_with_friction, zone_friction
+from .friction_recovery import recovered_with_friction
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
@@ -161,13 +162,18 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
     for factor, step in zip(case.factors, case.steps, strict=True):
         start = states[-1].status.closed if states else None
         before = case.steps[len(states) - 1] if states else None
-        if any(zone.slips for zone in problem.scene.zones):
-            state = solve_with_friction(problem, step, states[-1] if states else None)
+        last = states[-1] if states else None
+        friction = any(zone.slips for zone in problem.scene.zones)
+        if friction:
+            state = solve_with_friction(problem, step, last)
         else:
             state = problem.solve(step, start, before=before)
         if (state.trial.violation(state.iterate.closed) > 1).any():
             raise SolveError(f"{_called(step, factor)}: contact bears tension or surfaces overlap")
-        state, field = recovered(problem, state, step)
+        if friction:
+            state, field = recovered_with_friction(problem, state, step, last)
+        else:
+            state, field = recovered(problem, state, step)
         states.append(state)
         fields.append(field)
         closed = int(state.status.closed[: problem.scene.n_multipliers].sum())

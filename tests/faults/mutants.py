@@ -80,11 +80,8 @@ ROLLER = "rigid/cylinder"
 DIE, SHAFT, LINES = "rigid/tilted-die", "rigid/shaft-in-tube", "rigid/lines-of-the-mesh"
 STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 STUCK, SLIDING, STEPWISE = (f"friction-patch/{n}" for n in ("n-stick", "e-slip", "two-steps"))
-UNLOADED, PULLED, RIGHT = (
-    "friction/unloaded-quad8",
-    "friction/pulled-quad8",
-    "friction-patch/t-slip",
-)
+UNLOADED, PULLED = "friction/unloaded-quad8", "friction/pulled-quad8"
+RIGHT, RECOVERED = "friction-patch/t-slip", "friction/sliding-recovered"
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 
@@ -357,7 +354,7 @@ MUTANTS = (
            "solver.simulation.friction:following",
            changed(lambda found: (replace(found[0], direction=-found[0].direction), found[1]))),
     Mutant("bound-kept", "the bound of friction stays that of the first step", STEPWISE,
-           "solver.simulation.friction:_Search._bounds", first_kept),
+           "solver.simulation.friction:Search._bounds", first_kept),
     Mutant("slip-history", "slip is counted from the undeformed state in each step", UNLOADED,
            "solver.simulation.problem:ContactProblem.count_slip_from",
            given(lambda problem, jump: (problem, 0 * jump))),
@@ -369,6 +366,9 @@ MUTANTS = (
     Mutant("slip-without-rings", "slip is weighted as in the plane around an axis", PULLED,
            "solver.lac.operator:slip_operator",
            changed(lambda rows: tuple(0.9 * row for row in rows))),
+    Mutant("slide-lost", "friction of a recovered pressure is that of the constants", RECOVERED,
+           "solver.simulation.friction_recovery:_Loads.of",
+           changed(lambda loads: replace(loads, slide=0 * loads.slide))),
     Mutant("work-halved", "friction does half the work, as if it grew with the slip", STEPWISE,
            "solver.simulation.friction:_work", changed(lambda work: work / 2)),
 )  # fmt: skip

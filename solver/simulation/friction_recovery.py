@@ -1,0 +1,116 @@
+"""The recovered pressure with friction: where it slips, friction is that of the recovered pressure.
+
+The traction is q* = q + Σ c ψ on the master, as the pressure is p*. What slips has q* = −μp* d, so
+that its coefficients are −μ d times those of the pressure. What sticks has those of a
+reconstruction among macro-elements that stick: the traction has a kink where slip begins. The
+sweeps are those of `lac.recovery`; each solves for the state under the loads of the one before.
+"""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case.model import Step
+from ..lac.recovery import settled_means
+from .equilibrium import Equilibrium
+from .friction import Search, status_of
+from .problem import ContactProblem
+from .recovery import Recovered, RecoveredZone, ZoneFit, fit_of, recovered
+from .scene import ZoneScene
+
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Loads:
+    """What the reconstruction of a zone adds, in a state of friction.
+
+    `sticks` (m,); `slide` (m, k): −μ d where it slips, d the direction of slip.
+    """
+
+    zone: ZoneScene
+    fit: ZoneFit
+    sticks: np.ndarray
+    slide: np.ndarray
+
+    @classmethod
+    def of(cls, zone: ZoneScene, state: Equilibrium) -> "_Loads":
+        """Those of a state."""
+        assert state.friction is not None
+        closed = state.status.closed
+        slips = closed[zone.numbers] & state.friction.slipping[zone.numbers]
+        traction = np.array([state.pressure[rows] for rows in zone.slips]).T
+        traction = traction.reshape(len(slips), len(zone.slips))
+        size = np.linalg.norm(traction, axis=1, keepdims=True)
+        unit = np.divide(traction, size, out=np.zeros_like(traction), where=size > 0)
+        slide = zone.zone.friction * unit * slips[:, None]
+        return cls(zone, fit_of(zone, closed), closed[zone.numbers] & ~slips, slide)
+
+    def force(self, values: np.ndarray) -> np.ndarray:
+        """The forces (n_dofs,) by pressures and tractions (k,) of all rows."""
+        recovery, c = self.fit.recovery, self.fit.coefficients(values)
+        total = recovery.loads.T @ c
+        stuck = recovery.reconstruction(self.sticks).matrix
+        for k, (loads, rows) in enumerate(zip(recovery.slip_loads, self.zone.slips, strict=True)):
+            along = self.slide[:, [k]] * c.reshape(len(self.sticks), -1)
+            total = total + loads.T @ (along.ravel() + stuck @ values[rows])
+        return np.asarray(total)
+
+
+def recovered_with_friction(
+    problem: ContactProblem, state: Equilibrium, step: Step, before: Equilibrium | None
+) -> tuple[Equilibrium, Recovered]:
+    """See `recovery.recovered`; `before`: the state of the last step."""
+    given = [zone for zone in problem.scene.zones if zone.operator.recovery]
+    sweeps = max((z.operator.recovery.form.sweeps for z in given if z.operator.recovery), default=0)
+    if not sweeps or not state.status.closed.any():
+        return recovered(problem, state, step)
+    search, latest = Search(problem, step, before), state
+    search.count, search.changes = state.status.iterations, list(state.status.changes)
+
+    def under(force: np.ndarray) -> Equilibrium | None:
+        search.correction = force.reshape(state.force.shape)
+        return search.from_status(status_of(problem, latest))
+
+    def added(values: np.ndarray) -> np.ndarray:
+        return sum(_forces(given, latest, values), np.zeros(state.force.size))
+
+    def change(force: np.ndarray) -> np.ndarray:
+        nonlocal latest
+        found = under(search.correction.ravel() + force)
+        if found is None:
+            raise _UnsettledError
+        moved, latest = found.pressure - latest.pressure, found
+        return moved
+
+    try:
+        nothing = np.zeros(state.force.size)
+        values = settled_means(state.pressure, nothing, sweeps, added, change)
+    except _UnsettledError:
+        values = None
+    fits = [_Loads.of(zone, latest).fit for zone in given]
+    forces = [] if values is None else _forces(given, latest, values)
+    found = under(sum(forces, nothing)) if values is not None else None
+    if found is None or values is None:
+        _LOG.info("recovery: friction does not settle; pressure and traction stay constant by face")
+        return state, {}
+    return found, {
+        zone.zone.name: RecoveredZone(
+            name=fit.recovery.form.name,
+            recovery=fit.recovery,
+            coefficients=fit.read(found.pressure, fit.coefficients(values)),
+            degree=fit.reconstruction.degree,
+            force=force,
+        )
+        for zone, fit, force in zip(given, fits, forces, strict=True)
+    }
+
+
+class _UnsettledError(Exception):
+    """A sweep has no state."""
+
+
+def _forces(zones: Sequence[ZoneScene], state: Equilibrium, values: np.ndarray) -> list[np.ndarray]:
+    return [_Loads.of(zone, state).force(values) for zone in zones]
