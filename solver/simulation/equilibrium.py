@@ -1,13 +1,18 @@
 """A solved load factor: displacement, pressure, status, and the state of friction."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..lac.friction import Slip
 from ..lac.status import StatusResult, Trial
 from .accuracy import Accuracy
 from .iterate import ContactIterate
+
+if TYPE_CHECKING:
+    from ..lac.friction import Slip
 
 
 @dataclass(frozen=True)

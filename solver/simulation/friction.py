@@ -17,7 +17,6 @@ from scipy import sparse
 
 from ..case.model import Step
 from ..lac.errors import SolveError
-from ..lac.facets import tangents_of
 from ..lac.friction import (
     Response,
     Slip,
@@ -31,8 +30,6 @@ from ..lac.status import StatusResult
 from ..mechanics.mortar.tresca import coulomb_by_cones
 from .equilibrium import Equilibrium, Friction
 from .problem import ContactProblem
-from .scene import ZoneScene
-from .solution import ZoneFriction
 
 _LOG = logging.getLogger(__name__)
 # The change of bounds, by the largest, that is round-off; and that which may stall.
@@ -312,24 +309,6 @@ def _worst(wrong: np.ndarray, slipping: np.ndarray) -> tuple[np.ndarray, np.ndar
 def _work(found: Response, area: np.ndarray) -> float:
     """The work of friction, which resists the slip."""
     return float(-(found.traction * found.slip).sum(axis=1) @ area) + 0.0
-
-
-def zone_friction(zone: ZoneScene, state: Equilibrium) -> ZoneFriction | None:
-    """Traction, slip and status of a zone; None without friction."""
-    if not zone.slips or state.friction is None:
-        return None
-    tangents = tangents_of(zone.operator.surface.normal)
-
-    def in_space(values: np.ndarray) -> np.ndarray:
-        return np.einsum("mkd,km->md", tangents, np.array([values[rows] for rows in zone.slips]))
-
-    closed = state.status.closed[zone.numbers]
-    return ZoneFriction(
-        friction_traction=in_space(-state.pressure),
-        slip=in_space(state.gap),
-        slip_total=in_space(state.friction.total),
-        status=closed.astype(int) + (closed & state.friction.slipping[zone.numbers]),
-    )
 
 
 def solve_with_friction(

@@ -15,7 +15,7 @@ import numpy as np
 from ..case.model import Step
 from ..lac.recovery import settled_means
 from .equilibrium import Equilibrium
-from .friction import Search, status_of
+from .friction import Search, solve_with_friction, status_of
 from .problem import ContactProblem
 from .recovery import Recovered, RecoveredZone, ZoneFit, fit_of, recovered
 from .scene import ZoneScene
@@ -59,10 +59,15 @@ class _Loads:
         return np.asarray(total)
 
 
-def recovered_with_friction(
-    problem: ContactProblem, state: Equilibrium, step: Step, before: Equilibrium | None
+def solve_and_recover(
+    problem: ContactProblem, step: Step, before: Equilibrium | None
 ) -> tuple[Equilibrium, Recovered]:
-    """See `recovery.recovered`; `before`: the state of the last step."""
+    """Equilibrium at a step after the state `before`, and its recovered pressure by zone.
+
+    Where friction does not settle under the correction, the state stays as it is and no pressure is
+    recovered. Raises SolveError where there is no equilibrium.
+    """
+    state = solve_with_friction(problem, step, before)
     given = [zone for zone in problem.scene.zones if zone.operator.recovery]
     sweeps = max((z.operator.recovery.form.sweeps for z in given if z.operator.recovery), default=0)
     if not sweeps or not state.status.closed.any():

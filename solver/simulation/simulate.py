@@ -25,8 +25,6 @@ from .balance import (
 )
 from .consistency import inconsistency
 from .equilibrium import Equilibrium
-from .friction import solve_with_friction, zone_friction
-from .friction_recovery import recovered_with_friction
 from .geometry import check_geometry
 from .naming import body_infos
 from .options import LEAN, Options
@@ -43,7 +41,7 @@ from .solution import (
     StepResult,
     ZoneResult,
 )
-from .step_results import closed_of, step_results, stress_scale
+from .step_results import closed_of, step_results, stress_scale, zone_friction
 from .unloaded import without_unloaded
 from .validity import remarks, validity
 
@@ -162,17 +160,15 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
     for factor, step in zip(case.factors, case.steps, strict=True):
         start = states[-1].status.closed if states else None
         before = case.steps[len(states) - 1] if states else None
-        last = states[-1] if states else None
-        friction = any(zone.slips for zone in problem.scene.zones)
-        if friction:
-            state = solve_with_friction(problem, step, last)
+        if any(zone.slips for zone in problem.scene.zones):
+            from .friction_recovery import solve_and_recover  # friction alone needs it
+
+            state, field = solve_and_recover(problem, step, states[-1] if states else None)
         else:
             state = problem.solve(step, start, before=before)
-        if (state.trial.violation(state.iterate.closed) > 1).any():
-            raise SolveError(f"{_called(step, factor)}: contact bears tension or surfaces overlap")
-        if friction:
-            state, field = recovered_with_friction(problem, state, step, last)
-        else:
+            if (state.trial.violation(state.iterate.closed) > 1).any():
+                what = f"{_called(step, factor)}: contact bears tension or surfaces overlap"
+                raise SolveError(what)
             state, field = recovered(problem, state, step)
         states.append(state)
         fields.append(field)

@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from ..lac.facets import tangents_of
 from .balance import reactions, rigid_bodies
 from .equilibrium import Equilibrium
 from .recovery import Recovered
 from .resultants import resultants
 from .scene import Scene, ZoneScene
-from .solution import StepResult
+from .solution import StepResult, ZoneFriction
 
 # Half, up to round-off.
 _HALF = 0.5 - 1e-9
@@ -79,3 +80,21 @@ def stress_scale(scene: Scene, states: list[Equilibrium], stress: np.ndarray) ->
     ]
     largest = [np.abs(field).max(initial=0.0) for field in (stress, *(s.pressure for s in states))]
     return max(values, default=0.0) or float(max(largest)) or 1.0
+
+
+def zone_friction(zone: ZoneScene, state: Equilibrium) -> ZoneFriction | None:
+    """Traction, slip and status of a zone; None without friction."""
+    if not zone.slips or state.friction is None:
+        return None
+    tangents = tangents_of(zone.operator.surface.normal)
+
+    def in_space(values: np.ndarray) -> np.ndarray:
+        return np.einsum("mkd,km->md", tangents, np.array([values[rows] for rows in zone.slips]))
+
+    closed = state.status.closed[zone.numbers]
+    return ZoneFriction(
+        friction_traction=in_space(-state.pressure),
+        slip=in_space(state.gap),
+        slip_total=in_space(state.friction.total),
+        status=closed.astype(int) + (closed & state.friction.slipping[zone.numbers]),
+    )

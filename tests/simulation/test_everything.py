@@ -113,7 +113,7 @@ def test_random_problems_whose_state_is_not_uniform(seed):
     assert_agreed(case, mesh, swapped, within=1e-12, pressure=largest)
 
 
-def test_a_plane_solve_imports_nothing_of_three_dimensions(tmp_path):
+def test_a_plane_solve_imports_nothing_of_three_dimensions_or_friction(tmp_path):
     code = (
         "import sys; from pathlib import Path; from solver.verification.run import Job, solve\n"
         f"solve(Job(Path({str(CASES / 'b.yaml')!r})), Path('r.vtkhdf'), None)\n"
@@ -128,6 +128,7 @@ def test_a_plane_solve_imports_nothing_of_three_dimensions(tmp_path):
     of_space = {
         "solver.mechanics.fem.extra_elements",
         "solver.mesh.recipes.hybrid",
+        "solver.simulation.friction",
         "solver.report.case_picture",
     }
     assert not loaded & of_space
