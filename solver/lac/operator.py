@@ -24,7 +24,7 @@ from .partners import on_one_surface, uncovered
 from .recovery import Recovery, RecoveryRequest, recovery
 from .segments import Segments, intersect
 from .surface_points import Samples, Surface, face_samples
-from .tangential import slip_operator
+from .tangential import levers, slip_operator
 
 # Slave-side entries of nodal multipliers below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
@@ -45,7 +45,7 @@ class GapOperator:
     on how many faces the closure of integrals was used; `plain`: whether plain Gauss rules are
     exact on all of them. `at_nodes` (n, k): the values at `nodes`, then (n,), by multiplier, where
     some nodes have no multiplier of their own. `recovery`: what recovers the pressure, if asked
-    for. `slip`: the `slip_operator` by tangent, if asked for.
+    for. `slip`: the `slip_operator` by tangent, if asked for, with its `levers`.
     """
 
     matrix: sparse.csr_matrix
@@ -61,6 +61,7 @@ class GapOperator:
     at_nodes: sparse.csr_matrix | None = None
     recovery: Recovery | None = None
     slip: tuple[sparse.csr_matrix, ...] = ()
+    levers: np.ndarray | None = None
 
 
 def meet_in_segments(
@@ -171,6 +172,7 @@ def gap_operator(
         plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
         recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
         slip=slip_operator(parts, surface.normal, n_nodes) if scheme.slip else (),
+        levers=levers(parts, surface.normal) if scheme.slip else None,
     )
 
 

@@ -52,6 +52,30 @@ def slip_operator(
     return tuple(found)
 
 
+def levers(parts: Sequence[Integrals], normal: np.ndarray) -> np.ndarray:
+    """The couples (dim − 1, m, 3) ∫ g n × t dS of unit tractions, by tangent.
+
+    Tractions act on both surfaces where these are meshed, a gap g apart.
+
+    The edges are 1/2 apart over a length of 2, n × t is the axis across the plane:
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
+    >>> part = integrals(constants(data), segments)
+    >>> levers([part], np.array([[0.0, 1.0]]))[0].round(15).tolist()
+    [[0.0, 0.0, 1.0]]
+    """
+    dim = normal.shape[1]
+    found = np.zeros((dim - 1, len(normal), 3))
+    for k, tangents in enumerate(np.swapaxes(tangents_of(normal), 0, 1)):
+        for segments in (part.segments for part in parts):
+            pair = segments.normal, along_faces(segments, tangents)
+            n, t = (np.pad(v, [(0, 0), (0, 0), (0, 3 - dim)]) for v in pair)
+            couple = np.einsum("sq,sqd->sd", segments.weight * segments.gap, np.cross(n, t))
+            np.add.at(found[k], segments.macro, couple)
+    return found
+
+
 def along_faces(segments: Segments, tangents: np.ndarray) -> np.ndarray:
     """Unit tangents (s, q, dim) in the face at the points of segments, next to `tangents` (m, dim).
 

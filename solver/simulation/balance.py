@@ -23,28 +23,29 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     Forces are divided by the sum of the sizes of the nodal forces at work (loads, or contact forces
     where there is no load, and at least the force that the displacement could cause), moments by
     that times the length of the model. Of axisymmetric bodies only forces along the axis have a
-    resultant.
+    resultant. Friction between surfaces that are meshed apart is a couple, which is no imbalance.
     """
     points, around = scene.points, scene.case.axisymmetric
     contact = np.zeros_like(points)
     by_zone = {}
     for zone in scene.zones:
         forces = zone.forces(state.pressure).reshape(points.shape)
-        by_zone[zone.zone.name] = forces
+        by_zone[zone.zone.name] = forces, zone.couple(state.pressure)
         contact += forces
+    couple = sum((each for _, each in by_zone.values()), np.zeros(3))
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
     if not state.force.any():
         stress = stress_of_motion(scene.case, scene.length, state.displacement)
         scale = max(scale, stress * scene.length ** (scene.space - 1)) or 1.0
     result: dict[str, float] = {}
     if state.correction.any():
-        by_zone["correction of the pressure"] = state.correction
+        by_zone["correction of the pressure"] = state.correction, np.zeros(3)
         contact += state.correction
-    for name, forces in by_zone.items():
-        result |= _both(f"zone {name}", points, forces, scale, scene.length, around)
+    for name, (forces, own) in by_zone.items():
+        result |= _both(f"zone {name}", points, forces, own, scale, scene.length, around)
     held, free_part = _unbalanced(scene, state, contact)
     whole = held + state.force + _of_springs(state)
-    result |= _both("reactions and loads", points, whole, scale, scene.length, around)
+    result |= _both("reactions and loads", points, whole, -couple, scale, scene.length, around)
     result["free nodes: force"] = float(np.abs(free_part).max(initial=0.0) / scale)
     return result
 
@@ -165,15 +166,23 @@ def strain_energy(scene: Scene, state: Equilibrium) -> float:
 
 
 def _both(
-    name: str, points: np.ndarray, forces: np.ndarray, scale: float, length: float, around: bool
+    name: str,
+    points: np.ndarray,
+    forces: np.ndarray,
+    couple: np.ndarray,
+    scale: float,
+    length: float,
+    around: bool,
 ) -> dict[str, float]:
+    """The imbalance of forces, and of their moments less a known `couple` (3,)."""
     if around:
         return {f"{name}: force": float(abs(forces[:, 1].sum()) / scale)}
     force = np.abs(forces.sum(axis=0)).max()
     if points.shape[1] == 2:
-        moment = abs(float((points[:, 0] * forces[:, 1] - points[:, 1] * forces[:, 0]).sum()))
+        turning = (points[:, 0] * forces[:, 1] - points[:, 1] * forces[:, 0]).sum()
+        moment = abs(float(turning - couple[2]))
     else:
-        moment = float(np.abs(np.cross(points, forces).sum(axis=0)).max())
+        moment = float(np.abs(np.cross(points, forces).sum(axis=0) - couple).max())
     return {f"{name}: force": float(force / scale), f"{name}: moment": moment / (scale * length)}
 
 

@@ -82,6 +82,8 @@ def _own(operator: GapOperator, alone: np.ndarray) -> tuple[np.ndarray, np.ndarr
     entries = abs(operator.matrix).tocoo()
     node = entries.col // dim
     kept = alone[node]
+    if not kept.any():  # the surfaces do not meet, which is refused later
+        return np.empty(0, dtype=int), np.empty((0, dim, dim))
     order = np.flatnonzero(kept)[np.lexsort((entries.data[kept], entries.row[kept]))]
     row = entries.row[order]
     best = order[np.flatnonzero(np.diff(row, append=operator.matrix.shape[0]))]

@@ -83,6 +83,13 @@ class ZoneScene:
             found += matrix.T @ values[rows]
         return found
 
+    def couple(self, values: np.ndarray) -> np.ndarray:
+        """The couple (3,) of tractions on surfaces that are meshed apart."""
+        if self.operator.levers is None:
+            return np.zeros(3)
+        pairs = zip(self.operator.levers, self.slips, strict=True)
+        return np.sum([values[rows] @ lever for lever, rows in pairs], axis=0)
+
     def by_macro_element(self, values: np.ndarray) -> np.ndarray:
         """Values (k,) of all multipliers averaged over each macro-element of the zone (m,)."""
         return np.asarray(self.operator.mean @ values[self.numbers])

@@ -122,6 +122,22 @@ def test_a_recovered_stick_zone_keeps_the_law_and_the_balance():
     assert errors(recovered)["traction_means"] < 0.6 * errors(constant)["traction_means"]
 
 
+def test_friction_across_a_meshed_gap_is_a_couple_and_no_imbalance():
+    """A rigid cylinder: its tractions act on its own face, a gap above the half-plane."""
+    case = load_case(CASES / "friction" / "rigid-cylinder-tria6.yaml")
+    solution = solved(case)
+    assert max(solution.balance.values()) < 1e-12
+    zone, exact = solution.zones[0], case.solution
+    force = zone.multiplier * zone.area
+    place = (force @ zone.centre[:, 0]) / force.sum()
+    # The resultant is at −(2/3) ε a from the middle, which is −2 ε a from the apex (Johnson §8.2).
+    expected = -(2 + 2 / 3) * exact.skew * exact.half_width
+    assert place == pytest.approx(expected, rel=0.02)
+    recovered = case.as_solved(recovery="automatic")
+    with pytest.raises(InputError, match="meshed without a gap"):
+        solved(recovered)
+
+
 def test_without_a_coefficient_nothing_changes():
     zero = solved(plate(0, 0.05))
     without = solved(plate(0, 0.05, change=lambda text: text.replace(", friction: 0", "")))

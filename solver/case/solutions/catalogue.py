@@ -32,6 +32,7 @@ from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
 from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
 from .receding import RecedingLayer
+from .sliding_cylinder import SlidingCylinder
 from .sliding_waves import SlidingWaves
 from .uniform import Hydrostatic, UniformCompression
 from .waves import Waves2d, Waves3d
@@ -65,6 +66,7 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     Sheared,
     PulledTubes,
     SlidingWaves,
+    SlidingCylinder,
 )
 SOLUTIONS: dict[str, type[ExactSolution]] = {c.name: c for c in _CLASSES}
 _ALL, _RIGID = "all", "rigid"

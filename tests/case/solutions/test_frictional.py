@@ -9,6 +9,7 @@ from solver.case.solutions.base import ParameterError
 from solver.case.solutions.frictional import Sheared, ShearedBlocks, under
 from solver.case.solutions.nested import PulledTubes
 from solver.case.solutions.pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
+from solver.case.solutions.sliding_cylinder import SlidingCylinder
 from solver.case.solutions.sliding_waves import SlidingWaves
 from solver.mechanics.fem.stress import traction
 from tests.case.solutions.test_elastic import derivative
@@ -156,6 +157,23 @@ def test_a_share_of_the_force_makes_the_same_contact_smaller():
     for contact in CONTACTS[:3]:
         assert under(contact, 0.4).force == pytest.approx(0.4 * contact.force, rel=1e-12)
     assert under(CYLINDER, 0.25).end == pytest.approx(5.1, rel=1e-12)
+
+
+def test_a_sliding_cylinder_has_the_skew_of_johnson():
+    """ν = 0.3, μ = 0.5: β = 2/7, ε = 0.0451672353; the pressure bears the force."""
+    one = SlidingCylinder(material=ONE, radius=100.0, force=1000.0, friction=0.5)
+    assert one.skew == pytest.approx(0.0451672353, abs=1e-10)
+    x = np.column_stack([np.linspace(-12, 12, 200001), np.zeros(200001)])
+    pressure = one.contact_pressure(x)
+    whole = np.trapezoid(pressure, x[:, 0])
+    assert whole == pytest.approx(1000.0, rel=1e-5)
+    at = np.trapezoid(pressure * x[:, 0], x[:, 0]) / whole
+    assert at - one.middle == pytest.approx(-2 / 3 * one.skew * one.half_width, rel=1e-4)
+    # Far below, the half-plane is a body under a force: ∂v/∂y there is that of Flamant.
+    below = np.array([[0.0, -4000.0], [0.0, -4001.0]])
+    strain = -np.diff(one.displacement(below)[:, 1])[0]
+    expected = -2 * 1000.0 / (np.pi * 4000.5) * (1 - 0.3**2) / 2000.0
+    assert strain == pytest.approx(expected, rel=1e-3)
 
 
 def test_sliding_waves_have_the_amplitudes_and_phases_of_the_derivation():
