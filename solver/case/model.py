@@ -217,6 +217,15 @@ class Case:
         return tuple(float(n) if isinstance(step, dict) else step for n, step in numbered)
 
     @property
+    def frictional(self) -> bool:
+        """Whether a contact zone has friction."""
+        return any(zone.friction for zone in self.zones)
+
+    def zone_named(self, name: str) -> Zone:
+        """The contact zone of a name."""
+        return next(zone for zone in self.zones if zone.name == name)
+
+    @property
     def states(self) -> "dict[str, ExactSolution]":
         """The states of an exact solution that has one for each step, by the name of the step."""
         states = self.solution.states if self.solution else ()

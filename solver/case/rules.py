@@ -94,10 +94,6 @@ def _check_names(case: Case) -> None:
             raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
 
 
-def _frictional(case: Case) -> bool:
-    return any(zone.friction for zone in case.zones)
-
-
 def _check_friction(case: Case, number: int) -> None:
     """Friction is that of constants by macro-element, along the normals of their own faces."""
     zone, key = case.zones[number], f"contact[{number}]"
@@ -157,7 +153,7 @@ def _check_reference(case: Case) -> None:
     for key in case.reference.keys() & _OF_CONTACT if not case.zones else ():
         allowed = "cannot be compared: the case has no contact"
         raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
-    for key in case.reference.keys() & _OF_FRICTION if not _frictional(case) else ():
+    for key in case.reference.keys() & _OF_FRICTION if not case.frictional else ():
         allowed = "cannot be compared: no contact zone has friction"
         raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
     given = case.reference.get("dissipation")

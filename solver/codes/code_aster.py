@@ -45,7 +45,7 @@ Held = list[tuple[int, float, np.ndarray]]
 
 
 def _refuse(deck: Deck) -> None:
-    if any(pair.zone.friction for pair in deck.pairs):
+    if deck.case.frictional:
         raise UnsupportedError("friction: code_aster has none with the LAC method")
     if deck.forces.any():
         raise UnsupportedError("loads other than constant pressures: not written for code_aster")

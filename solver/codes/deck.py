@@ -169,7 +169,7 @@ def _is_constant(load: Load) -> bool:
 def _refuse(case: Case) -> None:
     if case.histories:
         raise UnsupportedError("factors of single loads in steps: not written for codes")
-    if len(case.steps) > 1 and any(zone.friction for zone in case.zones):
+    if len(case.steps) > 1 and case.frictional:
         raise UnsupportedError("a path of steps with friction: not written for codes")
     if any(load.strains for load in case.loads):
         raise UnsupportedError("initial strain and change of temperature: not written for codes")

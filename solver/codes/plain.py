@@ -42,7 +42,7 @@ class Plain:
     def write(self, deck: Deck, folder: Path) -> None:
         """Write `deck.json`; UnsupportedError for friction and axisymmetric bodies."""
         refuse_rings(deck, "deck.json")
-        if any(pair.zone.friction for pair in deck.pairs):
+        if deck.case.frictional:
             raise UnsupportedError("friction: not written for deck.json")
         text = json.dumps(content(deck))
         (folder / FILE).write_text(text, encoding="ascii")

@@ -10,7 +10,7 @@ scikit-fem, and nothing else of this program. Its files in the order of the meth
 - `pairing`, `clipping`, `regions`, `fans`, `segments`: mortar segments and points on them
 - `partners`, `surface_points`: the surface that a macro-element meets, and its area
 - `multipliers`, `closure`, `operator`: the gap operator B, its sums as exact as the area
-- `tangential`, `friction`: the slip operator, and Coulomb's law of each macro-element
+- `tangential`, `friction`: tangents of the slip operator, and Coulomb's law of each macro-element
 - `status`, `complementarity`: which macro-elements are closed
 - `reconstruction`, `recovery`: a pressure of second order
 

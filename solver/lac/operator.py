@@ -13,10 +13,9 @@ from scipy import sparse
 
 from .cells.quadrature import mortar_degree
 from .closure import MASTER, SLAVE, Integrals, close_faces, integrals
-from .facets import Facets
+from .facets import Facets, tangents_of
 from .multipliers import (
     InterfaceData,
-    Multipliers,
     Space,
     constants,
 )
@@ -24,9 +23,9 @@ from .partners import on_one_surface, uncovered
 from .recovery import Recovery, RecoveryRequest, recovery
 from .segments import Segments, intersect
 from .surface_points import Samples, Surface, face_samples
-from .tangential import levers, slip_operator
+from .tangential import levers, turned_along
 
-# Slave-side entries of nodal multipliers below this share of their row's largest are round-off.
+# Coefficients below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
 # The distance within which such faces are looked for grows by this factor at a time.
 _WIDER = 8.0
@@ -149,7 +148,8 @@ def gap_operator(
     space = scheme.space(data)
     parts = [integrals(space, segments) for segments in found]
     parts, closed = close_faces(parts) if scheme.closure else (parts, 0)
-    slave, master = (_assembled(space, parts, side, n_nodes, slaves) for side in (SLAVE, MASTER))
+    shape = space.count, n_nodes, slaves[0].centre.shape[1]
+    slave, master = (_assembled(parts, side, *shape) for side in (SLAVE, MASTER))
     initial, covered = np.zeros(space.count), np.zeros(space.count)
     for part in parts:
         np.add.at(initial, part.number, part.gap)
@@ -160,7 +160,7 @@ def gap_operator(
     surface = _surface(data, lost)
     averages = space.averages(samples, [block.number for block in slaves], n_macro)
     return GapOperator(
-        matrix=(master - (slave if space.nodes is None else _diagonal(slave))).tocsr(),
+        matrix=(master - (slave if space.nodes is None else without_round_off(slave))).tocsr(),
         initial=initial,
         area=averages.area,
         covered=covered,
@@ -221,11 +221,38 @@ def _reaches(faces: list[Facets], search: float) -> list[float]:
     return [reach for reach in reaches if reach < search] + [search]
 
 
+def slip_operator(
+    parts: Sequence[Integrals], normal: np.ndarray, n_nodes: int
+) -> tuple[sparse.csr_matrix, ...]:
+    """The dim − 1 matrices (m, n_dofs) ∫ (N_master − N_slave) t, by tangent.
+
+    `parts`: the closed integrals of m macro-elements; `normal` (m, dim): their mean normals, whose
+    `tangents_of` are the frames.
+
+    A slave edge of length 2, whose tangent is −x, under two master edges:
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
+    >>> part = integrals(constants(data), segments)
+    >>> (along,) = slip_operator([part], np.array([[0.0, 1.0]]), len(points))
+    >>> along.toarray().reshape(5, 2)[:, 0].round(15).tolist()
+    [1.0, 1.0, -0.5, -1.0, -0.5]
+    """
+    shape = len(normal), n_nodes, normal.shape[1]
+    found = []
+    for tangents in np.swapaxes(tangents_of(normal), 0, 1):
+        turned = [turned_along(part, tangents) for part in parts]
+        slave, master = (_assembled(turned, side, *shape) for side in (SLAVE, MASTER))
+        along = (master - slave).tocsr()
+        along.eliminate_zeros()
+        found.append(along)
+    return tuple(found)
+
+
 def _assembled(
-    space: Multipliers, parts: list[Integrals], side: int, n_nodes: int, slaves: list[Facets]
+    parts: Sequence[Integrals], side: int, count: int, n_nodes: int, dim: int
 ) -> sparse.csr_matrix:
-    """∫ φ N n of one side (k, n_dofs)."""
-    dim = slaves[0].centre.shape[1]
+    """The vectors of one side, by `count` multipliers (k, n_dofs)."""
     rows, columns, values = [], [], []
     for part in parts:
         vectors = part.vectors[side]
@@ -234,7 +261,7 @@ def _assembled(
         columns.append(_spread(dofs, vectors))
         values.append(vectors.ravel())
     entries = (_joined(values), (_joined(rows).astype(int), _joined(columns).astype(int)))
-    return sparse.coo_matrix(entries, shape=(space.count, dim * n_nodes)).tocsr()
+    return sparse.coo_matrix(entries, shape=(count, dim * n_nodes)).tocsr()
 
 
 def _spread(numbers: np.ndarray, part: np.ndarray) -> np.ndarray:
@@ -245,17 +272,21 @@ def _joined(parts: list[np.ndarray]) -> np.ndarray:
     return np.concatenate(parts) if parts else np.empty(0)
 
 
-def _diagonal(slave: sparse.csr_matrix) -> sparse.csr_matrix:
-    """Without the round-off at nodes where the integral of a nodal multiplier vanishes.
+def without_round_off(rows: sparse.csr_matrix) -> sparse.csr_matrix:
+    """Rows without the coefficients that are round-off of their largest.
 
-    Dual multipliers see their own node alone. Linear ones see no other end of a quadratic edge:
-    ∫ t (1 − t) (1 − 2t) dt = 0; then each has an unknown of its own, and can be condensed.
+    Nodal multipliers then see no node where their integral vanishes: dual ones see their own alone,
+    linear ones no other end of a quadratic edge, ∫ t (1 − t) (1 − 2t) dt = 0. Each has an unknown
+    of its own, and can be condensed.
+
+    >>> without_round_off(sparse.csr_matrix([[2.0, 1e-14, 1e-3]])).toarray().tolist()
+    [[2.0, 0.0, 0.001]]
     """
-    largest = abs(slave).max(axis=1).toarray().ravel()
-    limit = np.repeat(_ROUND_OFF * largest, np.diff(slave.indptr))
-    slave.data[np.abs(slave.data) <= limit] = 0.0
-    slave.eliminate_zeros()
-    return slave
+    found = rows.copy()
+    largest = abs(found).max(axis=1).toarray().ravel()
+    found.data[np.abs(found.data) <= _ROUND_OFF * np.repeat(largest, np.diff(found.indptr))] = 0.0
+    found.eliminate_zeros()
+    return found
 
 
 def _surface(data: InterfaceData, lost: np.ndarray) -> Surface:

@@ -7,9 +7,9 @@ integrals ∫ N times t, so that a uniform shear acts on both sides as on whole 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy import sparse
 
 from .closure import MASTER, SLAVE, Integrals
 from .facets import tangents_of
@@ -17,39 +17,6 @@ from .segments import Segments
 
 # Normals that differ by less within a segment are one normal.
 _FLAT = 1e-12
-
-
-def slip_operator(
-    parts: Sequence[Integrals], normal: np.ndarray, n_nodes: int
-) -> tuple[sparse.csr_matrix, ...]:
-    """The dim − 1 matrices (m, n_dofs) ∫ (N_master − N_slave) t, by tangent.
-
-    `parts`: the closed integrals of m macro-elements; `normal` (m, dim): their mean normals, whose
-    `tangents_of` are the frames.
-
-    A slave edge of length 2, whose tangent is −x, under two master edges:
-
-    >>> (segments,) = intersect([slave], 0, [master], 1.0)
-    >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
-    >>> part = integrals(constants(data), segments)
-    >>> (along,) = slip_operator([part], np.array([[0.0, 1.0]]), len(points))
-    >>> along.toarray().reshape(5, 2)[:, 0].round(15).tolist()
-    [1.0, 1.0, -0.5, -1.0, -0.5]
-    """
-    dim = normal.shape[1]
-    found = []
-    for tangents in np.swapaxes(tangents_of(normal), 0, 1):
-        total = sparse.csr_matrix((len(normal), dim * n_nodes))
-        for part in parts:
-            for side, sign in ((SLAVE, -1.0), (MASTER, 1.0)):
-                values = sign * _along(part, side, tangents)
-                dofs = dim * part.segments.sides[side].nodes[..., None] + np.arange(dim)
-                rows = np.broadcast_to(part.segments.macro[:, None, None], dofs.shape)
-                entries = (values.ravel(), (rows.ravel(), dofs.ravel()))
-                total = total + sparse.coo_matrix(entries, shape=total.shape).tocsr()
-        total.eliminate_zeros()
-        found.append(total)
-    return tuple(found)
 
 
 def levers(parts: Sequence[Integrals], normal: np.ndarray) -> np.ndarray:
@@ -86,6 +53,19 @@ def along_faces(segments: Segments, tangents: np.ndarray) -> np.ndarray:
     normal, tangent = segments.normal, tangents[segments.macro][:, None]
     found = tangent - (tangent * normal).sum(axis=-1, keepdims=True) * normal
     return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+
+
+def turned_along(part: Integrals, tangents: np.ndarray) -> Integrals:
+    """The integrals of a part with ∫ N t in place of ∫ N n, t next to `tangents` (m, dim).
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
+    >>> part = integrals(constants(data), segments)
+    >>> turned_along(part, np.array([[1.0, 0.0]])).vectors[MASTER][..., 0].round(15).tolist()
+    [[[0.5, 0.5]], [[0.5, 0.5]]]
+    """
+    slave, master = (_along(part, side, tangents)[:, None] for side in (SLAVE, MASTER))
+    return replace(part, vectors=(slave, master))
 
 
 def _along(part: Integrals, side: int, tangents: np.ndarray) -> np.ndarray:

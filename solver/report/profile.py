@@ -188,7 +188,7 @@ def _of_friction(solution: Solution, zone: ZoneResult, place: Place) -> list[dic
     """The traction on the slave and ±μp; in 2D along the interface, else the size of both."""
     if zone.friction is None:
         return []
-    mu = next(z.friction for z in solution.case.zones if z.name == zone.name)
+    mu = solution.case.zone_named(zone.name).friction
     columns = {"number": np.arange(len(zone.centre)), "s": place(zone.centre)}
     along = np.column_stack([zone.normal[:, 1], -zone.normal[:, 0]])
     flat = zone.centre.shape[1] == 2

@@ -6,10 +6,10 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from ..lac.operator import without_round_off
 from ..mechanics.fem.bodies import support_resistance, unheld_motion
 from ..mechanics.linear.condensation import choose_pivots
 from ..system.errors import InputError
-from .frames import without_round_off
 from .naming import body_names
 from .scene import Scene, ZoneScene
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from ..lac.operator import GapOperator
+from ..lac.operator import GapOperator, without_round_off
 from ..mechanics.fem.supports import FreeMotion
 
 # Coefficients below this share of the largest of a macro-element's node are round-off.
@@ -45,15 +45,6 @@ def with_contact_frames(
     unknowns = free.basis.indices[free.basis.indptr[dofs]]
     rotation = _rotation(free.basis.shape[1], unknowns, np.concatenate(frames))
     return FreeMotion((free.basis @ rotation).tocsr(), free.offset, None)
-
-
-def without_round_off(rows: sparse.csr_matrix) -> sparse.csr_matrix:
-    """Rows without the coefficients that are round-off of their largest."""
-    found = rows.copy()
-    largest = abs(found).max(axis=1).toarray().ravel()
-    found.data[np.abs(found.data) <= _ROUND_OFF * np.repeat(largest, np.diff(found.indptr))] = 0.0
-    found.eliminate_zeros()
-    return found
 
 
 def _columns(operator: GapOperator, dim: int) -> np.ndarray:

@@ -19,8 +19,7 @@ def free_stiffness(scene: Scene, unknowns: Unknowns, single: bool) -> tuple[Stif
     """
     free, mean = scene.free, scene.mean
     # Friction adds springs to the matrix.
-    slips = any(zone.slips for zone in scene.zones)
-    iterative = not (slips or against_multigrid(len(unknowns.node), unknowns))
+    iterative = not (scene.case.frictional or against_multigrid(len(unknowns.node), unknowns))
     plain = free.selection is not None and not scene.springs.nnz
     in_blocks = plain and iterative and not mean.size
     blocks = stiffness(scene.points, scene.blocks, single and in_blocks)

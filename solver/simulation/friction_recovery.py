@@ -7,7 +7,6 @@ sweeps are those of `lac.recovery`; each solves for the state under the loads of
 """
 
 import logging
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,47 +74,42 @@ def solve_and_recover(
     search, latest = Search(problem, step, before), state
     search.count, search.changes = state.status.iterations, list(state.status.changes)
 
-    def under(force: np.ndarray) -> Equilibrium | None:
-        search.correction = force.reshape(state.force.shape)
-        return search.from_status(status_of(problem, latest))
-
     def added(values: np.ndarray) -> np.ndarray:
-        return sum(_forces(given, latest, values), np.zeros(state.force.size))
+        forces = (_Loads.of(zone, latest).force(values) for zone in given)
+        return sum(forces, np.zeros(state.force.size))
+
+    def under(force: np.ndarray) -> Equilibrium:
+        search.correction = force.reshape(state.force.shape)
+        found = search.from_status(status_of(problem, latest))
+        if found is None:
+            raise _UnsettledError
+        return found
 
     def change(force: np.ndarray) -> np.ndarray:
         nonlocal latest
-        found = under(search.correction.ravel() + force)
-        if found is None:
-            raise _UnsettledError
-        moved, latest = found.pressure - latest.pressure, found
-        return moved
+        before, latest = latest, under(search.correction.ravel() + force)
+        return latest.pressure - before.pressure
 
+    nothing = np.zeros(state.force.size)
     try:
-        nothing = np.zeros(state.force.size)
         values = settled_means(state.pressure, nothing, sweeps, added, change)
+        loads = [_Loads.of(zone, latest) for zone in given]
+        forces = [each.force(values) for each in loads]
+        found = under(sum(forces, nothing))
     except _UnsettledError:
-        values = None
-    fits = [_Loads.of(zone, latest).fit for zone in given]
-    forces = [] if values is None else _forces(given, latest, values)
-    found = under(sum(forces, nothing)) if values is not None else None
-    if found is None or values is None:
         _LOG.info("recovery: friction does not settle; pressure and traction stay constant by face")
         return state, {}
     return found, {
-        zone.zone.name: RecoveredZone(
-            name=fit.recovery.form.name,
-            recovery=fit.recovery,
-            coefficients=fit.read(found.pressure, fit.coefficients(values)),
-            degree=fit.reconstruction.degree,
+        each.zone.zone.name: RecoveredZone(
+            name=each.fit.recovery.form.name,
+            recovery=each.fit.recovery,
+            coefficients=each.fit.read(found.pressure, each.fit.coefficients(values)),
+            degree=each.fit.reconstruction.degree,
             force=force,
         )
-        for zone, fit, force in zip(given, fits, forces, strict=True)
+        for each, force in zip(loads, forces, strict=True)
     }
 
 
 class _UnsettledError(Exception):
     """A sweep has no state."""
-
-
-def _forces(zones: Sequence[ZoneScene], state: Equilibrium, values: np.ndarray) -> list[np.ndarray]:
-    return [_Loads.of(zone, state).force(values) for zone in zones]

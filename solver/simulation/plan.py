@@ -111,7 +111,8 @@ def _friction(states: Sequence[Equilibrium]) -> Iterator[Line]:
     yield Line(f"friction: {path}", "the state depends on the order and the size of the steps")
     if max(rates) > 0:
         what = f"friction: bounds of slip contract to {max(rates):.2g} of their error by iteration"
-        why = "the state is the only one nearby; for a large coefficient there may be others"
+        only = "the state is the only one nearby; for a large coefficient there may be others"
+        why = only if max(rates) < 1 else "there may be other states nearby"
         yield Line(what, why)
 
 

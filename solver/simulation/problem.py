@@ -80,8 +80,8 @@ class ContactProblem:
             self.unsupported = unsupported(motions, self._motions.supports, unit_springs(scene))
         refined = scene.options.safeguards.refinement
         # Springs of friction are added to a matrix in double precision.
-        friction = any(zone.slips for zone in scene.zones)
-        self.single = refined and scene.n_dofs >= SINGLE_FROM and not friction
+        large = scene.n_dofs >= SINGLE_FROM and not scene.case.frictional
+        self.single = refined and large
         del motions  # memory for the stiffness
         self._assemble()
 

@@ -121,7 +121,7 @@ def _log_forces(solution: Solution) -> None:
         most = max((float(np.abs(force).max()) for force in forces), default=0.0)
         for name, contact in step.resultants.items():
             _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, shown(most, contact))
-        if any(zone.friction for zone in solution.zones):
+        if solution.case.frictional:
             _LOG.log(OUTCOME, "%swork of friction %.6g", of_step, step.dissipation)
         for reaction in step.reactions:
             text = "%sreaction of %s: %s"
@@ -160,7 +160,7 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
     for factor, step in zip(case.factors, case.steps, strict=True):
         start = states[-1].status.closed if states else None
         before = case.steps[len(states) - 1] if states else None
-        if any(zone.slips for zone in problem.scene.zones):
+        if case.frictional:
             from .friction_recovery import solve_and_recover  # friction alone needs it
 
             state, field = solve_and_recover(problem, step, states[-1] if states else None)

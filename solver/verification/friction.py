@@ -21,7 +21,7 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     """
     if zone.friction is None:
         return None
-    mu = next(z.friction for z in solution.case.zones if z.name == zone.name)
+    mu = solution.case.zone_named(zone.name).friction
     traction, slip, status = (
         getattr(zone.friction, name) for name in ("friction_traction", "slip", "status")
     )
@@ -79,7 +79,7 @@ def stick_area(_: Solution, zone: ZoneResult, reference: Reference) -> Sample | 
 
 def dissipation(solution: Solution, _: None, reference: Reference) -> Sample | None:
     """The work of friction in each step."""
-    if not any(zone.friction for zone in solution.zones):
+    if not solution.case.frictional:
         return None
     if isinstance(reference, ExactValues):
         reference = reference.exact.dissipation

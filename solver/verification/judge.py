@@ -206,8 +206,7 @@ def _forces(solution: Solution) -> Iterator[Force]:
 
 def _dissipation(solution: Solution) -> list[float]:
     """The work of friction in each step; empty without friction."""
-    frictional = any(zone.friction for zone in solution.zones)
-    return [step.dissipation for step in solution.steps] if frictional else []
+    return [step.dissipation for step in solution.steps] if solution.case.frictional else []
 
 
 def _probes(solution: Solution, most: int = 10) -> Iterator[Probed]:

@@ -275,7 +275,7 @@ def _face_blocks(
     for name, attribute in _ON_FACES.items():
         values = [getattr(solution.zones[n], attribute)[owner] for _, _, owner, n in parts]
         data[name] = np.concatenate([np.empty(0), *values]).astype(float)
-    if any(zone.friction for zone in solution.zones):
+    if solution.case.frictional:
         for name in ("friction_traction", "slip", "slip_total"):
             values = [_of_friction(solution.zones[n], name)[owner] for _, _, owner, n in parts]
             data[name] = np.concatenate(values)

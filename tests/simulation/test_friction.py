@@ -1,6 +1,7 @@
 """Friction: the search for stick and slip, its fallback, and what it refuses."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from solver.case.reader import load_case, parse_case
 from solver.lac.errors import SolveError
 from solver.mechanics.mortar.tresca import coulomb_by_cones
-from solver.simulation import friction
+from solver.simulation import friction, plan
 from solver.simulation.options import Options
 from solver.simulation.problem import ContactProblem
 from solver.simulation.scene import build_scene
@@ -136,6 +137,12 @@ def test_friction_across_a_meshed_gap_is_a_couple_and_no_imbalance():
     recovered = case.as_solved(recovery="automatic")
     with pytest.raises(InputError, match="meshed without a gap"):
         solved(recovered)
+
+
+@pytest.mark.parametrize(("rate", "told"), [(0.4, "only one nearby"), (1.2, "other states nearby")])
+def test_the_plan_claims_no_more_than_the_contraction_shows(rate, told):
+    state = SimpleNamespace(friction=SimpleNamespace(contraction=rate))
+    assert told in list(plan._friction([state]))[-1].why
 
 
 def test_without_a_coefficient_nothing_changes():
