@@ -5,7 +5,7 @@ RUN apt-get update && apt-get install --yes --no-install-recommends \
 WORKDIR /mortarcheck
 # The packages first: a change of the project does not install them again.
 COPY Makefile pyproject.toml requirements*.txt ./
-COPY workflow/install workflow/install
+COPY workflow/libraries.py workflow/
 RUN make environment
 COPY . .
 CMD ["make", "all-cases"]

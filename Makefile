@@ -20,7 +20,6 @@ export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
 export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
 ALONE := .venv/bin/python -I -m
 OURS := .venv/bin/python -Es -m
-INSTALL := $(PYTHON) -Es workflow/install
 # A folder is taken from where make was called, also with `make -C`; quotes keep names that look like
 # numbers, and spaces.
 FROM = $(if $(filter-out $(CURDIR),$(PWD)),$(if $(filter /% ~%,$(CASES)),,$(PWD)/))
@@ -44,7 +43,7 @@ endef
 .PHONY: stability infsup scaling benchmark converge test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment code-environment test-environment lint-environment docs-environment
-.PHONY: bill-environment
+.PHONY: bill-environment slurm-environment lock-environment
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -129,7 +128,7 @@ kills: test-environment ## kill runs at 100 random moments and check that the ne
 cluster-test: test-environment ## compare six solves through a SLURM of one machine with a local run
 	@missing=$$($(OURS) tests.workflow.slurm --missing); \
 	if test -n "$$missing"; then echo "make cluster-test: skipped: $$missing"; \
-	else $(INSTALL) slurm && $(OURS) tests.workflow.slurm; fi
+	else $(MAKE) slurm-environment && $(OURS) tests.workflow.slurm; fi
 
 RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
 accept: environment ## store results as the accepted values and show the difference: all or CASE=…
@@ -148,8 +147,42 @@ lint: lint-environment ## check format, style and types of the sources
 	$(ALONE) mypy
 	.venv/bin/lint-imports --no-logo
 
+# A stamp for each lock file: its packages are installed again when it changes, and all of them for
+# another Python.
+VERSION := $(shell $(PYTHON) -Es -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+SITE := .venv/lib/python$(VERSION)/site-packages
+$(SITE):
+	@$(PYTHON) -Es -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is \
+	needed, this is %s: name a newer one, as in make PYTHON=python3.12" % sys.version.split()[0])'
+	@$(PYTHON) -Es -m venv --clear .venv
+
+PIP = $(ALONE) pip install --quiet --disable-pip-version-check --no-input --no-compile \
+	--no-cache-dir --require-hashes --only-binary :all: --requirement
+# One package is published as source only; it is built with the tools of requirements-build.txt.
+$(SITE)/installed-run: requirements.txt requirements-build.txt | $(SITE)
+	@echo "Installing requirements.txt into .venv …"
+	@$(PIP) requirements-build.txt
+	@$(PIP) requirements.txt --no-binary connection-pool --no-build-isolation
+	@-$(ALONE) compileall -q -q -j 0 .venv/lib
+	@touch $@
+
+$(SITE)/installed-%: requirements-%.txt $(SITE)/installed-run
+	@echo "Installing requirements-$*.txt into .venv …"
+	@$(PIP) $<
+	@touch $@
+
+# INSTALLED=yes takes the environment as it is. Its Python finds the project from any folder.
 environment:
-	@$(INSTALL) run
+ifndef INSTALLED
+	@$(MAKE) --silent $(SITE)/installed-run
+	@echo "$(CURDIR)" > $(SITE)/mortarcheck.pth
+	@$(PYTHON) -Es workflow/libraries.py
+endif
+
+lint-environment: test-environment
+test-environment lint-environment docs-environment bill-environment slurm-environment \
+lock-environment: %-environment: environment
+	@$(if $(INSTALLED),:,$(MAKE) --silent $(SITE)/installed-$*)
 
 DEBIAN_getfem = python3-getfem
 DEBIAN_calculix = calculix-ccx
@@ -164,18 +197,6 @@ else
 	@.venv-$(CODE)/bin/python -Es -m pip --disable-pip-version-check install --quiet \
 	  --require-hashes --only-binary :all: --requirement requirements-$(CODE).txt
 endif
-
-test-environment:
-	@$(INSTALL) run test
-
-lint-environment:
-	@$(INSTALL) run test lint
-
-docs-environment:
-	@$(INSTALL) run docs
-
-bill-environment:
-	@$(INSTALL) run bill
 
 docs: docs-environment ## write the documentation as a site into results/docs
 	@$(ALONE) sphinx --quiet --fresh-env --fail-on-warning --keep-going \
@@ -192,8 +213,7 @@ bill: bill-environment ## write the bill of materials: every installed package a
 LOCK := $(ALONE) uv pip compile --quiet --universal --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --no-annotate --custom-compile-command 'make lock'
 
-lock: ## lock the packages of pyproject.toml again: make lock ARGS=--upgrade
-	@$(INSTALL) lock
+lock: lock-environment ## lock the packages of pyproject.toml again: make lock ARGS=--upgrade
 	@$(LOCK) $(ARGS) pyproject.toml --group pyproject.toml:batch \
 	  --output-file requirements.txt
 	@for code in kratos ngsolve; do \

@@ -11,6 +11,7 @@ import math
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import groupby
@@ -198,18 +199,16 @@ def _head() -> str:
 
 @cache
 def _libraries() -> str:
-    """Vega, Vega-Lite and Vega-Embed as one script: as kept, or made in more than a second."""
+    """Vega, Vega-Lite and Vega-Embed as one script; made in more than a second, so it is kept."""
     import vl_convert
 
     kept = KEPT.read_text(encoding="utf-8") if KEPT.is_file() else ""
     if kept.startswith(_head()):
         return kept.removeprefix(_head())
-    return vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
-
-
-def keep_libraries() -> None:
-    """Keep that script in the environment; its installation calls this."""
-    write_text(KEPT, _head() + _libraries())
+    script = str(vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"))
+    with suppress(OSError):  # an environment that is not the user's
+        write_text(KEPT, _head() + script)
+    return script
 
 
 @cache

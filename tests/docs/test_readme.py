@@ -70,7 +70,7 @@ def blocks(page: Path) -> list[tuple[str, str]]:
 def run_all(page: Path, project: Path, **variables: str) -> None:
     """Run the blocks of a page; those in YAML are added to the case `part`."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST")}
-    environment |= {"MAKEFLAGS": "INSTALL=:"} | variables
+    environment |= {"MAKEFLAGS": "INSTALLED=yes"} | variables
     for language, text in blocks(page):
         if language == "yaml":
             with (project / "my-cases" / "part.yaml").open("a") as case:

@@ -141,7 +141,6 @@ def test_the_libraries_are_kept_with_the_packages_that_they_come_from(tmp_path, 
             charts.KEPT.write_text(file)
         charts._libraries.cache_clear()
         write_script(tmp_path / folder)
-        charts.keep_libraries()
     texts = {(tmp_path / folder / SCRIPT).read_text() for folder in ("first", "again", "other")}
     charts._libraries.cache_clear()
     assert len(made) == 2  # not again, but for a file of other versions

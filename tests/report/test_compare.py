@@ -198,7 +198,7 @@ def test_what_is_no_batch_is_refused_in_one_line(tmp_path, capsys, content, mess
 
 
 def test_make_says_what_it_needs():
-    environment = os.environ | {"MAKEFLAGS": "INSTALL=:"}
+    environment = os.environ | {"MAKEFLAGS": "INSTALLED=yes"}
     run = subprocess.run(
         ["make", "compare"], cwd=ROOT, env=environment, capture_output=True, text=True
     )

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 )
 def test_the_bill_names_every_installed_package(tmp_path):
     path = tmp_path / "bill.json"
-    command = ["make", "bill", "INSTALL=true", f"BILL={path}"]
+    command = ["make", "bill", "INSTALLED=yes", f"BILL={path}"]
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
     content = json.loads(path.read_text(encoding="utf-8"))
     assert content["bomFormat"] == "CycloneDX"

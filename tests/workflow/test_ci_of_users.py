@@ -104,7 +104,7 @@ def run_lines(project, lines, page):
     # Tests run by make: its level would make it tell the folders that it enters.
     left_out = ("PYTEST", "MAKELEVEL")
     environment = {k: v for k, v in os.environ.items() if not k.startswith(left_out)}
-    environment |= {"MAKEFLAGS": "INSTALL=:", "GITHUB_STEP_SUMMARY": str(page)}
+    environment |= {"MAKEFLAGS": "INSTALLED=yes", "GITHUB_STEP_SUMMARY": str(page)}
     return [
         subprocess.run(["bash", "-ec", line], cwd=project, env=environment).returncode
         for line in lines

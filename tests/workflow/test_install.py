@@ -1,18 +1,17 @@
 """Installation: the lock files, the stamp, and what is said when something is missing."""
 
 import importlib.metadata
+import os
 import re
-import runpy
 import shutil
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
-import environment
-import libraries
 import pytest
-from errors import InstallError
+
+from workflow import libraries
 
 ROOT = Path(__file__).resolve().parents[2]
 LOCKS = sorted(ROOT.glob("requirements*.txt"))
@@ -61,7 +60,7 @@ def test_locks_hold_what_pyproject_names():
     named = dict(project["dependency-groups"])
     named["run"] = [*project["project"]["dependencies"], *named.pop("batch")]
     for group, requirements in named.items():
-        locked = pins(environment.lock_file(group))
+        locked = pins(ROOT / ("requirements" + f"-{group}" * (group != "run") + ".txt"))
         assert {canonical(name) for name in requirements} <= set(locked), group
     assert len(named) == len(LOCKS)
 
@@ -86,101 +85,53 @@ def test_licences_of_all_packages_needed_are_compatible():
         assert "Proprietary" not in stated, name
 
 
-@pytest.fixture
-def project(tmp_path, monkeypatch):
-    """An empty project with two lock files and an environment that looks made."""
-    monkeypatch.setattr(environment, "ROOT", tmp_path)
-    monkeypatch.setattr(environment, "STAMP", tmp_path / "installed.json")
-    monkeypatch.setattr(environment, "PYTHON", Path(sys.executable))
-    for group in ("", "-build", "-test"):
-        (tmp_path / f"requirements{group}.txt").write_text(f"content{group}")
-    return tmp_path
+def make(folder, python, *targets):
+    """The finished process of make on the project's Makefile in a folder, with its own Python."""
+    shutil.copy(ROOT / "Makefile", folder)
+    command = ["make", f"PYTHON={python}", *targets]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
 
 
-def test_stamp_holds_until_a_lock_changes(project):
-    groups = environment.wanted(["run"])
-    assert set(groups) == {"build", "run"}
-    assert not environment.current(groups)
-    environment.stamp(groups)
-    assert environment.current(environment.wanted(["run"]))
-    assert not environment.current(environment.wanted(["test"]))
-    (project / "requirements.txt").write_text("changed")
-    assert not environment.current(environment.wanted(["run"]))
-
-
-def test_stamp_of_another_interpreter_is_stale(project, monkeypatch):
-    environment.stamp(environment.wanted(["run"]))
-    monkeypatch.setattr(environment, "interpreter", lambda: "another one")
-    assert not environment.current(environment.wanted(["run"]))
-
-
-def test_unknown_group_is_refused(project):
-    with pytest.raises(InstallError, match=r"requirements-nonsense\.txt is not in"):
-        environment.wanted(["nonsense"])
-
-
-def test_python_without_venv_is_told_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ensurepip", None)
-    with pytest.raises(InstallError, match=r"install .*python3-venv") as caught:
-        environment.make()
-    assert "\n" not in str(caught.value)
-
-
-def test_old_python_is_told_the_version_needed(monkeypatch):
-    monkeypatch.setattr(sys, "version_info", (3, 9, 2, "final", 0))
-    with pytest.raises(SystemExit, match=r"3\.11 or newer is needed, this is 3\.9 .*PYTHON="):
-        runpy.run_path(str(ROOT / "workflow" / "install"), run_name="__main__")
-
-
-def pretend(venv: Path, message: str) -> Path:
-    """An environment whose Python fails to load gmsh with this message."""
-    python = venv / "bin" / "python"
-    python.parent.mkdir(parents=True)
-    python.write_text(f"#!/bin/sh\necho '{message}' >&2\nexit 1\n")
+def test_old_python_is_told_the_version_needed(tmp_path):
+    python = tmp_path / "old-python"
+    old = "import sys; sys.version_info = (3, 9); sys.version = '3.9.2 (old)'"
+    python.write_text(f'#!/bin/sh\nexec {sys.executable} -c "{old}; exec(sys.argv[1])" "$3"\n')
     python.chmod(0o755)
-    return venv
+    for lock in LOCKS:
+        shutil.copy(lock, tmp_path)
+    done = make(tmp_path, python, "environment")
+    assert done.returncode == 2
+    assert "3.11 or newer is needed, this is 3.9.2: name a newer one" in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("manager", "package"),
-    [
-        ("dnf", "mesa-libGLU"),
-        ("zypper", "libGLU1"),
-        ("pacman", "glu"),
-        (None, "with apt-get: libglu1-mesa; with dnf: mesa"),
-    ],
-)
-def test_missing_library_is_named_with_its_package(tmp_path, monkeypatch, manager, package):
-    venv = pretend(tmp_path, LOADER)
-    monkeypatch.setattr(libraries.shutil, "which", lambda tool: tool if tool == manager else None)
-    with pytest.raises(InstallError, match=rf"libGLU\.so\.1 not found.*{package}") as caught:
-        libraries.provide(venv)
-    assert "\n" not in str(caught.value)
+def test_packages_are_installed_again_when_a_lock_changes(tmp_path):
+    for lock in LOCKS:
+        shutil.copy(lock, tmp_path)
+        os.utime(tmp_path / lock.name, (1, 1))
+    site = tmp_path / ".venv/lib/python{}.{}/site-packages".format(*sys.version_info[:2])
+    site.mkdir(parents=True)
+    for group in ("run", "test"):
+        (site / f"installed-{group}").touch()
+    assert "Installing" not in make(tmp_path, sys.executable, "-n", "test-environment").stdout
+    (tmp_path / "requirements-test.txt").touch()
+    planned = make(tmp_path, sys.executable, "-n", "test-environment").stdout
+    assert re.findall(r"Installing (\S+)", planned) == ["requirements-test.txt"]
+    (tmp_path / "requirements-build.txt").touch()
+    planned = make(tmp_path, sys.executable, "-n", "environment").stdout
+    assert re.findall(r"Installing (\S+)", planned) == ["requirements.txt"]
 
 
-def test_other_failure_of_gmsh_is_passed_on(tmp_path, monkeypatch):
-    venv = pretend(tmp_path, "ModuleNotFoundError: No module named gmsh")
+def test_missing_libraries_are_named_with_their_packages(tmp_path, monkeypatch):
+    monkeypatch.setattr(libraries, "missing", lambda venv: ["libGLU.so.1", "libodd.so.2"])
     monkeypatch.setattr(libraries.shutil, "which", lambda tool: None)
-    with pytest.raises(InstallError, match="gmsh does not start: ModuleNotFoundError"):
-        libraries.provide(venv)
+    said = libraries.provide(tmp_path)
+    assert "libGLU.so.1, libodd.so.2 not found" in said
+    assert "libglu1-mesa libodd.so.2" in said
+    assert "\n" not in said
 
 
-def test_gmsh_loads_here():
-    assert libraries.failure(Path(sys.prefix)) == ""
-
-
-@pytest.mark.parametrize("missing", [[], ["libGLU.so.1"]])
-def test_an_environment_out_of_a_cache_is_completed_on_this_system(monkeypatch, missing):
-    done = []
-    monkeypatch.setattr(sys, "argv", ["install", "run"])
-    monkeypatch.setattr(environment, "current", lambda groups: True)
-    monkeypatch.setattr(environment, "complete", lambda: True)
-    monkeypatch.setattr(environment, "stamp", lambda groups, complete: done.append("stamp"))
-    monkeypatch.setattr(environment, "keep_scripts", lambda: None)
-    monkeypatch.setattr(libraries, "missing", lambda venv: missing)
-    monkeypatch.setattr(libraries, "provide", lambda venv: done.append("provide"))
-    runpy.run_path(str(ROOT / "workflow" / "install"), run_name="__main__")
-    assert done == (["provide", "stamp"] if missing else [])
+def test_gmsh_finds_its_libraries_here():
+    assert libraries.provide(Path(sys.prefix)) == ""
 
 
 @pytest.fixture
@@ -213,30 +164,3 @@ def test_unpacked_libraries_look_beside_themselves(tmp_path, library):
     command = [tmp_path / "bin" / "patchelf", "--print-rpath", tmp_path / "lib" / "libsample.so.1"]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     assert run.stdout.strip() == "$ORIGIN"
-
-
-def test_the_environment_knows_the_project_from_any_folder(tmp_path, monkeypatch):
-    packages = tmp_path / "lib" / "python3.11" / "site-packages"
-    packages.mkdir(parents=True)
-    monkeypatch.setattr(environment, "VENV", tmp_path)
-    environment.share()
-    environment.share()
-    code = f"import site; site.addsitedir({str(packages)!r}); import solver; print(solver.__file__)"
-    command = [sys.executable, "-I", "-S", "-c", code]
-    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert run.stdout.strip() == str(ROOT / "solver" / "__init__.py"), run.stderr
-
-
-def test_the_script_of_charts_is_made_once_for_an_environment(tmp_path, monkeypatch):
-    python = tmp_path / "python"
-    python.write_text(
-        '#!/bin/sh\ncd "$(dirname "$0")"\nmkdir -p share/mortarcheck\n'
-        'echo "$3" >> share/mortarcheck/vega.js\n'
-    )
-    python.chmod(0o755)
-    monkeypatch.setattr(environment, "VENV", tmp_path)
-    monkeypatch.setattr(environment, "PYTHON", python)
-    environment.keep_scripts()
-    environment.keep_scripts()
-    made = (tmp_path / "share" / "mortarcheck" / "vega.js").read_text().splitlines()
-    assert made == ["from solver.report.charts import keep_libraries; keep_libraries()"]

@@ -16,7 +16,7 @@ TAKEN_OVER = "raise SystemExit('taken over')\n"
 def make(project, home, **environment):
     """The finished process of `make all-cases`, with the environment there is."""
     return subprocess.run(
-        ["make", "all-cases", "INSTALL=true"],
+        ["make", "all-cases", "INSTALLED=yes"],
         cwd=project,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

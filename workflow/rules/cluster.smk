@@ -34,75 +34,46 @@ def minutes(job, attempt, refine=1):
     return attempt * round(START_MINUTES + SLACK * seconds(job, refine) / 60)
 
 
-# What was said of each job that failed, by what it should have made.
+# What the executor said of each job that failed, by what it should have made.
 FAILURES = {}
 
 
 def note_failure(record):
     """A filter of the log that lets all through."""
     if getattr(record, "event", None) == LogEvent.JOB_ERROR:
-        FAILURES.update(dict.fromkeys(record.output, record))
+        FAILURES.update(dict.fromkeys(record.output, record.rule_msg or ""))
     return True
 
 
 logger.addFilter(note_failure)
 
 
-def reason_of(failure):
-    """Why a job failed, in one line: what the executor says, and the first error that it, or the log
-    it kept of the job, names."""
-    said = failure.rule_msg or ""
-    logs = [log for log in map(str, failure.log) if not log.startswith("results/")]
-    texts = [
-        Path(log).read_text("utf-8", errors="replace")
-        for log in logs
-        if os.path.isfile(log)
-    ]
-    lines = "\n".join([said, *texts]).splitlines()
-    errors = [
-        line.partition("error: ")[2].strip(" *'") for line in lines if "error: " in line
-    ]
-    parts = filter(None, [said.split(". ")[0], *errors[:1]])
-    return ": ".join(parts) or "ended from outside"
+def report_failures():
+    """Give jobs that were ended from outside the verdict `crashed`, and write the report.
 
-
-def give_verdict(job, failure):
-    """The verdict `crashed` for a job of the batch that was not left to write one itself."""
+    Snakemake's own rule cannot: what it needs was not made in this run. The next run does these
+    jobs again.
+    """
     from solver.verification.run import Job as Solve
     from solver.verification.run import record_crash
 
-    folder = Path(results_of(job))
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "log").open("a", encoding="utf-8") as file:
-        file.write(f"{reason_of(failure)}\n")
-    solve = Solve(Path(job.file), swapped=job.swap, hexahedra=job.hexahedra)
-    record_crash(solve, folder / "verdict.json", folder / "log")
-
-
-def report_failures():
-    """Give jobs that were ended from outside their verdict, and write the report that waits for it.
-
-    Snakemake's own rule cannot: what it needs was not made in this run. The next run does these
-    jobs again, and finds the list of failures too old to be true.
-    """
     lost = 0
     for job in RUN.values():
         made = [results_of(job), *mesh_folder(job)]
-        failure = next((FAILURES[file] for file in made if file in FAILURES), None)
-        if failure and not Path(verdict_of(job)).exists():
-            give_verdict(job, failure)
+        said = next((FAILURES[file] for file in made if file in FAILURES), None)
+        if said is not None and not os.path.isfile(verdict_of(job)):
+            log = Path(results_of(job), "log")
+            log.parent.mkdir(parents=True, exist_ok=True)
+            log.write_text(f"{said.split('. ')[0] or 'ended from outside'}\n")
+            solve = Solve(Path(job.file), swapped=job.swap, hexahedra=job.hexahedra)
+            record_crash(solve, Path(verdict_of(job)), log)
             lost += 1
-    verdicts = [verdict_of(job) for job in RUN.values()]
-    if lost and all(map(os.path.exists, verdicts)):
-        command = [sys.executable, "-Es", "-m", "solver", "report"]
-        command += f"--list {VERDICTS} --older {OLDER_VERDICTS}".split()
-        command += ["-o", "results/report"]
-        subprocess.run([*command, "--families", *FAMILY_FILES])
+    if lost:
+        command = f"report --list {VERDICTS} --older {OLDER_VERDICTS} -o results/report".split()
+        arguments = [*command, "--families", *FAMILY_FILES]
+        subprocess.run([sys.executable, "-Es", "-m", "solver", *arguments])
+        # Too old to be true for the next run.
         os.utime("results/report/failures.txt", (1, 1))
-
-
-# Whether somebody has pressed Ctrl-C.
-INTERRUPTED = []
 
 
 onerror:

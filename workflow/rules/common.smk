@@ -207,35 +207,28 @@ def verdicts_there(jobs):
     return [verdict for verdict in map(verdict_of, jobs) if os.path.isfile(verdict)]
 
 
-def is_kept(folder):
-    """Whether a solve's verdict can be kept: it is undamaged, its result exists, and the solve was not
-    ended by the machine (memory, disk, a kill)."""
-    verdict = read_verdict_of(folder)
-    if verdict is None:
-        return False
-    there = verdict.result is None or Path(folder, verdict.result).is_file()
-    return there and not verdict.transient
-
-
 # Without Snakemake's records the inputs of the results are unknown.
 LOST = not any(Path(".snakemake/metadata").glob("*"))
-AGAIN = "results/.again"
 
 
-def again(folder, kept=is_kept):
-    """A further input of a job whose results cannot be kept: a file that never exists."""
-    return [AGAIN] if os.path.isdir(folder) and (LOST or not kept(folder)) else []
+def is_damaged(folder):
+    """Whether a folder of results is there and cannot be kept: its inputs are unknown, its verdict
+    is damaged, its file is missing, or the machine ended the solve (memory, disk, a kill).
+    """
+    if not os.path.isdir(folder) or LOST:
+        return os.path.isdir(folder)
+    if folder.startswith("results/meshes/"):
+        return not any(Path(folder, f).is_file() for f in ("mesh.vtkhdf", "refused"))
+    verdict = read_verdict_of(folder)
+    if verdict is None or verdict.transient:
+        return True
+    return verdict.result is not None and not Path(folder, verdict.result).is_file()
 
 
 wildcard_constraints:
     family="(?!(?:report|meshes|studies|docs)/)[^/]+",
     case="[^/]+",
     job="[^/@]+",
-
-
-def has_mesh(folder):
-    """Whether the mesh exists, or was refused because of the case."""
-    return any(Path(folder, name).is_file() for name in ("mesh.vtkhdf", "refused"))
 
 
 def mesh_folder(job):
@@ -258,10 +251,3 @@ def options_of(job):
     """The options of the command line for this job of a case."""
     cut = f" --hexahedra {job.hexahedra}" if job.hexahedra else ""
     return "--swap" * job.swap + cut
-
-
-def again_for(job):
-    """The result of `again` for a solve or its mesh."""
-    return again(results_of(job)) + [
-        f for mesh in mesh_folder(job) for f in again(mesh, has_mesh)
-    ]

@@ -6,7 +6,6 @@ RECIPES = {(j.family, j.case): j for j in BATCH.values() if j.mesh is None}
 rule mesh:
     input:
         case=lambda w: watched(RECIPES[w.family, w.case].file),
-        again=lambda w: again(f"results/meshes/{w.family}/{w.case}", has_mesh),
     output:
         directory("results/meshes/{family}/{case}"),
     log:
@@ -17,6 +16,7 @@ rule mesh:
         runtime=lambda w, attempt: minutes(RECIPES[w.family, w.case], attempt),
     params:
         file=lambda w: RECIPES[w.family, w.case].file,
+        damaged=lambda w: is_damaged(f"results/meshes/{w.family}/{w.case}"),
         content=lambda w: contents(RECIPES[w.family, w.case].file) + MESH_CONTENT,
     message:
         "mesh {wildcards.case}"

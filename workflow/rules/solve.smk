@@ -4,7 +4,6 @@ rule solve:
     input:
         case=lambda w: watched(*files_of(BATCH[w.family, w.job])),
         mesh=lambda w: mesh_folder(BATCH[w.family, w.job]),
-        again=lambda w: again(f"results/{w.family}/{w.job}"),
     output:
         directory("results/{family}/{job}"),
     log:
@@ -16,6 +15,7 @@ rule solve:
     params:
         file=lambda w: BATCH[w.family, w.job].file,
         mesh=lambda w: shlex.quote(mesh_file(BATCH[w.family, w.job])),
+        damaged=lambda w: is_damaged(f"results/{w.family}/{w.job}"),
         content=lambda w: contents(*files_of(BATCH[w.family, w.job])) + SOLVER_CONTENT,
         options=lambda w: options_of(BATCH[w.family, w.job]),
         refusal=lambda w: shlex.quote(BATCH[w.family, w.job].refusal),
