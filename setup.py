@@ -1,4 +1,4 @@
-"""Installs the folder solver/ as the package mortarcheck, with the cases in it.
+"""Installs the folder solver/ as the package mortarcheck, with the cases and the workflow in it.
 
 pyproject.toml has everything else.
 """
@@ -10,10 +10,15 @@ from setuptools import find_packages, setup
 # What an earlier build left there would join the wheel.
 shutil.rmtree("build/lib", ignore_errors=True)
 setup(
-    package_dir={"mortarcheck": "solver", "mortarcheck.cases": "cases"},
+    package_dir={
+        "mortarcheck": "solver",
+        "mortarcheck.cases": "cases",
+        "mortarcheck.workflow": "workflow",
+    },
     packages=[
         "mortarcheck",
         "mortarcheck.cases",
+        "mortarcheck.workflow",
         *(f"mortarcheck.{name}" for name in find_packages("solver")),
     ],
 )

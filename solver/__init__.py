@@ -10,14 +10,16 @@ if TYPE_CHECKING:
     from .api import Solved, solve_case
     from .lac.errors import SolveError
     from .system.errors import InputError
+    from .system.package import workflow_file
 
-__all__ = ["InputError", "SolveError", "Solved", "solve_case"]
+__all__ = ["InputError", "SolveError", "Solved", "solve_case", "workflow_file"]
 
 _HOME = {
     "InputError": ".system.errors",
     "SolveError": ".lac.errors",
     "Solved": ".api",
     "solve_case": ".api",
+    "workflow_file": ".system.package",
 }
 
 

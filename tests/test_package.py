@@ -39,7 +39,8 @@ def installed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("installed")
     copied = folder / "sources"
     shutil.copytree(SOURCES, copied / "solver", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copytree(ROOT / "cases", copied / "cases")
+    for name in ("cases", "workflow"):
+        shutil.copytree(ROOT / name, copied / name, ignore=shutil.ignore_patterns("__pycache__"))
     (copied / "build" / "lib" / "mortarcheck").mkdir(parents=True)
     (copied / "build" / "lib" / "mortarcheck" / "removed.py").touch()  # of an earlier build
     for name in ("LICENSE", "README.md", "pyproject.toml", "setup.py"):
@@ -75,7 +76,11 @@ def test_the_wheel_holds_every_file_of_the_package(installed):
     held = {name for name in ZipFile(wheel).namelist() if name.startswith("mortarcheck/")}
     expected = {
         f"mortarcheck/{prefix}{f.relative_to(folder).as_posix()}"
-        for prefix, folder in (("", SOURCES), ("cases/", ROOT / "cases"))
+        for prefix, folder in (
+            ("", SOURCES),
+            ("cases/", ROOT / "cases"),
+            ("workflow/", ROOT / "workflow"),
+        )
         for f in folder.rglob("*")
         if f.is_file() and "__pycache__" not in f.parts
     }
@@ -112,6 +117,49 @@ def test_the_cases_come_with_it_and_are_solved_by_name(installed, fresh):
     refused = fresh(command, "solve", "ssnp170-ee")
     assert refused.returncode == 2
     assert "case = 'ssnp170-ee': no such case; did you mean ssnp170-e? (" in refused.stderr
+
+
+@pytest.fixture
+def own(installed, tmp_path):
+    """Run the Python of an environment that has the wheel and Snakemake alone."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "own"], check=True)
+    (site,) = tmp_path.glob("own/lib/python*/site-packages")
+    packages = Path(pytest.__file__).parents[1]
+    (site / "here.pth").write_text(f"{packages}\n{installed / 'packages'}\n")
+
+    def run(folder, *command):
+        return subprocess.run(
+            [tmp_path / "own/bin/python", "-Es", "-m", *command],
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    return run
+
+
+def test_a_family_in_a_folder_of_its_own_becomes_green_and_red(own, tmp_path):
+    made = own(tmp_path, "mortarcheck", "init", "my-family")
+    assert made.stdout == "my-family: written; next: cd my-family && snakemake --cores all\n"
+    family = tmp_path / "my-family"
+    green = own(family, "snakemake", "--cores", "1")
+    assert green.returncode == 0, green.stdout
+    assert "The one solve passed. Report: results/report/summary.html" in green.stdout
+    assert "<h1>my-family</h1>" in (family / "results/report/my-family.html").read_text()
+    assert "Nothing to be done" in own(family, "snakemake", "--cores", "1").stdout
+    case = family / "cases/my-family/block.yaml"
+    text = case.read_text()
+    assert "contact_pressure: 25.0" in text
+    case.write_text(text.replace("contact_pressure: 25.0", "contact_pressure: 26.0"))
+    red = own(family, "snakemake", "--cores", "1")
+    assert red.returncode == 1, red.stdout
+    assert "block: failed: " in red.stdout
+    assert "1 failed. Report: results/report/summary.html" in red.stdout
+    refused = own(tmp_path, "mortarcheck", "init", "my-family")
+    assert refused.returncode == 2
+    assert refused.stdout == "my-family: folder: is not empty; name a new one\n"
+    assert own(tmp_path, "mortarcheck", "init", "odd name").returncode == 2
 
 
 def test_the_import_solves_and_every_module_is_found(fresh):

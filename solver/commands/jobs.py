@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 # Files of these names describe a folder of cases.
 DESCRIPTIONS = ("family.yaml", "orders.yaml")
 # Names of folders and files become paths of results and patterns of the workflow.
-_PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 # Folders of results that are no family's.
 _RESERVED = ["report", "meshes", "studies", "docs"]
 
@@ -70,7 +70,7 @@ def check_names(folder: Path) -> None:
     if set(str(folder)) & set("{}\n"):
         raise InputError(folder, "folder", None, "must be without braces and line ends")
     for path, name in [(folder, family), *((f, f.stem) for f in case_files(folder))]:
-        if not _PLAIN.fullmatch(name):
+        if not PLAIN.fullmatch(name):
             must = "must be letters, digits, `_`, `-` and `.`, 64 at most, a letter or digit first"
             raise InputError(path, "name", name, must)
 

@@ -27,6 +27,16 @@ def cases_folder() -> Path:
     return _SOURCES / "cases" if in_project() else Path(__file__).parents[1] / "cases"
 
 
+def workflow_folder() -> Path:
+    """The Snakemake workflow of the project, or of the installed package."""
+    return _SOURCES / "workflow" if in_project() else Path(__file__).parents[1] / "workflow"
+
+
+def workflow_file() -> str:
+    """The Snakefile that a workflow of one's own uses as a `module`."""
+    return str(workflow_folder() / "Snakefile")
+
+
 @cache
 def project_version() -> str:
     """The version in pyproject.toml: of the file itself, or as installed; else `unknown`."""

@@ -6,9 +6,9 @@ import re
 
 import pytest
 
+from solver.commands.progress import Progress, hides
 from solver.system.files import last_line
 from tests.workflow.projects import new_project, snakemake
-from workflow.progress import Progress, hides
 
 
 def log(tmp_path, *lines):

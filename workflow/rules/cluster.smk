@@ -1,5 +1,7 @@
 """Jobs sent elsewhere: what they ask for, and what becomes of those that are ended from outside."""
 
+import atexit
+
 from snakemake_interface_logger_plugins.common import LogEvent
 
 # In a job Snakemake runs in Snakemake, with its plugins' libraries: memory beside the solve's own.
@@ -13,9 +15,7 @@ MOST_MEMORY, MOST_SECONDS = 1e15, 1e9
 
 
 def size_of(job, refine):
-    from solver.mesh.size import Size
-
-    return Size(job.points * refine**job.dim, job.dim)
+    return part("mesh.size").Size(job.points * refine**job.dim, job.dim)
 
 
 def memory(job, attempt, refine=1):
@@ -54,10 +54,9 @@ def report_failures():
     Snakemake's own rule cannot: what it needs was not made in this run. The next run does these
     jobs again.
     """
-    from solver.verification.run import Job as Solve
-    from solver.verification.run import record_crash
-
-    lost = 0
+    if INTERRUPTED or not FAILURES:
+        return
+    lost, program = 0, [sys.executable, "-Es", "-m", PACKAGE]
     for job in RUN.values():
         made = [results_of(job), *mesh_folder(job)]
         said = next((FAILURES[file] for file in made if file in FAILURES), None)
@@ -65,17 +64,17 @@ def report_failures():
             log = Path(results_of(job), "log")
             log.parent.mkdir(parents=True, exist_ok=True)
             log.write_text(f"{said.split('. ')[0] or 'ended from outside'}\n")
-            solve = Solve(Path(job.file), swapped=job.swap, hexahedra=job.hexahedra)
-            record_crash(solve, Path(verdict_of(job)), log)
+            solve = [job.file, *shlex.split(options_of(job))]
+            files = ["--log", log, "--verdict", verdict_of(job)]
+            subprocess.run([*program, "crashed", *solve, *files])
             lost += 1
     if lost:
         command = f"report --list {VERDICTS} --older {OLDER_VERDICTS} -o results/report".split()
-        arguments = [*command, "--families", *FAMILY_FILES]
-        subprocess.run([sys.executable, "-Es", "-m", "solver", *arguments])
+        subprocess.run([*program, *command, "--families", *FAMILY_FILES])
         # Too old to be true for the next run.
         os.utime("results/report/failures.txt", (1, 1))
 
 
-onerror:
-    if not INTERRUPTED:
-        report_failures()
+# At the end of this process: a module has no handler `onerror`.
+if RUNS:
+    atexit.register(report_failures)

@@ -5,13 +5,10 @@
 @cache
 def codes_to_run():
     """The codes by name: those configured, else all that are installed."""
-    from solver.codes.registry import find, names
-    from solver.system.errors import InputError
-
-    chosen = listed(config["codes"])
+    registry, chosen = part("codes.registry"), listed(config["codes"])
     try:
-        found = {find(code).name: code for code in chosen or names()}
-    except InputError as error:
+        found = {registry.find(c).name: c for c in chosen or registry.names()}
+    except part("system.errors").InputError as error:
         refuse(error)
     if chosen:
         return found
@@ -20,9 +17,7 @@ def codes_to_run():
 
 @cache
 def version_of(code):
-    from solver.codes.registry import find
-
-    return find(code).version()
+    return part("codes.registry").find(code).version()
 
 
 def sources_of(code):
@@ -61,7 +56,7 @@ rule run_code:
     shell:
         "set -- {params.file:q} {params.options};"
         ' if test -e {params.mesh}; then set -- "$@" --mesh {params.mesh}; fi;'
-        ' {SOLVER} {output:q}/benchmark run "$@" --code {params.code:q} -o {output:q} > {log:q} 2>&1'
+        ' warm {output:q}/benchmark run "$@" --code {params.code:q} -o {output:q} > {log:q} 2>&1'
         " || test -s {output:q}/verdict.json"
 
 
@@ -73,4 +68,4 @@ rule bench:
     message:
         "report of all codes"
     shell:
-        "{PYTHON} -m solver report --results results -o results/report"
+        "program report --results results -o results/report"

@@ -16,11 +16,19 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
 
-# The project's folder gives these packages alone: Snakemake put it first, and a file `jsonschema.py`
-# in it would be taken for the package.
-for package in ("solver", "workflow.progress"):
-    import_module(package)
+# The program: `solver` in the project, `mortarcheck` where it is installed with this workflow in it.
+HERE = Path(workflow.current_basedir.get_path_or_uri(secret_free=False))
+PACKAGE = "solver" if (HERE.parents[1] / "solver").is_dir() else "mortarcheck"
+FOLDER = Path(import_module(PACKAGE).__file__).parent
+# The working folder gives this package alone: Snakemake put it first, and a file `jsonschema.py` in it
+# would be taken for the package.
 sys.path.sort(key=lambda folder: Path(folder) == Path(workflow.basedir))
+
+
+def part(name):
+    """A module of the program."""
+    return import_module(f"{PACKAGE}.{name}")
+
 
 # One solve, as `python -m solver jobs` lists it.
 FIELDS = "family case name file mesh swap hexahedra points dim refusal"
@@ -60,18 +68,21 @@ read_config()
 # Jobs share their bytecode: compiling the sources in each costs a third of a small solve.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 VARIANTS = config["variants"] in (True, "true")
-MEMORY_CHECK = "--no-memory-check" * (config["memory_check"] in (False, "false"))
-# These processes ignore PYTHONPATH and the user's own packages.
+# What jobs call: `program COMMAND`, and `warm FILE COMMAND`, which runs in a fork of the warm process,
+# if there is one, and writes its cost to a file. These processes ignore PYTHONPATH and the user's own
+# packages. As functions of the shell they are no part of the code of a rule, and known in a module.
 PYTHON = f"{shlex.quote(sys.executable)} -Es"
-# Followed by a file for its cost and a command of the solver, which runs in a fork of the warm
-# process, if there is one.
-SOLVER = f"{PYTHON} -IS solver/commands/warm.py"
+WARM = f"{PYTHON} -IS {shlex.quote(str(FOLDER / 'commands/warm.py'))}"
+NO_CHECK = "--no-memory-check" * (config["memory_check"] in (False, "false"))
+shell.prefix(
+    f'program() {{{{ {PYTHON} -m {PACKAGE} "$@"; }}}}; warm() {{{{ {WARM} "$@"; }}}}; '
+    f"memory_check={NO_CHECK}; "
+)
 
 
 def sources(*patterns):
     """Source files of the solver."""
-    files = {f for p in patterns for f in Path("solver").glob(p) if f.is_file()}
-    return sorted(map(str, files))
+    return sorted({str(f) for p in patterns for f in FOLDER.glob(p) if f.is_file()})
 
 
 OF_PAGES = (
@@ -103,7 +114,8 @@ def contents(*files):
 
     Snakemake compares parameters only if they depend on wildcards alone.
     """
-    found = "".join(f"{file} {content_of(file)}\n" for file in files)
+    names = [os.path.relpath(file, FOLDER.parent) for file in files]
+    found = "".join(f"{n} {content_of(f)}\n" for n, f in zip(names, files))
     return hashlib.sha256(found.encode("utf-8", "surrogateescape")).hexdigest()
 
 
@@ -122,7 +134,7 @@ def watched(*files):
 
 def list_jobs(folders):
     """The jobs in the folders, as the solver lists them."""
-    command = [sys.executable, "-Es", "-m", "solver", "jobs", *folders]
+    command = [sys.executable, "-Es", "-m", PACKAGE, "jobs", *folders]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         refuse((done.stderr.strip() or "cases: they cannot be listed").splitlines()[-1])
@@ -144,12 +156,12 @@ def find_jobs():
 
 def chosen(key, known):
     """The names that a setting chooses by names and patterns such as `hertz-*`; all if it is empty."""
-    from solver.system.errors import hint
-
     found = {pattern: fnmatch.filter(known, pattern) for pattern in listed(config[key])}
     for pattern in found:
         if not found[pattern]:
-            refuse(f"{key} = {pattern}: unknown; {hint(pattern, known)}")
+            refuse(
+                f"{key} = {pattern}: unknown; {part('system.errors').hint(pattern, known)}"
+            )
     return set().union(*found.values()) if found else set(known)
 
 
@@ -182,12 +194,9 @@ def verdict_of(job):
 
 def read_verdict_of(folder):
     """The verdict in a folder of results; None if it is missing or damaged."""
-    from solver.system.errors import InputError
-    from solver.verification.verdict import read_verdict
-
     try:
-        return read_verdict(Path(folder, "verdict.json"))
-    except InputError:
+        return part("verification.verdict").read_verdict(Path(folder, "verdict.json"))
+    except part("system.errors").InputError:
         return None
 
 

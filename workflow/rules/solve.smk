@@ -25,11 +25,11 @@ rule solve:
         "died=0; set -- {params.file:q} {params.options};"
         ' if test -e {params.mesh}; then set -- "$@" --mesh {params.mesh}; fi;'
         " if test -z {params.refusal}; then"
-        ' {SOLVER} {output:q}/benchmark solve "$@" {MEMORY_CHECK} --verbose'
+        ' warm {output:q}/benchmark solve "$@" $memory_check --verbose'
         " -o {output:q}/result.vtkhdf --verdict {output:q}/verdict.json"
         " --pictures results/report/pictures > {log:q} 2>&1 || died=$?; fi;"
         # Ctrl-C: no verdict, so that the next run solves it.
         " test $died != 130 || exit 130;"
         " test -s {output:q}/verdict.json"
-        ' || {PYTHON} -m solver crashed "$@" --status $died --refusal {params.refusal}'
+        ' || program crashed "$@" --status $died --refusal {params.refusal}'
         " --log {log:q} --verdict {output:q}/verdict.json >> {log:q}"

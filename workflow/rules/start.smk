@@ -7,8 +7,6 @@ import signal
 
 from snakemake.settings.enums import Quietness
 
-from workflow.progress import Progress, hides
-
 # Whether somebody has pressed Ctrl-C: what has no verdict then has not failed.
 INTERRUPTED = []
 
@@ -50,20 +48,26 @@ def report_progress():
         if quiet:
             handler.setLevel(logging.WARNING)
         if not settings.verbose:
-            handler.addFilter(lambda record: not hides(record))
+            handler.addFilter(
+                lambda record: not part("commands.progress").hides(record)
+            )
     if not quiet:
-        logger.addFilter(Progress(sys.stdout))
+        logger.addFilter(part("commands.progress").Progress(sys.stdout))
 
 
-onstart:
-    if workflow.is_main_process:
+def begin(record):
+    """A filter of the log that lets all through: before the first job. A module has no `onstart`."""
+    if str(getattr(record, "event", None)) == "run_info":
         signal.signal(signal.SIGINT, note_interruption)
         list_verdicts()
         begin_warm()
+    return True
 
 
 # A dry run changes nothing, and Snakemake reports it well.
-if workflow.is_main_process and not workflow.output_settings.dryrun:
+RUNS = workflow.is_main_process and not workflow.output_settings.dryrun
+if RUNS:
     LOCK = take_lock()  # as long as this process lives
     remove_damaged()
     report_progress()
+    logger.addFilter(begin)

@@ -20,14 +20,11 @@ def records_of(study):
 @cache
 def studies(target):
     """The studies of a target by name, with their files."""
-    from solver.studies.description import read_study
-    from solver.system.errors import InputError
-
     found = {}
     for file in TARGETS[target]:
         try:
-            study = read_study(Path(file), LEVEL)
-        except InputError as error:
+            study = part("studies.description").read_study(Path(file), LEVEL)
+        except part("system.errors").InputError as error:
             refuse(error)
         found[study.name] = file, study
     return found
@@ -39,10 +36,8 @@ def study_of(w):
 
 def is_timed(w):
     """Whether a group has the machine for itself."""
-    from solver.studies.run import APART
-
     _, study = study_of(w)
-    return (study.group(w.group).measure or study.measure) in APART
+    return (study.group(w.group).measure or study.measure) in part("studies.run").APART
 
 
 rule measure:
@@ -65,7 +60,8 @@ rule measure:
     message:
         "measure {wildcards.study}/{wildcards.group}"
     shell:
-        "{SOLVER} {output.benchmark:q} measure {input.study:q} {wildcards.group:q} --level {LEVEL}"
+        "warm {output.benchmark:q} measure {input.study:q} {wildcards.group:q}"
+        f" --level {LEVEL}"
         " -o {output.record:q} > {log:q} 2>&1"
 
 
@@ -84,8 +80,9 @@ rule study_page:
     message:
         "page of {wildcards.study}"
     shell:
-        "{PYTHON} -m solver study-page {input.study:q} --level {LEVEL}"
-        " --results results/studies/{wildcards.study}/{LEVEL} -o results/report 2>&1 | tee {log:q}"
+        f"program study-page {{input.study:q}} --level {LEVEL}"
+        f" --results results/studies/{{wildcards.study}}/{LEVEL}"
+        " -o results/report 2>&1 | tee {log:q}"
 
 
 # The gates: each fails when something of its studies does not hold; the pages are there by then.

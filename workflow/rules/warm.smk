@@ -13,8 +13,6 @@ def begin_warm():
     """
     if sys.platform != "linux" or not workflow.local_exec:
         return
-    from solver.system.process import THREADS
-
     folder = tempfile.TemporaryDirectory()
     with socket.socket(socket.AF_UNIX) as listener:
         try:
@@ -23,10 +21,10 @@ def begin_warm():
             return  # a file system without sockets, or too long a name
         listener.listen()
         server = subprocess.Popen(
-            [sys.executable, "-Es", "-m", "solver", "serve", str(listener.fileno())],
+            [sys.executable, "-Es", "-m", PACKAGE, "serve", str(listener.fileno())],
             stdin=subprocess.PIPE,  # closed when this run ends
             pass_fds=[listener.fileno()],
-            env={**os.environ, **dict.fromkeys(THREADS, "1")},
+            env={**os.environ, **dict.fromkeys(part("system.process").THREADS, "1")},
         )
     os.environ["WARM_SOLVER"] = f"{folder.name}/warm"
     atexit.register(end_warm, server, folder)

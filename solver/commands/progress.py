@@ -8,7 +8,7 @@ import logging
 from pathlib import Path
 from typing import TextIO
 
-from solver.system.files import last_line
+from ..system.files import last_line
 
 # The rules whose jobs are counted.
 _COUNTED = ("solve", "measure")
