@@ -146,6 +146,9 @@ lint: lint-environment ## check format, style and types of the sources
 	.venv/bin/snakefmt --check Snakefile workflow
 	$(ALONE) mypy
 	.venv/bin/lint-imports --no-logo
+	.venv/bin/reuse lint --quiet
+	.venv/bin/zizmor --quiet --offline --min-severity medium .github
+	.venv/bin/sp-repo-review . > /dev/null
 
 # A stamp for each lock file: its packages are installed again when it changes, and all of them for
 # another Python.

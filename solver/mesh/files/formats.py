@@ -19,7 +19,7 @@ from ...system.files import replacing
 from ..tidy import tidy
 from .apart import read_apart, read_here
 
-WRITTEN = (".vtkhdf", ".med", ".msh", ".vtu")
+WRITTEN = (".vtkhdf", ".med", ".msh", ".vtu", ".inp")
 # Modules with a function `read(path)` that returns the mesh as stored in the file.
 _READERS = {
     ".med": ".med",
@@ -60,7 +60,8 @@ def write(mesh: meshio.Mesh, path: Path) -> None:
         # gmsh goes by the extension, in lower case.
         whole = temporary.with_name(f"{temporary.name}{suffix}")
         try:
-            import_module(_READERS[suffix], __package__).write(mesh, whole)
+            writer = ".abaqus_writer" if suffix == ".inp" else _READERS[suffix]
+            import_module(writer, __package__).write(mesh, whole)
             whole.replace(temporary)
         finally:
             whole.unlink(missing_ok=True)

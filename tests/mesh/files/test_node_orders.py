@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import vtk
 
+import solver.mechanics.fem  # noqa: F401 -- adds PENTA15 and the pyramids
 from solver.lac.cells.catalogue import BY_NAME, CellType
 from solver.lac.cells.gauss import gauss_rule
 from solver.lac.cells.shape import shape_functions

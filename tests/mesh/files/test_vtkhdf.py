@@ -9,6 +9,7 @@ import pytest
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
+import solver.mechanics.fem  # noqa: F401 -- adds PENTA15 and the pyramids
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.cells.shape import shape_functions
 from solver.mesh import generate, read_mesh, write_mesh
