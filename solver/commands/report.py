@@ -33,6 +33,12 @@ def add_commands(commands: Any) -> None:
         "--processes", type=int, metavar="N", help="to draw pictures; default: one for each core"
     )
 
+    command = add_command(
+        commands, "saved", _saved, "measure the time that a family saves", listed=False
+    )
+    command.add_argument("results", type=Path, metavar="DIR", help="the family's results")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.json")
+
     command = add_command(commands, "compare", _compare, "compare with another batch")
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
@@ -69,6 +75,13 @@ def _report(options: argparse.Namespace) -> int:
     older = _listed(options.older) if options.older else []
     print(write_report(verdicts, options.output, families, options.processes, older))
     return FAILED if (options.output / "failures.txt").stat().st_size else PASSED
+
+
+def _saved(options: argparse.Namespace) -> int:
+    from ..verification.savings import write_savings
+
+    write_savings(options.results, options.output)
+    return PASSED
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -15,7 +15,10 @@ from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import MUTED, PAPER
 from .layout import (
+    OF_STATUS,
     PRESSURE,
+    RELATIVE,
+    STATUS,
     color_map,
     macro_edges,
     mean_normal,
@@ -160,15 +163,16 @@ def _draw_hatched(
 
 
 def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
-    """A zone seen along its normal: its pressure, and its deviation from the reference."""
+    """A zone seen along its normal: its pressure, and what sticks, or the deviation."""
     points, (screen, names) = solution.mesh.points, plan_axes(zone)
     used, flat = np.unique(np.concatenate([f.ravel() for _, f, _ in zone.faces])), points @ screen.T
     box = pressed_box(flat, [zone], flat[used])
     names = (with_unit(names[0], solution.case.units.get("length")), names[1])
-    fields = [
-        field for field in zone_fields(solution, zone).items() if not field[0].startswith("gap")
-    ]
-    for frame, (title, values) in zip(_PLANS, fields, strict=False):
+    fields = zone_fields(solution, zone)
+    pressure = next(iter(fields))
+    second = next((name for name in (STATUS, RELATIVE) if name in fields), pressure)
+    for frame, title in zip(_PLANS, dict.fromkeys((pressure, second)), strict=False):
+        values = fields[title]
         view, (limits, colors) = View.of(drawing, screen, box, frame), color_map(title, values)
         x, y, width, height = view.rectangle(box)
         with drawing.clipped(x, y, width, height):
@@ -176,16 +180,33 @@ def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
             _draw_sub_faces(view, points, zone, np.rint(share * LEVELS).astype(int), colors, box)
         drawing.text(x, y - 10, title)
         _draw_ends(drawing, (x, y, width, height), box, names if frame is _PLANS[0] else names[:1])
-        for k in range(LEVELS):
-            fill, step = shade((LEVELS - k - 0.5) / LEVELS, colors), height / LEVELS
-            drawing.rectangle(x + width + 10, y + k * step, 10, step + 0.3, fill=fill)
-        drawing.text(x + width + 24, y + 9, f"{limits[1]:.3g}")
-        drawing.text(x + width + 24, y + height, f"{limits[0]:.3g}")
+        _draw_legend(drawing, (x + width + 10, y, 10, height), title, limits, colors)
     sub_faces = sum(len(nodes) for _, nodes, _ in zone.faces)
     kinds = ", ".join(sorted({cell_type(kind).name for kind, _, _ in zone.faces}))
     words = f"{zone.name}: macro-elements {len(zone.centre)}, sub-faces {sub_faces} ({kinds}), "
     words += f"master faces {sum(len(f) for _, f in zone.master_faces)} (orange)"
     drawing.text(_PLANS[0][0], drawing.height - 24, words)
+
+
+def _draw_legend(
+    drawing: Drawing,
+    frame: Frame,
+    title: str,
+    limits: tuple[float, float],
+    colors: Sequence[str],
+) -> None:
+    """The colours of a plan beside it: a scale with its ends, or the words of each status."""
+    x, y, width, height = frame
+    if title == STATUS:
+        for k, (word, color) in enumerate(OF_STATUS.items()):
+            drawing.rectangle(x, y + 20 * k, width, width, fill=color, stroke=MUTED)
+            drawing.text(x + 14, y + 20 * k + 9, word)
+        return
+    for k in range(LEVELS):
+        fill, step = shade((LEVELS - k - 0.5) / LEVELS, colors), height / LEVELS
+        drawing.rectangle(x, y + k * step, width, step + 0.3, fill=fill)
+    drawing.text(x + 14, y + 9, f"{limits[1]:.3g}")
+    drawing.text(x + 14, y + height, f"{limits[0]:.3g}")
 
 
 def _draw_sub_faces(

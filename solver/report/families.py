@@ -2,6 +2,7 @@
 
 title: A block on a rigid parabola
 description: What it shows, in a few sentences.
+group: Patch tests             # families of a group are shown together
 order: 2                       # its place in the report; families without one come last, by name
 problem: |
   What is solved: bodies, materials, supports, loads.
@@ -66,6 +67,7 @@ class FamilyFile(Section, frozen=True):
 
     title: Text
     description: str = ""
+    group: Text = "Other families"
     order: Annotated[int, Meta(description="a whole number: the place in the report")] | None = None
     problem: str = ""
     reference: str = ""

@@ -14,8 +14,8 @@ ROUND_OFF = 1e-12
 
 
 def number(value: float | None) -> str:
-    """Six significant digits, and no negative zero."""
-    return NOTHING if value is None or math.isnan(value) else f"{value + 0.0:.6g}"
+    """Four significant digits, and no negative zero."""
+    return NOTHING if value is None or math.isnan(value) else f"{value + 0.0:.4g}"
 
 
 def error(value: float | None) -> str:
@@ -42,7 +42,7 @@ def _near_zero(value: float | None, scale: float | None) -> str:
 
 
 def vector(values: Sequence[float], scale: float = 0.0) -> str:
-    """Numbers in six digits, those below 1e-9 of the scale as zero."""
+    """Numbers in four digits, those below 1e-9 of the scale as zero."""
     return ", ".join(number(value if abs(value) > 1e-9 * scale else 0.0) for value in values)
 
 

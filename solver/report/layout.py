@@ -16,6 +16,8 @@ DEVIATION = ("#b35806", "#f1a340", "#fee0b6", "#f7f7f7", "#d8daeb", "#998ec3", "
 # Errors without a sign, from none to the largest.
 ERROR = ("#fff7ec", "#fdd49e", "#fc8d59", "#d7301f", "#7f0000")
 RELATIVE = "Δp / max p"
+STATUS = "status: 0 open, 1 stick, 2 slip"
+OF_STATUS = {"open": "#f3f6fa", "stick": "#2f75a8", "slip": "#f1a340"}
 # Errors of this size or less are round-off, and stay pale; values of the other sign below this
 # share of the largest are.
 _ROUND_OFF, _NO_SIGN = 1e-12, 1e-9
@@ -35,6 +37,8 @@ def tint(body: BodyInfo) -> str:
 
 def color_map(title: str, values: np.ndarray) -> tuple[tuple[float, float], Sequence[str]]:
     """Limits and colours of a map: the same on both sides of zero where values have two signs."""
+    if title == STATUS:
+        return (0.0, 2.0), tuple(OF_STATUS.values())
     low, high = float(values.min()), float(values.max())
     most = max(abs(low), abs(high), _ROUND_OFF if "Δ" in title else 0.0) or 1.0
     if min(-low, high) > _NO_SIGN * most or title == RELATIVE:

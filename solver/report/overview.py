@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+from ..verification.savings import Savings, read_savings
 from . import formats
 from .charts import (
     BLUE,
@@ -138,14 +140,18 @@ def fewest_digits(rows: Sequence[Row]) -> list[Row]:
 
 
 def left_out_by_family(
-    rows: Sequence[Row], switches: Sequence[str] = tuple(WORK)
-) -> dict[str, tuple[int, list[int]]]:
-    """By family: how many solves, and how many of them left out the work of each switch."""
-    found: dict[str, tuple[int, list[int]]] = {}
+    rows: Sequence[Row], folder: Path, switches: Sequence[str] = tuple(WORK)
+) -> dict[str, tuple[int, list[int], Savings | None]]:
+    """By family: how many solves, how many of them left out the work of each switch, time saved.
+
+    The times are in `folder`, that of the report.
+    """
+    found: dict[str, tuple[int, list[int], Savings | None]] = {}
     solved = [row for row in ours(rows) if row.verdict.dofs]
     for family, mine in families(solved).items():
         left = [{switch for line in row.verdict.plan for switch in line[2:]} for row in mine]
-        found[family] = len(mine), [sum(switch in used for used in left) for switch in switches]
+        counts = [sum(switch in used for used in left) for switch in switches]
+        found[family] = len(mine), counts, read_savings(folder / "saved" / f"{family}.json")
     return found
 
 

@@ -10,7 +10,7 @@ from .charts import Chart
 from .html import TEMPLATES, render
 from .pictures import VIEWER, picture, profile
 from .rows import Row, causes, choices, ours
-from .sections import FamilySection
+from .sections import FamilySection, grouped
 from .tables import outcome
 
 # Pages beside the report that other commands write.
@@ -57,15 +57,14 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         fewest=overview.fewest_digits(rows),
         digits_kept=overview.digits_kept,
         cause=overview.cause,
-        left_out=overview.left_out_by_family(rows),
+        left_out=overview.left_out_by_family(rows, folder),
         switches=overview.WORK,
         good=bool(rows) and not bad,
         outcome=outcome(rows),
-        families=sections,
+        groups=grouped(sections),
         origin=_facts(rows),
         checks=[checks[name] for name in sorted(checks, key=_order)],
         meaning={name: check.what for name, check in BY_NAME.items()},
-        stages=_stages(rows),
         folder=folder,
     )
 

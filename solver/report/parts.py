@@ -16,7 +16,7 @@ from ..simulation.rigid import quadric_of
 from ..simulation.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import BLUE, PAPER
-from .layout import RELATIVE, edge_color, tint, ways_apart
+from .layout import RELATIVE, STATUS, edge_color, tint, ways_apart
 from .profile import expected
 from .svg import mixed
 
@@ -124,7 +124,7 @@ def zone_fields(solution: Solution, zone: ZoneResult) -> dict[str, np.ndarray]:
         found |= {
             with_unit("friction |t|", units.get("stress")): size,
             with_unit("slip", units.get("length")): np.linalg.norm(zone.friction.slip, axis=1),
-            "status: 0 open, 1 stick, 2 slip": zone.friction.status.astype(float),
+            STATUS: zone.friction.status.astype(float),
         }
     means = expected(solution, zone)
     if means is not None:

@@ -24,6 +24,7 @@ from .charts import (
     GREEN,
     INK,
     ORANGE,
+    PURPLE,
     RED,
     Axis,
     Chart,
@@ -35,10 +36,11 @@ from .charts import (
 )
 from .layout import extents, plan_axes, tangent
 
-CONSTANT, MEANS, NODES = "p, constant by macro-element", "means of p by face", "p at nodes"
+CONSTANT, MEANS, NODES = "p by macro-element", "means of p by face", "p at nodes"
 RECOVERED, REFERENCE = "p*, recovered", "reference"
 SLAVE, MASTER = "−σₙ, slave", "−σₙ, master"
-BOUND, TRACTION, SHEAR = "±μp", "friction on the slave", "its reference"
+BOUND, STUCK, SLIDING = "±μp", "friction where it sticks", "friction where it slips"
+SHEAR = "reference of friction"
 _LOOKS = {
     CONSTANT: Look(BLUE),
     MEANS: Look(BLUE),
@@ -48,7 +50,8 @@ _LOOKS = {
     SLAVE: Look(BLUE),
     MASTER: Look(ORANGE, "square"),
     BOUND: Look(INK),
-    TRACTION: Look(RED),
+    STUCK: Look(PURPLE),
+    SLIDING: Look(RED),
     SHEAR: Look(INK, "triangle-down"),
 }
 # Where less than this share of the interface is pressed, only that and what is next to it is drawn.
@@ -110,7 +113,7 @@ def _looks(records: Sequence[Any], flat: bool) -> dict[str, Look]:
     """The looks of the series found; in the legend, what is drawn as a line is one."""
     found = {record["series"] for record in records}
     looks = {name: look for name, look in _LOOKS.items() if name in found}
-    lines = (CONSTANT, MEANS, RECOVERED, REFERENCE, BOUND, TRACTION) if flat else ()
+    lines = (CONSTANT, MEANS, RECOVERED, REFERENCE, BOUND, STUCK, SLIDING) if flat else ()
     return looks | {n: replace(looks[n], shape="stroke") for n in lines if n in found}
 
 
@@ -126,7 +129,7 @@ def _view(
     """One view: steps and lines where the interface is a line, else marks."""
     found = list(dict.fromkeys(record["series"] for record in records))
     lines = [name for name in (REFERENCE, NODES, RECOVERED) if name in found and flat]
-    steps = [name for name in (CONSTANT, MEANS, BOUND, TRACTION) if name in found and flat]
+    steps = [name for name in (CONSTANT, MEANS, BOUND, STUCK, SLIDING) if name in found and flat]
     channels = series(looks)
     shape, _ = channels.pop("shape"), channels.pop("strokeDash")
     shared = {"x": x.channel(), "y": y.channel()} | channels
@@ -204,7 +207,10 @@ def _of_friction(solution: Solution, zone: ZoneResult, place: Place) -> list[dic
     found = []
     for sign in (1.0, -1.0)[: 1 + flat]:
         found += _records(BOUND, **columns, p=sign * mu * zone.multiplier)
-    found += _records(TRACTION, **columns, p=signed(zone.friction.friction_traction))
+    traction = signed(zone.friction.friction_traction)
+    for name, status in ((STUCK, 1), (SLIDING, 2)):
+        mine = zone.friction.status == status
+        found += _records(name, **{k: c[mine] for k, c in columns.items()}, p=traction[mine])
     exact = solution.case.solution
     if exact and "friction_traction" in exact.quantities:
         values = ExactValues(solution, exact).of_friction(zone, "friction_traction")
@@ -282,7 +288,9 @@ def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> 
         return name, lambda points: points @ direction
     normals = zone.normal[zone.multiplier > 0]
     if len(normals) and (normals @ normals.T).min() < _STRAIGHT:
-        return "arc length s", Arc.of(solution.mesh.points, zone)
+        arc = Arc.of(solution.mesh.points, zone)
+        x, y = (f"{value:.4g}" for value in arc.ends[0, 0] + 0.0)
+        return f"arc length s from ({x}, {y})", arc
     direction = tangent(zone)
     name = next(("xy"[i] for i in (0, 1) if direction[i] > 1 - 1e-9), "s along the interface")
     return name, lambda points: points @ direction
@@ -297,10 +305,13 @@ class Arc:
 
     @classmethod
     def of(cls, points: np.ndarray, zone: ZoneResult) -> "Arc":
-        """Faces one after another, from an end of the interface or, on a ring, from any face."""
+        """Faces one after another, from an end of the interface or, on a ring, its largest x."""
         pairs = np.concatenate([nodes[:, :2] for _, nodes, _ in zone.faces])
         after = {int(a): i for i, (a, _) in enumerate(pairs)}
-        start_points = [*(after.keys() - set(pairs[:, 1].tolist())), *after]
+        start_points = [
+            *sorted(after.keys() - set(pairs[:, 1].tolist())),
+            *sorted(after, key=lambda node: tuple(-points[node])),
+        ]
         chain: list[int] = []
         seen: set[int] = set()
         for first in start_points:

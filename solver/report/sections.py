@@ -77,6 +77,11 @@ class FamilySection:
         values = [x for pair in known for x in pair or () if x is not None]
         return bool(values) and all(abs(x - 1) < formats.ROUND_OFF for x in values)
 
+    def unit(self, kind: str) -> str:
+        """The unit of a kind of quantity, if all solves have the same."""
+        found = {row.verdict.units.get(kind, "") for row in ours(self.rows) if row.verdict.dofs}
+        return found.pop() if len(found) == 1 else ""
+
     @property
     def cpu(self) -> float:
         """Processor time of all solves, seconds, without the start of Python."""
@@ -179,6 +184,14 @@ class FamilySection:
         """The rows that the figure cannot show."""
         points = drawn(self.rows)
         return [row for row in self.rows if row not in points]
+
+
+def grouped(sections: Sequence[FamilySection]) -> dict[str, list[FamilySection]]:
+    """Sections by the group of their family, groups with failures first."""
+    found: dict[str, list[FamilySection]] = {}
+    for section in sorted(sections, key=lambda section: not section.bad):
+        found.setdefault(section.family.group, []).append(section)
+    return found
 
 
 def sections(rows: Sequence[Row], files: Mapping[str, Path], pictures: Path) -> list[FamilySection]:

@@ -14,6 +14,7 @@ from ..case import job_name
 from ..simulation.accuracy import Accuracy
 from ..simulation.validity import limits_passed
 from .scatter import oscillating
+from .units import derived
 from .verdict import (
     EXACT,
     EXPECTED,
@@ -116,6 +117,7 @@ def judge(
         bodies=_bodies(solution),
         plan=[list(entry) for entry in solution.plan],
         checks=list(checks),
+        units=derived(solution.case.units, _is_spatial(solution)),
         forces=list(_forces(solution)),
         dissipation=_dissipation(solution),
         probes=list(_probes(solution)),
@@ -123,6 +125,11 @@ def judge(
         attainable=accuracy.estimate,
         provenance=dict(provenance or {}),
     )
+
+
+def _is_spatial(solution: Solution) -> bool:
+    """Whether forces are whole ones: in 3D, and on the full circle."""
+    return solution.mesh.points.shape[1] == 3 or solution.case.axisymmetric
 
 
 def _unverified(case: Case) -> str:

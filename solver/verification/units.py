@@ -52,6 +52,26 @@ def _label(group: h5py.Group, units: Mapping[str, str]) -> set[str]:
     return labelled
 
 
+# The names of forces where they are products of these lengths and stresses.
+_FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa"): "MN"}
+
+
+def derived(units: Mapping[str, str], spatial: bool) -> dict[str, str]:
+    """The units of length, stress, area, force, moment and energy; empty without length or stress.
+
+    In plane cases, not `spatial`, forces, moments and energies are per thickness, and an area of
+    contact is a length.
+    """
+    length, stress = units.get("length"), units.get("stress")
+    if not (length and stress):
+        return dict(units)
+    force = _FORCES.get((length, stress), f"{stress}·{length}²")
+    found = {"area": f"{length}²", "force": force, "moment": f"{force}·{length}"}
+    if not spatial:
+        found = {"area": length, "force": f"{force}/{length}", "moment": force}
+    return dict(units) | found | {"energy": found["moment"]}
+
+
 def with_unit(text: str, unit: str | None) -> str:
     """The text of a label with its unit, if there is one."""
     return f"{text} [{unit}]" if unit else text

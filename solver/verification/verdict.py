@@ -179,7 +179,8 @@ class Verdict:
     `closest_to_tolerance` the one nearest to its tolerance or furthest past it. Pairs are minimum
     and maximum over all zones; `seconds` has wall times by stage and their `total`.
     `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
-    reconstruction. `strain` to `unpaired`: see `solver.simulation.solution.Validity`.
+    reconstruction. `units` names the units of length, stress, area, force, moment and energy where
+    the case does. `strain` to `unpaired`: see `solver.simulation.solution.Validity`.
     `transient`: the machine is the reason (memory, disk, a kill), so that the same solve may
     succeed another time.
 
@@ -216,6 +217,7 @@ class Verdict:
     linear_solver: str | None = None
     linear_iterations: int | None = None
     matrix_entries: int | None = None
+    units: dict[str, str] = field(default_factory=dict)
     length: float | None = None
     load_scale: float | None = None
     pressure_error_estimate: float | None = None

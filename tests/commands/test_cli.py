@@ -223,7 +223,7 @@ def test_check_judges_a_stored_result_again(small, capsys):
 
 
 def test_a_result_is_named_as_what_it_is(small, capsys):
-    allowed = {"mesh": "allowed: .vtkhdf, .med, .msh, .vtu", "solve": "must be .vtkhdf"}
+    allowed = {"mesh": "allowed: .vtkhdf, .med, .msh, .vtu, .inp", "solve": "must be .vtkhdf"}
     for command, said in allowed.items():
         output = small / "out.stl"
         assert main([command, str(small / "c.yaml"), "-o", str(output)]) == 2

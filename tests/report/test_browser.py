@@ -50,7 +50,10 @@ def pages(tmp_path_factory):
     for content in contents:
         files.append(folder / content["family"] / content["job"] / "verdict.json")
         put(files[-1], content)
-    write_report(files, folder / "report")
+    many = folder / "cases" / "many" / "family.yaml"
+    many.parent.mkdir(parents=True)
+    many.write_text("title: Many\ngroup: Many solves\n")
+    write_report(files, folder / "report", [many])
     return folder / "report"
 
 
@@ -95,8 +98,8 @@ def test_the_charts_of_a_family_are_drawn_and_say_what_they_show(pages, window):
 
 def test_a_filter_chooses_rows_at_once_and_stays_in_the_address(pages, window):
     window.open(pages / "summary.html")
-    rows = "[...document.querySelectorAll('tr[data-verdict]:not([hidden])')]"
-    shown = f"{rows}.map((row) => row.cells[0].innerText.split('\\n')[0])"
+    rows = "[...document.querySelectorAll('[data-verdict]:not([hidden])')]"
+    shown = f"{rows}.map((row) => row.textContent)"
     assert len(window.run(shown)) == MANY
     window.run(
         """((field) => { field.value = "many-3";
@@ -143,12 +146,16 @@ def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(pages, window):
     assert window.run(ticks) == zoomed
 
 
-def test_tables_of_families_fold_and_failures_are_open(pages, window):
+def test_groups_of_families_fold_and_failures_are_open(pages, window):
     window.open(pages / "summary.html")
+    groups = "[...document.querySelectorAll('.group > summary')].map((group) => group.innerText)"
+    assert window.run(groups) == ["Other families", "Many solves"]
     folds = "[...document.querySelectorAll('details.fold')].map((fold) => fold.open)"
-    assert window.run(folds) == [True, False]  # the first family has failures
+    assert window.run(folds) == [True, False]  # the first group has failures
     window.open((pages / "summary.html").resolve().as_uri() + "?text=many-3")
     assert window.run(folds) == [True, True]
+    hidden = "[...document.querySelectorAll('details.group')].map((group) => group.hidden)"
+    assert window.run(hidden) == [True, False]
 
 
 def test_a_tile_shows_the_problem_with_its_pressure(pages, window):
@@ -311,7 +318,7 @@ def thousand(tmp_path_factory):
 
 def test_a_summary_of_a_thousand_solves_stays_small_and_can_be_searched(thousand, window):
     window.open(thousand / "summary.html")
-    shown = "document.querySelectorAll('tr[data-verdict]:not([hidden])').length"
+    shown = "document.querySelectorAll('[data-verdict]:not([hidden])').length"
     assert window.run(shown) == 1000
     window.run(CHOOSE % ("text", "block-77"))
     assert window.run(shown) == 1 + 10  # 77, 770 … 779

@@ -1,5 +1,6 @@
 """The first screen of the report: its sentence, charts, and tables."""
 
+import json
 import math
 
 import pytest
@@ -8,6 +9,8 @@ from solver.report import formats, overview
 from solver.report.families import Family
 from solver.report.rows import Row
 from solver.report.sections import FamilySection
+from solver.system.files import write_text
+from solver.verification.savings import Savings
 from tests.report.test_report import CHECK, verdict
 from tests.report.verdicts import record
 
@@ -66,9 +69,14 @@ def test_an_estimate_of_nothing_keeps_all_digits_of_doubles(tmp_path):
     assert overview.digits_kept(row("x", tmp_path, attainable=1e-30)) == -math.log10(2.0**-52)
 
 
-def test_work_left_out_is_counted_by_family(rows):
-    found = overview.left_out_by_family(rows, ["status", "quadrature"])
-    assert found == {"fam": (3, [2, 0]), "other": (1, [0, 0])}
+def test_work_left_out_is_counted_by_family(rows, tmp_path):
+    saved = {"jobs": ["a"], "seconds": 9.0, "cost": 2.0, "lean": 1.0, "everything": 1.5}
+    write_text(tmp_path / "saved" / "fam.json", json.dumps(saved))
+    write_text(tmp_path / "saved" / "other.json", "null")
+    found = overview.left_out_by_family(rows, tmp_path, ["status", "quadrature"])
+    time = Savings(**saved)
+    assert time.saved == 2.25
+    assert found == {"fam": (3, [2, 0], time), "other": (1, [0, 0], None)}
 
 
 @pytest.mark.parametrize(("status", "is_one"), [([1, 1], True), ([0, 1], False), ([0, 0], False)])

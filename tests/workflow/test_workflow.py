@@ -58,11 +58,12 @@ def test_nothing_to_do_is_said(solved):
 
 
 REPORT = {"report of all cases", "all cases passed?"}
+SAVED = {"time saved: tiny"}
 
 
 def test_a_changed_case_runs_alone(project):
     append(project / "cases" / "tiny" / "tiny-a.yaml", "# changed\n")
-    expected = {"mesh tiny-a", "solve tiny-a", "solve tiny-a-swapped"} | REPORT
+    expected = {"mesh tiny-a", "solve tiny-a", "solve tiny-a-swapped"} | SAVED | REPORT
     assert jobs(project) == expected
 
 
@@ -70,7 +71,7 @@ def test_changed_accepted_values_check_their_solve_again(project):
     accepted = project / "cases" / "tiny" / "regression" / "tiny-a-swapped.json"
     accepted.parent.mkdir()
     accepted.write_text("{}")
-    assert jobs(project) == {"solve tiny-a-swapped"} | REPORT
+    assert jobs(project) == {"solve tiny-a-swapped"} | SAVED | REPORT
 
 
 def test_a_changed_solver_runs_all_and_a_changed_report_only_itself(project):
@@ -78,7 +79,7 @@ def test_a_changed_solver_runs_all_and_a_changed_report_only_itself(project):
     assert jobs(project) == REPORT
     append(project / "solver" / "mechanics" / "mortar" / "__init__.py", "# changed\n")
     solves = {"solve tiny-a", "solve tiny-a-swapped", "solve tiny-b"}
-    assert jobs(project) == solves | REPORT
+    assert jobs(project) == solves | SAVED | REPORT
 
 
 def test_all_runs_again_where_snakemake_remembers_nothing(project):
@@ -90,7 +91,7 @@ def test_all_runs_again_where_snakemake_remembers_nothing(project):
 
 def test_one_case_again_is_one_case(project):
     verdict = "results/tiny/tiny-a-swapped"
-    assert jobs(project, "--forcerun", verdict) == {"solve tiny-a-swapped"} | REPORT
+    assert jobs(project, "--forcerun", verdict) == {"solve tiny-a-swapped"} | SAVED | REPORT
     assert jobs(project, verdict, "--forcerun", verdict) == {"solve tiny-a-swapped"}
     forced = ("--config", "case=tiny-b", "--forcerun", "solve")
     assert jobs(project, *forced) == {"solve tiny-b"} | REPORT
@@ -116,7 +117,7 @@ def test_what_has_not_passed_runs_once_more(project):
 
 def test_another_family_joins_what_was_solved(project):
     write_case(project / "cases" / "other", "other-a")
-    expected = {"mesh other-a", "solve other-a"} | REPORT
+    expected = {"mesh other-a", "solve other-a", "time saved: other"} | REPORT
     assert jobs(project, "--config", "family=other") == expected
     assert jobs(project) == expected
 

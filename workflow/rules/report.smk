@@ -54,12 +54,38 @@ def list_verdicts():
         Path(listed).write_bytes(text)
 
 
+# Families whose solves all belong to this run, or are there.
+WHOLE = {
+    family
+    for family in {job.family for job in RUN.values()}
+    if all(key in RUN for key in BATCH if key[0] == family)
+}
+SAVED = [f"results/report/saved/{family}.json" for family in sorted(WHOLE)]
+
+
+# The time that a family saves by the work that it leaves out.
+rule saved:
+    input:
+        lambda w: [results_of(job) for job in RUN.values() if job.family == w.family],
+    output:
+        "results/report/saved/{family}.json",
+    log:
+        "results/report/saved/{family}.log",
+    params:
+        content=SOLVER_CONTENT,
+    message:
+        "time saved: {wildcards.family}"
+    shell:
+        "warm {output:q}.benchmark saved results/{wildcards.family:q} -o {output:q} > {log:q} 2>&1"
+
+
 # The pages of families are no outputs here: one that is missing, of a family not asked for before,
 # would hide from Snakemake that the batch is another one.
 rule report:
     input:
         solves=lambda w: [results_of(job) for job in RUN.values()],
         families=watched(*FAMILY_FILES),
+        saved=SAVED,
     output:
         report(
             "results/report/summary.html",

@@ -39,7 +39,7 @@ document.addEventListener("DOMContentLoaded", () => {
   // Fields of a form choose rows; the choice stays in the address.
   const form = document.querySelector("form.filters");
   if (form) {
-    const rows = [...document.querySelectorAll("tr[data-verdict]")];
+    const rows = [...document.querySelectorAll("[data-verdict]")];
     const entries = rows.map((row) => ({ row, text: row.textContent.toLowerCase(), data: row.dataset }));
     const address = new URLSearchParams(location.search);
     for (const field of form.elements) if (field.name) field.value = address.get(field.name) ?? "";
@@ -52,11 +52,11 @@ document.addEventListener("DOMContentLoaded", () => {
         row.hidden = !(words.includes(text) && rest.every(([name, value]) => data[name].split(" ").includes(value)));
         shown += !row.hidden;
       }
-      for (const table of new Set(rows.map((row) => row.closest("table")))) {
-        for (const body of table.tBodies) body.hidden = !body.querySelector("tr[data-verdict]:not([hidden])");
-        table.closest("section").hidden = ![...table.tBodies].some((body) => !body.hidden);
-        const fold = table.closest("details.fold"); // what is looked for is seen, and failures always
-        if (fold) fold.open = wanted.length > 0 || "bad" in fold.dataset;
+      for (const part of new Set(rows.map((row) => row.closest("tbody, p.names")))) part.hidden = !part.querySelector("[data-verdict]:not([hidden])");
+      for (const fold of document.querySelectorAll("details.fold")) { // what is looked for is seen, and failures always
+        const any = fold.querySelector("[data-verdict]:not([hidden])");
+        fold.open = (wanted.length > 0 && any) || "bad" in fold.dataset;
+        fold.closest("details.group").hidden = !any;
       }
       form.querySelector("output").value = `${shown} of ${rows.length} solves`;
       const query = new URLSearchParams(wanted).toString();
