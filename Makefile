@@ -130,7 +130,7 @@ cluster-test: test-environment ## compare six solves through a SLURM of one mach
 	if test -n "$$missing"; then echo "make cluster-test: skipped: $$missing"; \
 	else $(MAKE) slurm-environment && $(OURS) tests.workflow.slurm; fi
 
-RESULTS = $(wildcard results/*/$(or $(CASE),*)/result.vtkhdf)
+RESULTS = $(or $(filter %.yaml,$(CASE)),$(wildcard results/*/$(or $(CASE),*)/result.vtkhdf))
 accept: environment ## store results as the accepted values and show the difference: all or CASE=…
 	@test -n "$(RESULTS)" || { echo "make accept: there is no such result; solve first"; exit 2; }
 	@$(OURS) solver accept $(RESULTS)
@@ -225,8 +225,9 @@ lock: lock-environment ## lock the packages of pyproject.toml again: make lock A
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 
-schemas: environment ## write the JSON Schemas of the typed files, for editors
+schemas: environment ## write the JSON Schemas of the typed files, and tables of the documentation
 	@.venv/bin/python -m solver.commands.schemas
+	@.venv/bin/python docs/site/tables.py
 
 clean: ## remove results and caches
 	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +

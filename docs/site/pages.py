@@ -13,7 +13,8 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from tables import TABLES
 
-_TABLE = re.compile(r"^<!-- table: (.*) -->$", re.MULTILINE)
+# A link to a table, alone on its line: the site has the table there.
+_TABLE = re.compile(r"^\[.*\]\(design/tables/(.*)\.md\)$", re.MULTILINE)
 _SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
 _LINK = re.compile(r"^- \[(.*)\]\((.+)\.md\)", re.MULTILINE)
 _DESIGN = "docs/design/"

@@ -1,12 +1,13 @@
-"""Parts of the pages that are made from the sources, so that they are never out of date.
+"""Tables of the pages that are made from the sources: `python docs/site/tables.py` writes them.
 
-A page asks for one by a line `<!-- table: NAME -->`, which a forge does not show.
+A page has a link to one, alone on its line; the site has the table in its place.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, fields
 from importlib import import_module
 from inspect import getdoc
+from pathlib import Path
 from typing import Any, get_args, get_origin
 
 from msgspec import NODEFAULT
@@ -61,7 +62,7 @@ def checks() -> str:
 
 
 def _check(check: Check) -> tuple[str, ...]:
-    scale = (getdoc(getattr(scales, check.scale)) or "").rstrip(".").lower()
+    scale = (getdoc(getattr(scales, check.scale)) or "").split("\n\n")[0].rstrip(".").lower()
     return (
         f"`{check.name}`" + (f"<br>{check.alias}" if check.alias else ""),
         check.what,
@@ -124,6 +125,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in cells)
 
 
+FOLDER = Path(__file__).parents[1] / "design" / "tables"
 TABLES = {
     "case-keys": case_keys,
     "checks": checks,
@@ -131,3 +133,14 @@ TABLES = {
     "solutions": solutions,
     "transforms": transforms,
 }
+
+
+def page(name: str) -> str:
+    """A table as a page of its own."""
+    return f"# {name.replace('-', ' ').capitalize()}\n\n{TABLES[name]()}\n"
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    for name in TABLES:
+        (FOLDER / f"{name}.md").write_text(page(name), encoding="utf-8")

@@ -162,7 +162,9 @@ def _add_cases(commands: Any) -> None:
 def _add_batch(commands: Any) -> None:
     """Add the commands that work on the results of many cases."""
     command = add_command(commands, "accept", _accept, "store results as the accepted values")
-    command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+    command.add_argument(
+        "results", type=Path, nargs="+", metavar="RESULT.vtkhdf", help="or a case file"
+    )
 
     command = add_command(
         commands, "crashed", _crashed, "write the verdict of a solve that died", listed=False
@@ -346,7 +348,7 @@ def _accept(options: argparse.Namespace) -> int:
     from ..verification.regression import accept, accepted_values, regression_file
     from ..verification.results import read_result
 
-    for path in options.results:
+    for path in (result for given in options.results for result in jobs.results_of(given)):
         solution = read_result(path).solution
         case, target = solution.case.path, regression_file(solution).resolve()
         if not (case.is_file() and target.is_relative_to(Path.cwd())):

@@ -114,6 +114,13 @@ def find_job(name: str, cases: Path) -> ListedJob:
     raise InputError(cases, "case", name, f"no such case; {hint(name, known)}")
 
 
+def results_of(given: Path) -> list[Path]:
+    """A result, or those of all jobs of a case file, in the folder `results` of the batch."""
+    if given.suffix != ".yaml":
+        return [given]
+    return [Path("results", *job.key, "result.vtkhdf") for job in jobs_of(given)]
+
+
 def jobs_of(file: Path, variants: bool = False) -> Iterator[ListedJob]:
     """The jobs of one case file."""
     from ..case.reader import load_case
