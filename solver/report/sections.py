@@ -82,6 +82,10 @@ class FamilySection:
         found = {row.verdict.units.get(kind, "") for row in ours(self.rows) if row.verdict.dofs}
         return found.pop() if len(found) == 1 else ""
 
+    def own_unit(self, row: Row, kind: str) -> str:
+        """The unit that a row's numbers have beside them, where the head of the table has none."""
+        return "" if self.unit(kind) else row.verdict.units.get(kind, "")
+
     @property
     def cpu(self) -> float:
         """Processor time of all solves, seconds, without the start of Python."""
