@@ -1,5 +1,6 @@
 """The first screen of the report: how well, error against run time, digits kept, work left out."""
 
+import csv
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,9 +18,11 @@ from .charts import (
     Axis,
     Chart,
     Look,
+    Spec,
     floor_band,
     level,
     series_chart,
+    tooltip,
 )
 from .errors import address, against_time, drawn, mark, unknowns
 from .rows import Row, families, ours
@@ -120,6 +123,34 @@ def digit_chart(rows: Sequence[Row]) -> Chart | None:
         width=560,
         height=230,
     )
+
+
+def extreme_cases(folder: Path) -> Chart | None:
+    """The digits of the pressure in each stiff or extreme case, where the study is in `folder`."""
+    file = folder / "stability.csv"
+    if not file.is_file():
+        return None
+    with file.open(encoding="utf-8", newline="") as stream:
+        points = [point for point in csv.DictReader(stream) if point["pressure"]]
+    records = [
+        {
+            "quantity": point["group"].replace("-", " "),
+            "digits": min(-math.log10(float(point["pressure"]) or EPSILON), _DIGITS_OF_DOUBLE),
+            "mesh": point["line"],
+            "value": point["labels_x"],
+            "url": f"stability.html#map-{point['group']}",
+        }
+        for point in points
+    ]
+    titles = {"quantity": "varied", "value": "value", "mesh": "mesh", "digits": "digits kept"}
+    names: Spec = {"field": "quantity", "type": "nominal", "sort": None, "title": None}
+    x = Axis("digits", "digits of the pressure", domain=(0.0, _DIGITS_OF_DOUBLE)).channel()
+    marks = {"type": "tick", "thickness": 2, "color": BLUE, "cursor": "pointer"}
+    channels = {"x": x, "y": names | {"axis": {"labelLimit": 260, "grid": True}}}
+    channels |= {"href": {"field": "url"}, "tooltip": tooltip(records, titles)}
+    spec: Spec = {"data": {"values": records}, "mark": marks, "encoding": channels}
+    size = {"width": 420, "height": {"step": 15}}
+    return Chart("extreme-cases", "Digits in stiff and extreme cases", spec | size, 700)
 
 
 def digits_kept(row: Row) -> float:

@@ -54,6 +54,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         verified=overview.in_words(rows),
         errors=overview.error_chart(ours(rows)),
         digits=overview.digit_chart(rows),
+        extremes=overview.extreme_cases(folder),
         fewest=overview.fewest_digits(rows),
         digits_kept=overview.digits_kept,
         cause=overview.cause,

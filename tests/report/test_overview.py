@@ -96,3 +96,13 @@ def test_without_solves_there_is_nothing_to_show():
     assert overview.in_words([]) == ""
     assert overview.error_chart([]) is None
     assert overview.digit_chart([]) is None
+
+
+def test_extreme_cases_are_there_with_their_study(tmp_path):
+    assert overview.extreme_cases(tmp_path) is None
+    lines = ["group,line,labels_x,pressure", "tiny-pressure,2D,1e-12,1e-9", "far,3D,1,0.0"]
+    (tmp_path / "stability.csv").write_text("\n".join([*lines, "far,3D,refused,", ""]))
+    records = overview.extreme_cases(tmp_path).spec["data"]["values"]
+    assert [record["quantity"] for record in records] == ["tiny pressure", "far"]
+    assert [record["digits"] for record in records] == [9.0, -math.log10(2.0**-52)]
+    assert records[0]["url"] == "stability.html#map-tiny-pressure"
