@@ -146,11 +146,12 @@ def extreme_cases(folder: Path) -> Chart | None:
     names: Spec = {"field": "quantity", "type": "nominal", "sort": None, "title": None}
     x = Axis("digits", "digits of the pressure", domain=(0.0, _DIGITS_OF_DOUBLE)).channel()
     marks = {"type": "tick", "thickness": 2, "color": BLUE, "cursor": "pointer"}
-    channels = {"x": x, "y": names | {"axis": {"labelLimit": 260, "grid": True}}}
+    channels: Spec = {"x": x, "y": names | {"axis": {"labelLimit": 260, "grid": True}}}
     channels |= {"href": {"field": "url"}, "tooltip": tooltip(records, titles)}
-    spec: Spec = {"data": {"values": records}, "mark": marks, "encoding": channels}
-    size = {"width": 420, "height": {"step": 15}}
-    return Chart("extreme-cases", "Digits in stiff and extreme cases", spec | size, 700)
+    height = 15 * len({record["quantity"] for record in records})
+    spec = {"width": 420, "height": height, "data": {"values": records}, "mark": marks}
+    spec |= {"encoding": channels}
+    return Chart("extreme-cases", "Digits in stiff and extreme cases", spec, 700)
 
 
 def digits_kept(row: Row) -> float:
