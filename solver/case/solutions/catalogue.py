@@ -32,7 +32,8 @@ from .oval import OvalCylinders
 from .polynomial import PolynomialPressure2d, PolynomialPressure3d
 from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
 from .receding import RecedingLayer
-from .sliding_cylinder import SlidingCylinder
+from .sheared_sphere import ShearedSphere
+from .sliding_rigid import SlidingCylinder, SlidingPunch
 from .sliding_waves import SlidingWaves
 from .uniform import Hydrostatic, UniformCompression
 from .waves import Waves2d, Waves3d
@@ -67,6 +68,8 @@ _CLASSES: tuple[type[ExactSolution], ...] = (
     PulledTubes,
     SlidingWaves,
     SlidingCylinder,
+    SlidingPunch,
+    ShearedSphere,
 )
 SOLUTIONS: dict[str, type[ExactSolution]] = {c.name: c for c in _CLASSES}
 _ALL, _RIGID = "all", "rigid"

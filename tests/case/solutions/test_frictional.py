@@ -9,7 +9,8 @@ from solver.case.solutions.base import ParameterError
 from solver.case.solutions.frictional import Sheared, ShearedBlocks, under
 from solver.case.solutions.nested import PulledTubes
 from solver.case.solutions.pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
-from solver.case.solutions.sliding_cylinder import SlidingCylinder
+from solver.case.solutions.sheared_sphere import ShearedSphere
+from solver.case.solutions.sliding_rigid import SlidingCylinder, SlidingPunch
 from solver.case.solutions.sliding_waves import SlidingWaves
 from solver.mechanics.fem.stress import traction
 from tests.case.solutions.test_elastic import derivative
@@ -176,6 +177,68 @@ def test_a_sliding_cylinder_has_the_skew_of_johnson():
     assert strain == pytest.approx(expected, rel=1e-3)
 
 
+def test_a_sliding_punch_bears_its_force_and_a_moment():
+    """The integral of (1 + t)^(−1/2 − ε) (1 − t)^(−1/2 + ε) is π/cos πε, the mean of t −2ε."""
+    one = SlidingPunch(material=ONE, width=10.0, force=1000.0, friction=0.5)
+    # With t = −cos φ the pressure times dt is finite at both ends.
+    angle = (np.arange(400000) + 0.5) * np.pi / 400000
+    x = np.column_stack([-10.0 * np.cos(angle), np.zeros(len(angle))])
+    load = one.contact_pressure(x) * 10.0 * np.sin(angle) * np.pi / 400000
+    assert load.sum() == pytest.approx(1000.0, rel=1e-3)
+    assert (load * x[:, 0]).sum() / load.sum() == pytest.approx(-2 * one.skew * 10.0, rel=2e-3)
+    assert one.contact_pressure(np.array([[10.5, 0.0], [-11.0, 0.0]])).tolist() == [0.0, 0.0]
+    # Along the surface beside the contact, Flamant's formula for the settlement, by differences.
+    beside = np.array([[30.0, 0.0], [31.0, 0.0]])
+    slope = np.diff(one.displacement(beside)[:, 1])[0]
+    modulus = 2000.0 / (1 - 0.3**2)
+    pulls = np.log((31.0 - x[:, 0]) / (30.0 - x[:, 0]))
+    assert slope == pytest.approx(2 / (np.pi * modulus) * (load * pulls).sum(), rel=1e-4)
+
+
+SOFT = Material(2000.0, 0.0)
+
+
+def sphere(**given):
+    parameters = {"radius": 100.0, "end": 10.0, "friction": 0.4, "shear": 0.5} | given
+    return ShearedSphere(material=SOFT, **parameters)
+
+
+def test_a_sheared_sphere_is_in_equilibrium():
+    """With ν = 0: ∇²u + ∇ div u = 0 in both bodies, by differences."""
+    step, one = 1e-2 * np.eye(3), sphere()
+    x = np.array([[12.0, 7.0, 9.0], [3.0, 5.0, -14.0]])
+
+    def divergence(at):
+        moved = (one.displacement(at + e) - one.displacement(at - e) for e in step)
+        return sum(m[:, i] for i, m in enumerate(moved)) / 2e-2
+
+    u = one.displacement(x)
+    laplace = sum(one.displacement(x + e) + one.displacement(x - e) - 2 * u for e in step) / 1e-4
+    slope = [(divergence(x + e) - divergence(x - e)) / 2e-2 for e in step]
+    assert np.abs(laplace).max() > 1e-4
+    np.testing.assert_allclose(laplace + np.stack(slope, axis=1), 0.0, atol=1e-8)
+
+
+def test_a_sheared_sphere_has_the_forces_and_the_gap_of_its_tractions():
+    one = sphere()
+    assert one.stick / one.end == pytest.approx(0.79370053, abs=1e-8)
+    r = 10.0 * (np.arange(200000) + 0.5) / 200000
+    x = np.column_stack([r, 0 * r, 0 * r])
+    ring = 2 * np.pi * r * 10.0 / 200000
+    force = 4 * 1000.0 * 10.0**3 / 300.0
+    assert one.contact_pressure(x) @ ring == pytest.approx(force, rel=1e-6)
+    assert one.friction_traction(x)[:, 0] @ ring == pytest.approx(0.5 * 0.4 * force, rel=1e-6)
+    # Beside the contact, from the displacement of both surfaces: the gap opens and the ring slips.
+    beside = np.array([[25.0, 0.0, 0.0], [0.0, 30.0, 0.0]])
+    jump = one.displacement(beside, 1) - one.displacement(beside, 0)
+    opened = jump[:, 2] + (beside**2).sum(axis=1) / 200
+    np.testing.assert_allclose(opened, one.gap(beside), rtol=1e-8)
+    np.testing.assert_allclose(jump[:, :2], one.slip(beside)[:, :2], atol=1e-10)
+    assert sphere(share=0.5).stick_area == pytest.approx(one.stick_area / 2)
+    # The work of a complete slide is μ P times the slide; here the ring alone slides.
+    assert 0 < one.dissipation[0] < 0.4 * force * one.slip(np.array([[10.0, 0.0, 0.0]]))[0, 0]
+
+
 def test_sliding_waves_have_the_amplitudes_and_phases_of_the_derivation():
     """|p₁|/Δ and the phase in degrees, computed apart with 30 digits."""
     for friction, size, phase in (
@@ -192,6 +255,9 @@ def test_sliding_waves_have_the_amplitudes_and_phases_of_the_derivation():
     ("make", "parameter"),
     [
         (lambda: sheared(shear=(1.0,)), "shear"),
+        (lambda: sphere(shear=1.0), "shear"),
+        (lambda: ShearedSphere(material=ONE, radius=1.0, end=0.1, friction=0.4, shear=0.5),
+         "material"),
         (lambda: sheared(shear=(0.5, -0.6)), "shear"),
         (lambda: sheared(shear=(0.5, 0.2, 0.6)), "shear"),
         (lambda: sheared(contact=BLOCKS), "contact"),
