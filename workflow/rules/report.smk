@@ -54,23 +54,33 @@ def list_verdicts():
         Path(listed).write_bytes(text)
 
 
-# Families whose solves all belong to this run, or are there.
+# Families whose solves all belong to this run.
 WHOLE = {
     family
     for family in {job.family for job in RUN.values()}
     if all(key in RUN for key in BATCH if key[0] == family)
 }
+
+
+def of_family(w):
+    return [job for job in RUN.values() if job.family == w.family]
+
+
 SAVED = [f"results/report/saved/{family}.json" for family in sorted(WHOLE)]
 
 
 # The time that a family saves by the work that it leaves out.
 rule saved:
     input:
-        lambda w: [results_of(job) for job in RUN.values() if job.family == w.family],
+        lambda w: [results_of(job) for job in of_family(w)],
     output:
         "results/report/saved/{family}.json",
     log:
         "results/report/saved/{family}.log",
+    resources:
+        mem_mb=lambda w, attempt: max(memory(job, attempt) for job in of_family(w)),
+        runtime=lambda w, attempt: 6
+        * max(minutes(job, attempt) for job in of_family(w)),
     params:
         content=SOLVER_CONTENT,
     message:
