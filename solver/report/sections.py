@@ -96,11 +96,6 @@ class FamilySection:
         """The largest error of all solves, with its check."""
         return max((row.accuracy for row in ours(self.rows) if row.accuracy), default=None)
 
-    @property
-    def cost(self) -> str:
-        """The processor time in words."""
-        return f"{formats.seconds(self.cpu)} of processor time."
-
     @cached_property
     def by_origin(self) -> dict[str, list[Row]]:
         """Rows by where their reference comes from, in words."""

@@ -13,7 +13,6 @@ from ..case.model import Case
 from ..simulation.options import LEAN, Options
 from ..simulation.simulate import simulate
 from ..system.clock import processor_time
-from ..system.errors import InputError
 from ..system.files import write_text
 from .results import read_result
 from .run import mesh_of
@@ -86,10 +85,8 @@ def write_savings(folder: Path, output: Path) -> None:
 
 
 def read_savings(file: Path) -> Savings | None:
-    """The savings in a file; None where nothing was measured. Raises InputError if damaged."""
-    if not file.is_file():
-        return None
+    """The savings in a file; None where nothing was measured, or otherwise than today."""
     try:
         return msgspec.json.decode(file.read_bytes(), type=Savings | None)
-    except msgspec.DecodeError as error:
-        raise InputError(file, "savings", None, str(error)) from None
+    except (FileNotFoundError, msgspec.DecodeError):
+        return None
