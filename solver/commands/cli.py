@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..lac.errors import SolveError
 from ..system.errors import InputError, hint, of_machine
-from ..system.package import PROGRAM, PROJECT, cases_folder, project_version
+from ..system.package import PROGRAM, PROJECT, project_version
 from . import codes, completion, family_folder, jobs, look, report, results, studies
 from .options import (
     BUG,
@@ -231,7 +231,7 @@ def _mesh(options: argparse.Namespace) -> int:
     from ..mesh import write_mesh
     from ..verification.run import mesh_of
 
-    file, _ = _named(options.case)
+    file, _ = jobs.named(options.case)
     write_mesh(mesh_of(load_case(file), limited=True), options.output)
     return PASSED
 
@@ -241,16 +241,8 @@ def _job(options: argparse.Namespace) -> "Job":
 
     given = vars(options)
     chosen = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
-    file, swapped = _named(options.case)
+    file, swapped = jobs.named(options.case)
     return Job(swapped=options.swap != swapped, **chosen | {"case": file})
-
-
-def _named(case: Path) -> tuple[Path, bool]:
-    """The file of a case that is given by its file or its name, and whether it is swapped."""
-    if case.suffix or case.exists():
-        return case, False
-    found = jobs.find_job(str(case), cases_folder())
-    return Path(found.file), found.swap
 
 
 def _solve(options: argparse.Namespace) -> int:

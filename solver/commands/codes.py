@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError
+from .jobs import case_file
 from .options import FAILED, PASSED, add_command, print_checks
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def add_commands(commands: Any) -> None:
 
 def _add_case(command: argparse.ArgumentParser) -> None:
     """Add the arguments that identify a solve by one code."""
-    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument("case", type=Path, metavar="CASE", help="a case file, or a name")
     command.add_argument("--code", required=True, metavar="NAME", help="which code")
     command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, used unchanged")
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
@@ -47,7 +48,7 @@ def _chosen(options: argparse.Namespace) -> "tuple[Code, Case, meshio.Mesh]":
     from ..verification.run import mesh_of
 
     code = find(options.code)
-    case = load_case(options.case).as_solved(options.swap)
+    case = load_case(case_file(options.case)).as_solved(options.swap)
     return code, case, read_mesh(options.mesh) if options.mesh else mesh_of(case)
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from ..case import job_name
 from ..system.errors import InputError, hint
+from ..system.package import cases_folder
 from .options import add_command
 
 if TYPE_CHECKING:
@@ -112,6 +113,22 @@ def find_job(name: str, cases: Path) -> ListedJob:
                 return job
             known.append(job.name)
     raise InputError(cases, "case", name, f"no such case; {hint(name, known)}")
+
+
+def named(case: Path) -> tuple[Path, bool]:
+    """The file of a case that is given by its file or its name, and whether it is swapped."""
+    if case.suffix or case.exists():
+        return case, False
+    found = find_job(str(case), cases_folder())
+    return Path(found.file), found.swap
+
+
+def case_file(case: Path) -> Path:
+    """The file of a case by its file or its name; InputError for the name of a swapped solve."""
+    file, swapped = named(case)
+    if swapped:
+        raise InputError("command line", "case", str(case), "name the case, and add --swap")
+    return file
 
 
 def results_of(given: Path) -> list[Path]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..system.errors import InputError
+from .jobs import case_file
 from .options import FAILED, PASSED, add_command, print_checks
 
 
@@ -13,7 +14,7 @@ def add_commands(commands: Any) -> None:
     command = add_command(
         commands, "check-result", _check_result, "check a result that another code computed"
     )
-    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument("case", type=Path, metavar="CASE", help="a case file, or a name")
     command.add_argument(
         "results",
         type=Path,
@@ -44,7 +45,7 @@ def _check_result(options: argparse.Namespace) -> int:
     from ..mesh import read_mesh
     from ..verification.verdict import to_json
 
-    case = load_case(options.case).as_solved(options.swap)
+    case = load_case(case_file(options.case)).as_solved(options.swap)
     mapping = ResultMap()
     if options.map:
         mapping = read_as(ResultMap, read_mapping(options.map), options.map)

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..system.errors import InputError
 from ..system.progress import report_outcomes
+from .jobs import case_file
 from .options import add_command, add_threads
 
 LEVELS = (1, 2, 4)
@@ -20,12 +21,12 @@ def add_commands(commands: Any) -> None:
     """Add the commands of studies to the program."""
     purpose = "the errors that refined meshes predict for a case's own: its `expected`"
     command = add_command(commands, "expect", _expect, purpose)
-    command.add_argument("case", type=Path, metavar="CASE.yaml")
+    command.add_argument("case", type=Path, metavar="CASE", help="a case file, or a name")
     _add_levels(command)
 
     purpose = "the order, the limit and its uncertainty of results, by refined meshes"
     command = add_command(commands, "converge", _converge, purpose)
-    command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
+    command.add_argument("cases", type=Path, nargs="+", metavar="CASE", help="files, or names")
     command.add_argument("--swap", action="store_true", help="exchange slave and master")
     _add_levels(command)
     command.add_argument(
@@ -61,7 +62,7 @@ def _expect(options: argparse.Namespace) -> int:
     from ..studies.expected import expected_errors
 
     print("expected:")
-    for name, error in expected_errors(options.case, options.levels).items():
+    for name, error in expected_errors(case_file(options.case), options.levels).items():
         print(f"  {name}: {error:.1e}")
     return 0
 
@@ -69,7 +70,8 @@ def _expect(options: argparse.Namespace) -> int:
 def _converge(options: argparse.Namespace) -> int:
     from ..studies.converge import convergence
 
-    study, groups = convergence(options.cases, options.levels, options.swap)
+    cases = [case_file(case) for case in options.cases]
+    study, groups = convergence(cases, options.levels, options.swap)
     from ..studies.page import show, write_page
 
     shown = show(study, groups)

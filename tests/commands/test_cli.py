@@ -379,3 +379,13 @@ def test_a_plane_solve_imports_little(small):
         [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True
     )
     assert done.stdout == "0 [] True\n"
+
+
+def test_commands_of_one_case_take_its_name(tmp_path, capsys):
+    assert main(["export", "ssnp170-a", "--code", "plain", "-o", str(tmp_path / "deck")]) == 0
+    assert (tmp_path / "deck" / "deck.json").is_file()
+    assert main(["converge", "ssnp170-e-swapped"]) == 2
+    assert "'ssnp170-e-swapped': name the case, and add --swap" in capsys.readouterr().err
+    assert main(["converge", "manufactured-quad4", "--levels", "1", "2"]) == 2
+    assert main(["expect", "no-such-case"]) == 2
+    assert "no such case" in capsys.readouterr().err
