@@ -16,10 +16,10 @@ from tempfile import TemporaryDirectory
 import meshio
 import numpy as np
 
-from ..lac.cells.catalogue import BY_NAME, CellType
+from ..lac.cells.catalogue import BY_NAME
 from ..lac.cells.faces import FaceBlock
 from ..lac.errors import SolveError
-from ..mesh.files.abaqus import FACES
+from ..mesh.files.abaqus_writer import data_lines, face_number
 from ..system.errors import InputError
 from ..system.process import cores_for, run_in_subprocess
 from .deck import Deck, UnsupportedError, face_size
@@ -254,17 +254,14 @@ def _refuse(deck: Deck) -> None:
 
 
 def _elements(deck: Deck) -> Iterator[str]:
-    """Elements by type and material: number and nodes; a line holds 16 entries at most."""
+    """Elements by type and material: number and nodes."""
     for name, cells in deck.cells.items():
         for material in np.unique(deck.material[name]).tolist():
             mine = np.flatnonzero(deck.material[name] == material)
             yield f"*ELEMENT, TYPE={_elements_of(deck)[name]}, ELSET=PART{material}"
             rows = np.column_stack([deck.starts[name] + mine, cells[mine] + 1])
             for row in rows.tolist():
-                entries = list(map(str, row))
-                for i in range(0, len(entries), 15):
-                    more = "," if i + 15 < len(entries) else ""
-                    yield ", ".join(entries[i : i + 15]) + more
+                yield from data_lines(row)
     for material in np.unique(np.concatenate(list(deck.material.values()))).tolist():
         of = deck.materials[material]
         yield from (f"*MATERIAL, NAME=SOLID{material}", "*ELASTIC", f"{of.young!r}, {of.poisson!r}")
@@ -278,19 +275,6 @@ def _faces(deck: Deck, blocks: Sequence[FaceBlock]) -> Iterator[tuple[int, int]]
         numbers = np.array([face_number(kind, i) for i in range(len(kind.faces))])
         first = deck.starts[kind.name]
         yield from zip((first + block.owner).tolist(), numbers[block.local].tolist(), strict=True)
-
-
-def face_number(cell: CellType, local: int) -> int:
-    """CalculiX's number of a cell's face, from 1.
-
-    >>> from solver.lac.cells.catalogue import BY_NAME
-    >>> [face_number(BY_NAME["TETRA4"], i) for i in range(4)]
-    [1, 2, 3, 4]
-    """
-    face = cell.faces[local]
-    corners = set(face.nodes[: BY_NAME[face.type].n_vertices])
-    labels = [{int(c) - 1 for c in text} for text in FACES[cell.name.rstrip("0123456789")]]
-    return next(i for i, label in enumerate(labels, start=1) if label <= corners)
 
 
 def _flat(deck: Deck) -> bool:

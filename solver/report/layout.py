@@ -17,7 +17,7 @@ DEVIATION = ("#b35806", "#f1a340", "#fee0b6", "#f7f7f7", "#d8daeb", "#998ec3", "
 ERROR = ("#fff7ec", "#fdd49e", "#fc8d59", "#d7301f", "#7f0000")
 RELATIVE = "Δp / max p"
 STATUS = "status: 0 open, 1 stick, 2 slip"
-OF_STATUS = {"open": "#f3f6fa", "stick": "#2f75a8", "slip": "#f1a340"}
+OF_STATUS = {"open": PRESSURE[0], "stick": PRESSURE[4], "slip": DEVIATION[1]}
 # Errors of this size or less are round-off, and stay pale; values of the other sign below this
 # share of the largest are.
 _ROUND_OFF, _NO_SIGN = 1e-12, 1e-9

@@ -135,7 +135,7 @@ def extreme_cases(folder: Path) -> Chart | None:
     records = [
         {
             "quantity": point["group"].replace("-", " "),
-            "digits": min(-math.log10(float(point["pressure"]) or EPSILON), _DIGITS_OF_DOUBLE),
+            "digits": _digits(float(point["pressure"])),
             "mesh": point["line"],
             "value": point["labels_x"],
             "url": f"stability.html#map-{point['group']}",
@@ -156,7 +156,11 @@ def extreme_cases(folder: Path) -> Chart | None:
 
 def digits_kept(row: Row) -> float:
     """How many decimal digits rounding leaves in the pressure, by the estimate of the solve."""
-    return min(max(-math.log10(row.verdict.attainable or 1.0), 0.0), _DIGITS_OF_DOUBLE)
+    return _digits(row.verdict.attainable or 1.0)
+
+
+def _digits(error: float) -> float:
+    return min(max(-math.log10(error or EPSILON), 0.0), _DIGITS_OF_DOUBLE)
 
 
 def cause(row: Row) -> str:
@@ -181,8 +185,7 @@ def left_out_by_family(
     found: dict[str, tuple[int, list[int], Savings | None]] = {}
     solved = [row for row in ours(rows) if row.verdict.dofs]
     for family, mine in families(solved).items():
-        left = [{switch for line in row.verdict.plan for switch in line[2:]} for row in mine]
-        counts = [sum(switch in used for used in left) for switch in switches]
+        counts = [sum(switch in row.verdict.switches for row in mine) for switch in switches]
         found[family] = len(mine), counts, read_savings(folder / "saved" / f"{family}.json")
     return found
 

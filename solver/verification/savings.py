@@ -16,7 +16,7 @@ from ..system.clock import processor_time
 from ..system.files import write_text
 from .results import read_result
 from .run import mesh_of
-from .verdict import Verdict, read_verdict
+from .verdict import read_verdict
 
 # The places, in the order of cost, of the solves that are measured.
 _SAMPLES = (1 / 6, 1 / 2, 5 / 6)
@@ -42,18 +42,15 @@ class Savings:
         return self.seconds * (self.everything - self.lean) / self.cost
 
 
-def left_work_out(verdict: Verdict) -> bool:
-    """Whether a solve of our own left work out that a switch turns on."""
-    return not verdict.code and any(any(line[2:]) for line in verdict.plan)
-
-
 def measure(results: Sequence[Path]) -> Savings | None:
     """Solve a cheap, a middle and a dear one both ways; None where no solve leaves work out.
 
     `results` are files of our own solves, with their verdicts beside them.
     """
     found = [(read_verdict(result.with_name("verdict.json")), result) for result in results]
-    costs = sorted((v.cpu_seconds or 0.0, result) for v, result in found if left_work_out(v))
+    costs = sorted(
+        (v.cpu_seconds or 0.0, result) for v, result in found if v.switches and not v.code
+    )
     if not costs:
         return None
     chosen = [costs[i] for i in sorted({int(share * len(costs)) for share in _SAMPLES})]

@@ -266,6 +266,11 @@ class Verdict:
         return self.verdict in (PASSED, SOLVED)
 
     @property
+    def switches(self) -> set[str]:
+        """The switches of the work that the solve left out."""
+        return {switch for line in self.plan for switch in line[2:] if switch}
+
+    @property
     def summary(self) -> str:
         """One line: job, word, reason or largest checked error, time."""
         line = f"{self.job}: {self.verdict}"

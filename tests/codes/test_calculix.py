@@ -11,6 +11,7 @@ from solver.codes.deck import UnsupportedError, deck_of, face_size
 from solver.codes.run import CrashError, Limits, run_code
 from solver.lac.errors import SolveError
 from solver.mechanics.fem.faces import boundary_faces
+from solver.mesh.files import abaqus
 from tests.codes.blocks import CELLS_2D, CELLS_3D, case_of
 
 # From the manual of CalculiX 2.20, chapter "Element Types": the two nodes between which each node
@@ -112,8 +113,8 @@ def test_a_wrong_permutation_is_seen(cells):
 
 def test_faces_counted_from_another_corner_are_seen(monkeypatch):
     deck = deck_for("HEXA8")
-    wrong = [*calculix.FACES["HEXA"][1:], calculix.FACES["HEXA"][0]]
-    monkeypatch.setitem(calculix.FACES, "HEXA", wrong)
+    wrong = [*abaqus.FACES["HEXA"][1:], abaqus.FACES["HEXA"][0]]
+    monkeypatch.setitem(abaqus.FACES, "HEXA", wrong)
     assert mistakes(deck_lines(deck), 3)
 
 

@@ -54,18 +54,14 @@ def list_verdicts():
         Path(listed).write_bytes(text)
 
 
-# Families whose solves all belong to this run.
-WHOLE = {
-    family
-    for family in {job.family for job in RUN.values()}
-    if all(key in RUN for key in BATCH if key[0] == family)
-}
-
-
 def of_family(w):
     return [job for job in RUN.values() if job.family == w.family]
 
 
+# Of the families whose solves all belong to this run.
+WHOLE = {family for family, _ in RUN} - {
+    family for family, _ in BATCH.keys() - RUN.keys()
+}
 SAVED = [f"results/report/saved/{family}.json" for family in sorted(WHOLE)]
 
 

@@ -1,6 +1,6 @@
 """Abaqus input files (.inp), written: nodes, cells, groups as *ELSET, *SURFACE and *NSET."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import meshio
@@ -16,7 +16,7 @@ _NAMES = {
     "HEXA20": "C3D20",
 }  # fmt: skip
 # Entries of a data line.
-_IN_LINE = 12
+_IN_LINE = 15
 
 
 def write(mesh: meshio.Mesh, path: Path) -> None:
@@ -28,7 +28,7 @@ def write(mesh: meshio.Mesh, path: Path) -> None:
     _check_names(mesh, path)
     lines = [*_cells(mesh, path), *_cell_groups(mesh), *_face_groups(mesh, path)]
     for name, nodes in mesh.point_sets.items():
-        lines += [f"*NSET, NSET={name}", *_wrapped((np.asarray(nodes) + 1).tolist())]
+        lines += [f"*NSET, NSET={name}", *data_lines((np.asarray(nodes) + 1).tolist())]
     path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
 
 
@@ -58,14 +58,14 @@ def _cells(mesh: meshio.Mesh, path: Path) -> Iterator[str]:
             raise InputError(path, "cell type", cell.name, f"allowed: {', '.join(_NAMES)}")
         yield f"*ELEMENT, TYPE={_NAMES[cell.name]}"
         for number, nodes in enumerate((data + 1).tolist(), start=first):
-            yield from _wrapped([number, *nodes])
+            yield from data_lines([number, *nodes])
 
 
 def _cell_groups(mesh: meshio.Mesh) -> Iterator[str]:
     for name, ids in mesh.cell_sets.items():
         numbers = [n for i, first, *_ in _blocks(mesh) for n in (ids[i] + first).tolist()]
         if numbers:
-            yield from (f"*ELSET, ELSET={name}", *_wrapped(numbers))
+            yield from (f"*ELSET, ELSET={name}", *data_lines(numbers))
 
 
 def _face_groups(mesh: meshio.Mesh, path: Path) -> Iterator[str]:
@@ -88,23 +88,29 @@ def _owners(mesh: meshio.Mesh) -> dict[tuple[int, ...], str]:
     """The line of a *SURFACE, `cell, face`, by the sorted corners of the face."""
     found: dict[tuple[int, ...], str] = {}
     for _, first, cell, data in _blocks(mesh):
-        for label, local in _labels(cell):
+        for i, face in enumerate(cell.faces):
+            local = list(face.nodes[: BY_NAME[face.type].n_vertices])
             corners = np.sort(data[:, local], axis=1).tolist()
+            label = f"S{face_number(cell, i)}"
             found |= {tuple(c): f"{n}, {label}" for n, c in enumerate(corners, start=first)}
     return found
 
 
-def _labels(cell: CellType) -> Iterator[tuple[str, list[int]]]:
-    """The faces of a cell: their labels S1, S2, … and their corners."""
-    corners = FACES[cell.name.rstrip("0123456789")]
-    for face in cell.faces:
-        local = list(face.nodes[: BY_NAME[face.type].n_vertices])
-        label = next(k for k, c in enumerate(corners, 1) if {int(x) - 1 for x in c} == {*local})
-        yield f"S{label}", local
+def face_number(cell: CellType, local: int) -> int:
+    """The number of a cell's face in Abaqus and CalculiX, from 1.
+
+    >>> from solver.lac.cells.catalogue import BY_NAME
+    >>> [face_number(BY_NAME["TETRA4"], i) for i in range(4)]
+    [1, 2, 3, 4]
+    """
+    face = cell.faces[local]
+    corners = set(face.nodes[: BY_NAME[face.type].n_vertices])
+    labels = [{int(c) - 1 for c in text} for text in FACES[cell.name.rstrip("0123456789")]]
+    return next(i for i, label in enumerate(labels, start=1) if label <= corners)
 
 
-def _wrapped(numbers: list[int]) -> Iterator[str]:
-    """Numbers in data lines; a line that goes on ends with a comma."""
+def data_lines(numbers: Sequence[int]) -> Iterator[str]:
+    """Numbers in lines of 16 at most; a line that goes on ends with a comma."""
     for start in range(0, len(numbers), _IN_LINE):
         more = "," if start + _IN_LINE < len(numbers) else ""
         yield ", ".join(map(str, numbers[start : start + _IN_LINE])) + more
