@@ -6,8 +6,7 @@ from ..mechanics.fem.bodies import motion_fields, nodes_of_unknowns
 from ..mechanics.fem.elasticity import stiffness
 from ..mechanics.fem.vertices import from_vertices, linear_unknowns
 from ..mechanics.linear.choice import against_multigrid
-from ..mechanics.linear.nodal_matrix import NodalMatrix
-from ..mechanics.linear.stiffened import StiffenedMatrix, Stiffness
+from ..mechanics.linear.nodal_matrix import NodalMatrix, Stiffness
 from ..mechanics.linear.unknowns import Unknowns
 from .scene import Scene
 
@@ -30,18 +29,9 @@ def free_stiffness(scene: Scene, unknowns: Unknowns, single: bool) -> tuple[Stif
     if scene.springs.nnz:
         matrix = matrix + free.reduced(scene.springs)
         diagonal = diagonal + scene.springs.diagonal()
-    if not mean.size:
-        return matrix, diagonal
-    beyond, near = mean.parted()
-    if not (iterative and beyond.any()):
-        return matrix + free.reduced(mean.stiffness()), diagonal
-    soft = matrix + free.reduced(mean.stiffness(1 / mean.compliance - beyond))
-    stiff = beyond > 0
-    divergence = (mean.divergence[stiff] @ free.basis).tocsr()
-    weight = beyond[stiff]
-    schur = 1 / weight + near[stiff]
-    about = mean.stable, mean.locks
-    return StiffenedMatrix(soft, divergence, weight, schur, *about), diagonal
+    if mean.size:
+        matrix = matrix + free.reduced(mean.stiffness())
+    return matrix, diagonal
 
 
 def free_unknowns(scene: Scene) -> Unknowns:
@@ -56,9 +46,8 @@ def free_unknowns(scene: Scene) -> Unknowns:
             found[:, number] = scene.free.gathered(field.ravel())
         return found
 
-    about = dim, node, motions, scene.body[node], scene.points
+    about, mixed = (dim, node, motions, scene.body[node], scene.points), scene.mean.size > 0
     if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
-        return Unknowns(*about)
-    return Unknowns(
-        *about, *linear_unknowns(basis, dim, *from_vertices(scene.points, scene.blocks))
-    )
+        return Unknowns(*about, mixed=mixed)
+    vertices = from_vertices(scene.points, scene.blocks)
+    return Unknowns(*about, *linear_unknowns(basis, dim, *vertices), mixed)

@@ -16,8 +16,8 @@ from ..mechanics.fem.bodies import (
     unsupported,
 )
 from ..mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
+from ..mechanics.linear.nodal_matrix import Stiffness
 from ..mechanics.linear.stabilised import Compliance
-from ..mechanics.linear.stiffened import Stiffness
 from ..mechanics.linear.systems import Systems, parts_of
 from ..system.memory import release
 from .accuracy import Roughness, estimate, judged, roughness

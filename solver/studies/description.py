@@ -100,7 +100,7 @@ class Run(Section, frozen=True):
     that holds tension; `program`: another code in place of the solver.
     """
 
-    solver: Literal["auto", "multigrid", "cholmod", "superlu"] = "auto"
+    solver: Literal["auto", "multigrid", "cholmod"] = "auto"
     cures: bool = True
     everything: bool = False
     bilateral: bool = False

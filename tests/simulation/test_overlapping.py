@@ -17,8 +17,7 @@ def test_the_patch_test_is_exact(cells):
     assert found.pressure == pytest.approx(PRESSURE, rel=1e-12)
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.4999])
 @pytest.mark.parametrize("treatment", ["nodal", "uncut"])
-def test_the_pressures_are_those_of_a_factor(treatment, poisson):
+def test_the_pressures_are_those_of_a_factor(treatment):
     case = waves(("HEXA8", 6), ("HEXA8", 3), (1e3, 1e4), treatment=treatment)
-    check_like_a_factor(case, poisson, 1e-10)
+    check_like_a_factor(case, 0.3, 1e-10)

@@ -255,7 +255,7 @@ def test_tension_in_any_load_step_is_noticed_whatever_the_search_found(step, mon
 
 @pytest.mark.parametrize(("slave", "alone"), [("TRIA6", True), ("QUAD8", True), ("QUAD4", False)])
 def test_nodal_multipliers_on_quadratic_edges_own_an_unknown(slave, alone):
-    """∫ of an end's linear function times the other end's quadratic one is 0: no saddle point."""
+    """∫ of an end's linear function times the other end's quadratic one is 0: condensed."""
     case = block_case(2, zone=", treatment: nodal")
     problem = ContactProblem(build_scene(case, block_mesh(slave, "QUAD4", (5, 4))))
     assert (len(problem.constraints.dependent) == 0) == alone

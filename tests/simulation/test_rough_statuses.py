@@ -60,7 +60,7 @@ def test_result_is_that_of_a_factor_in_fewer_iterations(monkeypatch):
         return solution, count
 
     monkeypatch.setattr(multigrid, "conjugate_gradients", counted)
-    exact = solved(scene, "superlu")
+    exact = solved(scene, "cholmod")
     assert exact.status.iterations > 1
     for iterative in (True, False):
         iterations.append(0)
@@ -71,7 +71,7 @@ def test_result_is_that_of_a_factor_in_fewer_iterations(monkeypatch):
 
 def test_rough_solves_that_decide_nothing(scene, monkeypatch):
     monkeypatch.setattr(problem, "_UNDECIDED", 1e9)
-    exact = solved(scene, "superlu")
+    exact = solved(scene, "cholmod")
     found = solved(scene, "multigrid")
     assert_same(found, exact)
     assert found.status.changes == exact.status.changes
@@ -91,6 +91,6 @@ def test_rough_solve_that_is_wrong(scene, monkeypatch):
         return found, trial
 
     monkeypatch.setattr(ContactProblem, "_roughly", astray)
-    found, exact = solved(scene, "multigrid"), solved(scene, "superlu")
+    found, exact = solved(scene, "multigrid"), solved(scene, "cholmod")
     assert found.status.iterations > exact.status.iterations
     assert_same(found, exact)

@@ -141,10 +141,9 @@ def check_like_a_factor(case, poisson, close):
     assert np.abs(one.multiplier - other.multiplier).max() < close * peak
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.4999])
-def test_multigrid_finds_the_pressures_of_a_factor(poisson):
+def test_multigrid_finds_the_pressures_of_a_factor():
     case = waves(("HEXA8", 6), ("HEXA8", 3), (1e4, 1e3), stabilised=True)
-    check_like_a_factor(case, poisson, 1e-11)
+    check_like_a_factor(case, 0.3, 1e-11)
 
 
 def test_contact_that_opens():

@@ -33,9 +33,6 @@ from .elasticity import chunks, shapes_in
 
 AUTOMATIC_ABOVE = 0.499
 """Poisson's ratio above which the mixed form is taken where a case does not choose."""
-# Poisson's ratio from which multigrid alone needs too many iterations, and the one whose λ is left
-# in its matrix: trials with 0.2 to 0.48.
-_STIFF, _SOFT = 0.49, 0.4
 _AT_VERTICES, _LINEAR = ("TRIA6", "QUAD8"), ("QUAD9", "HEXA27")
 _CELLS_AT_ONCE = 2048
 
@@ -87,39 +84,10 @@ class MeanStress:
         """How many cells are in mixed form."""
         return sum(len(part.cells) for part in self._parts)
 
-    @property
-    def stable(self) -> bool:
-        """Whether displacements see all s, whatever the mesh: cells are quadratic (inf–sup)."""
-        return all(part.block.type.order == 2 for part in self._parts)
-
-    @property
-    def locks(self) -> bool:
-        """Whether most cells are TETRA4, which have more s than displacements can follow."""
-        simplices = [len(part.cells) for part in self._parts if part.name == "TETRA4"]
-        return 2 * sum(simplices) > self.n_cells
-
-    def stiffness(self, weight: np.ndarray | None = None) -> sparse.csr_matrix:
-        """The part (n_dofs, n_dofs) of s in the stiffness once it is eliminated: Bᵀ C⁻¹ B.
-
-        Or another `weight` (size,) than C⁻¹.
-        """
-        weight = 1 / self.compliance if weight is None else weight
-        scaled = sparse.diags(weight) @ self.divergence
+    def stiffness(self) -> sparse.csr_matrix:
+        """The part (n_dofs, n_dofs) of s in the stiffness once it is eliminated: Bᵀ C⁻¹ B."""
+        scaled = sparse.diags(1 / self.compliance) @ self.divergence
         return (self.divergence.T @ scaled).tocsr()
-
-    def parted(self) -> tuple[np.ndarray, np.ndarray]:
-        """The part of C⁻¹ (size,) that multigrid leaves out, and ∫ q² / (2μ + λ) with the λ left.
-
-        The first is zero where material is far enough from incompressible. See `linear.stiffened`.
-        """
-        beyond, near = np.zeros(self.size), np.zeros(self.size)
-        for part in self._parts:
-            lame, shear = part.block.lame[:, None], part.block.shear[:, None]
-            stiff = lame > _lame_by_shear(_STIFF) * shear
-            soft = np.where(stiff, _lame_by_shear(_SOFT) * shear, lame)
-            beyond[part.unknowns] = 1 - soft / lame
-            near[part.unknowns] = lame / (2 * shear + soft)
-        return beyond / self.compliance, near * self.compliance
 
     def force(self, stress: np.ndarray) -> np.ndarray:
         """Internal forces (n_nodes, dim) of s (size,): Bᵀ s."""
@@ -215,10 +183,6 @@ class MeanStress:
             entries = (part.flux.ravel(), (rows, columns))
             total = total + sparse.coo_matrix(entries, shape=total.shape).tocsr()
         return total
-
-
-def _lame_by_shear(poisson: float) -> float:
-    return 2 * poisson / (1 - 2 * poisson)
 
 
 def in_mixed_form(poisson: float, form: str) -> bool:

@@ -18,13 +18,14 @@ from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise
 from .hierarchy import Shared
 from .krylov import EPSILON
-from .stiffened import StiffenedMatrix, Stiffness
+from .nodal_matrix import Stiffness
 from .unknowns import Unknowns
 
-# A step leaves about 1/w of a violation; the factor loses as many digits, which refinement returns.
-_WEIGHT = 1e4
-# The smallest eigenvalue of Ĝ D⁻¹ Ĝᵀ, of diagonal one: constraints below it nearly depend.
-_LEAST = 1e-3
+# A step leaves about 1 / (w λ) of a violation, with the smallest eigenvalue λ of Ĝ D⁻¹ Ĝᵀ, whose
+# diagonal is one; the factor loses as many digits as w has, which refinement returns.
+_WEIGHT, _REDUCTION = 1e4, 10.0
+# Constraints with a smaller λ nearly depend on one another.
+_LEAST = 1e-7
 _MOST_STEPS = 12
 # A step that leaves more than this of the violation has reached round-off.
 _GAIN = 0.5
@@ -34,7 +35,8 @@ _GAIN = 0.5
 class AugmentedSystem:
     """`scaled` Ĝ (m, n): constraints, each divided by its `size` (m,); the `factor` of A.
 
-    `compliance` (n,): the inverse of the diagonal D of K; the factor `gram` of Ĝ D⁻¹ Ĝᵀ.
+    `compliance` (n,): the inverse of the diagonal D of K; the factor `gram` of Ĝ D⁻¹ Ĝᵀ;
+    the `weight` w.
     """
 
     scaled: sparse.csr_matrix
@@ -42,6 +44,7 @@ class AugmentedSystem:
     factor: LinearSolver
     compliance: np.ndarray
     gram: Factor
+    weight: float
     reason: str
 
     @property
@@ -63,7 +66,7 @@ class AugmentedSystem:
         pulled = self.scaled.T @ wanted
         # The weight makes no force that may be left larger.
         limit = accuracy * (self._norm(force) + self._norm(pulled))
-        change = self._solved(force + _WEIGHT * pulled, limit)
+        change = self._solved(force + self.weight * pulled, limit)
         last, first = np.inf, 0.0
         for _ in range(_MOST_STEPS):
             left = wanted - self.scaled @ change
@@ -71,7 +74,7 @@ class AugmentedSystem:
             first = first or size
             if size <= EPSILON * first or size > _GAIN * last:
                 break
-            last, right = size, _WEIGHT * (self.scaled.T @ left)
+            last, right = size, self.weight * (self.scaled.T @ left)
             if (self._norm(right) <= limit).all():
                 break
             change = change + self._solved(right, limit)
@@ -119,17 +122,16 @@ def augment(
         raise SolveError("a constraint holds no unknown")
     scaled = (sparse.diags(1 / size) @ constraints).tocsr()
     gram = factorise(scaled @ sparse.diags(compliance) @ scaled.T, least=_LEAST)
-    factor = prepare(_augmented(matrix, scaled), unknowns, gave_up, shared)
+    weight = max(_WEIGHT, _REDUCTION / gram.smallest)
+    factor = prepare(_augmented(matrix, scaled, weight), unknowns, gave_up, shared)
     if factor.warning:
         raise SolveError(factor.warning)
-    return AugmentedSystem(scaled, size, factor, compliance, gram, why)
+    return AugmentedSystem(scaled, size, factor, compliance, gram, weight, why)
 
 
-def _augmented(matrix: Stiffness, scaled: sparse.csr_matrix) -> Symmetric:
+def _augmented(matrix: Stiffness, scaled: sparse.csr_matrix, weight: float) -> Symmetric:
     """K + Ĝᵀ w Ĝ."""
     if not scaled.shape[0]:
         return matrix
-    if isinstance(matrix, StiffenedMatrix):
-        return matrix.changed(_augmented(matrix.soft, scaled), matrix.divergence)
     everything = np.arange(matrix.shape[0])
-    return CondensedMatrix(matrix, everything, (_WEIGHT * (scaled.T @ scaled)).tocsr())
+    return CondensedMatrix(matrix, everything, (weight * (scaled.T @ scaled)).tocsr())

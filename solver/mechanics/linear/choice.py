@@ -11,7 +11,6 @@ from .direct import Factor, factorise, wanted
 from .hierarchy import Shared
 from .krylov import EPSILON
 from .multigrid import Multigrid
-from .stiffened import Stiffened, StiffenedMatrix
 from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)
@@ -24,9 +23,6 @@ _ASKED = "as asked for"
 # Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory. In
 # graded meshes it takes less from about 100,000.
 MULTIGRID_FROM = 20_000
-# The same where some cells are nearly incompressible, by whether displacements see all pressures:
-# with three times the iterations, and with twenty times.
-_STIFFENED_FROM = {True: 100_000, False: 250_000}
 
 
 class LinearSolver:
@@ -38,7 +34,7 @@ class LinearSolver:
     round-off: what it solves is a solution only if refinement converges.
     """
 
-    def __init__(self, matrix: Symmetric, solver: Factor | Multigrid | Stiffened | None, why: str):
+    def __init__(self, matrix: Symmetric, solver: Factor | Multigrid | None, why: str):
         """Without a `solver` the matrix is factored."""
         self._matrix, self._why = matrix, why
         self.gave_up = self.warning = ""
@@ -111,12 +107,12 @@ def prepare(
     if unknowns is None:
         return LinearSolver(matrix, None, "what multigrid asks for is not known")
     size = matrix.shape[0]
-    against = gave_up or against_multigrid(size, unknowns) or _against_stiffened(matrix)
+    against = gave_up or against_multigrid(size, unknowns)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
         why = f"{MULTIGRID_FROM} unknowns or more in 3D: faster and smaller than a factor"
         try:
-            solver = _iterative(matrix, unknowns, shared)
+            solver = Multigrid(matrix, unknowns, shared)
             return LinearSolver(matrix, solver, why if wanted() == "auto" else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
@@ -127,33 +123,16 @@ def prepare(
     return chosen
 
 
-def _iterative(
-    matrix: Symmetric, unknowns: Unknowns, shared: Shared | None
-) -> Multigrid | Stiffened:
-    if isinstance(matrix, StiffenedMatrix):
-        return Stiffened(matrix, unknowns, shared)
-    return Multigrid(matrix, unknowns, shared)
-
-
 def against_multigrid(size: int, unknowns: Unknowns) -> str:
     """Why a system of that size is factored; empty where it is not."""
     if wanted() != "auto":
         return "" if wanted() == MULTIGRID else _ASKED
     if unknowns.dim == 2:
         return "a factor is small in 2D"
+    if unknowns.mixed:
+        return "nearly incompressible cells: multigrid does not converge"
     few = size < MULTIGRID_FROM
     return f"fewer than {MULTIGRID_FROM} unknowns: a factor is faster than multigrid" * few
-
-
-def _against_stiffened(matrix: Symmetric) -> str:
-    """Why a matrix of nearly incompressible material is factored; empty where it is not."""
-    if wanted() != "auto" or not isinstance(matrix, StiffenedMatrix):
-        return ""
-    if matrix.locks:
-        return "nearly incompressible TETRA4 lock: multigrid does not converge"
-    least, kind = _STIFFENED_FROM[matrix.stable], "" if matrix.stable else "linear "
-    few = f"fewer than {least} unknowns, some of nearly incompressible {kind}cells"
-    return f"{few}: a factor is faster than multigrid" * (matrix.shape[0] < least)
 
 
 def _fallback_reason(error: SolveError) -> str:

@@ -17,10 +17,9 @@ from scipy import sparse
 from ...lac.errors import SolveError
 from .choice import LinearSolver, prepare
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .direct import Factor, factorise_indefinite
 from .hierarchy import Shared
 from .krylov import EPSILON, ROUGH
-from .stiffened import StiffenedMatrix, Stiffness
+from .nodal_matrix import Stiffness
 from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)
@@ -48,7 +47,7 @@ class ConstrainedSystem(Protocol):
     """A factored system K x = f + Gᵀ p under constraints G x = b."""
 
     @property
-    def factor(self) -> LinearSolver | Factor:
+    def factor(self) -> LinearSolver:
         """The solver of the system."""
 
     @property
@@ -127,54 +126,6 @@ class CondensedSystem:
     def _on_kept(self, force: np.ndarray) -> np.ndarray:
         """Zᵀ f."""
         return np.asarray(force[self.kept] + self.follow.T @ force[self.pivot])
-
-
-@dataclass(frozen=True)
-class SaddlePoint:
-    """The system with the multipliers as unknowns.
-
-    `scaled` are the constraints with rows of unit size; the matrix is K + `weight` Ĝᵀ Ĝ, which
-    changes no solution and is positive definite: any order of elimination takes it.
-    """
-
-    constraints: sparse.csr_matrix
-    scaled: sparse.csr_matrix
-    size: np.ndarray
-    weight: float
-    factor: Factor
-    why: str
-    warning: str = ""
-
-    def correction(
-        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
-    ) -> np.ndarray:
-        """Solved for x and p together."""
-        wanted = (violation.T / self.size).T
-        pulled = force + self.weight * (self.scaled.T @ wanted)
-        return self.factor.solve(np.concatenate([pulled, -wanted]), accuracy)[: len(force)]
-
-    def multiplier(self, force: np.ndarray) -> np.ndarray:
-        """The multipliers of the same system with nothing violated."""
-        nothing = np.zeros((len(self.size), *force.shape[1:]))
-        found = self.factor.solve(np.concatenate([force, nothing]))[len(force) :]
-        return (found.T / self.size).T
-
-    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:  # noqa: ARG002
-        """The largest force left with the multipliers acting; see `CondensedSystem`."""
-        left = force + self.constraints.T @ self.multiplier(force)
-        return float(np.abs(left).max(initial=0.0))
-
-
-def saddle_point(
-    matrix: sparse.csr_matrix, constraints: sparse.csr_matrix, why: str
-) -> SaddlePoint:
-    """Factor K x − Gᵀ p = f, −G x = −b; raises SolveError where that is singular."""
-    size = np.sqrt(np.asarray(constraints.multiply(constraints).sum(axis=1)).ravel())
-    scaled = (sparse.diags(1 / size) @ constraints).tocsr()
-    weight = float(matrix.diagonal().max(initial=0.0))
-    upper = matrix + weight * (scaled.T @ scaled)
-    factor = factorise_indefinite(sparse.bmat([[upper, -scaled.T], [-scaled, None]], format="csr"))
-    return SaddlePoint(constraints, scaled, size, weight, factor, why)
 
 
 def choose_pivots(constraints: sparse.csr_matrix, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -259,9 +210,6 @@ def _condensed(
 ) -> Symmetric:
     """ZᵀKZ for the unknowns `kept` (k,), which the others `follow` (m, k); `springs` come last."""
     s = len(springs)
-    if isinstance(matrix, StiffenedMatrix):
-        opened = _wide(matrix.divergence, s)[:, kept] + matrix.divergence[:, pivot] @ follow
-        return matrix.changed(_condensed(matrix.soft, kept, pivot, follow, springs), opened.tocsr())
     coupling = _wide(matrix[pivot], s)
     pulled = (coupling[:, kept].T @ follow).tocsr()
     added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)

@@ -1,11 +1,11 @@
-"""Sparse direct solution of symmetric systems: CHOLMOD, and SuperLU for saddle points.
+"""Sparse direct solution of symmetric positive definite systems by CHOLMOD.
 
 The matrix is first scaled symmetrically to a diagonal near one, by powers of two, which rounds
 nothing. The rest does not depend on units, and a pivot or an eigenvalue of the scaled matrix can be
 compared with the machine precision.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Self
@@ -14,22 +14,17 @@ import numpy as np
 from scipy.sparse import csr_matrix, sparray, spmatrix
 
 from ...lac.errors import SolveError
-from .backends import BACKENDS, Backend, BreakdownError, Solve
 from .krylov import EPSILON
 
 SINGULAR = 4 * EPSILON
 """A scaled matrix (largest entry 1) whose smallest eigenvalue is not larger counts as singular."""
-SINGULAR_INDEFINITE = 1e-12
-"""The same for an indefinite matrix."""
+Solve = Callable[[np.ndarray], np.ndarray]
 _auto: ContextVar[str] = ContextVar("auto", default="auto")
 
 
 @contextmanager
 def force_solver(kind: str) -> Iterator[None]:
-    """Within the block `auto` means `kind`: the name of a solver, or `multigrid`.
-
-    Raises SolveError there for a solver that is not for that kind of matrix.
-    """
+    """Within the block `auto` means `kind`: `cholmod` or `multigrid`."""
     token = _auto.set(kind)
     try:
         yield
@@ -38,19 +33,23 @@ def force_solver(kind: str) -> Iterator[None]:
 
 
 def wanted() -> str:
-    """The present meaning of `auto`: `auto` itself, or the name of a solver."""
+    """The present meaning of `auto`: `auto`, `cholmod` or `multigrid`."""
     return _auto.get()
 
 
 class Factor:
-    """A matrix factored by the library `name`; closing or dropping it releases the memory."""
+    """A factored matrix; closing or dropping it releases the memory."""
 
+    name = "CHOLMOD"
     iterative = False
     iterations = 0
 
-    def __init__(self, name: str, solve: Solve, scale: np.ndarray):
-        """`solve` takes columns (n, k) of the system scaled by `scale` (n,)."""
-        self.name = name
+    def __init__(self, solve: Solve, scale: np.ndarray, smallest: float = 1.0):
+        """`solve` takes columns (n, k) of the system scaled by `scale` (n,).
+
+        `smallest`: about the smallest eigenvalue of the scaled matrix, whose largest entry is 1.
+        """
+        self.smallest = smallest
         self._scale = scale
         self._solve: Solve | None = solve
 
@@ -79,43 +78,32 @@ class Factor:
         self.close()
 
 
-def factorise(
-    matrix: spmatrix | sparray,
-    kind: str = "auto",
-    least: float = SINGULAR,
-) -> Factor:
+def factorise(matrix: spmatrix | sparray, least: float = SINGULAR) -> Factor:
     """Factor a symmetric positive definite `matrix` (n, n), of which the upper triangle is read.
-
-    `kind`: auto, cholmod or superlu.
 
     Raises SolveError where the matrix is not positive definite, or singular to working precision:
     the smallest eigenvalue of the matrix scaled to a diagonal near one is at most `least`.
     """
     upper = _upper_triangle(matrix)
     if upper.shape[0] == 0:
-        return Factor("nothing to solve", lambda right: right, np.ones(0))
+        return Factor(lambda right: right, np.ones(0))
     diagonal = upper.diagonal()
     if not (diagonal > 0).all():
         worst = int(np.argmin(np.where(np.isnan(diagonal), -np.inf, diagonal)))
         raise SolveError(
             f"the matrix is not positive definite: diagonal entry {worst} is {diagonal[worst]:g}"
         )
-    scale = _power_of_two(1 / np.sqrt(diagonal))
-    upper = _scaled(upper, scale)
-    return _factorise(upper, scale, kind, definite=True, limit=least)
-
-
-def factorise_indefinite(matrix: spmatrix | sparray, kind: str = "auto") -> Factor:
-    """Factor a symmetric indefinite `matrix` (n, n), a saddle point; see `factorise`.
-
-    `kind`: auto or superlu. Here the scaled matrix has its largest entry in each row near one.
-    """
-    upper = _upper_triangle(matrix)
-    scale = np.ones(upper.shape[0])
-    for _ in range(3):
-        scale *= _power_of_two(1 / np.sqrt(_largest_in_row(_scaled(upper, scale))))
-    upper = _scaled(upper, scale)
-    return _factorise(upper, scale, kind, definite=False, limit=SINGULAR_INDEFINITE)
+    # The nearest power of two.
+    scale = np.exp2(np.rint(np.log2(1 / np.sqrt(diagonal))))
+    upper.data *= np.repeat(scale, np.diff(upper.indptr)) * scale[upper.indices]
+    solve = _cholmod(upper)
+    smallest = _smallest_eigenvalue(solve, upper.shape[0])
+    if not smallest > least:
+        raise SolveError(
+            f"the matrix is singular to working precision: scaled to a largest entry of 1, its "
+            f"smallest eigenvalue is about {smallest:.0e} (more than {least:.0e} is needed)"
+        )
+    return Factor(solve, scale, smallest)
 
 
 def factorise_roughly(matrix: csr_matrix) -> Solve:
@@ -123,40 +111,28 @@ def factorise_roughly(matrix: csr_matrix) -> Solve:
 
     The solve takes columns (n, k). Raises SolveError where a pivot fails.
     """
-    backend = _choose("auto", definite=True)
+    return _cholmod(_upper_triangle(matrix))
+
+
+def _cholmod(upper: csr_matrix) -> Solve:
+    """The solve of columns (n, k); raises SolveError at a pivot that is not positive."""
+    from cvxopt import cholmod, matrix, spmatrix
+
+    columns = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
+    rows = upper.indices.astype(np.int64)
+    lower = spmatrix(matrix(upper.data), matrix(rows), matrix(columns), upper.shape)
+    factor = cholmod.symbolic(lower)
     try:
-        return backend.factor(_upper_triangle(matrix), True)
-    except BreakdownError:
-        raise SolveError(
-            f"a part of the matrix is not positive definite ({backend.name})"
-        ) from None
+        cholmod.numeric(lower, factor)
+    except ArithmeticError:
+        raise SolveError("the matrix is not positive definite: a pivot fails in CHOLMOD") from None
 
+    def solve(right: np.ndarray) -> np.ndarray:
+        solution = matrix(np.asfortranarray(right, dtype=float))
+        cholmod.solve(factor, solution)
+        return np.array(solution)
 
-def _choose(kind: str, definite: bool) -> Backend:
-    # Multigrid makes no factor: where one is needed all the same, take the best.
-    if kind == "auto" and (kind := wanted()) not in BACKENDS:
-        kind = "cholmod" if definite else "superlu"
-    if kind == "cholmod" and not definite:
-        raise SolveError("CHOLMOD factors positive definite matrices only")
-    return BACKENDS[kind]
-
-
-def _factorise(
-    upper: csr_matrix, scale: np.ndarray, kind: str, definite: bool, limit: float
-) -> Factor:
-    backend = _choose(kind, definite)
-    try:
-        solve = backend.factor(upper, definite)
-    except BreakdownError:
-        wanted = "positive definite" if definite else "regular"
-        raise SolveError(f"the matrix is not {wanted}: a pivot fails in {backend.name}") from None
-    smallest = _smallest_eigenvalue(solve, upper.shape[0])
-    if not smallest > limit:
-        raise SolveError(
-            f"the matrix is singular to working precision: scaled to a largest entry of 1, its "
-            f"smallest eigenvalue is about {smallest:.0e} (more than {limit:.0e} is needed)"
-        )
-    return Factor(backend.name, solve, scale)
+    return solve
 
 
 def _smallest_eigenvalue(solve: Solve, size: int) -> float:
@@ -196,22 +172,3 @@ def _upper_triangle(matrix: spmatrix | sparray) -> csr_matrix:
     starts = np.zeros(size + 1, dtype=np.int32)
     np.cumsum(np.bincount(rows, minlength=size), out=starts[1:])
     return csr_matrix((values, columns, starts), shape=whole.shape)
-
-
-def _scaled(upper: csr_matrix, scale: np.ndarray) -> csr_matrix:
-    values = upper.data * np.repeat(scale, np.diff(upper.indptr))
-    values *= scale[upper.indices]
-    return csr_matrix((values, upper.indices, upper.indptr), shape=upper.shape)
-
-
-def _power_of_two(values: np.ndarray) -> np.ndarray:
-    return np.exp2(np.rint(np.log2(values)))
-
-
-def _largest_in_row(upper: csr_matrix) -> np.ndarray:
-    """Largest modulus in each row of the symmetric matrix."""
-    modulus = abs(upper)
-    largest = np.maximum(modulus.max(axis=0).toarray(), modulus.max(axis=1).toarray().T).ravel()
-    if not largest.all():
-        raise SolveError(f"the matrix is singular: row {int(np.argmin(largest))} is zero")
-    return largest

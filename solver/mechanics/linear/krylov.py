@@ -15,7 +15,6 @@ _LOG = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of vectors at once
 _LOGGED = 10  # iterations from one line of the log to the next
 _SAFETY = 1.05  # of a bound from below
-_KEPT = 10  # directions of conjugate residuals; 40 save a tenth of the iterations, all no more
 
 Operator = Callable[[np.ndarray], np.ndarray]
 
@@ -59,49 +58,6 @@ def conjugate_gradients(
     return solution, iteration
 
 
-def conjugate_residuals(
-    multiply: Operator,
-    precondition: Operator,
-    right: np.ndarray,
-    measure: Callable[[np.ndarray], float],
-    accuracy: float,
-    most: int,
-) -> tuple[np.ndarray, int]:
-    """Solve for one `right` (n,), with any regular matrix; return the solution and the iterations.
-
-    Until the `measure` of the residual is `accuracy` times the first one; raises SolveError as
-    `conjugate_gradients`. Each residual is the smallest over the latest directions (Eisenstat,
-    Elman and Schultz, SIAM J. Numer. Anal. 20 (1983) 345: Orthomin). The preconditioner need not be
-    linear, nor symmetric.
-    """
-    solution, residual = np.zeros_like(right), right.copy()
-    directions = np.zeros((_KEPT, len(right)))
-    images = np.zeros_like(directions)
-    start = measure(residual)
-    iteration, reached = 0, float(start != 0)
-    while reached > accuracy:
-        _give_up("conjugate residuals", iteration, reached, accuracy, most)
-        direction = precondition(residual)
-        image = multiply(direction)
-        # No BLAS here: its sums depend on the number of threads. A `measure` may use it.
-        shares = np.einsum("kn,n->k", images, image)
-        image -= np.einsum("k,kn->n", shares, images)
-        direction -= np.einsum("k,kn->n", shares, directions)
-        size = float(np.sqrt(np.sum(image * image)))
-        if not size:
-            raise SolveError(f"conjugate residuals break down after {iteration} iterations")
-        place = iteration % _KEPT
-        np.divide(image, size, out=images[place])
-        np.divide(direction, size, out=directions[place])
-        step = np.sum(residual * images[place])
-        solution += step * directions[place]
-        residual -= step * images[place]
-        iteration += 1
-        reached = measure(residual) / start
-        _log_progress("conjugate residuals", iteration, reached)
-    return solution, iteration
-
-
 def two_steps(precondition: Operator, multiply: Operator, residual: np.ndarray) -> np.ndarray:
     """The change (n,) for a `residual` (n,): two steps of conjugate gradients from zero.
 
@@ -124,7 +80,7 @@ def two_steps(precondition: Operator, multiply: Operator, residual: np.ndarray) 
 
 
 def _inner(one: np.ndarray, other: np.ndarray) -> float:
-    """The product of vectors in single precision. No BLAS: see `conjugate_residuals`."""
+    """The product of vectors in single precision; sums of BLAS depend on the threads."""
     return float(np.sum(one * other, dtype=float))
 
 

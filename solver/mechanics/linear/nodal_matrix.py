@@ -4,7 +4,7 @@ An index for each pair of nodes takes a ninth of the memory of one for each entr
 with blocks takes less time.
 """
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
@@ -105,3 +105,6 @@ def _unscaled(matrix: csr_matrix, rows: np.ndarray, columns: np.ndarray) -> csr_
     """The matrix (r, n) with its rows divided by `rows` (r,), its columns by `columns` (n,)."""
     factors = np.repeat(1 / rows, np.diff(matrix.indptr)) / columns[matrix.indices]
     return csr_matrix((matrix.data * factors, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+Stiffness: TypeAlias = csr_matrix | NodalMatrix

@@ -15,7 +15,7 @@ from .choice import LinearSolver
 from .condensation import CondensedSystem, condense
 from .hierarchy import Shared
 from .krylov import EPSILON
-from .stiffened import Stiffness
+from .nodal_matrix import Stiffness
 from .unknowns import Unknowns
 
 

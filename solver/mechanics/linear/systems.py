@@ -14,19 +14,17 @@ from ...lac.errors import SolveError
 from ..fem.bodies import joined_bodies
 from .augmented import augment
 from .choice import LinearSolver
-from .condensation import ConstrainedSystem, condense, saddle_point
-from .direct import Factor
+from .condensation import ConstrainedSystem, condense
 from .hierarchy import Shared
 from .krylov import EPSILON
+from .nodal_matrix import Stiffness
 from .stabilised import Compliance, stabilise
-from .stiffened import Stiffness, part_of
 from .unknowns import Unknowns
 
 _MANY = "a factor serves many right-hand sides at once"
 # A factor of so many unknowns takes too much memory to be tried for that.
 _LARGEST = 300_000
 _NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
-_DEPENDENT = "constraints that nearly depend on one another: a saddle point"
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ class IndependentSystems:
         return max(self.parts, key=lambda part: len(part[0]))[2]
 
     @property
-    def factor(self) -> Factor | LinearSolver:
+    def factor(self) -> LinearSolver:
         """The solver of the largest system."""
         return self._largest.factor
 
@@ -135,7 +133,7 @@ class Systems:
     def _drop(self, number: int) -> None:
         """Drop a part's system, and remember why multigrid failed on it, if it did."""
         factor = self._kept.pop(number)[1].factor
-        if isinstance(factor, LinearSolver) and factor.gave_up:
+        if factor.gave_up:
             self._gave_up[number] = factor.gave_up
 
     def closed(self, closed: np.ndarray) -> ConstrainedSystem:
@@ -158,7 +156,7 @@ class Systems:
         """
         if self._matrix.shape[0] < _LARGEST:
             for number, (_, system) in list(self._kept.items()):
-                if isinstance(system.factor, LinearSolver) and system.factor.iterative:
+                if system.factor.iterative:
                     self._drop(number)
             before, self._gave_up = self._gave_up, dict.fromkeys(range(len(self._parts)), _MANY)
             try:
@@ -183,7 +181,7 @@ class Systems:
         matrix, constraints = self._matrix, self._constraints[closed]
         own, unknowns = self._own, self._unknowns
         if chosen is not None:
-            matrix, constraints = part_of(matrix, chosen), constraints[:, chosen]
+            matrix, constraints = matrix.tocsr()[chosen][:, chosen], constraints[:, chosen]
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
         known = self._gave_up.get(number, ""), self._shared[number]
         if own is None:
@@ -198,10 +196,6 @@ def _augmented(
 ) -> ConstrainedSystem:
     try:
         return augment(matrix, constraints, _NOTHING_OWN, unknowns, why, shared)
-    except SolveError:
-        pass
-    try:
-        return saddle_point(matrix.tocsr(), constraints, _DEPENDENT)
     except SolveError as error:
         raise SolveError(
             f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "

@@ -128,12 +128,6 @@ def test_how_many_unknowns_a_cell_has(name, size):
     assert split(points, [block], [np.array([True])], [np.array([0])])[1].size == size
 
 
-@pytest.mark.parametrize(("name", "locks"), [("TETRA4", True), ("PENTA6", False), ("HEXA8", False)])
-def test_tetra4_are_known_to_lock(name, locks):
-    points, block = one_cell(name)
-    assert split(points, [block], [np.array([True])], [np.array([0])])[1].locks is locks
-
-
 def test_the_pieces_of_a_cut_cell_share_their_constant():
     mesh = block_mesh("HEXA8", "HEXA8", (2, 1))
     case = parse_case(block_case(3).source.replace("0.3", "0.4999999"), Path("patch.yaml"))

@@ -278,7 +278,7 @@ def test_nodal_blocks_give_the_solution_of_the_entries(tied):
 
 def test_choice_as_asked_for():
     matrix, unknowns = clamped(6)
-    for kind, name in (("multigrid", "multigrid"), ("superlu", "SuperLU")):
+    for kind, name in (("multigrid", "multigrid"), ("cholmod", "CHOLMOD")):
         with force_solver(kind):
             chosen = choice.prepare(matrix, unknowns)
         assert name in chosen.name
