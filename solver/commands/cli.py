@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from ..lac.errors import SolveError
 from ..system.errors import InputError, hint, of_machine
 from ..system.package import PROGRAM, PROJECT, project_version
-from . import codes, completion, family_folder, jobs, look, report, results, studies
+from . import codes, family_folder, jobs, look, report, results, studies
 from .options import (
     BUG,
     FAILED,
@@ -115,7 +115,6 @@ def parser() -> argparse.ArgumentParser:
     jobs.add_commands(commands)
     family_folder.add_commands(commands)
     studies.add_commands(commands)
-    completion.add_commands(commands, parser)
     return parser
 
 

@@ -15,13 +15,13 @@ def write_report(
     """Write the report of the verdict files into `folder`; returns what it found.
 
     Every verdict is in every file: the main page and the page of its family, summary.json, .csv,
-    .md; `bench.html` where other codes have results; `matrix.html` with families. junit.xml is of
-    our own solves. `older` are the verdicts of solves that the batch did not ask for: all these
-    files show them too, but failures.txt does not. It lists what did not pass, and is empty when
-    all passed; results of other codes are no failures of a batch. `families` are files
-    `family.yaml`, each in the folder of its family. Pictures are drawn by so many `processes`, one
-    for each core where None is given. Returned are the processor time by family, a line for each
-    solve that did not pass, and the outcome.
+    .md; `bench.html` where other codes have results. junit.xml is of our own solves. `older` are
+    the verdicts of solves that the batch did not ask for: all these files show them too, but
+    failures.txt does not. It lists what did not pass, and is empty when all passed; results of
+    other codes are no failures of a batch. `families` are files `family.yaml`, each in the folder
+    of its family. Pictures are drawn by so many `processes`, one for each core where None is given.
+    Returned are the processor time by family, a line for each solve that did not pass, and the
+    outcome.
     """
     from functools import partial
 
@@ -33,7 +33,6 @@ def write_report(
     from .charts import write_script
     from .html import PAGE
     from .junit import to_junit
-    from .matrix import matrix_page
     from .page import family_page, main_page
     from .pictures import write_viewer
     from .rows import read_rows
@@ -49,8 +48,6 @@ def write_report(
     drawings = [partial(part.draw, row) for part in parts for row in part.drawn]
     with in_forks([partial(write_script, folder), *drawings], processes or workers()):
         write_bench(rows, folder, folders)
-        if folders:  # the main page links it
-            write_text(folder / "matrix.html", matrix_page(rows, folders))
         contents = {
             PAGE: main_page(parts, folder),
             "summary.json": tables.to_json(rows),

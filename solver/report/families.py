@@ -33,7 +33,7 @@ from ..system.errors import InputError
 FILE_NAME = "family.yaml"
 # Pages of the report that are no family's, also with a dash and more (`study-quick`): a family of
 # such a name has its page under another.
-_TAKEN = {"index", "summary", "matrix", "bench", "compare", "workflow"} | {
+_TAKEN = {"index", "summary", "bench", "compare", "workflow"} | {
     *("orders", "study", "stability", "infsup", "scaling", "benchmark"),
 }
 

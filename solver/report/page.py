@@ -15,7 +15,6 @@ from .tables import outcome
 
 # Pages beside the report that other commands write.
 _PAGES = {
-    "matrix": "what is verified, by feature",
     "study": "error against run time, LAC and other treatments",
     "stability": "numerical stability",
     "scaling": "scaling",

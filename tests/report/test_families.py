@@ -136,7 +136,7 @@ def test_pages_of_the_report_are_no_family_s():
     assert page_name("lame") == "lame.html"
     assert page_name("summary") == "family-summary.html"
     assert page_name("orders-waves") == "family-orders-waves.html"
-    assert page_name("matrix") == "family-matrix.html"
+    assert page_name("bench") == "family-bench.html"
     assert "/" not in page_name("a/b")
 
 

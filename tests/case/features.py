@@ -11,9 +11,9 @@ from typing import Any, Literal, get_args, get_origin
 
 from msgspec import NODEFAULT
 
-from .file import CaseFile
-from .solutions.catalogue import SOLUTIONS
-from .typed import Section, fields, is_section, parts_of, read_as
+from solver.case.file import CaseFile
+from solver.case.solutions.catalogue import SOLUTIONS
+from solver.case.typed import Section, fields, is_section, parts_of, read_as
 
 # Labels and texts for readers, which change no result.
 _TEXTS = ("name", "title", "description", "units", "remark")

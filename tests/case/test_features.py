@@ -1,21 +1,19 @@
-"""The matrix of what is verified: no key of the case file without a case, or a reason."""
+"""What is verified: no key of the case file without a case of the batch, or a reason."""
 
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pytest
 
 from solver.case.checks import CHECKS
-from solver.case.features import features, used
 from solver.case.reader import load_case
 from solver.case.yaml import read_mapping
 from solver.commands.jobs import case_files
 from solver.mesh.keys import RECIPES
-from solver.report.matrix import fits, matrix, matrix_page, reasons
-from solver.report.rows import read_rows
-from tests.report.test_report import CHECK, verdict
-from tests.report.verdicts import put
+from tests.case.features import features, used
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
+REASONS = read_mapping(CASES / "unverified.yaml")["features"]
 ROUND_OFF = 1e-10
 FOLDERS = sorted(file.parent for file in CASES.glob("*/family.yaml"))
 CASE = """\
@@ -45,13 +43,17 @@ def unused():
     return [feature for feature in features(RECIPES) if feature not in found]
 
 
+def fits(feature, pattern):
+    """`[]` is literal."""
+    return fnmatchcase(feature, pattern.replace("[", "[[]"))
+
+
 def test_every_key_and_choice_has_a_case_or_a_reason(unused):
-    patterns = reasons(FOLDERS)
-    assert [f for f in unused if not any(fits(f, pattern) for pattern in patterns)] == []
+    assert [f for f in unused if not any(fits(f, pattern) for pattern in REASONS)] == []
 
 
 def test_no_reason_outlives_its_hole(unused):
-    assert [p for p in reasons(FOLDERS) if not any(fits(f, p) for f in unused)] == []
+    assert [p for p in REASONS if not any(fits(f, p) for f in unused)] == []
 
 
 def test_features_of_a_file(tmp_path):
@@ -67,32 +69,6 @@ def test_features_of_a_file(tmp_path):
         "supports[].group",
     }
     assert not {"loads", "contact[].treatment: lac", "contact[].clearance"} & features_of(file)
-
-
-def test_a_line_counts_solves_by_dimension_and_names_the_strictest_check(tmp_path):
-    family, files = tmp_path / "cases" / "fam", []
-    family.mkdir(parents=True)
-    for name, plane, tolerance in (
-        ("a", "strain", 1e-3),
-        ("b", "strain", 1e-6),
-        ("c", "stress", 1),
-    ):
-        (family / f"{name}.yaml").write_text(CASE.format(name=name, plane=plane))
-        check = CHECK | {"error": tolerance / 2, "tolerance": tolerance, "passed": True}
-        files.append(tmp_path / "results" / "fam" / name / "verdict.json")
-        put(files[-1], verdict(name, "passed", family="fam", checks=[check], worst=check))
-    rows = read_rows(files)
-    lines = {line.feature: line for line in matrix(rows, [family])}
-    use = lines["plane: strain"].by_dimension["plane"]
-    assert len(use.solves) == 2
-    assert (use.strictest[0], use.strictest[2].name) == (1e-6, "b")
-    assert len(lines["contact[].treatment: nodal"].by_dimension["plane"].solves) == 3
-    assert lines["plane: axisymmetric"].hole
-    assert not lines["plane: stress"].hole
-    (tmp_path / "cases" / "unverified.yaml").write_text("features: {'plane: axi*': not yet}\n")
-    page = matrix_page(rows, [family])
-    assert "Not used: not yet" in page
-    assert "<li>contact[].treatment: lac</li>" in page
 
 
 def test_no_case_of_the_batch_has_a_stated_tolerance():
