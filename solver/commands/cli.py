@@ -112,7 +112,6 @@ def parser() -> argparse.ArgumentParser:
     codes.add_commands(commands)
     report.add_commands(commands)
     _add_batch(commands)
-    jobs.add_commands(commands)
     family_folder.add_commands(commands)
     studies.add_commands(commands)
     return parser

@@ -1,4 +1,4 @@
-"""The jobs that the case files of folders stand for, as JSON: what a workflow has to run.
+"""The jobs that the case files of folders stand for: what a workflow has to run.
 
 One case file is a job for each direction, and where asked for one for each cut of hexahedra. A file
 that is refused is one job too: the solve says why. So no file keeps the others from being solved.
@@ -6,18 +6,15 @@ that is refused is one job too: the solve says why. So no file keeps the others 
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..case import job_name
 from ..system.errors import InputError, hint
 from ..system.package import cases_folder
-from .options import add_command
 
 if TYPE_CHECKING:
     from ..case.model import Case
@@ -32,7 +29,7 @@ _RESERVED = ["report", "meshes", "studies", "docs"]
 
 
 @dataclass(frozen=True)
-class ListedJob:
+class Job:
     """One job: the family, the case's name, its own name, its file, how it is solved.
 
     `mesh` holds the files of the user's own mesh, the one named in the case first, then those it
@@ -64,7 +61,11 @@ def case_files(folder: Path) -> list[Path]:
 
 
 def check_names(folder: Path) -> None:
-    """Raise InputError where a folder of cases, or a case file, has a name that is not plain."""
+    """Raise InputError for a folder without cases, and where it or a file has an odd name."""
+    if not folder.is_dir():
+        raise InputError(folder, "cases", None, "no such folder")
+    if not case_files(folder):
+        raise InputError(folder, "cases", None, "no case file (*.yaml) in this folder")
     family = folder.resolve().name
     if family in _RESERVED:
         raise InputError(folder, "folder", family, "is a folder of results: choose another name")
@@ -76,18 +77,18 @@ def check_names(folder: Path) -> None:
             raise InputError(path, "name", name, must)
 
 
-def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[ListedJob]:
+def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Job]:
     """The jobs of all case files in the folders, file by file.
 
     `variants`: where there may be hexahedra, once more with the other cut. A file that
     names its case as another file of the family does is refused, under a free name. Raises
-    InputError for a folder or a file with an odd name.
+    InputError as `check_names`.
     """
     for folder in folders:
         check_names(folder)
     listed = [list(jobs_of(file, variants)) for folder in folders for file in case_files(folder)]
     taken: dict[tuple[str, str], str] = {}
-    jobs: list[ListedJob] = []
+    jobs: list[Job] = []
     # A file that is called as its case goes before one that took a copied name.
     for found in sorted(listed, key=lambda found: found[0].case != Path(found[0].file).stem):
         owner = next((taken[job.key] for job in found if job.key in taken), None)
@@ -103,7 +104,7 @@ def families_in(cases: Path) -> dict[str, Path]:
     return {folder.name: folder for folder in folders if case_files(folder)}
 
 
-def find_job(name: str, cases: Path) -> ListedJob:
+def find_job(name: str, cases: Path) -> Job:
     """The job of that name in the families of a folder; InputError with near names."""
     folders = sorted(families_in(cases).values(), key=lambda f: not name.startswith(f.name))
     known: list[str] = []
@@ -138,11 +139,11 @@ def results_of(given: Path) -> list[Path]:
     return [Path("results", *job.key, "result.vtkhdf") for job in jobs_of(given)]
 
 
-def jobs_of(file: Path, variants: bool = False) -> Iterator[ListedJob]:
+def jobs_of(file: Path, variants: bool = False) -> Iterator[Job]:
     """The jobs of one case file."""
     from ..case.reader import load_case
 
-    alone = ListedJob(file.resolve().parent.name, file.stem, file.stem, str(file), mesh=())
+    alone = Job(file.resolve().parent.name, file.stem, file.stem, str(file), mesh=())
     try:
         case = load_case(file)
     except Exception:  # noqa: BLE001 -- whatever it is, the solve meets it again and reports it
@@ -151,7 +152,7 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[ListedJob]:
     mesh, size = _mesh_files(case), _size(case)
     for cut in [None, _other_cut(case)] if variants and _may_hold_hexahedra(case) else [None]:
         for swap in [False, True] if case.directions == "both" else [False]:
-            yield ListedJob(
+            yield Job(
                 family=alone.family,
                 case=case.name,
                 name=job_name(case.name, swap, cut),
@@ -164,7 +165,7 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[ListedJob]:
             )
 
 
-def _second(job: ListedJob, owner: str, taken: dict[tuple[str, str], str]) -> ListedJob:
+def _second(job: Job, owner: str, taken: dict[tuple[str, str], str]) -> Job:
     """The refused job of a file whose case has the name of another file's."""
     stem = Path(job.file).stem[:60]
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
@@ -173,7 +174,7 @@ def _second(job: ListedJob, owner: str, taken: dict[tuple[str, str], str]) -> Li
         f"{job.file}: name = {job.case!r}: already taken by {owner}; "
         "each case of a family needs a name of its own"
     )
-    return ListedJob(job.family, name, name, job.file, mesh=(), refusal=refusal)
+    return Job(job.family, name, name, job.file, mesh=(), refusal=refusal)
 
 
 def _may_hold_hexahedra(case: Case) -> bool:
@@ -201,22 +202,3 @@ def _size(case: Case) -> Size:
 
     path = case.mesh.get("path")
     return of_mesh({"file": str(path)} if path else case.mesh, Path())
-
-
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add the command `jobs`."""
-    purpose = "list the jobs of folders of cases, as JSON"
-    command = add_command(commands, "jobs", print_jobs, purpose, listed=False)
-    command.add_argument("folders", type=Path, nargs="+", metavar="DIR", help="with case files")
-    command.add_argument("--variants", action="store_true", help="with the other cut of hexahedra")
-
-
-def print_jobs(options: argparse.Namespace) -> int:
-    """Print the jobs of the folders as a line of JSON; InputError for a folder without cases."""
-    for folder in options.folders:
-        if not folder.is_dir():
-            raise InputError(folder, "cases", None, "no such folder")
-        if not case_files(folder):
-            raise InputError(folder, "cases", None, "no case file (*.yaml) in this folder")
-    print(json.dumps([asdict(job) for job in list_jobs(options.folders, options.variants)]))
-    return 0

@@ -33,7 +33,8 @@ def foreign_runs():
 
 rule run_code:
     input:
-        case=lambda w: watched(*files_of(BATCH[w.family, w.job])),
+        case=lambda w: existing(*files_of(BATCH[w.family, w.job])),
+        code=lambda w: sources_of(codes_to_run()[w.code]),
         mesh=lambda w: mesh_folder(BATCH[w.family, w.job]),
     output:
         directory("results/{family}/{job}@{code}"),
@@ -46,11 +47,7 @@ rule run_code:
         mesh=lambda w: shlex.quote(mesh_file(BATCH[w.family, w.job])),
         code=lambda w: codes_to_run()[w.code],
         options=lambda w: options_of(BATCH[w.family, w.job]),
-        content=lambda w: contents(
-            *files_of(BATCH[w.family, w.job]), *sources_of(codes_to_run()[w.code])
-        )
-        + SOLVER_CONTENT
-        + version_of(codes_to_run()[w.code]),
+        program=lambda w: SOLVER_HASH + version_of(codes_to_run()[w.code]),
     message:
         "{wildcards.code}: {wildcards.job}"
     shell:

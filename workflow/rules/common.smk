@@ -2,13 +2,11 @@
 
 import fnmatch
 import hashlib
-import json
 import os
 import re
 import shlex
 import subprocess
 import sys
-from collections import namedtuple
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -30,11 +28,6 @@ def part(name):
     return import_module(f"{PACKAGE}.{name}")
 
 
-# One solve, as `python -m solver jobs` lists it.
-FIELDS = "family case name file mesh swap hexahedra points dim refusal"
-Job = namedtuple("Job", FIELDS)
-
-
 def refuse(line):
     """End with one line and no traceback, for a wrong setting."""
     print(line, file=sys.stderr)
@@ -43,9 +36,6 @@ def refuse(line):
 
 def read_config():
     """Validate the configuration by its schema, which also fills in defaults."""
-    for key in ("family", "cases", "case"):  # Snakemake reads `case=12` as a number
-        if isinstance(config.get(key), (int, float)):
-            config[key] = str(config[key])
     try:
         validate(config, "../schemas/config.schema.yaml")
     except WorkflowError as error:
@@ -80,78 +70,44 @@ shell.prefix(
 )
 
 
-def sources(*patterns):
-    """Source files of the solver."""
-    return sorted({str(f) for p in patterns for f in FOLDER.glob(p) if f.is_file()})
+def files_in(*patterns):
+    """Source files of the program."""
+    found = {f for p in patterns for f in FOLDER.glob(p) if f.is_file()}
+    return {f for f in found if f.suffix != ".pyc"}
 
 
-OF_PAGES = (
-    "report/**/*.*",
-    "studies/page*",
-    "studies/shown.py",
-    "studies/figures/*.py",
+def hash_of(files):
+    """The hash of source files, a parameter of jobs: these run again when it changes."""
+    found = hashlib.sha256()
+    for file in sorted(files):
+        found.update(os.fsencode(file.relative_to(FOLDER)) + file.read_bytes())
+    return found.hexdigest()
+
+
+REPORT_SOURCES = files_in(
+    "report/**/*.*", "studies/page*", "studies/shown.py", "studies/figures/*.py"
 )
-REPORT_SOURCES = [f for f in sources(*OF_PAGES) if not f.endswith(".pyc")]
-SOLVER_SOURCES = sorted({*sources("**/*.py", "case/schemas/*")} - {*REPORT_SOURCES})
-MESH_SOURCES = sources("case/**/*.py", "case/schemas/*", "mesh/**/*.py", "system/*.py")
+REPORT_HASH = hash_of(REPORT_SOURCES)
+SOLVER_HASH = hash_of(files_in("**/*.py", "case/schemas/*") - REPORT_SOURCES)
+MESH_HASH = hash_of(files_in("case/**/*.*", "mesh/**/*.py", "system/*.py"))
 
 
-@cache
-def content_of(file):
-    """The hash of a file's content; empty if it is not a regular file or cannot be read."""
-    if not os.path.isfile(file):
-        return ""
-    try:
-        with open(file, "rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError:
-        return ""
-
-
-@cache
-def contents(*files):
-    """The hash of a job's inputs, as a parameter: a change runs it again, whatever the dates.
-
-    Snakemake compares parameters only if they depend on wildcards alone.
-    """
-    names = [os.path.relpath(file, FOLDER.parent) for file in files]
-    found = "".join(f"{n} {content_of(f)}\n" for n, f in zip(names, files))
-    return hashlib.sha256(found.encode("utf-8", "surrogateescape")).hexdigest()
-
-
-SOLVER_CONTENT = contents(*SOLVER_SOURCES)
-REPORT_CONTENT = contents(*REPORT_SOURCES)
-MESH_CONTENT = contents(*MESH_SOURCES)
-
-
-def watched(*files):
-    """The user's files as inputs of a job, without missing ones, which the solver reports.
-
-    Their content is among the job's parameters and counts; their dates do not.
-    """
-    return [ancient(f) for f in files if os.path.isfile(f)]
-
-
-def list_jobs(folders):
-    """The jobs in the folders, as the solver lists them."""
-    command = [sys.executable, "-Es", "-m", PACKAGE, "jobs", *folders]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        refuse((done.stderr.strip() or "cases: they cannot be listed").splitlines()[-1])
-    return done.stdout.splitlines()[-1]
+def existing(*files):
+    """The user's files as inputs of a job, without missing ones, which the solver reports."""
+    return [f for f in files if os.path.isfile(f)]
 
 
 def find_jobs():
     """All jobs by family and name: ours, and those of the configured folders."""
-    ours = sorted(
-        {f.parent for f in Path("cases").glob("*/*.yaml")} - {Path("cases/studies")}
-    )
-    folders = [*ours, *(Path(f).expanduser() for f in listed(config["cases"]))]
+    ours = {f.parent for f in Path("cases").glob("*/*.yaml")} - {Path("cases/studies")}
+    folders = [*sorted(ours), *(Path(f).expanduser() for f in listed(config["cases"]))]
     if not folders:
         refuse("cases: no folder with case files (*.yaml) in it")
-    what = [*map(str, folders), *["--variants"] * VARIANTS]
-    jobs = [Job(**of) for of in json.loads(list_jobs(what))]
-    return {(job.family, job.name): job for job in jobs}
+    try:
+        found = part("commands.jobs").list_jobs(folders, VARIANTS)
+    except part("system.errors").InputError as error:
+        refuse(error)
+    return {job.key: job for job in found}
 
 
 def chosen(key, known):

@@ -5,7 +5,7 @@ RECIPES = {(j.family, j.case): j for j in BATCH.values() if j.mesh is None}
 # solve tries again, and its verdict gives the reason.
 rule mesh:
     input:
-        case=lambda w: watched(RECIPES[w.family, w.case].file),
+        case=lambda w: existing(RECIPES[w.family, w.case].file),
     output:
         directory("results/meshes/{family}/{case}"),
     log:
@@ -17,7 +17,7 @@ rule mesh:
     params:
         file=lambda w: RECIPES[w.family, w.case].file,
         damaged=lambda w: is_damaged(f"results/meshes/{w.family}/{w.case}"),
-        content=lambda w: contents(RECIPES[w.family, w.case].file) + MESH_CONTENT,
+        program=MESH_HASH,
     message:
         "mesh {wildcards.case}"
     shell:

@@ -78,7 +78,7 @@ rule saved:
         runtime=lambda w, attempt: 6
         * max(minutes(job, attempt) for job in of_family(w)),
     params:
-        content=SOLVER_CONTENT,
+        program=SOLVER_HASH,
     message:
         "time saved: {wildcards.family}"
     shell:
@@ -90,7 +90,7 @@ rule saved:
 rule report:
     input:
         solves=lambda w: [results_of(job) for job in RUN.values()],
-        families=watched(*FAMILY_FILES),
+        families=FAMILY_FILES + RECORDED,
         saved=SAVED,
     output:
         report(
@@ -110,7 +110,8 @@ rule report:
         verdicts=lambda w: [verdict_of(job) for job in RUN.values()],
         others=OLDER + CODES,
         families=FAMILY_FILES,
-        content=contents(*FAMILY_FILES, *RECORDED, *PAGES, *CODES) + REPORT_CONTENT,
+        pages=PAGES,
+        program=REPORT_HASH,
     message:
         "report of all cases"
     shell:

@@ -2,7 +2,7 @@
 # there is one; its output and its cost.
 rule solve:
     input:
-        case=lambda w: watched(*files_of(BATCH[w.family, w.job])),
+        case=lambda w: existing(*files_of(BATCH[w.family, w.job])),
         mesh=lambda w: mesh_folder(BATCH[w.family, w.job]),
     output:
         directory("results/{family}/{job}"),
@@ -16,7 +16,7 @@ rule solve:
         file=lambda w: BATCH[w.family, w.job].file,
         mesh=lambda w: shlex.quote(mesh_file(BATCH[w.family, w.job])),
         damaged=lambda w: is_damaged(f"results/{w.family}/{w.job}"),
-        content=lambda w: contents(*files_of(BATCH[w.family, w.job])) + SOLVER_CONTENT,
+        program=SOLVER_HASH,
         options=lambda w: options_of(BATCH[w.family, w.job]),
         refusal=lambda w: shlex.quote(BATCH[w.family, w.job].refusal),
     message:

@@ -56,7 +56,7 @@ rule measure:
         mem_mb=lambda w, attempt: 2000 * attempt,
         runtime=lambda w, attempt: 120 * attempt,
     params:
-        content=SOLVER_CONTENT,
+        program=SOLVER_HASH,
     message:
         "measure {wildcards.study}/{wildcards.group}"
     shell:
@@ -76,7 +76,7 @@ rule study_page:
     log:
         f"results/studies/{{study}}/{LEVEL}/page.log",
     params:
-        content=REPORT_CONTENT,
+        program=REPORT_HASH,
     message:
         "page of {wildcards.study}"
     shell:
