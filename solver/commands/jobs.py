@@ -19,6 +19,7 @@ from ..system.package import cases_folder
 if TYPE_CHECKING:
     from ..case.model import Case
     from ..mesh.size import Size
+    from ..verification.verdict import Verdict
 
 # Files of these names describe a folder of cases.
 DESCRIPTIONS = ("family.yaml", "orders.yaml")
@@ -52,6 +53,70 @@ class Job:
     def key(self) -> tuple[str, str]:
         """The unique key of a job."""
         return self.family, self.name
+
+    @property
+    def folder(self) -> str:
+        """Where its results lie."""
+        return f"results/{self.family}/{self.name}"
+
+    @property
+    def verdict(self) -> str:
+        """The file of its verdict."""
+        return f"{self.folder}/verdict.json"
+
+    @property
+    def mesh_folder(self) -> str:
+        """The folder of a recipe's mesh; empty for a mesh of the user."""
+        return f"results/meshes/{self.family}/{self.case}" if self.mesh is None else ""
+
+    @property
+    def inputs(self) -> list[str]:
+        """Those files of the user that exist: case, mesh with what it includes, accepted values."""
+        accepted = Path(self.file).parent / "regression" / f"{self.name}.json"
+        files = [self.file, *(self.mesh or ()), str(accepted)]
+        return [file for file in files if Path(file).is_file()]
+
+    @property
+    def options(self) -> str:
+        """The options of the command line for this job of a case."""
+        return "--swap" * self.swap + (f" --hexahedra {self.hexahedra}" if self.hexahedra else "")
+
+    @property
+    def size(self) -> Size:
+        """Its estimated size."""
+        from ..mesh.size import Size
+
+        return Size(self.points, self.dim)
+
+    def read_verdict(self) -> Verdict | None:
+        """Its verdict; None if it is missing or damaged."""
+        from ..verification.verdict import read_verdict
+
+        try:
+            return read_verdict(self.verdict)
+        except InputError:
+            return None
+
+    @property
+    def passed(self) -> bool:
+        """Whether it has a verdict, and it is sound."""
+        verdict = self.read_verdict()
+        return verdict is not None and verdict.sound
+
+    @property
+    def damaged(self) -> bool:
+        """Whether its results are there and cannot be kept.
+
+        The verdict is damaged, its file is missing, or the machine ended the solve (memory, disk, a
+        kill).
+        """
+        folder = Path(self.folder)
+        if not folder.is_dir():
+            return False
+        verdict = self.read_verdict()
+        if verdict is None or verdict.transient:
+            return True
+        return verdict.result is not None and not (folder / verdict.result).is_file()
 
 
 def case_files(folder: Path) -> list[Path]:
@@ -136,7 +201,7 @@ def results_of(given: Path) -> list[Path]:
     """A result, or those of all jobs of a case file, in the folder `results` of the batch."""
     if given.suffix != ".yaml":
         return [given]
-    return [Path("results", *job.key, "result.vtkhdf") for job in jobs_of(given)]
+    return [Path(job.folder, "result.vtkhdf") for job in jobs_of(given)]
 
 
 def jobs_of(file: Path, variants: bool = False) -> Iterator[Job]:

@@ -14,24 +14,19 @@ SLACK = 10
 MOST_MEMORY, MOST_SECONDS = 1e15, 1e9
 
 
-def size_of(job, refine):
-    return part("mesh.size").Size(job.points * refine**job.dim, job.dim)
-
-
-def memory(job, attempt, refine=1):
+def memory(job, attempt):
     """Megabytes that a job of this case asks for, more each time it has to be run again."""
-    most = size_of(job, refine).memory.most
-    return attempt * round(AROUND_MB + min(most, MOST_MEMORY) / 1e6)
+    return attempt * round(AROUND_MB + min(job.size.memory.most, MOST_MEMORY) / 1e6)
 
 
-def seconds(job, refine=1):
+def seconds(job):
     """Estimated seconds of a case, the priority of its jobs: the longest cases start first."""
-    return min(size_of(job, refine).seconds, MOST_SECONDS)
+    return min(job.size.seconds, MOST_SECONDS)
 
 
-def minutes(job, attempt, refine=1):
+def minutes(job, attempt):
     """Minutes that a job of this case asks for, more each time it has to be run again."""
-    return attempt * round(START_MINUTES + SLACK * seconds(job, refine) / 60)
+    return attempt * round(START_MINUTES + SLACK * seconds(job) / 60)
 
 
 # What the executor said of each job that failed, by what it should have made.
@@ -56,18 +51,20 @@ def report_failures():
     """
     if INTERRUPTED or not FAILURES:
         return
-    lost, program = 0, [sys.executable, "-Es", "-m", PACKAGE]
-    for job in RUN.values():
-        made = [results_of(job), *mesh_folder(job)]
-        said = next((FAILURES[file] for file in made if file in FAILURES), None)
-        if said is not None and not os.path.isfile(verdict_of(job)):
-            log = Path(results_of(job), "log")
-            log.parent.mkdir(parents=True, exist_ok=True)
-            log.write_text(f"{said.split('. ')[0] or 'ended from outside'}\n")
-            solve = [job.file, *shlex.split(options_of(job))]
-            files = ["--log", log, "--verdict", verdict_of(job)]
-            subprocess.run([*program, "crashed", *solve, *files])
-            lost += 1
+    program = [sys.executable, "-Es", "-m", PACKAGE]
+    lost = [
+        job
+        for job in RUN.values()
+        if {job.folder, job.mesh_folder} & FAILURES.keys()
+        and not os.path.isfile(job.verdict)
+    ]
+    for job in lost:
+        said = FAILURES.get(job.folder) or FAILURES.get(job.mesh_folder, "")
+        log = Path(job.folder, "log")
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.write_text(f"{said.split('. ')[0] or 'ended from outside'}\n")
+        solve = ["crashed", job.file, *shlex.split(job.options), "--log", log]
+        subprocess.run([*program, *solve, "--verdict", job.verdict])
     if lost:
         command = f"report --list {VERDICTS} --older {OLDER_VERDICTS} -o results/report".split()
         subprocess.run([*program, *command, "--families", *FAMILY_FILES])

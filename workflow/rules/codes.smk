@@ -28,14 +28,14 @@ def sources_of(code):
 def foreign_runs():
     """The folders of all runs of other codes: both directions, the case's own cut."""
     jobs = [job for job in RUN.values() if not job.hexahedra and not job.refusal]
-    return [f"{results_of(job)}@{code}" for code in codes_to_run() for job in jobs]
+    return [f"{job.folder}@{code}" for code in codes_to_run() for job in jobs]
 
 
 rule run_code:
     input:
-        case=lambda w: existing(*files_of(BATCH[w.family, w.job])),
+        files=lambda w: batch(w).inputs,
+        mesh=lambda w: batch(w).mesh_folder or [],
         code=lambda w: sources_of(codes_to_run()[w.code]),
-        mesh=lambda w: mesh_folder(BATCH[w.family, w.job]),
     output:
         directory("results/{family}/{job}@{code}"),
     log:
@@ -43,17 +43,16 @@ rule run_code:
     wildcard_constraints:
         code="[^/@]+",
     params:
-        file=lambda w: BATCH[w.family, w.job].file,
-        mesh=lambda w: shlex.quote(mesh_file(BATCH[w.family, w.job])),
+        case=lambda w: batch(w).file,
+        mesh=mesh_option,
+        options=lambda w: batch(w).options,
         code=lambda w: codes_to_run()[w.code],
-        options=lambda w: options_of(BATCH[w.family, w.job]),
         program=lambda w: SOLVER_HASH + version_of(codes_to_run()[w.code]),
     message:
         "{wildcards.code}: {wildcards.job}"
     shell:
-        "set -- {params.file:q} {params.options};"
-        ' if test -e {params.mesh}; then set -- "$@" --mesh {params.mesh}; fi;'
-        ' warm {output:q}/benchmark run "$@" --code {params.code:q} -o {output:q} > {log:q} 2>&1'
+        "warm {output:q}/benchmark run {params.case:q} {params.options} {params.mesh}"
+        " --code {params.code:q} -o {output:q} > {log:q} 2>&1"
         " || test -s {output:q}/verdict.json"
 
 
@@ -61,7 +60,7 @@ rule run_code:
 rule bench:
     input:
         codes=lambda w: foreign_runs(),
-        ours=lambda w: [results_of(job) for job in RUN.values()],
+        ours=lambda w: [job.folder for job in RUN.values()],
     message:
         "report of all codes"
     shell:

@@ -92,11 +92,6 @@ SOLVER_HASH = hash_of(files_in("**/*.py", "case/schemas/*") - REPORT_SOURCES)
 MESH_HASH = hash_of(files_in("case/**/*.*", "mesh/**/*.py", "system/*.py"))
 
 
-def existing(*files):
-    """The user's files as inputs of a job, without missing ones, which the solver reports."""
-    return [f for f in files if os.path.isfile(f)]
-
-
 def find_jobs():
     """All jobs by family and name: ours, and those of the configured folders."""
     ours = {f.parent for f in Path("cases").glob("*/*.yaml")} - {Path("cases/studies")}
@@ -133,86 +128,45 @@ def choose_jobs():
     names = chosen("case", {job.name for job in jobs.values()})
     jobs = {key: job for key, job in jobs.items() if job.name in names}
     if config["failed"] in (True, "true"):
-        jobs = {key: job for key, job in jobs.items() if not has_passed(job)}
+        jobs = {key: job for key, job in jobs.items() if not job.passed}
         if not jobs and workflow.is_main_process:
             print("Nothing to be done: all chosen cases have passed.")
             sys.exit(0)
     return jobs
 
 
-def results_of(job):
-    return f"results/{job.family}/{job.name}"
-
-
-def verdict_of(job):
-    return f"{results_of(job)}/verdict.json"
-
-
-def read_verdict_of(folder):
-    """The verdict in a folder of results; None if it is missing or damaged."""
-    try:
-        return part("verification.verdict").read_verdict(Path(folder, "verdict.json"))
-    except part("system.errors").InputError:
-        return None
-
-
-def has_passed(job):
-    """Whether a solve has a verdict, and it is sound."""
-    verdict = read_verdict_of(results_of(job))
-    return verdict is not None and verdict.sound
-
-
 BATCH = find_jobs()
 FAMILIES = chosen("family", {job.family for job in BATCH.values()})
 RUN = choose_jobs()
-
-
-def verdicts_there(jobs):
-    """The verdicts of those jobs that have one."""
-    return [verdict for verdict in map(verdict_of, jobs) if os.path.isfile(verdict)]
-
-
 # Without Snakemake's records the inputs of the results are unknown.
 LOST = not any(Path(".snakemake/metadata").glob("*"))
 
 
-def is_damaged(folder):
-    """Whether a folder of results is there and cannot be kept: its inputs are unknown, its verdict
-    is damaged, its file is missing, or the machine ended the solve (memory, disk, a kill).
-    """
-    if not os.path.isdir(folder) or LOST:
-        return os.path.isdir(folder)
-    if folder.startswith("results/meshes/"):
-        return not any(Path(folder, f).is_file() for f in ("mesh.vtkhdf", "refused"))
-    verdict = read_verdict_of(folder)
-    if verdict is None or verdict.transient:
-        return True
-    return verdict.result is not None and not Path(folder, verdict.result).is_file()
+def is_damaged(job):
+    """Whether results of a job are there and cannot be kept."""
+    return LOST and os.path.isdir(job.folder) or job.damaged
+
+
+def is_damaged_mesh(job):
+    """The same of its mesh."""
+    if not os.path.isdir(job.mesh_folder):
+        return False
+    made = (Path(job.mesh_folder, name) for name in ("mesh.vtkhdf", "refused"))
+    return LOST or not any(file.is_file() for file in made)
+
+
+def batch(w):
+    """The job of a rule's wildcards."""
+    return BATCH[w.family, w.job]
+
+
+def mesh_option(w):
+    """The mesh of a job as words of the shell: nothing if there is none."""
+    file = f"{batch(w).mesh_folder}/mesh.vtkhdf"
+    return f'$(test ! -e {file} || echo "--mesh {file}")'
 
 
 wildcard_constraints:
     family="(?!(?:report|meshes|studies|docs)/)[^/]+",
     case="[^/]+",
     job="[^/@]+",
-
-
-def mesh_folder(job):
-    """The folder of a recipe's mesh, in a list; empty for a mesh of the user."""
-    return [f"results/meshes/{job.family}/{job.case}"] if job.mesh is None else []
-
-
-def mesh_file(job):
-    """The path of the generated mesh, which may be missing; empty for a mesh of the user."""
-    return "".join(f"{folder}/mesh.vtkhdf" for folder in mesh_folder(job))
-
-
-def files_of(job):
-    """The input files of a solve: case, mesh with its included files, accepted values."""
-    accepted = Path(job.file).parent / "regression" / f"{job.name}.json"
-    return [job.file, *(job.mesh or ()), str(accepted)]
-
-
-def options_of(job):
-    """The options of the command line for this job of a case."""
-    cut = f" --hexahedra {job.hexahedra}" if job.hexahedra else ""
-    return "--swap" * job.swap + cut

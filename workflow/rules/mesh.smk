@@ -1,25 +1,28 @@
-RECIPES = {(j.family, j.case): j for j in BATCH.values() if j.mesh is None}
+RECIPES = {(j.family, j.case): j for j in BATCH.values() if j.mesh_folder}
+
+
+def recipe(w):
+    return RECIPES[w.family, w.case]
 
 
 # The mesh of a recipe, one for all directions and variants of a case. If it cannot be made, the
 # solve tries again, and its verdict gives the reason.
 rule mesh:
     input:
-        case=lambda w: existing(RECIPES[w.family, w.case].file),
+        case=lambda w: recipe(w).file,
     output:
         directory("results/meshes/{family}/{case}"),
     log:
         "results/meshes/{family}/{case}/log",
-    priority: lambda w: seconds(RECIPES[w.family, w.case])
+    priority: lambda w: seconds(recipe(w))
     resources:
-        mem_mb=lambda w, attempt: memory(RECIPES[w.family, w.case], attempt),
-        runtime=lambda w, attempt: minutes(RECIPES[w.family, w.case], attempt),
+        mem_mb=lambda w, attempt: memory(recipe(w), attempt),
+        runtime=lambda w, attempt: minutes(recipe(w), attempt),
     params:
-        file=lambda w: RECIPES[w.family, w.case].file,
-        damaged=lambda w: is_damaged(f"results/meshes/{w.family}/{w.case}"),
+        damaged=lambda w: is_damaged_mesh(recipe(w)),
         program=MESH_HASH,
     message:
         "mesh {wildcards.case}"
     shell:
-        "warm {output:q}/benchmark mesh {params.file:q} -o {output:q}/mesh.vtkhdf"
+        "warm {output:q}/benchmark mesh {input.case:q} -o {output:q}/mesh.vtkhdf"
         " > {log:q} 2>&1 || {{ test $? != 2 || touch {output:q}/refused; }}"

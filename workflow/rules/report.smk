@@ -19,13 +19,16 @@ CODES = sorted(
     for verdict in map(str, Path("results").glob("*/*@*/verdict.json"))
     if solved_by(verdict) in BATCH
 )
+ASKED = [job.verdict for job in RUN.values()]
 # Older results: where a family or a case is asked for, those of all others are shown too.
 OLDER = [
-    *verdicts_there([job for key, job in BATCH.items() if key not in RUN]),
+    *(
+        j.verdict
+        for k, j in BATCH.items()
+        if k not in RUN and os.path.isfile(j.verdict)
+    ),
     *(verdict for verdict in CODES if solved_by(verdict) not in RUN),
 ]
-
-
 # What the families are about, of whichever folder their cases lie in.
 FAMILY_FILES = sorted(
     {
@@ -34,24 +37,18 @@ FAMILY_FILES = sorted(
         if (file := Path(job.file).with_name("family.yaml")).is_file()
     }
 )
-
-
 RECORDED = sorted(
     str(file) for f in FAMILY_FILES for file in Path(f).parent.glob("recorded/*.yaml")
 )
-
-
 # Lists of verdicts: the system takes 128 kB for a job's shell command, 2,800 of them.
 VERDICTS, OLDER_VERDICTS = ".snakemake/verdicts", ".snakemake/older-verdicts"
 
 
 def list_verdicts():
     """Write the lists of verdicts that the report reads: of this run, and older ones."""
-    codes = [verdict for verdict in CODES if solved_by(verdict) in RUN]
-    mine = [*map(verdict_of, RUN.values()), *codes]
-    for listed, verdicts in ((VERDICTS, mine), (OLDER_VERDICTS, OLDER)):
-        text = b"".join(os.fsencode(f"{verdict}\n") for verdict in verdicts)
-        Path(listed).write_bytes(text)
+    mine = ASKED + [verdict for verdict in CODES if verdict not in OLDER]
+    for file, verdicts in ((VERDICTS, mine), (OLDER_VERDICTS, OLDER)):
+        Path(file).write_text("".join(f"{verdict}\n" for verdict in verdicts))
 
 
 def of_family(w):
@@ -68,7 +65,7 @@ SAVED = [f"results/report/saved/{family}.json" for family in sorted(WHOLE)]
 # The time that a family saves by the work that it leaves out.
 rule saved:
     input:
-        lambda w: [results_of(job) for job in of_family(w)],
+        lambda w: [job.folder for job in of_family(w)],
     output:
         "results/report/saved/{family}.json",
     log:
@@ -89,7 +86,7 @@ rule saved:
 # would hide from Snakemake that the batch is another one.
 rule report:
     input:
-        solves=lambda w: [results_of(job) for job in RUN.values()],
+        solves=lambda w: [job.folder for job in RUN.values()],
         families=FAMILY_FILES + RECORDED,
         saved=SAVED,
     output:
@@ -107,7 +104,7 @@ rule report:
     threads: workflow.resource_settings.cores or 1
     # What is listed is a parameter: the report is written again when it changes.
     params:
-        verdicts=lambda w: [verdict_of(job) for job in RUN.values()],
+        verdicts=ASKED,
         others=OLDER + CODES,
         families=FAMILY_FILES,
         pages=PAGES,

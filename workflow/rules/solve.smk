@@ -2,28 +2,27 @@
 # there is one; its output and its cost.
 rule solve:
     input:
-        case=lambda w: existing(*files_of(BATCH[w.family, w.job])),
-        mesh=lambda w: mesh_folder(BATCH[w.family, w.job]),
+        files=lambda w: batch(w).inputs,
+        mesh=lambda w: batch(w).mesh_folder or [],
     output:
         directory("results/{family}/{job}"),
     log:
         "results/{family}/{job}/log",
-    priority: lambda w: seconds(BATCH[w.family, w.job])
+    priority: lambda w: seconds(batch(w))
     resources:
-        mem_mb=lambda w, attempt: memory(BATCH[w.family, w.job], attempt),
-        runtime=lambda w, attempt: minutes(BATCH[w.family, w.job], attempt),
+        mem_mb=lambda w, attempt: memory(batch(w), attempt),
+        runtime=lambda w, attempt: minutes(batch(w), attempt),
     params:
-        file=lambda w: BATCH[w.family, w.job].file,
-        mesh=lambda w: shlex.quote(mesh_file(BATCH[w.family, w.job])),
-        damaged=lambda w: is_damaged(f"results/{w.family}/{w.job}"),
+        case=lambda w: batch(w).file,
+        mesh=mesh_option,
+        options=lambda w: batch(w).options,
+        refusal=lambda w: shlex.quote(batch(w).refusal),
+        damaged=lambda w: is_damaged(batch(w)),
         program=SOLVER_HASH,
-        options=lambda w: options_of(BATCH[w.family, w.job]),
-        refusal=lambda w: shlex.quote(BATCH[w.family, w.job].refusal),
     message:
         "solve {wildcards.job}"
     shell:
-        "died=0; set -- {params.file:q} {params.options};"
-        ' if test -e {params.mesh}; then set -- "$@" --mesh {params.mesh}; fi;'
+        "died=0; set -- {params.case:q} {params.options} {params.mesh};"
         " if test -z {params.refusal}; then"
         ' warm {output:q}/benchmark solve "$@" $memory_check --verbose'
         " -o {output:q}/result.vtkhdf --verdict {output:q}/verdict.json"

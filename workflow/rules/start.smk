@@ -30,8 +30,10 @@ def take_lock():
 def remove_damaged():
     """Remove results that cannot be kept, so that Snakemake finds them missing."""
     for job in RUN.values():
-        for folder in filter(is_damaged, [results_of(job), *mesh_folder(job)]):
-            shutil.rmtree(folder)
+        if is_damaged(job):
+            shutil.rmtree(job.folder)
+        if is_damaged_mesh(job):
+            shutil.rmtree(job.mesh_folder)
 
 
 def note_interruption(*_):
