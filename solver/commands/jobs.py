@@ -30,7 +30,7 @@ _RESERVED = ["report", "meshes", "studies", "docs"]
 
 
 @dataclass(frozen=True)
-class Job:
+class BatchJob:
     """One job: the family, the case's name, its own name, its file, how it is solved.
 
     `mesh` holds the files of the user's own mesh, the one named in the case first, then those it
@@ -142,7 +142,7 @@ def check_names(folder: Path) -> None:
             raise InputError(path, "name", name, must)
 
 
-def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Job]:
+def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[BatchJob]:
     """The jobs of all case files in the folders, file by file.
 
     `variants`: where there may be hexahedra, once more with the other cut. A file that
@@ -153,7 +153,7 @@ def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[Job]:
         check_names(folder)
     listed = [list(jobs_of(file, variants)) for folder in folders for file in case_files(folder)]
     taken: dict[tuple[str, str], str] = {}
-    jobs: list[Job] = []
+    jobs: list[BatchJob] = []
     # A file that is called as its case goes before one that took a copied name.
     for found in sorted(listed, key=lambda found: found[0].case != Path(found[0].file).stem):
         owner = next((taken[job.key] for job in found if job.key in taken), None)
@@ -169,7 +169,7 @@ def families_in(cases: Path) -> dict[str, Path]:
     return {folder.name: folder for folder in folders if case_files(folder)}
 
 
-def find_job(name: str, cases: Path) -> Job:
+def find_job(name: str, cases: Path) -> BatchJob:
     """The job of that name in the families of a folder; InputError with near names."""
     folders = sorted(families_in(cases).values(), key=lambda f: not name.startswith(f.name))
     known: list[str] = []
@@ -204,11 +204,11 @@ def results_of(given: Path) -> list[Path]:
     return [Path(job.folder, "result.vtkhdf") for job in jobs_of(given)]
 
 
-def jobs_of(file: Path, variants: bool = False) -> Iterator[Job]:
+def jobs_of(file: Path, variants: bool = False) -> Iterator[BatchJob]:
     """The jobs of one case file."""
     from ..case.reader import load_case
 
-    alone = Job(file.resolve().parent.name, file.stem, file.stem, str(file), mesh=())
+    alone = BatchJob(file.resolve().parent.name, file.stem, file.stem, str(file), mesh=())
     try:
         case = load_case(file)
     except Exception:  # noqa: BLE001 -- whatever it is, the solve meets it again and reports it
@@ -217,7 +217,7 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[Job]:
     mesh, size = _mesh_files(case), _size(case)
     for cut in [None, _other_cut(case)] if variants and _may_hold_hexahedra(case) else [None]:
         for swap in [False, True] if case.directions == "both" else [False]:
-            yield Job(
+            yield BatchJob(
                 family=alone.family,
                 case=case.name,
                 name=job_name(case.name, swap, cut),
@@ -230,7 +230,7 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[Job]:
             )
 
 
-def _second(job: Job, owner: str, taken: dict[tuple[str, str], str]) -> Job:
+def _second(job: BatchJob, owner: str, taken: dict[tuple[str, str], str]) -> BatchJob:
     """The refused job of a file whose case has the name of another file's."""
     stem = Path(job.file).stem[:60]
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
@@ -239,7 +239,7 @@ def _second(job: Job, owner: str, taken: dict[tuple[str, str], str]) -> Job:
         f"{job.file}: name = {job.case!r}: already taken by {owner}; "
         "each case of a family needs a name of its own"
     )
-    return Job(job.family, name, name, job.file, mesh=(), refusal=refusal)
+    return BatchJob(job.family, name, name, job.file, mesh=(), refusal=refusal)
 
 
 def _may_hold_hexahedra(case: Case) -> bool:
