@@ -84,6 +84,7 @@ _NORMS = (
     ("pressure_inner", "pressure, two macro-elements inside", "contact_pressure"),
     ("half_width", "half-width of contact", "half_width"),
     ("peak", "peak pressure", "peak"),
+    ("traction_l2", "friction traction, L2", "friction_traction"),
     ("traction_means", "friction traction, macro-element means", "friction_traction"),
 )
 CHECKS: tuple[Check, ...] = (

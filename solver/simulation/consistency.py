@@ -124,6 +124,9 @@ def _zone(zone: ZoneResult, n: int, dim: int) -> Iterator[str]:
         yield from _nodal(zone.nodal, n)
     if zone.friction:
         yield from _friction(zone.friction, m, dim)
+        if (field := zone.friction.recovered) is not None and zone.recovered:
+            shape = (*zone.recovered.coefficients.shape, dim)
+            yield from _values("recovered traction", field, shape)
 
 
 def _faces(zone: ZoneResult, n: int, m: int) -> Iterator[str]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..case.solutions.base import ExactSolution
 from ..lac.cells.catalogue import cell_type
-from ..lac.cells.faces import FACE_POINTS, nodal_normals
+from ..lac.cells.faces import FACE_POINTS, nodal_normals, surface_points
 from ..lac.cells.gauss import gauss_rule
 from ..lac.cells.shape import shape_functions
 from ..mechanics.fem.faces import means_on_faces
@@ -33,6 +33,16 @@ def computed_pressure(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
             for name, nodes, owner in zone.faces
         ]
     )
+
+
+def computed_traction(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
+    """The computed traction of friction (k, dim) at the `surface_points` of a zone."""
+    assert zone.friction is not None
+    at, mean = surface_points(points, zone.faces), zone.friction.friction_traction
+    if zone.friction.recovered is None or zone.recovered is None:
+        return mean[at.macro]
+    psi = zone.recovered.shapes(at.macro, at.place[:, None])[:, 0]
+    return mean[at.macro] + np.einsum("qk,qkd->qd", psi, zone.friction.recovered[at.macro])
 
 
 def pressure_on(
@@ -128,7 +138,15 @@ class ExactValues:
         The solution has them for its first part: for the other one both change their sign.
         """
         mean = self._means(zone, lambda place: getattr(self.exact, quantity)(place).T).T
-        return mean if self.part[zone.slave_nodes[0]] == 0 else -mean
+        return self._side(zone) * mean
+
+    def friction_traction(self, zone: ZoneResult, places: np.ndarray) -> np.ndarray:
+        """The friction traction (k, dim) on the slave at places (k, dim)."""
+        return self._side(zone) * self.exact.friction_traction(places)
+
+    def _side(self, zone: ZoneResult) -> float:
+        """1 where the slave is the first part, else −1."""
+        return 1.0 if self.part[zone.slave_nodes[0]] == 0 else -1.0
 
     def ends_within(self, zone: ZoneResult) -> np.ndarray:
         """Which macro-elements (m,) the contact area covers in part only."""

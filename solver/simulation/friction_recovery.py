@@ -47,14 +47,19 @@ class _Loads:
         slide = zone.zone.friction * unit * slips[:, None]
         return cls(zone, fit_of(zone, closed), closed[zone.numbers] & ~slips, slide)
 
+    def tractions(self, values: np.ndarray) -> list[np.ndarray]:
+        """The coefficients (m · k,) of q* by tangent, for pressures and tractions of all rows."""
+        c = self.fit.coefficients(values).reshape(len(self.sticks), -1)
+        stuck = self.fit.recovery.reconstruction(self.sticks).matrix
+        along = [(slide[:, None] * c).ravel() for slide in self.slide.T]
+        return [a + stuck @ values[rows] for a, rows in zip(along, self.zone.slips, strict=True)]
+
     def force(self, values: np.ndarray) -> np.ndarray:
         """The forces (n_dofs,) by pressures and tractions (k,) of all rows."""
-        recovery, c = self.fit.recovery, self.fit.coefficients(values)
-        total = recovery.loads.T @ c
-        stuck = recovery.reconstruction(self.sticks).matrix
-        for k, (loads, rows) in enumerate(zip(recovery.slip_loads, self.zone.slips, strict=True)):
-            along = self.slide[:, [k]] * c.reshape(len(self.sticks), -1)
-            total = total + loads.T @ (along.ravel() + stuck @ values[rows])
+        recovery = self.fit.recovery
+        total = recovery.loads.T @ self.fit.coefficients(values)
+        for loads, c in zip(recovery.slip_loads, self.tractions(values), strict=True):
+            total = total + loads.T @ c
         return np.asarray(total)
 
 
@@ -106,6 +111,7 @@ def solve_and_recover(
             coefficients=each.fit.read(found.pressure, each.fit.coefficients(values)),
             degree=each.fit.reconstruction.degree,
             force=force,
+            tractions=each.tractions(values),
         )
         for each, force in zip(loads, forces, strict=True)
     }

@@ -5,6 +5,7 @@ in full, so that means and loads are in equilibrium with the displacement.
 """
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +48,8 @@ class ZoneFit:
 class RecoveredZone:
     """A zone's reconstruction: `coefficients` (m · k,), `degree` (m,), by the form of a `name`.
 
-    `force` (n_dofs,): what its loads add to the contact forces of the means.
+    `force` (n_dofs,): what its loads add to the contact forces of the means. With friction
+    `tractions` are the coefficients (m · k,) of the traction on the master, by tangent.
     """
 
     name: str
@@ -55,6 +57,7 @@ class RecoveredZone:
     coefficients: np.ndarray
     degree: np.ndarray
     force: np.ndarray
+    tractions: Sequence[np.ndarray] = ()
 
     @property
     def error(self) -> np.ndarray:

@@ -294,7 +294,7 @@ def _zone_result(
         pressure_error=None if field is None else field.error,
         recovered=_recovered_pressure(scene, zone, state, field),
         resultants=step.resultants[zone.zone.name],
-        friction=zone_friction(zone, state),
+        friction=zone_friction(zone, state, field),
     )
 
 

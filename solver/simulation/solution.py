@@ -79,12 +79,16 @@ class RecoveredPressure:
     nodes: np.ndarray
     at_nodes: np.ndarray
 
-    def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
+    def shapes(self, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """ψ (s, q, k) on macro-elements (s,) at points (s, q, dim)."""
         from ..lac.reconstruction import FORMS, Local
 
         local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
-        psi = local.shapes(macro, places, FORMS[self.form])
+        return local.shapes(macro, places, FORMS[self.form])
+
+    def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
+        psi = self.shapes(macro, places)
         return mean[macro][:, None] + np.einsum("sqk,sk->sq", psi, self.coefficients[macro])
 
 
@@ -93,13 +97,15 @@ class ZoneFriction:
     """Friction by macro-element (m,) in the last step.
 
     `friction_traction` (m, dim) on the slave; `slip` (m, dim) of the master relative to the slave
-    in the step, `slip_total` in all steps; `status` (m,): 0 open, 1 stick, 2 slip.
+    in the step, `slip_total` in all steps; `status` (m,): 0 open, 1 stick, 2 slip. `recovered`
+    (m, k, dim): coefficients of the recovered traction, of the functions of the recovered pressure.
     """
 
     friction_traction: np.ndarray
     slip: np.ndarray
     slip_total: np.ndarray
     status: np.ndarray
+    recovered: np.ndarray | None = None
 
 
 @dataclass

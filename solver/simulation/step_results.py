@@ -5,7 +5,7 @@ import numpy as np
 from ..lac.facets import tangents_of
 from .balance import reactions, rigid_bodies
 from .equilibrium import Equilibrium
-from .recovery import Recovered
+from .recovery import Recovered, RecoveredZone
 from .resultants import resultants
 from .scene import Scene, ZoneScene
 from .solution import StepResult, ZoneFriction
@@ -82,7 +82,9 @@ def stress_scale(scene: Scene, states: list[Equilibrium], stress: np.ndarray) ->
     return max(values, default=0.0) or float(max(largest)) or 1.0
 
 
-def zone_friction(zone: ZoneScene, state: Equilibrium) -> ZoneFriction | None:
+def zone_friction(
+    zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
+) -> ZoneFriction | None:
     """Traction, slip and status of a zone; None without friction."""
     if not zone.slips or state.friction is None:
         return None
@@ -91,10 +93,14 @@ def zone_friction(zone: ZoneScene, state: Equilibrium) -> ZoneFriction | None:
     def in_space(values: np.ndarray) -> np.ndarray:
         return np.einsum("mkd,km->md", tangents, np.array([values[rows] for rows in zone.slips]))
 
-    closed = state.status.closed[zone.numbers]
+    closed, recovered = state.status.closed[zone.numbers], None
+    if field is not None and len(field.tractions):
+        coefficients = -np.array(field.tractions).reshape(len(zone.slips), len(closed), -1)
+        recovered = np.einsum("mtd,tmk->mkd", tangents, coefficients)
     return ZoneFriction(
         friction_traction=in_space(-state.pressure),
         slip=in_space(state.gap),
         slip_total=in_space(state.friction.total),
         status=closed.astype(int) + (closed & state.friction.slipping[zone.numbers]),
+        recovered=recovered,
     )

@@ -17,13 +17,15 @@ in cells in mixed form):
                                                              at nodes (see `oscillation`)
     pressure_inner        largest |p_h − p̄| / largest p      except on the last two macro-elements
                                                              at each end of the contact
-    traction_means        |t_h − t̄| / |t̄|                    t: traction of friction
+    traction_l2           |t_h − t| / |t|                    t: traction of friction
+    traction_means        |t_h − t̄| / |t̄|
     half_width, peak      of the half ellipse of p_h (Hertz): from its second moment, and fitted
                           within 0.8 of the half-width found; of other shapes from the moment alone
 
 In pressure_l2, pressure_max and half_width p_h is the field that the treatment of the interface
 solves for: constant on each macro-element, or what is recovered from the constants, or, with
 multipliers at nodes, interpolated between these; in the others its mean over each macro-element.
+In traction_l2 t_h is constant or recovered too.
 
 Volume integrals use Gauss points two more each way than the degree of the cell, so that the
 quadrature is no part of what is seen.
@@ -47,7 +49,7 @@ from ..lac.threads import prefetch
 from ..mechanics.fem import cell_loops
 from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop
 from ..mechanics.fem.faces import pieces
-from ..simulation.exact import ExactValues, computed_pressure
+from ..simulation.exact import ExactValues, computed_pressure, computed_traction
 from ..simulation.solution import Solution, ZoneResult
 from .oscillation import grown, macro_neighbours, oscillation
 
@@ -184,22 +186,27 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
         "pressure_inner": _over(inner, highest),
     }
     if "friction_traction" in exact.quantities:
-        found["traction_means"] = _traction_error(solution, exact)
+        found |= _traction_errors(solution, exact)
     if "half_width" in exact.quantities:
         found |= _ellipse_errors(solution, exact)
     return found
 
 
-def _traction_error(solution: Solution, exact: ExactSolution) -> float:
-    squares = np.zeros(2)
+def _traction_errors(solution: Solution, exact: ExactSolution) -> dict[str, float]:
+    squares, means = np.zeros(2), np.zeros(2)
     for zone in solution.zones:
         if zone.friction is None:
             continue
-        mean = ExactValues(solution, exact).of_friction(zone, "friction_traction")
-        weight = zone.area * zone.coverage
+        values = ExactValues(solution, exact)
+        mean, weight = values.of_friction(zone, "friction_traction"), zone.area * zone.coverage
         error = zone.friction.friction_traction - mean
-        squares += _integral(weight, error), _integral(weight, mean)
-    return _root(*squares)
+        means += _integral(weight, error), _integral(weight, mean)
+        at = surface_points(solution.mesh.points, zone.faces, solution.case.axisymmetric)
+        traction = values.friction_traction(zone, at.place)
+        weight = at.weight * zone.coverage[at.macro]
+        error = computed_traction(solution.mesh.points, zone) - traction
+        squares += _integral(weight, error), _integral(weight, traction)
+    return {"traction_l2": _root(*squares), "traction_means": _root(*means)}
 
 
 def _pressures(

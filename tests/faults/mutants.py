@@ -369,6 +369,9 @@ MUTANTS = (
     Mutant("slide-lost", "friction of a recovered pressure is that of the constants", RECOVERED,
            "solver.simulation.friction_recovery:_Loads.of",
            changed(lambda loads: replace(loads, slide=0 * loads.slide))),
+    Mutant("traction-unrecovered", "the recovered traction is that on the master", RECOVERED,
+           "solver.simulation.simulate:zone_friction",
+           changed(lambda f: f and replace(f, recovered=-f.recovered))),
     Mutant("work-halved", "friction does half the work, as if it grew with the slip", STEPWISE,
            "solver.simulation.friction:_work", changed(lambda work: work / 2)),
 )  # fmt: skip
