@@ -172,7 +172,7 @@ def gap_operator(
         plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
         recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
         slip=slip_operator(parts, surface.normal, n_nodes) if scheme.slip else (),
-        levers=levers(parts, surface.normal) if scheme.slip else None,
+        levers=levers(found, surface.normal) if scheme.slip else None,
     )
 
 

@@ -15,6 +15,7 @@ D. G. Anderson, J. ACM 12 (1965) 547–560, for the combination.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from .facets import tangents_of
 from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
 from .surface_points import Surface
-from .tangential import along_faces
+from .tangential import along_faces, levers
 
 # The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
 _RELAXATION = 0.87
@@ -87,8 +88,8 @@ class Recovery:
     """The recovery of the pressure on m macro-elements by functions ψ, k on each.
 
     `near` (m, m): which of them may be neighbours; `loads` (m · k, n_dofs): ∫ ψ (N_master −
-    N_slave) n dS, none for a constant ψ; `slip_loads`: the same with each tangent in place of n;
-    `products` (m, k, k): ∫ ψ ψᵀ dS.
+    N_slave) n dS, none for a constant ψ; `slip_loads`: the same with each tangent in place of n,
+    `levers` their couples (see `tangential.levers`); `products` (m, k, k): ∫ ψ ψᵀ dS.
     """
 
     form: Form
@@ -98,6 +99,7 @@ class Recovery:
     products: np.ndarray
     stabilisation: Any = None
     slip_loads: tuple[sparse.csr_matrix, ...] = ()
+    levers: np.ndarray | None = None
 
     def reconstruction(self, closed: np.ndarray) -> Reconstruction:
         """The reconstruction among closed macro-elements (m,)."""
@@ -137,37 +139,43 @@ def recovery(
         weighted = segments.weight[..., None] * psi
         np.add.at(products, segments.macro, np.einsum("sqk,sql->skl", weighted, psi))
     tangents = np.swapaxes(tangents_of(surface.normal), 0, 1) if asked.slip else ()
-    near = _same_materials(asked, found)
+    near, applied = _same_materials(asked, found), partial(_applied, local=at.local, form=form)
+    given = found if form.sweeps else ()
     stabilise, shape = asked.stabilise, (m * k, dim * n_nodes)
     return Recovery(
         form=form,
         moments=at,
         near=near,
-        loads=_loads(found, at.local, form, shape),
+        loads=_loads(given, applied, m, shape),
         products=products,
-        slip_loads=tuple(_loads(found, at.local, form, shape, t) for t in tangents),
+        slip_loads=tuple(_loads(given, applied, m, shape, t) for t in tangents),
+        levers=levers(given, surface.normal, applied) if asked.slip else None,
         stabilisation=stabilise and stabilise(found, at, near, surface.covered),
     )
 
 
+def _applied(segments: Segments, local: Local, form: Form) -> np.ndarray:
+    """The ψ (s, q, k or k − 1) at the points of segments, without a constant."""
+    psi = local.shapes(segments.macro, segments.points, form)
+    return psi[..., : psi.shape[-1] - (not form.keeps_means)]
+
+
 def _loads(
     found: Sequence[Segments],
-    local: Local,
-    form: Form,
+    applied: Callable[[Segments], np.ndarray],
+    m: int,
     shape: tuple[int, int],
     tangents: np.ndarray | None = None,
 ) -> sparse.csr_matrix:
     """∫ ψ (N_master − N_slave) n dS (m · k, n_dofs), or with `tangents` (m, dim) in place of n."""
     rows, columns, values = [], [], []
-    dim = local.centre.shape[1]
-    k = form.count(dim)
-    for segments in found if form.sweeps else ():
-        psi = local.shapes(segments.macro, segments.points, form)
-        applied = segments.weight[..., None] * psi[..., : k - (not form.keeps_means)]
+    for segments in found:
+        weighted = segments.weight[..., None] * applied(segments)
         along = segments.normal if tangents is None else along_faces(segments, tangents)
-        row = segments.macro[:, None] * k + np.arange(applied.shape[-1])
+        row = segments.macro[:, None] * (shape[0] // m) + np.arange(weighted.shape[-1])
+        dim = along.shape[-1]
         for sign, side in zip((-1.0, 1.0), segments.sides, strict=True):
-            part = np.einsum("sqk,sqa,sqd->skad", sign * applied, side.values, along)
+            part = np.einsum("sqk,sqa,sqd->skad", sign * weighted, side.values, along)
             column = dim * side.nodes[:, :, None] + np.arange(dim)
             rows.append(np.broadcast_to(row[:, :, None, None], part.shape).ravel())
             columns.append(np.broadcast_to(column[:, None], part.shape).ravel())

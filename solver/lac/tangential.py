@@ -6,7 +6,7 @@ Rows are integrated at the points of the gap operator. Where a segment is flat t
 integrals ∫ N times t, so that a uniform shear acts on both sides as on whole faces.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,28 +19,33 @@ from .segments import Segments
 _FLAT = 1e-12
 
 
-def levers(parts: Sequence[Integrals], normal: np.ndarray) -> np.ndarray:
-    """The couples (dim − 1, m, 3) ∫ g n × t dS of unit tractions, by tangent.
+def levers(
+    found: Sequence[Segments],
+    normal: np.ndarray,
+    functions: Callable[[Segments], np.ndarray] = lambda s: np.ones((*s.weight.shape, 1)),
+) -> np.ndarray:
+    """The couples (dim − 1, m, k, 3) ∫ ψ g n × t dS of tractions ψ, by tangent.
 
-    Tractions act on both surfaces where these are meshed, a gap g apart.
+    Tractions act on both surfaces where these are meshed, a gap g apart. `functions` are the ψ
+    (s, q, k) at the points of segments.
 
     The edges are 1/2 apart over a length of 2, n × t is the axis across the plane:
 
     >>> (segments,) = intersect([slave], 0, [master], 1.0)
-    >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
-    >>> part = integrals(constants(data), segments)
-    >>> levers([part], np.array([[0.0, 1.0]]))[0].round(15).tolist()
-    [[0.0, 0.0, 1.0]]
+    >>> levers([segments], np.array([[0.0, 1.0]]))[0].round(15).tolist()
+    [[[0.0, 0.0, 1.0]]]
     """
-    dim = normal.shape[1]
-    found = np.zeros((dim - 1, len(normal), 3))
-    for k, tangents in enumerate(np.swapaxes(tangents_of(normal), 0, 1)):
-        for segments in (part.segments for part in parts):
+    m, dim = normal.shape
+    given = [(segments, functions(segments)) for segments in found]
+    couples = np.zeros((dim - 1, m, given[0][1].shape[-1] if given else 1, 3))
+    for by_macro, tangents in zip(couples, np.swapaxes(tangents_of(normal), 0, 1), strict=True):
+        for segments, psi in given:
             pair = segments.normal, along_faces(segments, tangents)
             n, t = (np.pad(v, [(0, 0), (0, 0), (0, 3 - dim)]) for v in pair)
-            couple = np.einsum("sq,sqd->sd", segments.weight * segments.gap, np.cross(n, t))
-            np.add.at(found[k], segments.macro, couple)
-    return found
+            weight = segments.weight * segments.gap
+            couple = np.einsum("sq,sqk,sqd->skd", weight, psi, np.cross(n, t))
+            np.add.at(by_macro, segments.macro, couple)
+    return couples
 
 
 def along_faces(segments: Segments, tangents: np.ndarray) -> np.ndarray:

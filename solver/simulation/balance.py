@@ -32,17 +32,17 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         forces = zone.forces(state.pressure).reshape(points.shape)
         by_zone[zone.zone.name] = forces, zone.couple(state.pressure)
         contact += forces
-    couple = sum((each for _, each in by_zone.values()), np.zeros(3))
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
     if not state.force.any():
         stress = stress_of_motion(scene.case, scene.length, state.displacement)
         scale = max(scale, stress * scene.length ** (scene.space - 1)) or 1.0
     result: dict[str, float] = {}
     if state.correction.any():
-        by_zone["correction of the pressure"] = state.correction, np.zeros(3)
+        by_zone["correction of the pressure"] = state.correction, state.couple
         contact += state.correction
     for name, (forces, own) in by_zone.items():
         result |= _both(f"zone {name}", points, forces, own, scale, scene.length, around)
+    couple = sum((each for _, each in by_zone.values()), np.zeros(3))
     held, free_part = _unbalanced(scene, state, contact)
     whole = held + state.force + _of_springs(state)
     result |= _both("reactions and loads", points, whole, -couple, scale, scene.length, around)

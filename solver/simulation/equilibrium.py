@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,8 +40,9 @@ class Equilibrium:
 
     `residual` is relative to `force_scale`, the size of the forces at work. Fields are those of the
     `iterate`. `correction` (n, dim) are the contact forces beside those of the pressures, of a
-    recovered pressure. With `friction`, the rows of slip have the tractions on the master as
-    pressures, and the slips of the step as gaps.
+    recovered pressure; `couple` (3,) is that of their tractions on surfaces that are apart. With
+    `friction`, the rows of slip have the tractions on the master as pressures, and the slips of the
+    step as gaps.
     """
 
     iterate: ContactIterate
@@ -51,6 +53,7 @@ class Equilibrium:
     accuracy: Accuracy
     correction: np.ndarray
     friction: Friction | None = None
+    couple: np.ndarray = field(default_factory=partial(np.zeros, 3))
 
     @property
     def pressure(self) -> np.ndarray:

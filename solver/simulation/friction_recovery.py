@@ -7,7 +7,7 @@ sweeps are those of `lac.recovery`; each solves for the state under the loads of
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,13 @@ class _Loads:
         stuck = self.fit.recovery.reconstruction(self.sticks).matrix
         along = [(slide[:, None] * c).ravel() for slide in self.slide.T]
         return [a + stuck @ values[rows] for a, rows in zip(along, self.zone.slips, strict=True)]
+
+    def couple(self, values: np.ndarray) -> np.ndarray:
+        """The couple (3,) of q* − q where the surfaces are meshed apart."""
+        levers, m = self.fit.recovery.levers, len(self.sticks)
+        assert levers is not None
+        applied = [c.reshape(m, -1)[:, : levers.shape[2]] for c in self.tractions(values)]
+        return np.einsum("tmk,tmkd->d", applied, levers)
 
     def force(self, values: np.ndarray) -> np.ndarray:
         """The forces (n_dofs,) by pressures and tractions (k,) of all rows."""
@@ -100,7 +107,8 @@ def solve_and_recover(
         values = settled_means(state.pressure, nothing, sweeps, added, change)
         loads = [_Loads.of(zone, latest) for zone in given]
         forces = [each.force(values) for each in loads]
-        found = under(sum(forces, nothing))
+        couples = (each.couple(values) for each in loads)
+        found = replace(under(sum(forces, nothing)), couple=sum(couples, np.zeros(3)))
     except _UnsettledError:
         _LOG.info("recovery: friction does not settle; pressure and traction stay constant by face")
         return state, {}

@@ -63,8 +63,6 @@ def operator_of(
             slaves, masters = ([_as_bent(block) for block in side] for side in (slaves, masters))
     asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
     operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
-    if asked and asked.slip and asked.form.sweeps:
-        _refuse_apart(groups, zone, operator, noise)
     return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
 
 
@@ -73,15 +71,6 @@ def _without_segments(scheme: Scheme, surface: Quadric) -> Scheme:
     sample = partial(gauss, n=FACE_POINTS) if scheme.sample is face_samples else scheme.sample
     meet = partial(meet_quadric, surface)
     return replace(scheme, sample=sample, meet=meet, closure=False, nearest=False)
-
-
-def _refuse_apart(groups: Attributes, zone: Zone, operator: GapOperator, noise: float) -> None:
-    """The couple of a recovered traction between surfaces that are meshed apart is not known."""
-    if (np.abs(operator.initial) > noise * operator.covered).any():
-        allowed = "with friction the surfaces must be meshed without a gap, or have a clearance; "
-        allowed += "allowed here: none"
-        key = f"contact[{groups.case.zones.index(zone)}].recovery"
-        raise InputError(groups.case.path, key, zone.recovery, allowed)
 
 
 def _refuse_sharp(groups: Attributes, zone: Zone, masters: list[Facets]) -> None:

@@ -88,7 +88,7 @@ class ZoneScene:
         if self.operator.levers is None:
             return np.zeros(3)
         pairs = zip(self.operator.levers, self.slips, strict=True)
-        return np.sum([values[rows] @ lever for lever, rows in pairs], axis=0)
+        return np.sum([values[rows] @ lever[:, 0] for lever, rows in pairs], axis=0)
 
     def by_macro_element(self, values: np.ndarray) -> np.ndarray:
         """Values (k,) of all multipliers averaged over each macro-element of the zone (m,)."""
