@@ -16,9 +16,9 @@ from ...lac.errors import SolveError
 from .choice import LinearSolver, prepare
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .direct import Factor, factorise
-from .hierarchy import Shared
 from .krylov import EPSILON
 from .nodal_matrix import Stiffness
+from .shared import Shared
 from .unknowns import Unknowns
 
 # A step leaves about 1 / (w λ) of a violation, with the smallest eigenvalue λ of Ĝ D⁻¹ Ĝᵀ, whose

@@ -1,6 +1,7 @@
 """The linear solver for a positive definite system, chosen by size and dimension."""
 
 import logging
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import diags
@@ -8,10 +9,12 @@ from scipy.sparse import diags
 from ...lac.errors import SolveError
 from .condensed_matrix import Symmetric
 from .direct import Factor, factorise, wanted
-from .hierarchy import Shared
 from .krylov import EPSILON
-from .multigrid import Multigrid
+from .shared import Shared
 from .unknowns import Unknowns
+
+if TYPE_CHECKING:
+    from .multigrid import Multigrid
 
 _LOG = logging.getLogger(__name__)
 
@@ -34,7 +37,7 @@ class LinearSolver:
     round-off: what it solves is a solution only if refinement converges.
     """
 
-    def __init__(self, matrix: Symmetric, solver: Factor | Multigrid | None, why: str):
+    def __init__(self, matrix: Symmetric, solver: "Factor | Multigrid | None", why: str):
         """Without a `solver` the matrix is factored."""
         self._matrix, self._why = matrix, why
         self.gave_up = self.warning = ""
@@ -110,6 +113,8 @@ def prepare(
     against = gave_up or against_multigrid(size, unknowns)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
+        from .multigrid import Multigrid  # only where it solves
+
         why = f"{MULTIGRID_FROM} unknowns or more in 3D: faster and smaller than a factor"
         try:
             solver = Multigrid(matrix, unknowns, shared)

@@ -17,9 +17,9 @@ from scipy import sparse
 from ...lac.errors import SolveError
 from .choice import LinearSolver, prepare
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .hierarchy import Shared
 from .krylov import EPSILON, ROUGH
 from .nodal_matrix import Stiffness
+from .shared import Shared
 from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)

@@ -188,28 +188,6 @@ class Hierarchy:
         return below, replace(nodes, motions=motions)
 
 
-class Shared:
-    """The hierarchy of one stiffness matrix, set up once for all contact statuses.
-
-    `slow`: whether iterations were so slow that coarse levels take two steps each from then on.
-    """
-
-    def __init__(self) -> None:
-        """Nothing is set up yet."""
-        self._hierarchy: Hierarchy | None = None
-        self.slow = False
-
-    def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
-        """The hierarchy of `matrix`, the same at each call until it is closed."""
-        if self._hierarchy is None:
-            self._hierarchy = Hierarchy(matrix, unknowns)
-        return self._hierarchy
-
-    def close(self) -> None:
-        """Release its memory."""
-        self._hierarchy = None
-
-
 def _bound_of(matrix: bsr_matrix) -> np.float32:
     return eigenvalue_bound(partial(multiply, matrix), matrix.shape[0])
 

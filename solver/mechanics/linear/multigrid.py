@@ -21,11 +21,12 @@ from ...lac.errors import SolveError
 from ...lac.threads import prefetch
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .contact_levels import Correction, correction_of
-from .hierarchy import Hierarchy, Level, Shared
+from .hierarchy import Hierarchy, Level
 from .krylov import EPSILON, by_columns, conjugate_gradients, in_single, two_steps
 from .nodal_matrix import NodalMatrix
 from .products import multiply, multiply_transposed
 from .scaled_system import ScaledSystem
+from .shared import Shared
 from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)

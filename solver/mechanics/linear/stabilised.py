@@ -13,9 +13,9 @@ from scipy import sparse
 
 from .choice import LinearSolver
 from .condensation import CondensedSystem, condense
-from .hierarchy import Shared
 from .krylov import EPSILON
 from .nodal_matrix import Stiffness
+from .shared import Shared
 from .unknowns import Unknowns
 
 

@@ -15,9 +15,9 @@ from ..fem.bodies import joined_bodies
 from .augmented import augment
 from .choice import LinearSolver
 from .condensation import ConstrainedSystem, condense
-from .hierarchy import Shared
 from .krylov import EPSILON
 from .nodal_matrix import Stiffness
+from .shared import Shared
 from .stabilised import Compliance, stabilise
 from .unknowns import Unknowns
 
