@@ -130,15 +130,6 @@ CHECKS: tuple[Check, ...] = (
         scale="load",
     ),
     Check(
-        "mean_gap",
-        "mean gap of a zone, relative to the block size",
-        key="gap",
-        sample="mean_gap",
-        scale="block_size",
-        tolerance=GAP,
-        fixed=True,
-    ),
-    Check(
         "element_gap",
         "average gap of every contact element, relative to the block size",
         alias="CONT_ELEM/JEU",

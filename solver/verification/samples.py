@@ -98,13 +98,6 @@ def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     return _at_macro_elements(zone.gap, evaluate(reference, zone.centre))
 
 
-def mean_gap(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
-    """The mean gap of a zone."""
-    each, weight = gap(solution, zone, reference), zone.area / zone.area.sum()
-    means = (np.array([weight @ values]) for values in (each.values, each.reference))
-    return Sample(*means, "zone {}".format)
-
-
 def status(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """Closed where the reference presses.
 
