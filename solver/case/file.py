@@ -179,7 +179,6 @@ class ZoneKeys(Section, frozen=True):
     friction: Coulomb's coefficient of friction; the steps are then a path
     interference: initial overlap of bodies that are modelled without it; subtracted from the gap
     clearance: the initial gap, which replaces the gap between the meshed faces
-    start: the status that the search starts from: a guess by the loads, or all closed
     """
 
     slave: Groups
@@ -197,7 +196,6 @@ class ZoneKeys(Section, frozen=True):
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
     clearance: Scalar | None = None
-    start: Literal["guess", "closed"] = "guess"
 
 
 class ObservationKeys(Section, frozen=True):

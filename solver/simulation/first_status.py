@@ -26,9 +26,6 @@ def first_guess(
     while free_motion(guess) and nearer < _NEAREST:
         nearer *= _NEARER
         guess = _likely(scene, constraints, step, nearer)
-    for zone in scene.zones:
-        if zone.zone.start == "closed":
-            guess[zone.numbers] = constraints.closable[zone.numbers]
     return constraints.closable if free_motion(guess) else guess
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from solver.lac import operator
 from solver.lac.pairing import candidate_pairs
@@ -105,9 +104,3 @@ def test_a_receding_contact_starts_from_the_last_status(problem):
     start = np.arange(len(constraints.initial)) % 3 == 0
     found = moved(start, 0.3, 1.0, problem.scene, constraints, lambda closed: "")
     np.testing.assert_array_equal(found, start)
-
-
-def test_a_zone_may_start_closed(problem):
-    zones = [replace(z, zone=structs.replace(z.zone, start="closed")) for z in problem.scene.zones]
-    found = first_guess(replace(problem.scene, zones=zones), problem.constraints, 0.3, lambda _: "")
-    np.testing.assert_array_equal(found, problem.constraints.closable)
