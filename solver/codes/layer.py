@@ -15,11 +15,6 @@ from ..case.solutions.base import ExactSolution, Part
 from ..lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
 
 LAYER = "whole layer"
-# The cell of one layer over each plane one.
-_OVER = {
-    "SEG2": "QUAD4", "SEG3": "QUAD8", "TRIA3": "PENTA6", "TRIA6": "PENTA15",
-    "QUAD4": "HEXA8", "QUAD8": "HEXA20", "QUAD9": "HEXA27",
-}  # fmt: skip
 
 
 def as_layer(case: Case, mesh: meshio.Mesh) -> tuple[Case, meshio.Mesh]:
@@ -32,7 +27,7 @@ def as_layer(case: Case, mesh: meshio.Mesh) -> tuple[Case, meshio.Mesh]:
     count = sum(len(data) for name, data in cells if BY_MESHIO[name].dim == 2)
     thickness = float(np.sqrt(np.ptp(mesh.points, axis=0).prod() / count))
     kinds = [(BY_MESHIO[name], data) for name, data in cells]
-    raised = [(over(kind).meshio, _raise(kind, data, n)) for kind, data in kinds]
+    raised = [(kind.layer.meshio, _raise(kind, data, n)) for kind, data in kinds]
     used = np.zeros(3 * n, dtype=bool)
     used[: 2 * n] = True
     for name, data in raised:
@@ -88,11 +83,6 @@ class _Plane(ExactSolution):
         return self.plane.body_part(nodes[:, :2])
 
 
-def over(kind: CellType) -> CellType:
-    """The type of the cells of one layer over plane ones or faces."""
-    return BY_NAME[_OVER[kind.name]]
-
-
 def _raise(kind: CellType, data: np.ndarray, n: int) -> np.ndarray:
     """The cells over plane ones (m, nodes); node i is in the faces as i and n + i, else 2 n + i."""
     nodes = [data[:, node] + n * level for node, level in columns(kind.name)]
@@ -102,7 +92,7 @@ def _raise(kind: CellType, data: np.ndarray, n: int) -> np.ndarray:
 @cache
 def columns(name: str) -> list[tuple[int, int]]:
     """For each node of the raised cell: the plane cell's node, and 0 below, 1 above, 2 between."""
-    plane, raised = BY_NAME[name], BY_NAME[_OVER[name]]
+    plane, raised = BY_NAME[name], BY_NAME[name].layer
     own = {frozenset(owners): i for i, owners in enumerate(plane.owners)}
     if plane.dim == 1:
         # Around the face: along the line, up, back, down.

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..case.material import Material
 from ..lac.cells.faces import FaceBlock, nodal_normals
 from .deck import Deck, PairedFaces, UnsupportedError
-from .layer import columns, over
+from .layer import columns
 
 # Thickness over the extent of the model, and stiffness over the softest body's.
 _THIN, _SOFT = 1e-3, 1e-6
@@ -95,7 +95,7 @@ def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
     new, points = np.tile(nodes, 3)[used], places.reshape(-1, deck.points.shape[1])[used]
     cells, material, slave = dict(deck.cells), dict(deck.material), []
     for block, rows in zip(pair.slave, raised, strict=True):
-        kind = over(block.type)
+        kind = block.type.layer
         before = cells.get(kind.name, np.empty((0, kind.n_nodes), dtype=int))
         numbers = material.get(kind.name, np.empty(0, dtype=int))
         cells[kind.name] = np.concatenate([before, label[rows]])
@@ -161,5 +161,5 @@ def _columns(block: FaceBlock) -> list[tuple[int, int]]:
     """For each node of the cell over a face: the face's node, and its level."""
     found = columns(block.type.name)
     # A line turned outward has the outside on its right; the cell over it is on its left.
-    mirror = over(block.type).mirror if block.type.dim == 1 else range(len(found))
+    mirror = block.type.layer.mirror if block.type.dim == 1 else range(len(found))
     return [found[node] for node in mirror]

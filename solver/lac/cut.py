@@ -243,7 +243,7 @@ def _template(name: str, pattern: Pattern) -> _Template:
         corners = face.nodes[: cell_type(face.type).n_vertices]
         carrier = next(p for p in pieces if any(set(f) == set(corners) for f in _faces(p)))
         pieces.remove(carrier)
-        cutter = _cutter(carrier, into_hexahedra or name == "HEXA27")
+        cutter = _cutter(carrier, into_hexahedra or kind.centred)
         new_pieces, new_faces = cutter(carrier, corners, places)
         pieces += new_pieces
         sub_faces.append(new_faces)
@@ -361,10 +361,8 @@ def _promote(
 
     def full(cell: Cell) -> tuple[str, list[int]]:
         skeleton, vertices = cell
-        name = skeleton if kind.order == 1 else _QUADRATIC[skeleton]
-        name = _CENTRED.get(name, name) if kind.name in _CENTRED.values() else name
-        owners = BY_NAME[name].owners
-        return name, [number(frozenset(vertices[i] for i in owner)) for owner in owners]
+        own = cell_type(skeleton).of(kind.order, kind.centred)
+        return own.name, [number(frozenset(vertices[i] for i in owner)) for owner in own.owners]
 
     for vertex in range(len(places)):
         number(frozenset([vertex]))
@@ -375,15 +373,3 @@ def _promote(
         middles=np.array(middles, dtype=int),
         new_edges=np.array(new_edges, dtype=int).reshape(-1, 2),
     )
-
-
-_QUADRATIC = {
-    "SEG2": "SEG3",
-    "TRIA3": "TRIA6",
-    "QUAD4": "QUAD8",
-    "TETRA4": "TETRA10",
-    "HEXA8": "HEXA20",
-    "PENTA6": "PENTA15",
-    "PYRA5": "PYRA13",
-}
-_CENTRED = {"QUAD8": "QUAD9", "HEXA20": "HEXA27"}

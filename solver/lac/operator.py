@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from .cells.quadrature import mortar_degree
+from .cells.catalogue import cell_type
 from .closure import MASTER, SLAVE, Integrals, close_faces, integrals
 from .facets import Facets, tangents_of
 from .multipliers import (
@@ -83,7 +83,7 @@ def meet_in_segments(
     """
     found = []
     for a, slave in enumerate(slaves):
-        more = mortar_degree(slave.type.skeleton) if weighted else degree
+        more = cell_type(slave.type.skeleton).degree if weighted else degree
         found += intersect(slaves, a, masters, reach, more, None if among is None else among[a])
     return found
 

@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 
 from .cells.faces import circumference
-from .cells.quadrature import mortar_degree, simplex_rule
+from .cells.quadrature import simplex_rule
 from .cells.shape import shape_functions
 from .cells.small_matrices import invert
 from .clipping import clip, overlap
@@ -189,7 +189,7 @@ def _looks_straight(corner: np.ndarray, bulge: np.ndarray) -> np.ndarray:
 
 def _degree(pairs: Pairs) -> int:
     kinds = [pairs.slave.type, *(block.type for block in pairs.masters)]
-    degree = max(mortar_degree(kind.name) for kind in kinds)
+    degree = max(kind.degree for kind in kinds)
     affine = pairs.slave.affine[pairs.i].all() and pairs.outline.affine[pairs.j].all()
     plain = affine and pairs.slave.directions is None
     # The radius of a ring is one more degree.

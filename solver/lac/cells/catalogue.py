@@ -26,7 +26,8 @@ class CellType:
     `meshio`, `vtk`, `gmsh`, `med`: its name or number there; `nodes` (n_nodes, dim) are the
     reference coordinates; `owners` the vertices in whose middle each node lies; `edges` the vertex
     pairs, in the order of the mid-edge nodes; `mirror` the node permutation that reverses the
-    orientation; `skeleton` the name of the linear type with the same vertices.
+    orientation; `skeleton` the name of the linear type with the same vertices; `centred`: whether a
+    node lies in the middle.
     """
 
     name: str
@@ -41,6 +42,7 @@ class CellType:
     edges: tuple[tuple[int, int], ...]
     faces: tuple[Face, ...]
     mirror: tuple[int, ...]
+    centred: bool
 
     @property
     def dim(self) -> int:
@@ -56,6 +58,23 @@ class CellType:
     def n_vertices(self) -> int:
         """Number of vertices; they come first in the node order."""
         return len(_SHAPES[_shape_of(self.name)].vertices)
+
+    @property
+    def degree(self) -> int:
+        """The degree of the shape functions of an edge or a face, in both directions together."""
+        if self.n_vertices < 4:
+            return self.order
+        return 2 * self.order - (self.order == 2 and not self.centred)
+
+    @property
+    def layer(self) -> "CellType":
+        """The type of the cells of one layer over cells of this type."""
+        over = {"SEG": "QUAD", "TRIA": "PENTA", "QUAD": "HEXA"}[_shape_of(self.name)]
+        return BY_NAME[_type_of(over, self.order, self.centred)]
+
+    def of(self, order: int, centred: bool) -> "CellType":
+        """The type of an order with the same vertices, with a node in its middle if there is one."""
+        return BY_NAME[_type_of(_shape_of(self.name), order, centred)]
 
     def put_between(self, values: np.ndarray, nodes: np.ndarray) -> None:
         """Give the nodes of cells (n, n_nodes) that are no vertices the mean of their vertices'.
@@ -149,10 +168,10 @@ def _shape_of(name: str) -> str:
     return name.rstrip("0123456789")
 
 
-def _face_type(n_vertices: int, order: int, centred: bool) -> str:
-    linear = {2: "SEG2", 3: "TRIA3", 4: "QUAD4"}
-    quadratic = {2: "SEG3", 3: "TRIA6", 4: "QUAD9" if centred else "QUAD8"}
-    return (linear if order == 1 else quadratic)[n_vertices]
+def _type_of(shape: str, order: int, centred: bool) -> str:
+    """The type of a shape and order, with a node in its middle if there is one."""
+    found = [n for n in _TYPES if _shape_of(n) == shape and _TYPES[n][4] == order]
+    return next((n for n in found if _TYPES[n][6] == centred), found[0])
 
 
 def _build(name: str) -> CellType:
@@ -178,7 +197,9 @@ def _build(name: str) -> CellType:
         if face_centres:
             parts.append(frozenset(face))
         nodes = tuple(number[p] for p in parts)
-        faces.append(Face(_face_type(len(face), order, face_centres), nodes))
+        faces.append(
+            Face(_type_of(("SEG", "TRIA", "QUAD")[len(face) - 2], order, face_centres), nodes)
+        )
     return CellType(
         name=name,
         meshio=meshio_name,
@@ -192,6 +213,7 @@ def _build(name: str) -> CellType:
         edges=shape.edges,
         faces=tuple(faces),
         mirror=tuple(number[m] for m in mirrored),
+        centred=cell_centre,
     )
 
 

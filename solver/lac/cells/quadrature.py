@@ -10,9 +10,6 @@ from .catalogue import BY_NAME
 
 Rule = tuple[np.ndarray, np.ndarray]
 
-# degree of the polynomial that a shape function is on an affine face
-_MORTAR_DEGREES = {"SEG2": 1, "SEG3": 2, "TRIA3": 1, "TRIA6": 2, "QUAD4": 2, "QUAD8": 3, "QUAD9": 4}
-
 
 def face_rule(name: str) -> Rule:
     """Points (n, dim) and weights (n,) for loads on the face type `name`: exact where planar."""
@@ -21,11 +18,6 @@ def face_rule(name: str) -> Rule:
         return simplex_rule(2, 2 * kind.order + 2)
     line = simplex_rule(1, 2 * kind.order + 1)
     return line if kind.dim == 1 else product_rule(line, line)
-
-
-def mortar_degree(name: str) -> int:
-    """Degree that integrates the shape functions of an affine face of that type exactly."""
-    return _MORTAR_DEGREES[name]
 
 
 @cache

@@ -16,11 +16,7 @@ from ...lac.cells.faces import area_vectors, nodal_normals
 from ...lac.cells.orient import right_side_out
 from ...lac.cells.shape import shape_functions
 
-# The cell behind a face, and its thickness in parts of the face's size.
-_BEHIND = {
-    "SEG2": "QUAD4", "SEG3": "QUAD8", "TRIA3": "PENTA6", "TRIA6": "PENTA15",
-    "QUAD4": "HEXA8", "QUAD8": "HEXA20", "QUAD9": "HEXA27",
-}  # fmt: skip
+# Thickness of a layer in parts of the face's size.
 _THICKNESS = 0.1
 Faces = Mapping[str, np.ndarray]
 
@@ -110,7 +106,7 @@ def layer(points: np.ndarray, faces: Faces) -> tuple[np.ndarray, dict[str, np.nd
     sheets = [points[used] - _THICKNESS * size * share * normal[used] for share in (0.5, 1.0)]
     cells = {}
     for name, nodes in faces.items():
-        kind = BY_NAME[_BEHIND[name]]
+        kind = cell_type(name).layer
         low = np.searchsorted(used, nodes)
         levels = np.stack([nodes, len(points) + low, len(points) + len(used) + low])
         height = np.rint(2 * kind.nodes[:, -1]).astype(int)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
+from ...lac.cells.catalogue import BY_NAME
 from ...lac.operator import LAC, Scheme, meet_in_segments
 from .lost import without_partner
 from .nodal import dual, linear
@@ -17,7 +18,7 @@ DEFAULT_POINTS = 4
 # Slave nodes at the end of a bent surface may look past the master's by this part of a face.
 _BEYOND = 0.05
 _LINEAR = ("SEG2", "TRIA3", "QUAD4")
-_ALL = (*_LINEAR, "SEG3", "TRIA6", "QUAD8", "QUAD9")
+_ALL = tuple(name for name, kind in BY_NAME.items() if kind.dim < 3)
 
 
 @dataclass(frozen=True)

@@ -89,8 +89,7 @@ class _Block:
 
     def mesh(self) -> meshio.Mesh:
         """The block's mesh, with its groups."""
-        complete = self.cell.name in ("QUAD9", "HEXA27")
-        with session(Mesh__SecondOrderIncomplete=not complete, **self.options):
+        with session(Mesh__SecondOrderIncomplete=not self.cell.centred, **self.options):
             edges = self._edges(self._corners())
             self._volume(self._surfaces(edges))
             gmsh.model.mesh.generate(self.cell.dim)
