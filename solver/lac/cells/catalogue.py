@@ -73,7 +73,7 @@ class CellType:
         return BY_NAME[_type_of(over, self.order, self.centred)]
 
     def of(self, order: int, centred: bool) -> "CellType":
-        """The type of an order with the same vertices, with a node in its middle if there is one."""
+        """The type of an order on these vertices, with a node in its middle if there is one."""
         return BY_NAME[_type_of(_shape_of(self.name), order, centred)]
 
     def put_between(self, values: np.ndarray, nodes: np.ndarray) -> None:

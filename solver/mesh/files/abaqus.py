@@ -18,7 +18,7 @@ from ...system.errors import InputError
 _SOLIDS = {
     4: "TETRA4", 10: "TETRA10", 5: "PYRA5", 6: "PENTA6", 15: "PENTA15", 8: "HEXA8", 20: "HEXA20",
 }  # fmt: skip
-_SURFACES = {3: "TRIA3", 6: "TRIA6", 4: "QUAD4", 8: "QUAD8", 9: "QUAD9"}
+_SURFACES = {kind.n_nodes: name for name, kind in BY_NAME.items() if kind.dim == 2}
 _LINES = {
     "T2D2": "SEG2", "T3D2": "SEG2", "B21": "SEG2", "B31": "SEG2", "R2D2": "SEG2",
     "T2D3": "SEG3", "T3D3": "SEG3", "B22": "SEG3", "B32": "SEG3",
