@@ -266,6 +266,9 @@ def test_a_mesh_that_includes_a_changed_file_is_solved_again(project):
     part.parent.mkdir()
     part.write_text("*INCLUDE, input=more.txt\n")
     part.with_name("more.txt").write_text("*NODE\n")
+    commands = snakemake(project, "--dry-run", "--printshellcmds", "results/tiny/tiny-b").stdout
+    assert "result.vtkhdf" in commands
+    assert "mesh.vtkhdf" not in commands
     snakemake(project)
     assert "solve tiny-b" not in jobs(project)
     part.with_name("more.txt").write_text("*NODE\n1, 0, 0\n")

@@ -77,10 +77,10 @@ def files_in(*patterns):
 
 
 def hash_of(files):
-    """The hash of source files, a parameter of jobs: these run again when it changes."""
+    """The hash of files, a parameter of jobs: these run again when it changes."""
     found = hashlib.sha256()
     for file in sorted(files):
-        found.update(os.fsencode(file.relative_to(FOLDER)) + file.read_bytes())
+        found.update(os.fsencode(os.path.relpath(file, FOLDER)) + file.read_bytes())
     return found.hexdigest()
 
 
@@ -161,9 +161,10 @@ def batch(w):
 
 
 def mesh_option(w):
-    """The mesh of a job as words of the shell: nothing if there is none."""
-    file = f"{batch(w).mesh_folder}/mesh.vtkhdf"
-    return f'$(test ! -e {file} || echo "--mesh {file}")'
+    """The option --mesh of a job, for the shell; empty unless the mesh of a recipe is there."""
+    if not (folder := batch(w).mesh_folder):
+        return ""
+    return f'$(test ! -e {folder}/mesh.vtkhdf || echo "--mesh {folder}/mesh.vtkhdf")'
 
 
 wildcard_constraints:

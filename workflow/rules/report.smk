@@ -46,7 +46,7 @@ VERDICTS, OLDER_VERDICTS = ".snakemake/verdicts", ".snakemake/older-verdicts"
 
 def list_verdicts():
     """Write the lists of verdicts that the report reads: of this run, and older ones."""
-    mine = ASKED + [verdict for verdict in CODES if verdict not in OLDER]
+    mine = ASKED + [verdict for verdict in CODES if solved_by(verdict) in RUN]
     for file, verdicts in ((VERDICTS, mine), (OLDER_VERDICTS, OLDER)):
         Path(file).write_text("".join(f"{verdict}\n" for verdict in verdicts))
 
@@ -105,7 +105,8 @@ rule report:
     # What is listed is a parameter: the report is written again when it changes.
     params:
         verdicts=ASKED,
-        others=OLDER + CODES,
+        others=OLDER,
+        codes=hash_of(map(Path, CODES)),
         families=FAMILY_FILES,
         pages=PAGES,
         program=REPORT_HASH,
