@@ -158,6 +158,7 @@ def gap_operator(
     if scheme.nearest and scheme.lost:
         lost = scheme.lost(slaves, masters, samples, found, reach, n_macro)
     surface = _surface(data, lost)
+    ones = ((segments, np.ones((*segments.weight.shape, 1))) for segments in found)
     averages = space.averages(samples, [block.number for block in slaves], n_macro)
     return GapOperator(
         matrix=(master - (slave if space.nodes is None else without_round_off(slave))).tocsr(),
@@ -172,7 +173,7 @@ def gap_operator(
         plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
         recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
         slip=slip_operator(parts, surface.normal, n_nodes) if scheme.slip else (),
-        levers=levers(found, surface.normal) if scheme.slip else None,
+        levers=levers(list(ones), surface.normal, 1) if scheme.slip else None,
     )
 
 

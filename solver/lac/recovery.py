@@ -15,7 +15,6 @@ D. G. Anderson, J. ACM 12 (1965) 547–560, for the combination.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -134,45 +133,43 @@ def recovery(
     at, (m, dim) = moments(found, surface), surface.centre.shape
     k = form.count(dim)
     products = np.zeros((m, k, k))
+    given = []
     for segments in found:
         psi = at.local.shapes(segments.macro, segments.points, form)
         weighted = segments.weight[..., None] * psi
         np.add.at(products, segments.macro, np.einsum("sqk,sql->skl", weighted, psi))
+        if form.sweeps:  # constants are not applied
+            given.append((segments, psi[..., : k - (not form.keeps_means)]))
     tangents = np.swapaxes(tangents_of(surface.normal), 0, 1) if asked.slip else ()
-    near, applied = _same_materials(asked, found), partial(_applied, local=at.local, form=form)
-    given = found if form.sweeps else ()
-    stabilise, shape = asked.stabilise, (m * k, dim * n_nodes)
+    near = _same_materials(asked, found)
+    stabilise, shape = asked.stabilise, (m, k, dim * n_nodes)
     return Recovery(
         form=form,
         moments=at,
         near=near,
-        loads=_loads(given, applied, m, shape),
+        loads=_loads(given, shape),
         products=products,
-        slip_loads=tuple(_loads(given, applied, m, shape, t) for t in tangents),
-        levers=levers(given, surface.normal, applied) if asked.slip else None,
+        slip_loads=tuple(_loads(given, shape, t) for t in tangents),
+        levers=levers(given, surface.normal, k) if asked.slip else None,
         stabilisation=stabilise and stabilise(found, at, near, surface.covered),
     )
 
 
-def _applied(segments: Segments, local: Local, form: Form) -> np.ndarray:
-    """The ψ (s, q, k or k − 1) at the points of segments, without a constant."""
-    psi = local.shapes(segments.macro, segments.points, form)
-    return psi[..., : psi.shape[-1] - (not form.keeps_means)]
-
-
 def _loads(
-    found: Sequence[Segments],
-    applied: Callable[[Segments], np.ndarray],
-    m: int,
-    shape: tuple[int, int],
+    given: Sequence[tuple[Segments, np.ndarray]],
+    shape: tuple[int, int, int],
     tangents: np.ndarray | None = None,
 ) -> sparse.csr_matrix:
-    """∫ ψ (N_master − N_slave) n dS (m · k, n_dofs), or with `tangents` (m, dim) in place of n."""
+    """∫ ψ (N_master − N_slave) n dS (m · k, n_dofs), or with `tangents` (m, dim) in place of n.
+
+    `given` are segments with the ψ (s, q, ≤ k) at their points, `shape` is m, k, n_dofs.
+    """
     rows, columns, values = [], [], []
-    for segments in found:
-        weighted = segments.weight[..., None] * applied(segments)
+    m, k, n_dofs = shape
+    for segments, psi in given:
+        weighted = segments.weight[..., None] * psi
         along = segments.normal if tangents is None else along_faces(segments, tangents)
-        row = segments.macro[:, None] * (shape[0] // m) + np.arange(weighted.shape[-1])
+        row = segments.macro[:, None] * k + np.arange(psi.shape[-1])
         dim = along.shape[-1]
         for sign, side in zip((-1.0, 1.0), segments.sides, strict=True):
             part = np.einsum("sqk,sqa,sqd->skad", sign * weighted, side.values, along)
@@ -181,7 +178,7 @@ def _loads(
             columns.append(np.broadcast_to(column[:, None], part.shape).ravel())
             values.append(part.ravel())
     entries = [np.concatenate(part or [np.empty(0, int)]) for part in (values, rows, columns)]
-    return sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=shape).tocsr()
+    return sparse.coo_matrix((entries[0], (entries[1], entries[2])), shape=(m * k, n_dofs)).tocsr()
 
 
 def _same_materials(asked: RecoveryRequest, found: Sequence[Segments]) -> sparse.csr_matrix:

@@ -6,7 +6,7 @@ Rows are integrated at the points of the gap operator. Where a segment is flat t
 integrals ∫ N times t, so that a uniform shear acts on both sides as on whole faces.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,32 +19,28 @@ from .segments import Segments
 _FLAT = 1e-12
 
 
-def levers(
-    found: Sequence[Segments],
-    normal: np.ndarray,
-    functions: Callable[[Segments], np.ndarray] = lambda s: np.ones((*s.weight.shape, 1)),
-) -> np.ndarray:
+def levers(given: Sequence[tuple[Segments, np.ndarray]], normal: np.ndarray, k: int) -> np.ndarray:
     """The couples (dim − 1, m, k, 3) ∫ ψ g n × t dS of tractions ψ, by tangent.
 
-    Tractions act on both surfaces where these are meshed, a gap g apart. `functions` are the ψ
-    (s, q, k) at the points of segments.
+    Tractions act on both surfaces where these are meshed, a gap g apart. `given` are segments with
+    functions ψ (s, q, ≤ k) at their points; the couples of further ones are zero.
 
     The edges are 1/2 apart over a length of 2, n × t is the axis across the plane:
 
     >>> (segments,) = intersect([slave], 0, [master], 1.0)
-    >>> levers([segments], np.array([[0.0, 1.0]]))[0].round(15).tolist()
+    >>> one = np.ones((*segments.weight.shape, 1))
+    >>> levers([(segments, one)], np.array([[0.0, 1.0]]), 1)[0].round(15).tolist()
     [[[0.0, 0.0, 1.0]]]
     """
     m, dim = normal.shape
-    given = [(segments, functions(segments)) for segments in found]
-    couples = np.zeros((dim - 1, m, given[0][1].shape[-1] if given else 1, 3))
+    couples = np.zeros((dim - 1, m, k, 3))
     for by_macro, tangents in zip(couples, np.swapaxes(tangents_of(normal), 0, 1), strict=True):
         for segments, psi in given:
             pair = segments.normal, along_faces(segments, tangents)
             n, t = (np.pad(v, [(0, 0), (0, 0), (0, 3 - dim)]) for v in pair)
             weight = segments.weight * segments.gap
             couple = np.einsum("sq,sqk,sqd->skd", weight, psi, np.cross(n, t))
-            np.add.at(by_macro, segments.macro, couple)
+            np.add.at(by_macro[:, : psi.shape[-1]], segments.macro, couple)
     return couples
 
 

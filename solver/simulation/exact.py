@@ -9,7 +9,7 @@ import numpy as np
 
 from ..case.solutions.base import ExactSolution
 from ..lac.cells.catalogue import cell_type
-from ..lac.cells.faces import FACE_POINTS, nodal_normals, surface_points
+from ..lac.cells.faces import FACE_POINTS, SurfacePoints, nodal_normals
 from ..lac.cells.gauss import gauss_rule
 from ..lac.cells.shape import shape_functions
 from ..mechanics.fem.faces import means_on_faces
@@ -35,10 +35,10 @@ def computed_pressure(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
     )
 
 
-def computed_traction(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
-    """The computed traction of friction (k, dim) at the `surface_points` of a zone."""
+def computed_traction(zone: ZoneResult, at: SurfacePoints) -> np.ndarray:
+    """The computed traction of friction (k, dim) at points of a zone's surface."""
     assert zone.friction is not None
-    at, mean = surface_points(points, zone.faces), zone.friction.friction_traction
+    mean = zone.friction.friction_traction
     if zone.friction.recovered is None or zone.recovered is None:
         return mean[at.macro]
     psi = zone.recovered.shapes(at.macro, at.place[:, None])[:, 0]

@@ -8,8 +8,10 @@ sweeps are those of `lac.recovery`; each solves for the state under the loads of
 
 import logging
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 
 from ..case.model import Step
 from ..lac.recovery import settled_means
@@ -50,16 +52,21 @@ class _Loads:
     def tractions(self, values: np.ndarray) -> list[np.ndarray]:
         """The coefficients (m · k,) of q* by tangent, for pressures and tractions of all rows."""
         c = self.fit.coefficients(values).reshape(len(self.sticks), -1)
-        stuck = self.fit.recovery.reconstruction(self.sticks).matrix
         along = [(slide[:, None] * c).ravel() for slide in self.slide.T]
-        return [a + stuck @ values[rows] for a, rows in zip(along, self.zone.slips, strict=True)]
+        pairs = zip(along, self.zone.slips, strict=True)
+        return [sliding + self._stuck @ values[rows] for sliding, rows in pairs]
+
+    @cached_property
+    def _stuck(self) -> sparse.csr_matrix:
+        """The reconstruction among macro-elements that stick."""
+        return self.fit.recovery.reconstruction(self.sticks).matrix
 
     def couple(self, values: np.ndarray) -> np.ndarray:
         """The couple (3,) of q* − q where the surfaces are meshed apart."""
-        levers, m = self.fit.recovery.levers, len(self.sticks)
+        levers = self.fit.recovery.levers
         assert levers is not None
-        applied = [c.reshape(m, -1)[:, : levers.shape[2]] for c in self.tractions(values)]
-        return np.einsum("tmk,tmkd->d", applied, levers)
+        tractions = np.reshape(self.tractions(values), levers.shape[:3])
+        return np.einsum("tmk,tmkd->d", tractions, levers)
 
     def force(self, values: np.ndarray) -> np.ndarray:
         """The forces (n_dofs,) by pressures and tractions (k,) of all rows."""

@@ -193,18 +193,17 @@ def _pressure_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
 
 
 def _traction_errors(solution: Solution, exact: ExactSolution) -> dict[str, float]:
-    squares, means = np.zeros(2), np.zeros(2)
+    squares, means, values = np.zeros(2), np.zeros(2), ExactValues(solution, exact)
     for zone in solution.zones:
         if zone.friction is None:
             continue
-        values = ExactValues(solution, exact)
         mean, weight = values.of_friction(zone, "friction_traction"), zone.area * zone.coverage
         error = zone.friction.friction_traction - mean
         means += _integral(weight, error), _integral(weight, mean)
         at = surface_points(solution.mesh.points, zone.faces, solution.case.axisymmetric)
         traction = values.friction_traction(zone, at.place)
         weight = at.weight * zone.coverage[at.macro]
-        error = computed_traction(solution.mesh.points, zone) - traction
+        error = computed_traction(zone, at) - traction
         squares += _integral(weight, error), _integral(weight, traction)
     return {"traction_l2": _root(*squares), "traction_means": _root(*means)}
 
