@@ -30,7 +30,7 @@ from .mesh import read_mesh
 from .mesh.size import check_memory
 from .mesh.tidy import tidy
 from .simulation.options import Options
-from .simulation.solution import Solution, ZoneResult
+from .simulation.results.solution import Solution, ZoneResult
 from .system.errors import InputError, key_path
 from .system.progress import report_outcomes
 from .verification.judge import judge

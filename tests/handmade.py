@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 
 from solver.case.reader import load_case
-from solver.simulation.solution import BodyInfo, Line, Solution, StepResult, ZoneResult
+from solver.simulation.results.solution import BodyInfo, Line, Solution, StepResult, ZoneResult
 
 PLANE = """\
 name: two-blocks

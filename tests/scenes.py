@@ -9,8 +9,8 @@ from solver.case.model import Case
 from solver.case.reader import parse_case
 from solver.lac.cells.catalogue import BY_NAME, cell_type
 from solver.mesh import generate
+from solver.simulation.results.solution import Solution
 from solver.simulation.simulate import simulate
-from solver.simulation.solution import Solution
 from solver.verification.run import mesh_of
 
 YOUNG, POISSON, PRESSURE = 2000.0, 0.3, 25.0

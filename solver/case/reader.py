@@ -1,7 +1,6 @@
 """The case file read: its text becomes a `Case`, or is refused with one line.
 
-`solver.case.rules` checks what concerns several keys, `solver.simulation.groups` what needs the
-mesh.
+`case.rules` checks what concerns several keys, `simulation.scene.groups` what needs the mesh.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ import numpy as np
 from ..case.checks import CHECKS, ERRORS, Check
 from ..case.expressions import evaluate
 from ..mechanics.fem.stress import COMPONENTS, normal_stress
-from ..simulation.exact import ExactValues
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.exact import ExactValues
+from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError
 from ..verification import samples
 from ..verification.norms import errors

@@ -11,8 +11,8 @@ from ..case.expressions import evaluate
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import FACE_POINTS, surface_points, surface_vectors
 from ..lac.cells.gauss import gauss_rule
-from ..simulation.exact import ExactValues, computed_pressure
-from ..simulation.solution import NodalContact, ZoneResult
+from ..simulation.results.exact import ExactValues, computed_pressure
+from ..simulation.results.solution import NodalContact, ZoneResult
 from ..system.errors import InputError
 from ..verification.samples import Reference, Sample, expected_pressure
 from .model import Model

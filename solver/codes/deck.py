@@ -12,10 +12,10 @@ from ..case.model import Case, Load, Zone
 from ..lac.cells.faces import FaceBlock
 from ..lac.cut import cut
 from ..mechanics.fem.faces import volume_cells
-from ..simulation.attributes import Attributes
-from ..simulation.cut_groups import faces_of
-from ..simulation.groups import check_groups, named_parts
-from ..simulation.selections import with_groups
+from ..simulation.scene.attributes import Attributes
+from ..simulation.scene.cut_groups import faces_of
+from ..simulation.scene.groups import check_groups, named_parts
+from ..simulation.scene.selections import with_groups
 from .layer import as_layer
 from .supports import Oblique, closing, split
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..case.model import Case
 from ..lac.cells.faces import FaceBlock, nodal_normals, surface_points
-from ..simulation.exact import ExactValues
-from ..simulation.naming import body_infos
-from ..simulation.scene import Scene, ZoneScene, build_scene
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.exact import ExactValues
+from ..simulation.results.results import body_infos
+from ..simulation.results.solution import Solution, ZoneResult
+from ..simulation.scene.scene import Scene, ZoneScene, build_scene
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from ..lac.cells.faces import FACE_POINTS, surface_points, surface_vectors
 from ..lac.cells.gauss import gauss_rule
 from ..lac.cells.orient import right_side_out
 from ..mechanics.fem.faces import outer_faces
-from ..simulation.exact import computed_pressure
-from ..simulation.solution import NodalContact, Solution, ZoneResult
+from ..simulation.results.exact import computed_pressure
+from ..simulation.results.solution import NodalContact, Solution, ZoneResult
 from .contact import SurfaceValues
 from .model import Model
 from .placing import Placed

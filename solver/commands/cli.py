@@ -36,7 +36,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..simulation.solution import Solution
+    from ..simulation.results.solution import Solution
     from ..verification.run import Job
     from ..verification.verdict import Verdict
 
@@ -316,8 +316,8 @@ def _validate_one(path: Path, with_mesh: bool) -> None:
 
         read_recipe(case.mesh, path)
     if with_mesh:
-        from ..simulation.groups import check_groups
-        from ..simulation.selections import with_groups
+        from ..simulation.scene.groups import check_groups
+        from ..simulation.scene.selections import with_groups
         from ..verification.run import mesh_of
 
         check_groups(case, with_groups(case, mesh_of(case)))

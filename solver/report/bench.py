@@ -14,7 +14,7 @@ import numpy as np
 
 from ..codes.recorded import recorded_verdicts
 from ..codes.verdicts import PRESSURE, read_pressures
-from ..simulation.solution import Solution
+from ..simulation.results.solution import Solution
 from ..system.errors import InputError
 from ..system.files import write_text
 from ..verification.results import read_result

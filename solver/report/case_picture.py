@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from ..lac.cells.catalogue import cell_type
 from ..mechanics.fem.faces import outer_faces
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import MUTED, PAPER
 from .layout import (

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ..lac.cells.catalogue import cell_type
-from ..simulation.solution import BodyInfo, Solution, ZoneResult
+from ..simulation.results.solution import BodyInfo, Solution, ZoneResult
 from .charts import BLUE, MUTED, ORANGE, PAPER
 from .svg import mixed
 

@@ -29,7 +29,7 @@ from .rows import Row, families, ours
 
 _DIMENSIONS = {2: "2D", 3: "3D"}
 _DIGITS_OF_DOUBLE = -math.log10(EPSILON)
-# With fewer digits a result is unreliable (`solver.simulation.accuracy`).
+# With fewer digits a result is unreliable (`solver.simulation.equilibrium.state`).
 _FEWEST = 4
 _WORST = 10
 # What may cost the digits of a solve, by the keys of `Verdict.accuracy`.

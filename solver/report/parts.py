@@ -12,8 +12,8 @@ import meshio
 import numpy as np
 
 from ..mechanics.fem.faces import outer_faces, volume_cells
-from ..simulation.rigid import quadric_of
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.solution import Solution, ZoneResult
+from ..simulation.scene.rigid import quadric_of
 from ..verification.units import with_unit
 from .charts import BLUE, PAPER
 from .layout import RELATIVE, STATUS, edge_color, tint, ways_apart

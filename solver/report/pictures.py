@@ -10,7 +10,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from ..case.expressions import Expression
-from ..simulation.solution import Solution
+from ..simulation.results.solution import Solution
 from ..system.errors import InputError
 from ..system.files import write_text
 from ..verification.results import read_result

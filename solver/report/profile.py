@@ -14,8 +14,8 @@ import numpy as np
 from ..case.expressions import Expression, evaluate
 from ..case.model import EXACT
 from ..lac.cells.faces import surface_points
-from ..simulation.exact import ExactValues
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.exact import ExactValues
+from ..simulation.results.solution import Solution, ZoneResult
 from ..verification.samples import expected_coverage, reference_where_covered
 from ..verification.units import with_unit
 from .charts import (

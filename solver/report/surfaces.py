@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..lac.cells.catalogue import cell_type
-from ..simulation.solution import Solution
+from ..simulation.results.solution import Solution
 from ..verification import samples
 from ..verification.units import with_unit
 from .layout import color_map, mean_normal

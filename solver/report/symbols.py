@@ -9,8 +9,8 @@ from ..case.expressions import Expression, evaluate
 from ..case.model import EXACT, Load, Support
 from ..lac.cells.faces import nodal_normals
 from ..mechanics.fem.stress import traction
-from ..simulation.exact import ExactValues
-from ..simulation.solution import Solution
+from ..simulation.results.exact import ExactValues
+from ..simulation.results.solution import Solution
 from .charts import GREEN, INK, MUTED, RED
 from .layout import edge_color
 from .parts import three

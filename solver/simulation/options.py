@@ -22,7 +22,7 @@ class Shortcuts(Switches):
         without more points and without closure; cells with straight edges have the rules of these.
     status: no second solve where the first fulfils the conditions of contact, which starts from a
         guess; a factor is kept while the closed multipliers stay the same.
-    unloaded: groups of bodies that nothing moves are not solved (see `solver.simulation.unloaded`).
+    unloaded: groups of bodies that nothing moves are not solved (see `simulation.scene.bodies`).
     """
 
     quadrature: bool = True

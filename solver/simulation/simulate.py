@@ -10,46 +10,24 @@ import meshio
 import numpy as np
 
 from ..case.model import STATE, Case, Step
-from ..lac.cells.catalogue import BY_NAME
-from ..lac.cells.faces import nodal_normals
 from ..lac.errors import SolveError
-from ..mechanics.fem.nodal_stress import nodal_stress
-from ..mechanics.fem.stress import normal_stress
 from ..system.clock import Clock, processor_time
 from ..system.memory import peak_mb
 from ..system.progress import OUTCOME, stage
-from .balance import (
-    imbalances,
-    pressures_of_forces,
-    strain_energy,
-)
-from .consistency import inconsistency
-from .equilibrium import Equilibrium
-from .geometry import check_geometry
-from .naming import body_infos
+from .equilibrium.problem import ContactProblem
+from .equilibrium.recovery import Recovered, recovered
+from .equilibrium.state import Equilibrium
+from .judgement.consistency import inconsistency
+from .judgement.plan import decided, estimated, plan_notes, remarks, softness_notes, validity
 from .options import LEAN, Options
-from .plan import decided, estimated, plan_notes, softness_notes
-from .probes import probed
-from .problem import ContactProblem
-from .recovery import Recovered, RecoveredZone, recovered
-from .scene import Scene, ZoneScene, build_scene
-from .solution import (
-    Line,
-    NodalContact,
-    RecoveredPressure,
-    Solution,
-    StepResult,
-    ZoneResult,
-)
-from .step_results import closed_of, step_results, stress_scale, zone_friction
-from .unloaded import without_unloaded
-from .validity import remarks, validity
+from .results.results import solution_of
+from .results.solution import Solution
+from .scene.bodies import check_geometry, without_unloaded
+from .scene.scene import Scene, build_scene
 
 _LOG = logging.getLogger(__name__)
 # Forces below this fraction of the largest one are shown as zero.
 _NOISE = 1e-10
-# Half, up to round-off.
-_HALF = 0.5 - 1e-9
 
 
 def simulate(
@@ -90,7 +68,8 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
         states, fields = _walk(problem)
     plan += plan_notes(problem, states)
     with stage(clock, "recovery"):
-        solution = _recover(problem, states, fields, plan)
+        solution = solution_of(problem, states, fields, plan)
+        solution.validity = validity(problem.scene, states)
     _log_forces(solution)
     solution.plan += [*estimated(solution), *remarks(solution.validity), *softness_notes(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
@@ -161,7 +140,7 @@ def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
         start = states[-1].status.closed if states else None
         before = case.steps[len(states) - 1] if states else None
         if case.frictional:
-            from .friction_recovery import solve_and_recover  # friction alone needs it
+            from .equilibrium.friction_recovery import solve_and_recover
 
             state, field = solve_and_recover(problem, step, states[-1] if states else None)
         else:
@@ -185,158 +164,3 @@ def _called(step: Step, factor: float) -> str:
     if all(name.startswith(STATE) for name in step):
         return f"step {factor:g}"
     return f"step {factor:g} ({', '.join(f'{name} {value:g}' for name, value in step.items())})"
-
-
-def _recover(
-    problem: ContactProblem, states: list[Equilibrium], fields: list[Recovered], plan: list[Line]
-) -> Solution:
-    scene = problem.scene
-    last = states[-1]
-    stress = nodal_stress(
-        scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
-    )
-    stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
-    stress -= scene.straining(scene.case.steps[-1], scene.initial.stress)
-    if scene.case.thin:
-        stress[:, 2] = 0.0
-    scale = stress_scale(scene, states, stress)
-    steps, at_nodes = step_results(scene, states, fields, scale)
-    zones = [
-        _zone_result(scene, zone, last, stress, forces, fields[-1].get(zone.zone.name), steps[-1])
-        for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
-    ]
-    return Solution(
-        case=scene.case,
-        mesh=_output_mesh(scene),
-        displacement=last.displacement,
-        stress=stress,
-        body=scene.body,
-        bodies=body_infos(scene),
-        zones=zones,
-        nodal_normal_stress=normal_stress(stress, _contact_direction(scene)),
-        balance=imbalances(scene, last),
-        steps=steps,
-        length=scene.length,
-        load_scale=scale,
-        dofs=scene.n_dofs,
-        macro_elements=sum(zone.count for zone in scene.zones),
-        iterations=sum(state.status.iterations for state in states),
-        linear_solver=problem.linear_solver,
-        linear_iterations=problem.linear_iterations,
-        matrix_entries=problem.matrix.nnz,
-        plan=plan,
-        validity=validity(scene, states),
-        strain_energy=strain_energy(scene, last),
-        reaction=at_nodes,
-        probes=probed(scene, zones, last.displacement, stress),
-        acted=scene.acted,
-        accuracy=last.accuracy.causes,
-        mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
-    )
-
-
-def _output_mesh(scene: Scene) -> meshio.Mesh:
-    cells = [(_meshio_name(name), data) for name, data in scene.mesh.cells.items()]
-    sets = {
-        group: [np.flatnonzero(scene.mesh.members(name, mask)) for name in scene.mesh.cells]
-        for group, mask in scene.given.groups.items()
-        if any(m.any() for m in mask.values())
-    }
-    return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)
-
-
-def _meshio_name(name: str) -> str:
-    return BY_NAME[name].meshio
-
-
-def _contact_direction(scene: Scene) -> np.ndarray:
-    """Unit mean normal of the first zone's slave surface; the last axis where there is no zone."""
-    dim = scene.points.shape[1]
-    if not scene.zones:
-        return np.eye(dim)[-1]
-    surface = scene.zones[0].operator.surface
-    mean = surface.area @ surface.normal
-    return mean / np.linalg.norm(mean)
-
-
-def _zone_result(
-    scene: Scene,
-    zone: ZoneScene,
-    state: Equilibrium,
-    stress: np.ndarray,
-    pressure_of_forces: np.ndarray | None,
-    field: RecoveredZone | None,
-    step: StepResult,
-) -> ZoneResult:
-    surface = zone.operator.surface
-    slave_nodes, slave_normal = _nodal_normals(
-        scene, [(f.type.name, f.nodes) for f in zone.sub_faces]
-    )
-    master = [(b.type.name, b.nodes) for b in zone.master_faces]
-    master_nodes, master_normal = _nodal_normals(scene, master)
-    return ZoneResult(
-        name=zone.zone.name,
-        faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
-        master_faces=master,
-        centre=surface.centre + scene.origin,
-        normal=surface.normal,
-        area=surface.area,
-        multiplier=zone.by_macro_element(state.pressure),
-        gap=zone.by_macro_element(state.gap),
-        closed=closed_of(zone, state),
-        coverage=surface.covered / surface.area,
-        stress_slave=normal_stress(stress[slave_nodes], slave_normal),
-        stress_master=normal_stress(stress[master_nodes], master_normal),
-        slave_nodes=slave_nodes,
-        master_nodes=master_nodes,
-        nodal=_nodal_contact(zone, state),
-        pressure_of_forces=pressure_of_forces,
-        pressure_error=None if field is None else field.error,
-        recovered=_recovered_pressure(scene, zone, state, field),
-        resultants=step.resultants[zone.zone.name],
-        friction=zone_friction(zone, state, field),
-    )
-
-
-def _recovered_pressure(
-    scene: Scene, zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
-) -> RecoveredPressure | None:
-    """The recovered pressure of a zone, and its mean at each node over the faces around."""
-    if field is None or field.name == "none":
-        return None
-    local, pressure = field.recovery.moments.local, state.pressure[zone.numbers]
-    nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
-    found = RecoveredPressure(
-        form=field.name,
-        coefficients=field.coefficients.reshape(len(pressure), -1),
-        degree=field.degree,
-        centre=local.centre + scene.origin,
-        axes=local.axes,
-        spread=local.spread,
-        nodes=nodes,
-        at_nodes=np.zeros(len(nodes)),
-    )
-    total, count = np.zeros((2, len(nodes)))
-    for faces in zone.sub_faces:
-        places = scene.points[faces.nodes] + scene.origin
-        at = np.searchsorted(nodes, faces.nodes)
-        np.add.at(total, at, found.values(pressure, faces.macro, places))
-        np.add.at(count, at, 1.0)
-    return replace(found, at_nodes=total / count)
-
-
-def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
-    nodes = zone.operator.nodes
-    if nodes is None:
-        return None
-    closed = zone.at_nodes(state.status.closed.astype(float)) >= _HALF
-    return NodalContact(nodes, zone.at_nodes(state.pressure), zone.at_nodes(state.gap), closed)
-
-
-def _nodal_normals(
-    scene: Scene, faces: list[tuple[str, np.ndarray]]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The nodes of a surface and its unit normals there, the mean over the faces around each."""
-    total = nodal_normals(scene.points, faces)
-    nodes = np.unique(np.concatenate([nodes.ravel() for _, nodes in faces]))
-    return nodes, total[nodes]

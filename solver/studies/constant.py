@@ -15,7 +15,7 @@ from ..mechanics.fem.assembly import CellSum
 from ..mechanics.fem.block import Block
 from ..mechanics.fem.elasticity import physical_gradients, stiffness
 from ..mechanics.linear.direct import factorise
-from ..simulation.scene import Scene
+from ..simulation.scene.scene import Scene
 
 
 def inf_sup_constant(scene: Scene) -> float:

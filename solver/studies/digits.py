@@ -17,10 +17,10 @@ from scipy import sparse
 from ..lac.errors import SolveError
 from ..mechanics.linear.condensation import CondensedSystem
 from ..mesh import generate, transform
-from ..simulation.accuracy import Accuracy
+from ..simulation.equilibrium.problem import ContactProblem
+from ..simulation.equilibrium.state import Accuracy
 from ..simulation.options import Options, Safeguards
-from ..simulation.problem import ContactProblem
-from ..simulation.scene import build_scene
+from ..simulation.scene.scene import build_scene
 from ..simulation.simulate import solve_problem
 from ..system.clock import Clock
 from ..system.errors import InputError

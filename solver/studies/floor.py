@@ -22,8 +22,8 @@ from ..case.model import Case
 from ..mechanics.fem.elasticity import internal_force
 from ..mechanics.fem.nodal_stress import nodal_stress
 from ..mesh import transform
-from ..simulation.problem import ContactProblem
-from ..simulation.scene import Scene, carried_over
+from ..simulation.equilibrium.problem import ContactProblem
+from ..simulation.scene.scene import Scene, carried_over
 from .states import UPPER, State
 
 _RANDOM_ROUNDINGS = 3

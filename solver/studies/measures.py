@@ -22,11 +22,11 @@ import numpy as np
 from ..case.model import Case
 from ..lac.errors import SolveError
 from ..mechanics.linear.direct import force_solver
+from ..simulation.equilibrium.problem import ContactProblem
 from ..simulation.options import Options, Safeguards, Shortcuts
-from ..simulation.problem import ContactProblem
-from ..simulation.scene import build_scene
+from ..simulation.results.solution import Solution
+from ..simulation.scene.scene import build_scene
 from ..simulation.simulate import simulate
-from ..simulation.solution import Solution
 from ..system.clock import SOLVING, Clock
 from ..system.errors import InputError
 from ..system.memory import available

@@ -12,8 +12,8 @@ from ..lac.cells.faces import circumference, surface_points
 from ..lac.cells.gauss import gauss_rule
 from ..lac.cells.shape import shape_functions
 from ..mechanics.fem.elasticity import physical_gradients
-from ..simulation.exact import ExactValues
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.exact import ExactValues
+from ..simulation.results.solution import Solution, ZoneResult
 
 # A surface whose normals differ by less is plane.
 _PLANE = 1e-12

@@ -17,8 +17,8 @@ import numpy as np
 
 from ..case.checks import CHECKS, Check
 from ..case.model import Exact
-from ..simulation.exact import ExactValues
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.exact import ExactValues
+from ..simulation.results.solution import Solution, ZoneResult
 from . import friction, numbers, samples, scales
 from .verdict import CheckResult, Regression
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..simulation.exact import ExactValues
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.exact import ExactValues
+from ..simulation.results.solution import Solution, ZoneResult
 from .samples import Reference, Sample, Sampler, by_component
 
 

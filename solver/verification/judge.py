@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..case import job_name
-from ..simulation.accuracy import Accuracy
-from ..simulation.validity import limits_passed
+from ..simulation.equilibrium.state import Accuracy
+from ..simulation.judgement.plan import limits_passed
 from .scatter import oscillating
 from .units import derived
 from .verdict import (
@@ -35,7 +35,7 @@ from .verdict import (
 
 if TYPE_CHECKING:
     from ..case.model import Case
-    from ..simulation.solution import Solution
+    from ..simulation.results.solution import Solution
 
 NOT_VERIFIED = "not verified: compared with no reference"
 NOT_JUDGED = "not verified: the tolerances belong to another recovery"

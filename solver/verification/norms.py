@@ -49,8 +49,8 @@ from ..lac.threads import prefetch
 from ..mechanics.fem import cell_loops
 from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop
 from ..mechanics.fem.faces import pieces
-from ..simulation.exact import ExactValues, computed_pressure, computed_traction
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.exact import ExactValues, computed_pressure, computed_traction
+from ..simulation.results.solution import Solution, ZoneResult
 from .oscillation import grown, macro_neighbours, oscillation
 
 # Numbers of gradients handled at once: small enough to stay in the processor's cache.

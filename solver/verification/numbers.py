@@ -11,7 +11,7 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..mechanics.fem.stress import COMPONENTS
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
 from .samples import Reference, Sample, Sampler
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..case.solutions.base import ExactSolution
 from ..lac.cells.catalogue import cell_type
-from ..simulation.solution import NodalContact, ZoneResult
+from ..simulation.results.solution import NodalContact, ZoneResult
 
 # Pairs of neighbours (k, 2), each once, and which places (m,) are at the rim.
 Neighbours = tuple[np.ndarray, np.ndarray]

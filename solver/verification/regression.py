@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..simulation.solution import Solution
+from ..simulation.results.solution import Solution
 from ..system.errors import InputError
 from ..system.files import write_text
 from .checks import Accepted

@@ -43,14 +43,8 @@ from ..case.model import Case
 from ..case.reader import parse_case
 from ..lac.cells.catalogue import cell_type
 from ..mesh.files.vtkhdf import check_name, read_grid, write_grid
-from ..simulation.consistency import inconsistency
-from ..simulation.solution import (
-    BodyInfo,
-    Line,
-    Solution,
-    Validity,
-    ZoneResult,
-)
+from ..simulation.judgement.consistency import inconsistency
+from ..simulation.results.solution import BodyInfo, Line, Solution, Validity, ZoneResult
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
 from ..system.hdf5 import new_file, read_file, read_table, write_table

@@ -19,8 +19,8 @@ from ..mesh.files.vtkhdf import check_name
 from ..mesh.size import check_memory, of_mesh
 from ..mesh.tidy import tidy
 from ..simulation.options import LEAN, Options
+from ..simulation.results.solution import Solution
 from ..simulation.simulate import simulate
-from ..simulation.solution import Solution
 from ..system.clock import Clock, processor_time
 from ..system.errors import InputError, MachineError, of_machine
 from ..system.files import last_line

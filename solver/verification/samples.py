@@ -26,10 +26,10 @@ from ..mechanics.fem.elasticity import (
 )
 from ..mechanics.fem.stress import COMPONENTS
 from ..mechanics.fem.volume_rules import volume_rule
-from ..simulation.exact import ExactValues
-from ..simulation.groups import ALL
-from ..simulation.initial import strain_at
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.results.exact import ExactValues
+from ..simulation.results.solution import Solution, ZoneResult
+from ..simulation.scene.attributes import strain_at
+from ..simulation.scene.groups import ALL
 from ..system.errors import InputError, hint
 
 Reference = Any

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..simulation.solution import Solution
+from ..simulation.results.solution import Solution
 
 
 def block_size(solution: Solution) -> float:

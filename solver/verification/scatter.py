@@ -22,8 +22,8 @@ from scipy.spatial import cKDTree
 from ..lac.cells.catalogue import cell_type
 from ..lac.facets import tangents_of
 from ..lac.reconstruction import vertex_neighbours
-from ..simulation.accuracy import stress_of_motion
-from ..simulation.solution import Solution, ZoneResult
+from ..simulation.equilibrium.state import stress_of_motion
+from ..simulation.results.solution import Solution, ZoneResult
 from .oscillation import macro_neighbours
 
 LIMIT = 0.04

@@ -6,8 +6,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..simulation.forces import ProbeResult, Reaction, Resultants, RigidMotion
-from ..simulation.solution import StepResult
+from ..simulation.results.forces import ProbeResult, Reaction, Resultants, RigidMotion
+from ..simulation.results.solution import StepResult
 from ..system.hdf5 import column, read_table, write_table
 
 _OF_STEP = (

@@ -180,7 +180,7 @@ class Verdict:
     and maximum over all zones; `seconds` has wall times by stage and their `total`.
     `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
     reconstruction. `units` names the units of length, stress, area, force, moment and energy where
-    the case does. `strain` to `unpaired`: see `solver.simulation.solution.Validity`.
+    the case does. `strain` to `unpaired`: see `solver.simulation.results.solution.Validity`.
     `transient`: the machine is the reason (memory, disk, a kill), so that the same solve may
     succeed another time.
 

@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 
 from ..mechanics.mortar.edge import Edges
-from ..simulation.forces import Resultants
-from ..simulation.solution import NodalContact, RecoveredPressure, ZoneFriction, ZoneResult
+from ..simulation.results.forces import Resultants
+from ..simulation.results.solution import NodalContact, RecoveredPressure, ZoneFriction, ZoneResult
 
 T = TypeVar("T")
 # Data sets that are not named as their field.

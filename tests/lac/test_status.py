@@ -5,7 +5,7 @@ import pytest
 
 from solver.lac.errors import SolveError
 from solver.lac.status import Trial, find_status
-from solver.simulation.first_status import likely_closed
+from solver.simulation.equilibrium.constraints import likely_closed
 
 
 def trial(pressure, gap, limit=1e-10):

@@ -8,7 +8,7 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.mesh.tidy import tidy
-from solver.simulation.scene import build_scene
+from solver.simulation.scene.scene import build_scene
 from solver.system.errors import InputError
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]

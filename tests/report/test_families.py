@@ -24,7 +24,7 @@ from solver.report.profile import (
     mathematics,
     position,
 )
-from solver.simulation.solution import NodalContact, RecoveredPressure
+from solver.simulation.results.solution import NodalContact, RecoveredPressure
 from solver.verification.results import write_result
 from tests import handmade
 from tests.report.test_report import CHECK, Page, verdict

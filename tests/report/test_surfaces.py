@@ -11,7 +11,7 @@ from solver.lac.cells.catalogue import cell_type
 from solver.report.layout import ways_apart
 from solver.report.parts import rigid_surface
 from solver.report.surfaces import magnification, split, surfaces
-from solver.simulation.solution import BodyInfo
+from solver.simulation.results.solution import BodyInfo
 from tests import handmade
 
 

@@ -11,7 +11,7 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.cell_sizes import largest_strain
 from solver.mesh import generate, transform
-from solver.simulation.accuracy import Accuracy
+from solver.simulation.equilibrium.state import Accuracy
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study
 from solver.studies.states import exact_state

@@ -8,8 +8,8 @@ import pytest
 from solver.case.reader import parse_case
 from solver.lac import segments
 from solver.mesh import transform
-from solver.simulation.resultants import _extent
-from solver.simulation.scene import build_scene
+from solver.simulation.results.balance import _extent
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, with_points

@@ -12,8 +12,8 @@ import pytest
 from solver.case.reader import load_case, parse_case
 from solver.commands.cli import main
 from solver.simulation.options import Options, Shortcuts
+from solver.simulation.results.solution import Line
 from solver.simulation.simulate import simulate
-from solver.simulation.solution import Line
 from solver.verification.results import read_result
 from solver.verification.run import mesh_of
 from tests.scenes import block_case, block_mesh, moved
@@ -128,7 +128,7 @@ def test_a_plane_solve_imports_nothing_of_three_dimensions_or_friction(tmp_path)
     of_space = {
         "solver.mechanics.fem.extra_elements",
         "solver.mesh.recipes.hybrid",
-        "solver.simulation.friction",
+        "solver.simulation.equilibrium.friction",
         "solver.report.case_picture",
     }
     assert not loaded & of_space

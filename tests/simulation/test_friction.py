@@ -9,10 +9,11 @@ import pytest
 from solver.case.reader import load_case, parse_case
 from solver.lac.errors import SolveError
 from solver.mechanics.mortar.tresca import coulomb_by_cones
-from solver.simulation import friction, plan
+from solver.simulation.equilibrium.problem import ContactProblem
+from solver.simulation.equilibrium.state import friction
+from solver.simulation.judgement import plan
 from solver.simulation.options import Options
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import build_scene
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.simulation.groups import check_groups
+from solver.simulation.scene.groups import check_groups
 from solver.system.errors import InputError
 
 PATH = Path("family/c.yaml")

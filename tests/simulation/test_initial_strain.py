@@ -11,8 +11,8 @@ import pytest
 from solver.case.reader import parse_case
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.mesh import generate
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import build_scene
+from solver.simulation.equilibrium.problem import ContactProblem
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks

@@ -13,10 +13,10 @@ from solver.mechanics.linear.choice import MULTIGRID
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.mesh import generate
-from solver.simulation import problem
-from solver.simulation.consistency import inconsistency
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import build_scene
+from solver.simulation.equilibrium.problem import ContactProblem
+from solver.simulation.equilibrium.state import problem
+from solver.simulation.judgement.consistency import inconsistency
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from tests.scenes import block_case, block_mesh
 from tests.simulation.test_unloaded import SCENE, side_by_side

@@ -15,8 +15,8 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.reconstruction import FORMS
 from solver.lac.recovery import Recovery
 from solver.mesh import generate
-from solver.simulation import recovery as sweeps
-from solver.simulation.scene import build_scene
+from solver.simulation.equilibrium.state import recovery as sweeps
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.norms import errors

@@ -11,9 +11,9 @@ from solver.lac import recovery
 from solver.lac.cells.faces import surface_points
 from solver.mechanics.linear import choice
 from solver.mesh import generate
-from solver.simulation.exact import computed_pressure
+from solver.simulation.results.exact import computed_pressure
+from solver.simulation.results.solution import Solution
 from solver.simulation.simulate import simulate
-from solver.simulation.solution import Solution
 from solver.verification.norms import errors
 from tests.scenes import block_mesh
 from tests.simulation.test_recovery import blocks, solved, waves

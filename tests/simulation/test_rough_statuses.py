@@ -11,11 +11,10 @@ from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.choice import LinearSolver
 from solver.mechanics.linear.direct import force_solver
 from solver.mesh import generate
-from solver.simulation import problem
-from solver.simulation.equilibrium import Equilibrium
+from solver.simulation.equilibrium.problem import ContactProblem
+from solver.simulation.equilibrium.state import Equilibrium, problem
 from solver.simulation.options import LEAN
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import Scene, build_scene
+from solver.simulation.scene.scene import Scene, build_scene
 from solver.system.clock import Clock
 
 SPHERE = Path(__file__).resolve().parents[2] / "cases/hertz/sphere-hexa8.yaml"

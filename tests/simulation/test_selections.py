@@ -12,7 +12,7 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.mesh import transform
-from solver.simulation.selections import with_groups
+from solver.simulation.scene.selections import with_groups
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from tests.scenes import PRESSURE, block_mesh, errors

@@ -7,10 +7,10 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.mechanics.linear.direct import force_solver
-from solver.simulation.attributes import Attributes
-from solver.simulation.scene import build_scene
+from solver.simulation.judgement.plan import meshed
+from solver.simulation.scene.attributes import Attributes
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
-from solver.simulation.validity import meshed
 from solver.studies.constant import inf_sup_constant
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of

@@ -8,8 +8,8 @@ import pytest
 
 from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME, cell_type
 from solver.lac.errors import SolveError
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import build_scene
+from solver.simulation.equilibrium.problem import ContactProblem
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from tests.scenes import block_case, block_mesh, changed_case, errors, turn, with_points

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from solver.case.reader import load_case, parse_case
+from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.options import Options, Shortcuts
-from solver.simulation.problem import ContactProblem
-from solver.simulation.scene import build_scene
+from solver.simulation.scene.bodies import without_unloaded
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
-from solver.simulation.unloaded import without_unloaded
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
 from tests.scenes import PRESSURE, block_mesh, replaced

@@ -5,7 +5,7 @@ import pytest
 
 from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.mortar.overlap import inside_others
-from solver.simulation import validity
+from solver.simulation.judgement import plan as validity
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from tests import scenes

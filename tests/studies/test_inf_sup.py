@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from solver.simulation.scene import build_scene
+from solver.simulation.scene.scene import build_scene
 from solver.studies.constant import inf_sup_constant
 from solver.studies.description import read_study
 from solver.studies.figures.inf_sup import levels_off

@@ -15,7 +15,7 @@ from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.mechanics.fem import cell_loops
 from solver.mesh import generate
-from solver.simulation.solution import ZoneResult
+from solver.simulation.results.solution import ZoneResult
 from solver.system.compiled import available
 from solver.verification.norms import errors
 from tests.handmade import plane

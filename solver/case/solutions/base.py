@@ -136,6 +136,13 @@ class ExactSolution:
         """The part that a body with these nodes (n, dim) is."""
         return int(self.level(nodes).mean() > 0)
 
+    def node_parts(self, points: np.ndarray, body: np.ndarray) -> np.ndarray:
+        """The part (n,) that each node belongs to, the same for all of a body."""
+        part = np.zeros(len(points), dtype=int)
+        for number in np.unique(body):
+            part[body == number] = self.body_part(points[body == number])
+        return part
+
     def part_of(self, x: np.ndarray, part: Part) -> np.ndarray:
         """The part (n,) of each point; where it is not given, by place."""
         return (self.level(x) > 0).astype(int) if part is None else np.broadcast_to(part, len(x))

@@ -14,7 +14,7 @@ from solver.mechanics.fem.mixed import split
 from solver.mechanics.fem.nodal_stress import nodal_stress
 from solver.mesh import generate
 from solver.simulation.options import LEAN, Options, Safeguards
-from solver.simulation.scene import build_scene
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.norms import errors as norms

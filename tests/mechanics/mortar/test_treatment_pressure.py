@@ -12,9 +12,9 @@ from solver.case.reader import load_case
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.lac.cells.faces import surface_points
 from solver.mechanics.mortar.treatments import TREATMENTS
-from solver.simulation.exact import computed_pressure
+from solver.simulation.results.exact import computed_pressure
+from solver.simulation.results.solution import NodalContact
 from solver.simulation.simulate import simulate
-from solver.simulation.solution import NodalContact
 from solver.verification.norms import errors
 from solver.verification.provenance import gather
 from solver.verification.results import read_result, write_result

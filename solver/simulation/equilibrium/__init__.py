@@ -1,0 +1,1 @@
+"""Constraints, the state of each step, friction, and the recovered pressure."""

@@ -1,0 +1,136 @@
+"""The recovered pressure with friction: where it slips, friction is that of the recovered pressure.
+
+The traction is q* = q + Σ c ψ on the master, as the pressure is p*. What slips has q* = −μp* d, so
+that its coefficients are −μ d times those of the pressure. What sticks has those of a
+reconstruction among macro-elements that stick: the traction has a kink where slip begins. The
+sweeps are those of `lac.recovery`; each solves for the state under the loads of the one before.
+"""
+
+import logging
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from ...case.model import Step
+from ...lac.recovery import settled_means
+from ..scene.scene import ZoneScene
+from .friction import Search, solve_with_friction, status_of
+from .problem import ContactProblem
+from .recovery import Recovered, RecoveredZone, ZoneFit, fit_of, recovered
+from .state import Equilibrium
+
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Loads:
+    """What the reconstruction of a zone adds, in a state of friction.
+
+    `sticks` (m,); `slide` (m, k): −μ d where it slips, d the direction of slip.
+    """
+
+    zone: ZoneScene
+    fit: ZoneFit
+    sticks: np.ndarray
+    slide: np.ndarray
+
+    @classmethod
+    def of(cls, zone: ZoneScene, state: Equilibrium) -> "_Loads":
+        """Those of a state."""
+        assert state.friction is not None
+        closed = state.status.closed
+        slips = closed[zone.numbers] & state.friction.slipping[zone.numbers]
+        traction = np.array([state.pressure[rows] for rows in zone.slips]).T
+        traction = traction.reshape(len(slips), len(zone.slips))
+        size = np.linalg.norm(traction, axis=1, keepdims=True)
+        unit = np.divide(traction, size, out=np.zeros_like(traction), where=size > 0)
+        slide = zone.zone.friction * unit * slips[:, None]
+        return cls(zone, fit_of(zone, closed), closed[zone.numbers] & ~slips, slide)
+
+    def tractions(self, values: np.ndarray) -> list[np.ndarray]:
+        """The coefficients (m · k,) of q* by tangent, for pressures and tractions of all rows."""
+        c = self.fit.coefficients(values).reshape(len(self.sticks), -1)
+        along = [(slide[:, None] * c).ravel() for slide in self.slide.T]
+        pairs = zip(along, self.zone.slips, strict=True)
+        return [sliding + self._stuck @ values[rows] for sliding, rows in pairs]
+
+    @cached_property
+    def _stuck(self) -> sparse.csr_matrix:
+        """The reconstruction among macro-elements that stick."""
+        return self.fit.recovery.reconstruction(self.sticks).matrix
+
+    def couple(self, values: np.ndarray) -> np.ndarray:
+        """The couple (3,) of q* − q where the surfaces are meshed apart."""
+        levers = self.fit.recovery.levers
+        assert levers is not None
+        tractions = np.reshape(self.tractions(values), levers.shape[:3])
+        return np.einsum("tmk,tmkd->d", tractions, levers)
+
+    def force(self, values: np.ndarray) -> np.ndarray:
+        """The forces (n_dofs,) by pressures and tractions (k,) of all rows."""
+        recovery = self.fit.recovery
+        total = recovery.loads.T @ self.fit.coefficients(values)
+        for loads, c in zip(recovery.slip_loads, self.tractions(values), strict=True):
+            total = total + loads.T @ c
+        return np.asarray(total)
+
+
+def solve_and_recover(
+    problem: ContactProblem, step: Step, before: Equilibrium | None
+) -> tuple[Equilibrium, Recovered]:
+    """Equilibrium at a step after the state `before`, and its recovered pressure by zone.
+
+    Where friction does not settle under the correction, the state stays as it is and no pressure is
+    recovered. Raises SolveError where there is no equilibrium.
+    """
+    state = solve_with_friction(problem, step, before)
+    given = [zone for zone in problem.scene.zones if zone.operator.recovery]
+    sweeps = max((z.operator.recovery.form.sweeps for z in given if z.operator.recovery), default=0)
+    if not sweeps or not state.status.closed.any():
+        return recovered(problem, state, step)
+    search, latest = Search(problem, step, before), state
+    search.count, search.changes = state.status.iterations, list(state.status.changes)
+
+    def added(values: np.ndarray) -> np.ndarray:
+        forces = (_Loads.of(zone, latest).force(values) for zone in given)
+        return sum(forces, np.zeros(state.force.size))
+
+    def under(force: np.ndarray) -> Equilibrium:
+        search.correction = force.reshape(state.force.shape)
+        found = search.from_status(status_of(problem, latest))
+        if found is None:
+            raise _UnsettledError
+        return found
+
+    def change(force: np.ndarray) -> np.ndarray:
+        nonlocal latest
+        before, latest = latest, under(search.correction.ravel() + force)
+        return latest.pressure - before.pressure
+
+    nothing = np.zeros(state.force.size)
+    try:
+        values = settled_means(state.pressure, nothing, sweeps, added, change)
+        loads = [_Loads.of(zone, latest) for zone in given]
+        forces = [each.force(values) for each in loads]
+        couples = (each.couple(values) for each in loads)
+        found = replace(under(sum(forces, nothing)), couple=sum(couples, np.zeros(3)))
+    except _UnsettledError:
+        _LOG.info("recovery: friction does not settle; pressure and traction stay constant by face")
+        return state, {}
+    return found, {
+        each.zone.zone.name: RecoveredZone(
+            name=each.fit.recovery.form.name,
+            recovery=each.fit.recovery,
+            coefficients=each.fit.read(found.pressure, each.fit.coefficients(values)),
+            degree=each.fit.reconstruction.degree,
+            force=force,
+            tractions=each.tractions(values),
+        )
+        for each, force in zip(loads, forces, strict=True)
+    }
+
+
+class _UnsettledError(Exception):
+    """A sweep has no state."""

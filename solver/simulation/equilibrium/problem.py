@@ -1,0 +1,397 @@
+"""The contact problem of a scene at one load factor: status, displacement, pressure."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property, partial
+
+import numpy as np
+from scipy import sparse
+
+from ...case.model import Step
+from ...lac.errors import SolveError
+from ...lac.status import StatusResult, Trial, find_status
+from ...mechanics.fem.bodies import rigid_motions, unsupported
+from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
+from ...mechanics.linear.nodal_matrix import Stiffness
+from ...mechanics.linear.stabilised import Compliance
+from ...mechanics.linear.systems import Systems, parts_of
+from ...system.memory import release
+from ..scene.cut_groups import unit_springs
+from ..scene.scene import Scene
+from .constraints import (
+    RigidMotions,
+    contact_constraints,
+    first_guess,
+    free_motion,
+    free_stiffness,
+    free_unknowns,
+    moved,
+    refuse_unsolvable,
+)
+from .iterate import ContactIterate, Displacement
+from .state import Equilibrium, Roughness, estimate, judged, roughness
+
+_LOG = logging.getLogger(__name__)
+
+# An estimated error of the pressure from which residuals are summed in extended precision.
+_EXTEND = 3e-11
+# How exactly the change of a sweep of recovery is solved for; its own error is far larger.
+_CHANGE = 1e-4
+# The residual of a corrected state may be so many times what is otherwise taken for round-off.
+_CORRECTED = 4.0
+# A share of the loads: what contact pressure may leave of them on free rigid motions.
+_BALANCED = 1e-9
+SINGLE_FROM = 1_000_000
+"""Degrees of freedom from which the stiffness is stored in single precision where multigrid solves:
+it takes half the memory, and refinement, by residuals of the cells in double precision, two steps
+more."""
+# Where refinement ends with a larger residual, the stiffness is assembled in double precision.
+_SINGLE_SERVES = 1e-11
+# From so many unknowns on, memory that was freed is given back before the matrix is made.
+_LARGE = 100_000
+# While the contact status is sought by an iterative solver: residuals of the first solve and of
+# changes, and the share of pressures and motions below which such a solve decides nothing.
+_ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
+# Entries of the solutions that are kept at once for the stiffness that gaps see.
+_AT_ONCE = 1 << 23
+
+
+class ContactProblem:
+    """Stiffness and contact constraints of a scene, with the factors kept between solves."""
+
+    def __init__(self, scene: Scene):
+        """Assemble; raises InputError where nothing can hold a body or a macro-element's node."""
+        self.scene = scene
+        self.constraints = contact_constraints(scene)
+        motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
+        self._motions = RigidMotions.of(scene, self.constraints, motions)
+        self._moves: dict[bytes, str] = {}
+        self._without: tuple[Scene, Stiffness, Systems] | None = None
+        refuse_unsolvable(scene, self._free_motion(self.constraints.eligible), self.constraints)
+        surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
+        loose = unsupported(motions, self._motions.supports)
+        self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
+        self.unsupported = loose
+        if scene.springs.nnz:
+            springs = unit_springs(scene.springs)
+            self.unsupported = unsupported(motions, self._motions.supports, springs)
+        refined = scene.options.safeguards.refinement
+        # Springs of friction are added to a matrix in double precision.
+        large = scene.n_dofs >= SINGLE_FROM and not scene.case.frictional
+        self.single = refined and large
+        del motions  # memory for the stiffness
+        self._assemble()
+
+    def _assemble(self) -> None:
+        scene, on_free = self.scene, self.constraints.on_free
+        own = None if len(self.constraints.dependent) else self.constraints.own
+        unknowns = free_unknowns(scene)
+        if scene.n_dofs > _LARGE:
+            release()
+        self.matrix, self.diagonal = free_stiffness(scene, unknowns, self.single)
+        self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
+        stabilised = any(zone.zone.stabilised for zone in scene.zones)
+        soft = self._compliance if stabilised else None
+        self._systems_of = partial(
+            Systems,
+            constraints=on_free,
+            own=own,
+            unknowns=unknowns,
+            parts=self.parts,
+            compliance=soft,
+        )
+        self._systems = self._systems_of(self.matrix)
+
+    @cached_property
+    def _rough(self) -> Roughness:
+        return roughness(self.scene)
+
+    @property
+    def system(self) -> ConstrainedSystem | None:
+        """The last system solved."""
+        return self._systems.latest
+
+    @property
+    def linear_solver(self) -> str:
+        """The name of the solver of the last system."""
+        return self.system.factor.name if self.system else "none"
+
+    @property
+    def why_solver(self) -> str:
+        """Why it was chosen."""
+        return self.system.why if self.system else ""
+
+    @property
+    def linear_iterations(self) -> int:
+        """The most iterations that one solution of the last system took; 0 by a factor alone."""
+        return self.system.factor.iterations if self.system else 0
+
+    def solve(
+        self,
+        step: Step,
+        start: np.ndarray | None = None,
+        bilateral: bool = False,
+        correction: np.ndarray | float = 0.0,
+        before: Step | None = None,
+    ) -> Equilibrium:
+        """Equilibrium at a step, the status search starting from `start` (k,), a guess.
+
+        `before`: the step that `start` is the status of, if it is another one. `bilateral`: no
+        status is sought, all macro-elements stay closed, in tension too. `correction` (n, dim): see
+        `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0, or a system
+        is singular.
+        """
+        scene, eligible = self.scene, self.constraints.closable
+        if bilateral:
+            return self.equilibrium(step, eligible, correction)
+        guess: Callable[[], np.ndarray] | None
+        guess = partial(first_guess, scene, self.constraints, step, self._free_motion)
+        if not scene.options.shortcuts.status:
+            start = eligible
+        elif start is None:
+            start, guess = guess(), None
+        elif before is not None:
+            about = scene, self.constraints, self._free_motion
+            start = moved(start, before, step, *about)
+        latest: list[Equilibrium] = []
+        rough, known = scene.options.shortcuts.status, None
+
+        def attempt(closed: np.ndarray) -> Trial:
+            nonlocal known
+            if not scene.options.shortcuts.status:
+                self._systems.forget()
+            first = rest = self._at_rest(closed, step, correction)
+            if rough and self._constrained(closed).factor.iterative:
+                known, trial = self._roughly(rest, known)
+                if (eligible & (trial.violation(closed) > 1)).any():
+                    return trial
+                first = known
+            latest[:] = [self._solve_closed(first, correction, _force_scale(rest))]
+            return latest[0].trial
+
+        def stiffness() -> np.ndarray:
+            nonlocal rough
+            rough = False
+            return self._gap_stiffness(step)
+
+        area, confirm = self.constraints.covered, not scene.options.shortcuts.status
+        status = find_status(attempt, start, eligible, area, stiffness, confirm, guess)
+        trial = latest[0].trial
+        touching = self.constraints.unloaded & (trial.gap <= trial.gap_limit)
+        return replace(latest[0], status=replace(status, closed=status.closed | touching))
+
+    def equilibrium(
+        self, step: Step, closed: np.ndarray, correction: np.ndarray | float
+    ) -> Equilibrium:
+        """Equilibrium with the rows `closed` (k,) and no others, under further forces (n, dim)."""
+        first = self._at_rest(closed, step, correction)
+        return self._solve_closed(first, correction, _force_scale(first))
+
+    def count_slip_from(self, jump: np.ndarray) -> None:
+        """Slip is what the jump of displacement (k,) has more than this, in the rows of slip."""
+        constraints = self.constraints
+        initial = np.where(constraints.normal, constraints.initial, -jump * constraints.covered)
+        self.constraints = replace(constraints, initial=initial)
+
+    def hold_across(self, springs: sparse.csr_matrix | None) -> None:
+        """Add springs (n_dofs, n_dofs) to those of the scene, in place of any added before."""
+        if springs is None and self._without is None:
+            return
+        if self._without is None:
+            self._without = self.scene, self.matrix, self._systems
+        self.scene, self.matrix, self._systems = self._without
+        if springs is None:
+            self._without = None
+            return
+        self.scene = replace(self.scene, springs=self.scene.springs + springs)
+        self.matrix = self.matrix + self.scene.free.reduced(springs)
+        self._systems = self._systems_of(self.matrix)
+
+    def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
+        """The state with another `correction` (n, dim), its status kept.
+
+        Only the change is solved for, on the factor that the state was solved with.
+        """
+        start = state.iterate.under(state.force + correction)
+        scale = max(state.force_scale, np.abs(correction).max())
+        return self._refined(start, scale, state.status, correction, _CORRECTED * ROUND_OFF)
+
+    def pressure_change(self, closed: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The change of pressure (k,) by forces (n_dofs,), with the `closed` (k,) kept closed.
+
+        Two digits more than the change has, for a factor that iterates.
+        """
+        system, pushed = self._constrained(closed), self.scene.free.gathered(force)
+        change = system.correction(pushed, np.zeros(int(closed.sum())), _CHANGE)
+        found = np.zeros(len(closed))
+        found[closed] = system.multiplier(pushed - self.matrix @ change)
+        return found
+
+    def _free_motion(self, closed: np.ndarray) -> str:
+        """See `free_motion`; the last answer is kept, as a guess is asked about more than once."""
+        key = closed.tobytes()
+        if key not in self._moves:
+            self._moves = {key: free_motion(self.scene, self._motions, closed)}
+        return self._moves[key]
+
+    def _at_rest(
+        self, closed: np.ndarray, step: Step, correction: np.ndarray | float
+    ) -> ContactIterate:
+        """The start of a solve with the given multipliers closed."""
+        scene = self.scene
+        if moves := self._free_motion(closed):
+            raise SolveError(f"{moves} {self._loose(closed)}, or a support is missing")
+        acting, offset = scene.acting(step)
+        return ContactIterate(
+            scene=scene,
+            constraints=self.constraints,
+            closed=closed,
+            force=acting + correction,
+            displacement=self.at_rest.moved(offset),
+            mean_stress=np.zeros(scene.mean.size),
+            swelling=scene.straining(step, scene.initial.swelling),
+        )
+
+    def _loose(self, closed: np.ndarray) -> str:
+        """How many macro-elements do not hold, and what the loads have done."""
+        loose, slips = ~closed[self.constraints.normal], False
+        for zone in self.scene.zones:
+            for rows in zone.slips[:1]:
+                loose[zone.numbers] |= ~closed[rows]
+                slips = True
+        count = int(loose.sum())
+        if not slips:
+            return f"once {count} macro-elements are open: the loads part the bodies"
+        words = "the loads part the bodies or overcome friction"
+        return f"once {count} macro-elements are open or slip: {words}"
+
+    def _solve_closed(
+        self, start: ContactIterate, correction: np.ndarray | float, scale: float
+    ) -> Equilibrium:
+        """Equilibrium with the multipliers closed that are so at the start."""
+        correction = np.zeros(self.scene.force.shape) + correction
+        return self._refined(start, scale, StatusResult(start.closed, 1, []), correction)
+
+    def _roughly(
+        self, start: ContactIterate, known: ContactIterate | None
+    ) -> tuple[ContactIterate, Trial]:
+        """An approximate solution, from the one `known` of another status, and its trial.
+
+        What it leaves undecided counts as no violation: a solve to round-off then judges.
+        """
+        accuracy = _ROUGH_CHANGE if known else _ROUGH_STATUS
+        start = known.with_closed(start.closed) if known else start
+        system = self._constrained(start.closed)
+        force = start.condensed(start.residual())
+        found = start.advanced(system.correction(force, start.violation(), accuracy))
+        pressure = np.zeros(len(start.closed))
+        pressure[start.closed] = system.multiplier(found.residual())
+        trial, gaps = judged(found, pressure, self.diagonal), self.constraints.gaps
+        covered = np.where(self.constraints.eligible, self.constraints.covered, np.inf)
+        motion = abs(gaps) @ np.abs(found.displacement.total) / covered
+        return found, replace(
+            trial,
+            pressure_limit=trial.pressure_limit + _UNDECIDED * np.abs(pressure).max(initial=0.0),
+            gap_limit=trial.gap_limit + _UNDECIDED * motion,
+        )
+
+    def _refined(
+        self,
+        start: ContactIterate,
+        scale: float,
+        status: StatusResult,
+        correction: np.ndarray,
+        round_off: float = ROUND_OFF,
+    ) -> Equilibrium:
+        """Solved from an iterate; in extended precision where that gains digits."""
+        system, cures = self._constrained(start.closed), self.scene.options.safeguards
+        found = self._once(system, start, scale, status, correction, round_off)
+        if self.single and found.residual > _SINGLE_SERVES:
+            _LOG.info("the stiffness is assembled again, in double precision")
+            self.single = False
+            self._systems.forget()
+            # Nothing holds the first stiffness while the second is made.
+            del system, self.matrix, self._systems
+            self._assemble()
+            system = self._constrained(start.closed)
+            found = self._once(system, start, scale, status, correction, round_off)
+        if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
+            extended = replace(found.iterate, extended=True)
+            found = self._once(system, extended, scale, status, correction, round_off)
+        return found
+
+    def _once(
+        self,
+        system: ConstrainedSystem,
+        start: ContactIterate,
+        scale: float,
+        status: StatusResult,
+        correction: np.ndarray,
+        round_off: float,
+    ) -> Equilibrium:
+        refine = self.scene.options.safeguards.refinement
+        # In a stretched model a force of the size of round-off may be a large one elsewhere.
+        round_off = 0.0 if start.extended else round_off
+        iterate, multiplier, residual = solve(system, start, scale, refine, round_off)
+        pressure = np.zeros(len(start.closed))
+        pressure[start.closed] = multiplier
+        return Equilibrium(
+            iterate=iterate,
+            trial=judged(iterate, pressure, self.diagonal),
+            status=status,
+            residual=residual,
+            force_scale=scale,
+            accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
+            correction=correction,
+        )
+
+    def _compliance(self, closed: np.ndarray) -> Compliance:
+        """The compliance of the closed multipliers (k,); zones without one have no part of it."""
+        parts, weight = [], [np.empty(0)]
+        for zone in self.scene.zones:
+            mine, recovery = closed[zone.numbers], zone.operator.recovery
+            if zone.zone.stabilised and recovery and recovery.stabilisation:
+                parts.append(recovery.stabilisation.scatter(mine))
+                weight.append(recovery.stabilisation.weight[mine])
+            else:
+                parts.append(sparse.csr_matrix((0, int(mine.sum()))))
+        return Compliance(sparse.block_diag(parts, format="csr"), np.concatenate(weight))
+
+    def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
+        return self._systems.closed(closed)
+
+    def _gap_stiffness(self, step: Step) -> np.ndarray:
+        """The forces (e, e) that average gaps bring up, each imposed with all others closed.
+
+        Of the e multipliers that may close; symmetric, positive semidefinite. Raises SolveError
+        where no contact pressure balances the loads on a rigid motion that supports leave free.
+        """
+        from scipy.optimize import nnls
+
+        eligible = self.constraints.closable
+        push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
+        # Up to round-off initial strain has no resultant.
+        strained = self.scene.straining(step, self.scene.initial.force)
+        loads = self.unsupported.T @ (self.scene.acting(step)[0] - strained).ravel()
+        largest = np.abs(loads).max(initial=0.0)
+        if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
+            raise SolveError("no contact pressure balances the loads")
+        return self.stiffness_of(eligible)
+
+    def stiffness_of(self, rows: np.ndarray) -> np.ndarray:
+        """The forces (e, e) that average gaps and slips in e `rows` bring up, all others closed."""
+        system, area = self._systems.factored(rows), self.constraints.covered[rows]
+        found, size = np.zeros((len(area), len(area))), self.matrix.shape[0]
+        for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
+            imposed = np.zeros((len(area), len(some)))
+            imposed[some, np.arange(len(some))] = area[some]
+            change = system.correction(np.zeros((size, len(some))), imposed)
+            found[:, some] = area[:, None] * system.multiplier(-(self.matrix @ change))
+        return found
+
+
+def _force_scale(start: ContactIterate) -> float:
+    """The size of the forces at work: the loads, or those that imposed values bring up."""
+    internal = start.internal - start.springs
+    return float(max(np.abs(start.force).max(), np.abs(internal).max())) or 1.0

@@ -1,0 +1,135 @@
+"""The recovered pressure: an equilibrium corrected by a reconstruction of its pressure.
+
+The sweeps that settle it (`lac.recovery`) run on the factor of the equilibrium; the last is solved
+in full, so that means and loads are in equilibrium with the displacement.
+"""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...case.model import Step
+from ...lac.reconstruction import Reconstruction
+from ...lac.recovery import Recovery, settled_means
+from ..scene.scene import ZoneScene
+from .problem import ContactProblem
+from .state import Equilibrium
+
+_LOG = logging.getLogger(__name__)
+# How often a status that the correction changes is found anew.
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZoneFit:
+    """A zone's reconstruction among the macro-elements that are closed."""
+
+    numbers: slice
+    recovery: Recovery
+    reconstruction: Reconstruction
+
+    def coefficients(self, pressure: np.ndarray) -> np.ndarray:
+        """C (m · k,) of the pressures (k,) of all multipliers."""
+        return np.asarray(self.reconstruction.matrix @ pressure[self.numbers])
+
+    def read(self, pressure: np.ndarray, applied: np.ndarray) -> np.ndarray:
+        """C (m · k,) as read: of a quadratic the one applied, else by the last pressures.
+
+        Three sweeps settle what is applied; after two the last pressures are a sweep ahead of it.
+        """
+        form = self.recovery.form
+        quadratic = form.degree == 2 and form.keeps_means
+        return applied if quadratic else self.coefficients(pressure)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecoveredZone:
+    """A zone's reconstruction: `coefficients` (m · k,), `degree` (m,), by the form of a `name`.
+
+    `force` (n_dofs,): what its loads add to the contact forces of the means. With friction
+    `tractions` are the coefficients (m · k,) of the traction on the master, by tangent.
+    """
+
+    name: str
+    recovery: Recovery
+    coefficients: np.ndarray
+    degree: np.ndarray
+    force: np.ndarray
+    tractions: Sequence[np.ndarray] = ()
+
+    @property
+    def error(self) -> np.ndarray:
+        """The estimated L2 error (m,) of the constants."""
+        return self.recovery.error(self.coefficients)
+
+
+Recovered = dict[str, RecoveredZone]
+
+
+def recovered(
+    problem: ContactProblem, state: Equilibrium, step: Step
+) -> tuple[Equilibrium, Recovered]:
+    """The equilibrium of a step under the recovered pressure, and this by zone.
+
+    Where the status does not settle under the correction, the state stays as it is and no pressure
+    is recovered.
+    """
+    given = [zone for zone in problem.scene.zones if zone.operator.recovery]
+    if not given or not state.status.closed.any():
+        return state, {}
+    found = state
+    for _ in range(_ROUNDS):
+        zones = [fit_of(zone, found.status.closed) for zone in given]
+        found, read, forces = _corrected(problem, found, zones)
+        wrong = found.trial.violation(found.status.closed) > 1
+        if not (wrong & problem.constraints.eligible).any():
+            return found, {
+                zone.zone.name: RecoveredZone(
+                    name=fit.recovery.form.name,
+                    recovery=fit.recovery,
+                    coefficients=c,
+                    degree=fit.reconstruction.degree,
+                    force=force,
+                )
+                for zone, fit, c, force in zip(given, zones, read, forces, strict=True)
+            }
+        found = problem.solve(step, found.status.closed, correction=found.correction)
+    _LOG.info("recovery: the contact status does not settle; the pressure stays constant by face")
+    return state, {}
+
+
+def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
+    """The reconstruction of a zone among the `closed` (k,) of all multipliers."""
+    recovery = zone.operator.recovery
+    assert recovery is not None
+    reconstruction = recovery.reconstruction(closed[zone.numbers])
+    return ZoneFit(numbers=zone.numbers, recovery=recovery, reconstruction=reconstruction)
+
+
+def _corrected(
+    problem: ContactProblem, state: Equilibrium, zones: list[ZoneFit]
+) -> tuple[Equilibrium, list[np.ndarray], list[np.ndarray]]:
+    """The state with the loads of its reconstruction; coefficients and loads (n_dofs,) by zone."""
+    size = state.correction.size
+    sweeps = max(zone.recovery.form.sweeps for zone in zones)
+    if not sweeps:
+        return state, [z.coefficients(state.pressure) for z in zones], [np.zeros(size)] * len(zones)
+
+    def loads(pressure: np.ndarray) -> list[np.ndarray]:
+        return [z.recovery.loads.T @ z.coefficients(pressure) for z in zones]
+
+    pressure = settled_means(
+        state.pressure,
+        state.correction.ravel(),
+        sweeps,
+        lambda pressure: sum(loads(pressure), np.zeros(size)),
+        lambda force: problem.pressure_change(state.status.closed, force),
+    )
+    applied = [zone.coefficients(pressure) for zone in zones]
+    added = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
+    correction = np.sum(added, axis=0).reshape(state.correction.shape)
+    state = problem.corrected(state, correction)
+    read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
+    return state, read, added

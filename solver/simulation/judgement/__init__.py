@@ -1,0 +1,1 @@
+"""What a solution is worth: its plan, its limits, whether its fields fit one another."""

@@ -1,0 +1,290 @@
+"""The plan of a solve, what is left out and why, and the limits of what it takes for granted.
+
+Some lines are decided by the scene before the solve, others noted after it. They are read in the
+result file and in the report; `docs/plan.md` describes all of them, with the time saved.
+
+Limits: linear theory has small strains and rotations. Pairs of faces are those of the undeformed
+bodies, so that contact may slide by less than a face. Bodies without a contact zone between them,
+or beyond its reach, may come to lie in one another. A macro-element under the end of the master has
+the mean pressure of the part that is covered.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy import sparse
+
+from ...case.model import Case
+from ...lac.cells.faces import circumference
+from ...lac.cut import needs_cut
+from ...mechanics.fem.cell_sizes import largest_strain
+from ...mechanics.fem.mixed import AUTOMATIC_ABOVE
+from ...mechanics.mortar.overlap import inside_others
+from ..equilibrium.constraints import MIN_COVERAGE
+from ..equilibrium.problem import ContactProblem
+from ..equilibrium.state import Equilibrium
+from ..options import Options
+from ..results.solution import Line, Solution, Validity
+from ..scene.bodies import body_names
+from ..scene.scene import Scene, ZoneScene
+
+# An estimated error below this is rounding.
+_ROUNDING = 1e-10
+
+
+def decided(problem: ContactProblem) -> Iterator[Line]:
+    """The lines that the scene alone decides, before the solve, in the order of the work."""
+    scene = problem.scene
+    if scene.options.shortcuts == Options.everything().shortcuts:
+        yield Line("everything is done", "as asked for by --everything, needed or not")
+    groups, cells = scene.given.unnamed
+    if groups or cells:
+        many = "s" * (groups != 1)
+        what = f"left behind: {groups} group{many}, {cells} faces and edges of the mesh"
+        yield Line(what, "the case does not name them")
+    if scene.mean.n_cells:
+        why = f"nearly incompressible (Poisson's ratio above {AUTOMATIC_ABOVE:g}), or as chosen"
+        yield Line(f"mixed form in {scene.mean.n_cells} cells", why)
+    yield from _cells(scene)
+    for zone in scene.zones:
+        yield from _zone(zone, scene, problem.constraints.inactive_multipliers)
+    unloaded = np.flatnonzero(scene.rest.unloaded_bodies)
+    if len(unloaded):
+        names = body_names(scene)
+        what = f"left out, at rest without pressure: {', '.join(names[b] for b in unloaded)}"
+        yield Line(what, "no load, displacement imposed or overlap reaches them", "unloaded")
+    fixed = np.flatnonzero(scene.rest.fixed_bodies)
+    if len(fixed):
+        names = body_names(scene)
+        what = f"no stiffness of {', '.join(names[b] for b in fixed)}"
+        yield Line(what, "supports or rigidity hold all of it where it is", "unloaded")
+    if len(problem.parts) > 1:
+        why = "no contact joins them"
+        yield Line(f"{len(problem.parts)} groups of bodies solved apart", why)
+
+
+def _cells(scene: Scene) -> Iterator[Line]:
+    straight = [b.type.name for b in scene.blocks if b.type.name == "TETRA10" and b.straight]
+    if straight:
+        yield Line("plain Gauss rules in TETRA10 cells", "all edges are straight", "quadrature")
+
+
+def _zone(zone: ZoneScene, scene: Scene, inactive: np.ndarray) -> Iterator[Line]:
+    """The lines of one zone; `inactive` (k,): the multipliers that act on no free unknown."""
+    name, operator = zone.zone.name, zone.operator
+    if zone.zone.treatment != "lac":
+        yield Line(f"{name}: treatment {zone.zone.treatment}", zone.treatment.what)
+    kinds = sorted({block.type.name for block in zone.slave_faces})
+    whole = [kind for kind in kinds if not needs_cut(kind)]
+    if zone.treatment.cut and whole:
+        yield Line(f"{name}: no cut", f"{', '.join(whole)} faces own an inner node")
+    if operator.closed_faces:
+        why = "some faces are no affine images of their reference face"
+        why = why if scene.options.shortcuts.quadrature else "as asked for"
+        yield Line(f"{name}: closure of {operator.closed_faces} face integrals", why)
+    elif operator.plain:
+        yield Line(f"{name}: plain Gauss rules", "every face is an affine image", "quadrature")
+    surface = operator.surface
+    bare = int((surface.covered <= MIN_COVERAGE * surface.area).sum())
+    if bare:
+        why = f"less than {MIN_COVERAGE:.0%} of their area lies under the master surface"
+        yield Line(f"{name}: {bare} macro-elements out of contact", why)
+    held = int(inactive[zone.numbers].sum())
+    if held:
+        why = "supports hold the nodes of both surfaces there"
+        yield Line(f"{name}: {held} multipliers left out", why)
+
+
+def plan_notes(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Line]:
+    """The lines of the solve: work that was not needed, and the linear solver."""
+    scene = problem.scene
+    if scene.zones and len(states) > 1:
+        why = "displacements are small: all load factors share them"
+        yield Line("pairs and intersections found once", why)
+    if scene.options.shortcuts.status and all(state.status.iterations == 1 for state in states):
+        why = "the first status already fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0"
+        yield Line("no second active-set solve", why, "status")
+    different = {state.status.closed.tobytes() for state in states}
+    if scene.options.shortcuts.status and len(different) < len(states):
+        why = "the same multipliers are closed as at another load factor"
+        yield Line("no new factor for each load factor", why, "status")
+    yield from _friction(states)
+    yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
+
+
+def _friction(states: Sequence[Equilibrium]) -> Iterator[Line]:
+    """What is certain about a state with friction, and what is not."""
+    rates = [state.friction.contraction for state in states if state.friction]
+    if not rates:
+        return
+    path = "one step from rest" if len(rates) == 1 else f"a path of {len(rates)} steps from rest"
+    yield Line(f"friction: {path}", "the state depends on the order and the size of the steps")
+    if max(rates) > 0:
+        what = f"friction: bounds of slip contract to {max(rates):.2g} of their error by iteration"
+        only = "the state is the only one nearby; for a large coefficient there may be others"
+        why = only if max(rates) < 1 else "there may be other states nearby"
+        yield Line(what, why)
+
+
+def estimated(solution: Solution) -> Iterator[Line]:
+    """The estimated error of constant pressures, by a reconstruction."""
+    for zone in solution.zones:
+        error = zone.relative_pressure_error
+        if error is not None and error > _ROUNDING:
+            how = f"a {zone.recovered.form} one" if zone.recovered else "a linear one"
+            what = f"{zone.name}: estimated error of the constant pressure {error:.1e} in L2"
+            yield Line(what, f"it differs so much from {how}, reconstructed from neighbours")
+        if zone.recovered and (left := int((zone.closed & (zone.recovered.degree == 0)).sum())):
+            what = f"{zone.name}: pressure constant on {left} macro-elements"
+            yield Line(what, "too few closed neighbours to recover it from")
+
+
+def softness_notes(solution: Solution) -> Iterator[Line]:
+    """A note where contact gives way to pressures that scatter."""
+    for given, zone in zip(solution.case.zones, solution.zones, strict=True):
+        if given.stabilised:
+            largest = float(np.abs(zone.gap[zone.closed]).max(initial=0.0))
+            what = f"{zone.name}: stabilised, average gaps of up to {largest:.1e} in contact"
+            yield Line(
+                what, "so far contact gives way to pressures that differ from their neighbours"
+            )
+
+
+# A strain or rotation above the first is noted, one above the second is unreliable.
+_NOTED_STRAIN, _SMALL_STRAIN = 1e-2, 1e-1
+# The same for a slip, a share of the size of the macro-element.
+_NOTED_SLIP, _SMALL_SLIP = 0.1, 1.0
+# The same for a share of a macro-element that should have a partner.
+_NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
+
+
+def validity(scene: Scene, states: Sequence[Equilibrium]) -> Validity:
+    """How far the load steps are from what a solve takes for granted."""
+    found, solid = Validity(strain=0.0, rotation=0.0, slip=0.0), meshed(scene)
+    for state in states:
+        moved, closed = state.displacement, state.status.closed
+        strain, rotation = largest_strain(scene.points, scene.blocks, moved)
+        slips = [
+            found.slip,
+            *(_slip(scene, z, moved, closed) for z in scene.zones if _bent(z, scene)),
+        ]
+        past = inside_others(scene.points + moved, solid, scene.body)
+        partly = sum(_partly_covered(zone, closed) for zone in scene.zones)
+        found = Validity(
+            strain=max(found.strain, strain),
+            rotation=max(found.rotation, rotation, _turn(scene, moved)),
+            slip=max(slips),
+            pushed_past=max(found.pushed_past, past),
+            partly_covered=max(found.partly_covered, partly),
+            unpaired=max([found.unpaired, *(_unpaired(zone, closed) for zone in scene.zones)]),
+        )
+    return found
+
+
+def meshed(scene: Scene) -> dict[str, np.ndarray]:
+    """The cells by type, without those that carry the motion of a surface given by the case."""
+    hidden = [scene.given.groups[name] for name, body in scene.case.rigid.items() if body.surface]
+    kept = {}
+    for kind, cells in scene.mesh.cells.items():
+        parts = [scene.mesh.members(kind, group) for group in hidden]
+        kept[kind] = cells[~np.any([np.zeros(len(cells), dtype=bool), *parts], axis=0)]
+    return kept
+
+
+def _turn(scene: Scene, moved: np.ndarray) -> float:
+    """The largest rotation of a rigid body, in radians."""
+    found = [0.0]
+    for frame in scene.rigid.values():
+        amount = frame.amount(moved[frame.nodes])
+        found.append(float(np.linalg.norm([amount.get(key, 0.0) for key in ("rx", "ry", "rz")])))
+    return max(found)
+
+
+def _bent(zone: ZoneScene, scene: Scene) -> bool:
+    """Whether sliding changes what a zone takes for granted: a rigid plane is the same all over."""
+    body = scene.case.rigid.get(zone.zone.master)
+    return body is None or body.surface != "plane"
+
+
+def _slip(scene: Scene, zone: ZoneScene, moved: np.ndarray, closed: np.ndarray) -> float:
+    """The largest mean slip under a closed multiplier, by the size of macro-elements there."""
+    operator, surface = zone.operator, zone.operator.surface
+    mine, dim = closed[zone.numbers], moved.shape[1]
+    size = surface.area
+    if scene.case.axisymmetric:
+        size = size / circumference(surface.centre)
+    by_multiplier, area = operator.mean.T, surface.area
+    normal = by_multiplier @ (area[:, None] * surface.normal)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    size = (by_multiplier @ (area * size ** (1 / (dim - 1)))) / (by_multiplier @ area)
+    gaps = operator.matrix.tocoo()
+    along = gaps.data * normal[gaps.row, gaps.col % dim]
+    shape = (len(mine), len(moved))
+    shares = sparse.csr_array((along, (gaps.row, gaps.col // dim)), shape=shape)
+    jump = (shares @ moved)[mine] / operator.covered[mine, None]
+    slip = jump - normal[mine] * np.einsum("kd,kd->k", jump, normal[mine])[:, None]
+    return float((np.linalg.norm(slip, axis=1) / size[mine]).max(initial=0.0))
+
+
+def _partly_covered(zone: ZoneScene, closed: np.ndarray) -> int:
+    """How many closed macro-elements the master covers in part."""
+    surface = zone.operator.surface
+    share = surface.covered / surface.area
+    pressed = zone.by_macro_element(closed.astype(float)) > 0
+    return int((pressed & (share > MIN_COVERAGE) & (share < 1 - MIN_COVERAGE)).sum())
+
+
+def _unpaired(zone: ZoneScene, closed: np.ndarray) -> float:
+    """The largest share of a macro-element that lost its partner, closed or not covered at all."""
+    surface = zone.operator.surface
+    pressed = zone.by_macro_element(closed.astype(float)) > 0
+    bare = surface.covered <= MIN_COVERAGE * surface.area
+    return float(np.max((surface.lost / surface.area)[pressed | bare], initial=0.0))
+
+
+def remarks(found: Validity) -> Iterator[Line]:
+    """Lines of the plan for what is not small, or not as a user may expect."""
+    if max(found.strain, found.rotation) > _NOTED_STRAIN:
+        what = f"largest strain {found.strain:.1e}, rotation {found.rotation:.1e}"
+        yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")
+    if found.slip > _NOTED_SLIP:
+        what = f"contact slides by up to {found.slip:.2g} of a face"
+        yield Line(what, "pairs of faces belong to the undeformed bodies")
+    if found.partly_covered:
+        what = f"the master ends inside {found.partly_covered} macro-elements in contact"
+        yield Line(what, "their pressure is the mean over the part that it covers")
+    if found.unpaired > _NOTED_UNPAIRED:
+        what = f"{found.unpaired:.1%} of a macro-element lies opposite the master without a partner"
+        yield Line(what, "the master has a step there, or turns away too far")
+
+
+def limits_passed(case: Case, found: Validity) -> list[str]:
+    """Why a result is unreliable; empty where it is not.
+
+    A case that names an exact solution asks for one of linear theory, whatever the size.
+    """
+    reasons = []
+    if found.unpaired > _UNPAIRED:
+        reasons.append(
+            f"{found.unpaired:.2g} of a macro-element lies opposite the master but has no partner: "
+            "refine the slave at steps of the master, or its surface where it turns away"
+        )
+    if case.solution is not None:
+        return reasons
+    if max(found.strain, found.rotation) > _SMALL_STRAIN:
+        reasons.append(
+            f"strain {found.strain:.2g} with rotation {found.rotation:.2g} is beyond small strain: "
+            f"above {_SMALL_STRAIN:g} linear theory does not describe the bodies"
+        )
+    if found.slip > _SMALL_SLIP:
+        reasons.append(
+            f"contact slides by {found.slip:.2g} of a face: above {_SMALL_SLIP:g} the faces that "
+            "were paired are no longer opposite each other"
+        )
+    if found.pushed_past:
+        reasons.append(
+            f"{found.pushed_past} cells have their middle inside another body: the bodies were "
+            "pushed past each other where no contact zone, or none within its reach, keeps them "
+            "apart"
+        )
+    return reasons

@@ -1,0 +1,1 @@
+"""The solution: fields, forces, probes, balance, exact values."""

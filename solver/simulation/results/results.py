@@ -1,0 +1,379 @@
+"""The results of a solve from its states: fields, zones, steps, probes, what a case observes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import meshio
+import numpy as np
+
+from ...case.model import Probe
+from ...lac.cells.catalogue import BY_NAME
+from ...lac.cells.faces import nodal_normals
+from ...lac.facets import tangents_of
+from ...mechanics.fem.locate import Located, locate
+from ...mechanics.fem.nodal_stress import nodal_stress
+from ...mechanics.fem.stress import normal_stress
+from ...system.errors import InputError
+from ..equilibrium.problem import ContactProblem
+from ..equilibrium.recovery import Recovered, RecoveredZone
+from ..equilibrium.state import Equilibrium
+from ..scene.bodies import body_names, meshed_cells
+from ..scene.scene import Scene, ZoneScene
+from .balance import (
+    imbalances,
+    pressures_of_forces,
+    reactions,
+    resultants,
+    rigid_bodies,
+    strain_energy,
+)
+from .exact import pressure_on
+from .forces import ProbeResult
+from .solution import (
+    BodyInfo,
+    Line,
+    NodalContact,
+    RecoveredPressure,
+    Solution,
+    StepResult,
+    ZoneFriction,
+    ZoneResult,
+)
+
+# Half, up to round-off.
+_HALF = 0.5 - 1e-9
+
+
+def solution_of(
+    problem: ContactProblem, states: list[Equilibrium], fields: list[Recovered], plan: list[Line]
+) -> Solution:
+    """The solution by the states of all steps, and the pressures recovered in them."""
+    scene = problem.scene
+    last = states[-1]
+    stress = nodal_stress(
+        scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
+    )
+    stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
+    stress -= scene.straining(scene.case.steps[-1], scene.initial.stress)
+    if scene.case.thin:
+        stress[:, 2] = 0.0
+    scale = stress_scale(scene, states, stress)
+    steps, at_nodes = step_results(scene, states, fields, scale)
+    zones = [
+        _zone_result(scene, zone, last, stress, forces, fields[-1].get(zone.zone.name), steps[-1])
+        for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
+    ]
+    return Solution(
+        case=scene.case,
+        mesh=_output_mesh(scene),
+        displacement=last.displacement,
+        stress=stress,
+        body=scene.body,
+        bodies=body_infos(scene),
+        zones=zones,
+        nodal_normal_stress=normal_stress(stress, _contact_direction(scene)),
+        balance=imbalances(scene, last),
+        steps=steps,
+        length=scene.length,
+        load_scale=scale,
+        dofs=scene.n_dofs,
+        macro_elements=sum(zone.count for zone in scene.zones),
+        iterations=sum(state.status.iterations for state in states),
+        linear_solver=problem.linear_solver,
+        linear_iterations=problem.linear_iterations,
+        matrix_entries=problem.matrix.nnz,
+        plan=plan,
+        strain_energy=strain_energy(scene, last),
+        reaction=at_nodes,
+        probes=probed(scene, zones, last.displacement, stress),
+        acted=scene.acted,
+        accuracy=last.accuracy.causes,
+        mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
+    )
+
+
+def body_infos(scene: Scene) -> list[BodyInfo]:
+    """Each body as it was meshed: name, cells by type, faces on contact surfaces, role."""
+    infos = []
+    for number, name in enumerate(body_names(scene)):
+        inside = meshed_cells(scene, number)
+        cells = {t: int(mask.sum()) for t, mask in inside.items() if mask.any()}
+        roles, faces = set(), 0
+        for zone in scene.zones:
+            for role, blocks in (("slave", zone.slave_faces), ("master", zone.master_faces)):
+                count = sum(int((scene.body[b.nodes[:, 0]] == number).sum()) for b in blocks)
+                faces += count
+                roles |= {role} if count else set()
+        role = "both" if len(roles) == 2 else next(iter(roles), "none")
+        infos.append(BodyInfo(name, cells, faces, role))
+    return infos
+
+
+def _output_mesh(scene: Scene) -> meshio.Mesh:
+    cells = [(_meshio_name(name), data) for name, data in scene.mesh.cells.items()]
+    sets = {
+        group: [np.flatnonzero(scene.mesh.members(name, mask)) for name in scene.mesh.cells]
+        for group, mask in scene.given.groups.items()
+        if any(m.any() for m in mask.values())
+    }
+    return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)
+
+
+def _meshio_name(name: str) -> str:
+    return BY_NAME[name].meshio
+
+
+def _contact_direction(scene: Scene) -> np.ndarray:
+    """Unit mean normal of the first zone's slave surface; the last axis where there is no zone."""
+    dim = scene.points.shape[1]
+    if not scene.zones:
+        return np.eye(dim)[-1]
+    surface = scene.zones[0].operator.surface
+    mean = surface.area @ surface.normal
+    return mean / np.linalg.norm(mean)
+
+
+def _zone_result(
+    scene: Scene,
+    zone: ZoneScene,
+    state: Equilibrium,
+    stress: np.ndarray,
+    pressure_of_forces: np.ndarray | None,
+    field: RecoveredZone | None,
+    step: StepResult,
+) -> ZoneResult:
+    surface = zone.operator.surface
+    slave_nodes, slave_normal = _nodal_normals(
+        scene, [(f.type.name, f.nodes) for f in zone.sub_faces]
+    )
+    master = [(b.type.name, b.nodes) for b in zone.master_faces]
+    master_nodes, master_normal = _nodal_normals(scene, master)
+    return ZoneResult(
+        name=zone.zone.name,
+        faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
+        master_faces=master,
+        centre=surface.centre + scene.origin,
+        normal=surface.normal,
+        area=surface.area,
+        multiplier=zone.by_macro_element(state.pressure),
+        gap=zone.by_macro_element(state.gap),
+        closed=closed_of(zone, state),
+        coverage=surface.covered / surface.area,
+        stress_slave=normal_stress(stress[slave_nodes], slave_normal),
+        stress_master=normal_stress(stress[master_nodes], master_normal),
+        slave_nodes=slave_nodes,
+        master_nodes=master_nodes,
+        nodal=_nodal_contact(zone, state),
+        pressure_of_forces=pressure_of_forces,
+        pressure_error=None if field is None else field.error,
+        recovered=_recovered_pressure(scene, zone, state, field),
+        resultants=step.resultants[zone.zone.name],
+        friction=zone_friction(zone, state, field),
+    )
+
+
+def _recovered_pressure(
+    scene: Scene, zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
+) -> RecoveredPressure | None:
+    """The recovered pressure of a zone, and its mean at each node over the faces around."""
+    if field is None or field.name == "none":
+        return None
+    local, pressure = field.recovery.moments.local, state.pressure[zone.numbers]
+    nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
+    found = RecoveredPressure(
+        form=field.name,
+        coefficients=field.coefficients.reshape(len(pressure), -1),
+        degree=field.degree,
+        centre=local.centre + scene.origin,
+        axes=local.axes,
+        spread=local.spread,
+        nodes=nodes,
+        at_nodes=np.zeros(len(nodes)),
+    )
+    total, count = np.zeros((2, len(nodes)))
+    for faces in zone.sub_faces:
+        places = scene.points[faces.nodes] + scene.origin
+        at = np.searchsorted(nodes, faces.nodes)
+        np.add.at(total, at, found.values(pressure, faces.macro, places))
+        np.add.at(count, at, 1.0)
+    return replace(found, at_nodes=total / count)
+
+
+def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
+    nodes = zone.operator.nodes
+    if nodes is None:
+        return None
+    closed = zone.at_nodes(state.status.closed.astype(float)) >= _HALF
+    return NodalContact(nodes, zone.at_nodes(state.pressure), zone.at_nodes(state.gap), closed)
+
+
+def _nodal_normals(
+    scene: Scene, faces: list[tuple[str, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The nodes of a surface and its unit normals there, the mean over the faces around each."""
+    total = nodal_normals(scene.points, faces)
+    nodes = np.unique(np.concatenate([nodes.ravel() for _, nodes in faces]))
+    return nodes, total[nodes]
+
+
+def step_results(
+    scene: Scene, states: list[Equilibrium], fields: list[Recovered], scale: float
+) -> tuple[list[StepResult], np.ndarray]:
+    """The steps, and the reactions at nodes (n, dim) in the last one."""
+    results, at_nodes = [], np.zeros(0)
+    for factor, state, field in zip(scene.case.factors, states, fields, strict=True):
+        seen = []
+        for wanted in scene.case.observe:
+            zone = next(z for z in scene.zones if z.zone.name == wanted.zone)
+            surface = zone.operator.surface
+            offset = surface.centre + scene.origin - np.array(wanted.nearest)
+            local = int(np.linalg.norm(offset, axis=1).argmin())
+            seen.append(
+                {
+                    "zone": wanted.zone,
+                    "macro_element": local,
+                    "pressure": float(zone.by_macro_element(state.pressure)[local]),
+                    "gap": float(zone.by_macro_element(state.gap)[local]),
+                    "status": int(closed_of(zone, state)[local]),
+                    "coverage": float(surface.covered[local] / surface.area[local]),
+                }
+            )
+        held, at_nodes = reactions(scene, state)
+        n = scene.n_multipliers
+        product = float(np.abs(state.pressure * state.gap)[:n].max(initial=0.0))
+        results.append(
+            StepResult(
+                factor=factor,
+                iterations=state.status.iterations,
+                status_changes=sum(state.status.changes),
+                residual=state.residual,
+                complementarity=product / (scale * scene.length),
+                observations=seen,
+                resultants={
+                    (name := zone.zone.name): resultants(
+                        scene, zone, state, closed_of(zone, state), field.get(name)
+                    )
+                    for zone in scene.zones
+                },
+                reactions=held,
+                rigid=rigid_bodies(scene, state),
+                dissipation=state.friction.dissipation if state.friction else 0.0,
+                contraction=state.friction.contraction if state.friction else 0.0,
+            )
+        )
+    return results, at_nodes
+
+
+def closed_of(zone: ZoneScene, state: Equilibrium) -> np.ndarray:
+    """The macro-elements (m,) with at least half of their multipliers closed."""
+    return zone.by_macro_element(state.status.closed.astype(float)) >= _HALF
+
+
+def stress_scale(scene: Scene, states: list[Equilibrium], stress: np.ndarray) -> float:
+    """The largest pressure of any step among the loads (as a number).
+
+    Else the largest contact pressure of any step or `stress` (n, 6), else 1.
+    """
+    values = [
+        abs(load.value * load.factor(step))
+        for load in scene.case.loads
+        for step in scene.case.steps
+        if load.kind == "pressure" and isinstance(load.value, float)
+    ]
+    largest = [np.abs(field).max(initial=0.0) for field in (stress, *(s.pressure for s in states))]
+    return max(values, default=0.0) or float(max(largest)) or 1.0
+
+
+def zone_friction(
+    zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
+) -> ZoneFriction | None:
+    """Traction, slip and status of a zone; None without friction."""
+    if not zone.slips or state.friction is None:
+        return None
+    tangents = tangents_of(zone.operator.surface.normal)
+
+    def in_space(values: np.ndarray) -> np.ndarray:
+        return np.einsum("mkd,km->md", tangents, np.array([values[rows] for rows in zone.slips]))
+
+    closed, recovered = state.status.closed[zone.numbers], None
+    if field is not None and len(field.tractions):
+        coefficients = -np.array(field.tractions).reshape(len(zone.slips), len(closed), -1)
+        recovered = np.einsum("mtd,tmk->mkd", tangents, coefficients)
+    return ZoneFriction(
+        friction_traction=in_space(-state.pressure),
+        slip=in_space(state.gap),
+        slip_total=in_space(state.friction.total),
+        status=closed.astype(int) + (closed & state.friction.slipping[zone.numbers]),
+        recovered=recovered,
+    )
+
+
+# A point is in a body, and in two of them, to this share of the model's length; and on a contact
+# surface, which its faces only approximate, to the second.
+_NEAR, _ON_SURFACE = 1e-6, 1e-2
+
+
+def probed(
+    scene: Scene, zones: Sequence[ZoneResult], displacement: np.ndarray, stress: np.ndarray
+) -> dict[str, ProbeResult]:
+    """The values at each probe of the case; InputError where a point is in no body, or in two."""
+    found = {}
+    for probe in scene.case.probes:
+        if probe.zone:
+            zone = next(zone for zone in zones if zone.name == probe.zone)
+            found[probe.name] = _on_surface(scene, probe, zone)
+            continue
+        if probe.group:
+            nodes = scene.probed[probe.name]
+            places, moved, tensor = scene.points[nodes], displacement[nodes], stress[nodes]
+        else:
+            cell = _in_body(scene, probe)
+            places = _at(scene, probe)
+            moved, tensor = (cell.weights @ f[cell.nodes][None] for f in (displacement, stress))
+        none = np.full(len(places), np.nan)
+        found[probe.name] = ProbeResult(places + scene.origin, moved, tensor, none)
+    return found
+
+
+def _at(scene: Scene, probe: Probe) -> np.ndarray:
+    """The places (k, dim) of a probe in local coordinates."""
+    if probe.group:
+        return scene.points[scene.probed[probe.name]]
+    return np.array([probe.at]) - scene.origin
+
+
+def _in_body(scene: Scene, probe: Probe) -> Located:
+    """The cell that holds the point of a probe."""
+    blocks = list(scene.mesh.cells.items())
+    if probe.within:
+        given = scene.given.groups[probe.within]
+        blocks = [(name, cells[scene.mesh.members(name, given)]) for name, cells in blocks]
+    found = locate(scene.points, blocks, _at(scene, probe)[0])
+    inside = [one for one in found if one.distance <= _NEAR * scene.length]
+    if not inside:
+        allowed = f"no cell is there; the nearest is {found[0].distance:.3g} away"
+        raise InputError(scene.case.path, f"probes.{probe.name}.at", list(probe.at), allowed)
+    if len({scene.body[one.nodes[0]] for one in inside}) > 1:
+        allowed = "bodies meet there; name the cells of one of them (within)"
+        raise InputError(scene.case.path, f"probes.{probe.name}.at", list(probe.at), allowed)
+    return inside[0]
+
+
+def _on_surface(scene: Scene, probe: Probe, zone: ZoneResult) -> ProbeResult:
+    """The contact pressure at the nearest places of the slave surface of a zone."""
+    blocks = [(name, nodes) for name, nodes, _ in zone.faces]
+    places = _at(scene, probe)
+    pressure = np.empty(len(places))
+    for i, place in enumerate(places):
+        face = locate(scene.points, blocks, place)[0]
+        if face.distance > _ON_SURFACE * scene.length:
+            key = f"probes.{probe.name}.{'group' if probe.group else 'at'}"
+            allowed = f"is {face.distance:.3g} from the slave surface of {zone.name}"
+            raise InputError(scene.case.path, key, probe.group or list(probe.at), allowed)
+        owner = zone.faces[face.block][2][face.number]
+        at = face.nodes[None], np.array([owner]), face.reference[None]
+        pressure[i] = pressure_on(scene.points + scene.origin, zone, face.type.name, *at)[0, 0]
+    none = np.full((len(places), 6), np.nan)
+    return ProbeResult(places + scene.origin, none[:, : places.shape[1]], none, pressure)

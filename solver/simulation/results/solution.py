@@ -1,0 +1,327 @@
+"""The result of a simulation: fields, contact state, balance and cost of one solve.
+
+In the units of the case; `n` counts the nodes of the cut mesh, `m` the macro-elements of a zone.
+Contact pressure is positive in compression, a gap when open, stress in tension.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...case import job_name
+from .forces import ProbeResult, Reaction, Resultants, RigidMotion
+
+if TYPE_CHECKING:
+    import meshio
+
+    from ...case.model import Case
+
+
+class Line(NamedTuple):
+    """A line of the plan: what was left out or decided, and why.
+
+    `skip`: its switch in `Shortcuts`, or empty.
+    """
+
+    what: str
+    why: str
+    skip: str = ""
+
+
+@dataclass
+class BodyInfo:
+    """One body as it was meshed, before any cut.
+
+    `cells` maps cell type to number of cells; `faces` counts its faces on contact surfaces; `role`
+    is slave, master, both or none.
+    """
+
+    name: str
+    cells: dict[str, int]
+    faces: int
+    role: str
+
+
+@dataclass
+class NodalContact:
+    """Contact by node, for treatments of the interface with multipliers at nodes.
+
+    `nodes` (k,) into the mesh's points; `multiplier` (pressure ≥ 0), the average `gap` that it sees
+    and `closed` (bool), all (k,).
+    """
+
+    nodes: np.ndarray
+    multiplier: np.ndarray
+    gap: np.ndarray
+    closed: np.ndarray
+
+
+@dataclass
+class RecoveredPressure:
+    """A pressure p* = p + Σ c ψ by macro-element (m,), recovered from the constants p.
+
+    `form`: linear, quadratic or smooth (`mechanics.mortar.reconstruction`); `coefficients` c
+    (m, k), `degree` (m,) of the polynomials; `centre`, `axes`, `spread` are those of the local
+    coordinates that ψ is written in. `nodes` (n,) of the slave surface and `at_nodes` (n,), the
+    mean there of p* on the faces around.
+    """
+
+    form: str
+    coefficients: np.ndarray
+    degree: np.ndarray
+    centre: np.ndarray
+    axes: np.ndarray
+    spread: np.ndarray
+    nodes: np.ndarray
+    at_nodes: np.ndarray
+
+    def shapes(self, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """ψ (s, q, k) on macro-elements (s,) at points (s, q, dim)."""
+        from ...lac.reconstruction import FORMS, Local
+
+        local = Local(centre=self.centre, axes=self.axes, spread=self.spread)
+        return local.shapes(macro, places, FORMS[self.form])
+
+    def values(self, mean: np.ndarray, macro: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """p* (s, q) on macro-elements (s,) at points (s, q, dim), given the constants (m,)."""
+        psi = self.shapes(macro, places)
+        return mean[macro][:, None] + np.einsum("sqk,sk->sq", psi, self.coefficients[macro])
+
+
+@dataclass
+class ZoneFriction:
+    """Friction by macro-element (m,) in the last step.
+
+    `friction_traction` (m, dim) on the slave; `slip` (m, dim) of the master relative to the slave
+    in the step, `slip_total` in all steps; `status` (m,): 0 open, 1 stick, 2 slip. `recovered`
+    (m, k, dim): coefficients of the recovered traction, of the functions of the recovered pressure.
+    """
+
+    friction_traction: np.ndarray
+    slip: np.ndarray
+    slip_total: np.ndarray
+    status: np.ndarray
+    recovered: np.ndarray | None = None
+
+
+@dataclass
+class ZoneResult:
+    """The contact state of one zone, by macro-element, and the stress on both surfaces.
+
+    `faces`: the slave sub-faces by cell type: (type, connectivity (s, nodes) into the mesh's
+    points, macro-element number (s,)); `master_faces`: (type, connectivity). `centre` and `normal`
+    (m, dim), `area`, `multiplier` (pressure ≥ 0), `gap`, `closed` (bool) and `coverage`
+    (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
+    `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
+    belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
+    `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
+    these do not determine it (see `results.balance`). `pressure_error` (m,) estimates the
+    L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
+    where multipliers belong to nodes. `recovered` is p* where the case asks for one. `resultants`:
+    area, force, moment and edges of contact; None in files of earlier versions. `friction`: see
+    there; None without.
+    """
+
+    name: str
+    faces: list[tuple[str, np.ndarray, np.ndarray]]
+    master_faces: list[tuple[str, np.ndarray]]
+    centre: np.ndarray
+    normal: np.ndarray
+    area: np.ndarray
+    multiplier: np.ndarray
+    gap: np.ndarray
+    closed: np.ndarray
+    coverage: np.ndarray
+    stress_slave: np.ndarray
+    stress_master: np.ndarray
+    slave_nodes: np.ndarray
+    master_nodes: np.ndarray
+    nodal: NodalContact | None = None
+    pressure_of_forces: np.ndarray | None = None
+    pressure_error: np.ndarray | None = None
+    recovered: RecoveredPressure | None = None
+    resultants: Resultants | None = None
+    friction: ZoneFriction | None = None
+
+    @property
+    def shown_status(self) -> np.ndarray:
+        """0 open, 1 in contact; with friction 1 stick, 2 slip (m,)."""
+        return self.closed.astype(int) if self.friction is None else self.friction.status
+
+    @property
+    def pressure_error_estimate(self) -> np.ndarray:
+        """The estimated root mean square error (m,) of each constant, a stress; NaN if unknown."""
+        unknown = np.full(len(self.area), np.nan)
+        if self.pressure_error is None:
+            return unknown
+        covered = self.area * self.coverage
+        return np.divide(self.pressure_error, np.sqrt(covered), out=unknown, where=covered > 0)
+
+    @property
+    def relative_pressure_error(self) -> float | None:
+        """The estimated L2 error of the constants over their norm; None if unknown."""
+        return pressure_error([self])
+
+
+def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
+    """The estimated L2 error of the constants of zones over their norm; None where unknown."""
+    known = [zone for zone in zones if zone.pressure_error is not None]
+    if not known:
+        return None
+    scale = max(float(zone.multiplier.max(initial=0.0)) for zone in known)
+    if not scale > 0:
+        return 0.0
+    errors = [np.asarray(zone.pressure_error) / scale for zone in known]
+    whole = [zone.area * zone.coverage * (zone.multiplier / scale) ** 2 for zone in known]
+    return float(np.linalg.norm(np.concatenate(errors)) / np.sqrt(np.concatenate(whole).sum()))
+
+
+@dataclass
+class Validity:
+    """How far a solve is from what it takes for granted, the largest of all load steps.
+
+    `strain` (principal) and `rotation` (radians), in the middle of the cells; `slip` of closed
+    contact, a mean over the macro-element, by its size; `pushed_past`: how many cells are inside
+    another body; `partly_covered`: how many closed macro-elements are under the master's end;
+    `unpaired`: the largest share of one, closed or bare, opposite the master but in no segment.
+    """
+
+    strain: float = float("nan")
+    rotation: float = float("nan")
+    slip: float = float("nan")
+    pushed_past: int = 0
+    partly_covered: int = 0
+    unpaired: float = 0.0
+
+
+@dataclass
+class StepResult:
+    """One load step: load factor, cost of the status iteration, and what was observed.
+
+    `residual` is relative to the forces; `complementarity` is the largest size of p ḡ on a
+    macro-element, relative to the scale of stress times the model's length.
+
+    `observations` holds one mapping per observed macro-element, in the order of the case file:
+    zone, macro_element (number), pressure, gap, status (0 or 1), coverage. `resultants` of contact
+    by zone, `reactions` and motions of `rigid` bodies; all empty in files of earlier versions.
+    `dissipation`: the work of friction in the step; `contraction`: see `problem.Friction`.
+    """
+
+    factor: float
+    iterations: int
+    status_changes: int
+    residual: float
+    complementarity: float
+    observations: list[dict[str, Any]]
+    resultants: dict[str, Resultants] = field(default_factory=dict)
+    reactions: list[Reaction] = field(default_factory=list)
+    rigid: list[RigidMotion] = field(default_factory=list)
+    dissipation: float = 0.0
+    contraction: float = 0.0
+
+
+@dataclass
+class Solution:
+    """One solve, complete: everything the result file, the checks and the report need.
+
+    `mesh` is the cut mesh (volume cells only; slave sub-faces are in the zones). `displacement` (n,
+    dim), `stress` (n, 6) in the order of `solver.mechanics.fem.stress` and averaged per body,
+    `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
+    `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
+    the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
+    largest stress. `validity`: see there.
+    `accuracy` are the relative errors that rounding alone may cause, by cause (see
+    `equilibrium.state`). `mean_stress` holds, by cell type, the stress s of cells in mixed
+    form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
+    `strain_energy` is that of the last load factor, and so is `reaction` (n, dim), the forces at
+    nodes with which supports, rigid bodies, springs and ties hold the bodies; `probes` by name.
+    `acted`: nodes by the key of the support, or of the load on a surface; empty in older files.
+    `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
+    `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
+    the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
+    `stage_cpu_seconds` are wall and processor time by stage, `peak_memory_mb` the process's largest
+    resident size.
+    """
+
+    case: Case
+    mesh: meshio.Mesh
+    displacement: np.ndarray
+    stress: np.ndarray
+    body: np.ndarray
+    bodies: list[BodyInfo]
+    zones: list[ZoneResult]
+    nodal_normal_stress: np.ndarray
+    balance: dict[str, float]
+    steps: list[StepResult]
+    length: float
+    load_scale: float
+    dofs: int
+    macro_elements: int
+    iterations: int
+    linear_solver: str
+    plan: list[Line]
+    matrix_entries: int = 0
+    linear_iterations: int = 0
+    validity: Validity = field(default_factory=Validity)
+    strain_energy: float | None = None
+    reaction: np.ndarray | None = None
+    probes: dict[str, ProbeResult] = field(default_factory=dict)
+    acted: dict[str, np.ndarray] = field(default_factory=dict)
+    accuracy: dict[str, float] = field(default_factory=dict)
+    mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
+    cpu_seconds: float = float("nan")
+    peak_memory_mb: float = float("nan")
+
+    @property
+    def swapped(self) -> bool:
+        """Whether slave and master were exchanged."""
+        return self.case.swapped
+
+    @property
+    def hexahedra(self) -> str | None:
+        """The cut of slave hexahedra, if it overrides the case's."""
+        return self.case.hexahedra
+
+    @property
+    def reactions(self) -> list[Reaction]:
+        """What holds each group in the last step."""
+        return self.steps[-1].reactions
+
+    @property
+    def rigid(self) -> list[RigidMotion]:
+        """The rigid bodies in the last step."""
+        return self.steps[-1].rigid
+
+    @property
+    def deformable(self) -> np.ndarray:
+        """Which nodes (n,) belong to bodies that are not rigid."""
+        nodes = self.body >= 0
+        for group in self.case.rigid:
+            members = self.mesh.cell_sets.get(group, [])
+            for block, mine in zip(self.mesh.cells, members, strict=False):
+                nodes[block.data[np.asarray(mine, dtype=int)].ravel()] = False
+        return nodes
+
+    @property
+    def largest_displacement(self) -> tuple[float, np.ndarray]:
+        """The length of the largest displacement of deformable bodies, and its place (dim,)."""
+        size = np.linalg.norm(self.displacement, axis=1) * self.deformable
+        node = int(size.argmax())
+        return float(size[node]), self.mesh.points[node]
+
+    @property
+    def pressure_error_estimate(self) -> float | None:
+        """The estimated L2 error of constant pressures, over all zones and relative."""
+        return pressure_error(self.zones)
+
+    @property
+    def job(self) -> str:
+        """The name of this solve, as of its folder and its file of accepted values."""
+        return job_name(self.case.name, self.swapped, self.hexahedra, self.case.recovery)

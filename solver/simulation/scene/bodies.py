@@ -1,0 +1,190 @@
+"""The bodies of a scene: their names, where they make no sense together, and what nothing moves.
+
+What a mesh alone shows (flat cells, missing nodes) is refused when it is read; `check_geometry`
+looks at the bodies and at the contact between them.
+
+Groups of bodies without any load are left out of a solve: their displacement is zero. Bodies belong
+together where a multiplier moves free unknowns of both. Without load, displacement imposed and
+initial overlap, u = 0 and p = 0 fulfil equilibrium, p ≥ 0, ḡ ≥ 0 and p ḡ = 0, whatever the status
+of their contact; ḡ stays the initial gap. A body that supports or its rigidity hold all over, where
+it is, has neither strain nor a free unknown: its stiffness is not needed, whatever presses on it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from ...mechanics.fem.bodies import (
+    joined_bodies,
+    nodes_of_unknowns,
+    rigid_motions,
+    support_resistance,
+    unheld_motion,
+)
+from ...mechanics.fem.supports import FreeMotion
+from ...system.errors import InputError
+from .cut_groups import unit_springs
+from .scene import Scene, Unloaded, ZoneScene
+
+
+def body_names(scene: Scene) -> list[str]:
+    """For each body the smallest group of volume cells that holds it whole, else `body k`."""
+    return [_name(scene, number) for number in range(scene.n_bodies)]
+
+
+def meshed_cells(scene: Scene, number: int) -> dict[str, np.ndarray]:
+    """Which cells (n,) of each type, before the cut, belong to a body."""
+    return {t: scene.body[c[:, 0]] == number for t, c in scene.given.cells.items()}
+
+
+def _name(scene: Scene, number: int) -> str:
+    inside, holders = meshed_cells(scene, number), []
+    for group, mask in scene.given.groups.items():
+        if all(mask[t][cells].all() for t, cells in inside.items()):
+            holders.append((sum(int(m.sum()) for m in mask.values()), group))
+    return min(holders)[1] if holders else f"body {number + 1}"
+
+
+# Nodes nearer than this share of the model's length are at one place.
+_ONE_PLACE = 1e-10
+# Bodies that overlap by more than this share of the smaller one are no problem of small strain.
+_DEEPEST = 0.1
+
+
+def check_geometry(scene: Scene) -> None:
+    """Raise `InputError` for the first thing that makes no sense."""
+    for i, zone in enumerate(scene.zones):
+        _refuse_mixed_groups(scene, i, zone)
+        _refuse_deep_overlap(scene, i, zone)
+    _refuse_unmerged(scene)
+
+
+def _refuse_mixed_groups(scene: Scene, i: int, zone: ZoneScene) -> None:
+    """A group on several bodies, one of which is on the other side too, was picked by mistake."""
+    bodies = {side: _bodies(scene, getattr(zone, f"{side}_faces")) for side in ("slave", "master")}
+    common = bodies["slave"] & bodies["master"]
+    for side in ("slave", "master"):
+        if common and len(bodies[side]) > 1:
+            names = body_names(scene)
+            held = ", ".join(names[b] for b in sorted(bodies[side]))
+            other = "master" if side == "slave" else "slave"
+            allowed = (
+                f"has faces on several bodies ({held}), of which {names[min(common)]} carries the "
+                f"{other} too; a surface must be on one body, or on others than its partner"
+            )
+            group = getattr(zone.zone, side)
+            raise InputError(scene.case.path, scene.case.zone_key(i, side), group, allowed)
+
+
+def _bodies(scene: Scene, faces: list) -> set[int]:
+    return {int(b) for block in faces for b in np.unique(scene.body[block.nodes[:, 0]])}
+
+
+def _refuse_deep_overlap(scene: Scene, i: int, zone: ZoneScene) -> None:
+    operator = zone.operator
+    covered = np.where(operator.covered > 0, operator.covered, np.inf)
+    depth = -operator.initial / covered
+    used = _bodies(scene, zone.slave_faces) | _bodies(scene, zone.master_faces)
+    size = min(float(np.ptp(scene.points[scene.body == b], axis=0).max()) for b in used)
+    deep = depth > _DEEPEST * size
+    if deep.any():
+        worst = int(depth.argmax())
+        allowed = (
+            f"the surfaces overlap by {depth[worst]:.4g} at multiplier {worst} of zone "
+            f"{zone.zone.name} ({int(deep.sum())} beyond the limit); allowed is {_DEEPEST:g} of "
+            f"the smaller body, {_DEEPEST * size:.4g}"
+        )
+        raise InputError(scene.case.path, scene.case.zone_key(i, "slave"), zone.zone.slave, allowed)
+
+
+def _refuse_unmerged(scene: Scene) -> None:
+    """Nodes of one body at one place without contact between them: an unintended slit."""
+    surfaces = [b.nodes.ravel() for z in scene.zones for b in (*z.slave_faces, *z.master_faces)]
+    surfaces += [f.nodes.ravel() for z in scene.zones for f in z.sub_faces]
+    pairs = cKDTree(scene.points).query_pairs(_ONE_PLACE * scene.length, output_type="ndarray")
+    within = scene.body[pairs[:, 0]] == scene.body[pairs[:, 1]]
+    on_surface = np.isin(pairs, np.concatenate([np.empty(0, dtype=int), *surfaces]))
+    loose = pairs[within & ~on_surface.all(axis=1)]
+    if len(loose):
+        name = body_names(scene)[scene.body[loose[0, 0]]]
+        place = ", ".join(f"{x:.6g}" for x in scene.points[loose[0, 0]] + scene.origin)
+        allowed = (
+            f"{len(loose)} pairs of nodes of {name} are at one "
+            f"place and not on a contact surface (the first at ({place})): merge them, or let a "
+            "contact zone join them"
+        )
+        raise InputError(scene.case.path, "mesh", None, allowed)
+
+
+def without_unloaded(scene: Scene) -> Scene:
+    """The scene without the cells and unknowns of such groups, and the cells of bodies held.
+
+    No group is left out where a body could move freely (a solve refuses it by name), and nothing
+    where there would be nothing to solve.
+    """
+    if scene.histories:  # what acts in one step may not in another
+        return scene
+    gaps, free = _gaps(scene), scene.free
+    acting = (gaps @ free.basis).tocsr()
+    bodies = scene.body[nodes_of_unknowns(free.basis, scene.points.shape[1])]
+    unloaded, fixed = _unloaded(scene, gaps, acting, bodies)
+    if unloaded.any() and _moves_freely(scene, gaps):
+        unloaded[:] = False
+    kept = ~unloaded[bodies]
+    if not (unloaded | fixed).any() or not kept.any():
+        return scene
+    selection = None if free.selection is None else free.selection[kept]
+    out = (unloaded | fixed)[scene.body]
+    blocks = (block.of(~out[block.cells[:, 0]]) for block in scene.blocks)
+    return replace(
+        scene,
+        rest=Unloaded(
+            unloaded_bodies=unloaded,
+            fixed_bodies=fixed,
+            unloaded_multipliers=np.asarray(abs(acting) @ (~kept).astype(float)) > 0,
+        ),
+        blocks=[block for block in blocks if len(block.cells)],
+        free=FreeMotion(free.basis[:, np.flatnonzero(kept)], free.offset, selection),
+    )
+
+
+def _unloaded(
+    scene: Scene, gaps: sparse.csr_matrix, acting: sparse.csr_matrix, bodies: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which bodies (b,) nothing moves: those with free unknowns, and those without.
+
+    `gaps` (k, n_dofs) on all unknowns, `acting` (k, n_free) on free ones, those of `bodies`.
+    """
+    n_bodies = scene.n_bodies
+    group = joined_bodies(acting, bodies, n_bodies)
+    offset = scene.free.offset
+    awake, imposed = np.zeros((2, n_bodies), dtype=bool)
+    imposed[scene.body[(offset.reshape(scene.force.shape) != 0).any(axis=1)]] = True
+    awake[scene.body[(scene.force != 0).any(axis=1)]] = True
+    # Where all of a body is held, its initial strain is stress.
+    imposed[scene.body[scene.initial.stress.any(axis=(0, 2))]] = True
+    awake |= imposed
+    initial = np.concatenate([np.empty(0), *(zone.operator.initial for zone in scene.zones)])
+    pushed = np.flatnonzero((initial < 0) | (gaps @ offset != 0))
+    awake[bodies[acting[pushed].indices]] = True
+    of_group = np.zeros(n_bodies, dtype=bool)
+    of_group[group[awake]] = True
+    with_unknowns = np.isin(np.arange(n_bodies), bodies)
+    return with_unknowns & ~of_group[group], ~with_unknowns & ~imposed
+
+
+def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:
+    covered = np.concatenate([zone.operator.covered for zone in scene.zones] or [np.empty(0)])
+    there = covered > 0
+    per_area = sparse.diags(1 / covered[there]) @ gaps[there]
+    motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
+    opened = sparse.vstack([per_area, unit_springs(scene.springs)]).tocsr() @ motions
+    supports = support_resistance(motions, scene.free.basis)
+    return unheld_motion(supports, opened, scene.n_bodies) is not None
+
+
+def _gaps(scene: Scene) -> sparse.csr_matrix:
+    empty = sparse.csr_matrix((0, scene.n_dofs))
+    return sparse.vstack([empty, *(zone.operator.matrix for zone in scene.zones)]).tocsr()

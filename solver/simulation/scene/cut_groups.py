@@ -1,0 +1,322 @@
+"""The groups of a mesh file on the mesh with cut slave cells: surfaces, and what joins nodes.
+
+Supports that fix no displacement are here: springs, nodes that move as one or as others do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeAlias
+
+import meshio
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from ...case.expressions import evaluate
+from ...case.model import Case, Scalar, Zone
+from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
+from ...lac.cells.faces import FaceBlock
+from ...lac.cut import CutMesh, SubFaces
+from ...mechanics.fem.bodies import body_numbers
+from ...mechanics.fem.faces import FaceError, boundary_faces, volume_cells
+from ...mechanics.fem.loads import Field
+from ...mechanics.fem.springs import at_nodes, foundation
+from ...mechanics.fem.supports import Copies
+from ...mechanics.mortar.treatments import TREATMENTS
+from ...system.errors import InputError
+from .groups import ALL
+
+
+@dataclass(frozen=True)
+class CutZone:
+    """A contact zone: its slave faces as meshed, and their sub-faces after the cut.
+
+    Macro-elements of sub-faces are counted within the zone.
+    """
+
+    slave_faces: list[FaceBlock]
+    sub_faces: list[SubFaces]
+
+    @property
+    def count(self) -> int:
+        """How many macro-elements there are."""
+        return sum(len(block.nodes) for block in self.slave_faces)
+
+
+def faces_of(mesh: meshio.Mesh, group: str, case: Case, key: str) -> list[FaceBlock]:
+    """The faces of a group that the case names under `key`; refuses those not on a boundary."""
+    try:
+        return boundary_faces(mesh, group)
+    except FaceError as error:
+        raise InputError(case.path, key, group, str(error)) from None
+
+
+class CutGroups:
+    """The groups of the mesh file carried over to the cut mesh.
+
+    Points are counted from `origin` (dim,), as in the scene.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        mesh: meshio.Mesh,
+        cut_mesh: CutMesh,
+        zones: Sequence[CutZone],
+        origin: np.ndarray,
+    ):
+        self.case, self.mesh, self.cut = case, mesh, cut_mesh
+        self.points, self.origin, self.zones = cut_mesh.points, origin, zones
+        self.axisymmetric = case.axisymmetric
+
+    def whole_cell_mask(self, group: str) -> dict[str, np.ndarray]:
+        """Which volume cells (n,) of each type, as meshed, belong to a group."""
+        whole = {name: np.zeros(len(c), bool) for name, c in volume_cells(self.mesh).items()}
+        for block, members in zip(self.mesh.cells, self.mesh.cell_sets.get(group, []), strict=True):
+            name = _type_name(block.type)
+            if name in whole and members is not None:
+                whole[name][np.asarray(members, dtype=int)] = True
+        return whole
+
+    def cell_mask(self, group: str) -> dict[str, np.ndarray]:
+        """Which cells (n,) of each type of the cut mesh belong to a group of volume cells."""
+        whole = self.whole_cell_mask(group)
+        return {name: self.cut.members(name, whole) for name in self.cut.cells}
+
+    def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
+        """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
+        blocks = self.as_cut(faces_of(self.mesh, group, self.case, key))
+        return [(block.type.name, block.nodes) for block in blocks]
+
+    def as_cut(self, faces: Sequence[FaceBlock]) -> list[FaceBlock]:
+        """The faces as meshed, slave faces replaced by their sub-faces."""
+        found: list[FaceBlock] = []
+        for block in faces:
+            whole = np.ones(len(block.nodes), dtype=bool)
+            for zone in self.zones:
+                for slave in zone.slave_faces:
+                    mine, theirs = block.common(slave)
+                    if len(mine):
+                        whole[mine] = False
+                        number = np.full(zone.count, -1)
+                        number[slave.number[theirs]] = mine
+                        found += [_part(block, sub, number) for sub in zone.sub_faces]
+            found.append(block.of(whole))
+        return [block for block in found if len(block.nodes)]
+
+    def nodes(self, group: str, key: str) -> np.ndarray:
+        """All nodes of a group: of its volume cells, faces, edges and points."""
+        dim = self.points.shape[1]
+        if group == ALL:
+            return np.arange(len(self.points))
+        parts = [np.asarray(self.mesh.point_sets.get(group, []), dtype=int)]
+        if group in self.mesh.cell_sets:
+            mask = self.cell_mask(group)
+            parts += [self.cut.cells[name][mask[name]].ravel() for name in mask]
+            dims = set()
+            for block, members in zip(self.mesh.cells, self.mesh.cell_sets[group], strict=True):
+                if members is not None and len(members):
+                    dims.add(BY_NAME[_type_name(block.type)].dim)
+                    parts.append(block.data[np.asarray(members, dtype=int)].ravel())
+            if dim - 1 in dims:
+                parts += [nodes.ravel() for _, nodes in self.faces(group, key)]
+        return np.unique(np.concatenate(parts))
+
+    def field(self, values: Scalar | tuple[Scalar, ...]) -> Field:
+        """A case's number, expression or vector as a function of the local coordinates."""
+
+        def value(local: np.ndarray) -> np.ndarray:
+            place = local + self.origin
+            if isinstance(values, tuple):
+                return np.stack([evaluate(v, place) for v in values], axis=1)
+            return evaluate(values, place)
+
+        return value
+
+    @cached_property
+    def body(self) -> np.ndarray:
+        """The body (n,) of each node."""
+        return body_numbers(len(self.points), self.cut.cells)
+
+
+def _part(block: FaceBlock, sub: SubFaces, number: np.ndarray) -> FaceBlock:
+    """The sub-faces of a block's faces, which `number` (m,) gives by macro-element, or −1."""
+    face = number[sub.macro]
+    return replace(block.of(face[face >= 0]), type=sub.type, nodes=sub.nodes[face >= 0])
+
+
+def _type_name(meshio_name: str) -> str:
+    return BY_MESHIO[meshio_name].name
+
+
+# Slave and master faces of each zone.
+Surfaces: TypeAlias = list[tuple[list[FaceBlock], list[FaceBlock]]]
+
+
+def surfaces_of(case: Case, mesh: meshio.Mesh) -> Surfaces:
+    """Slave and master faces of each zone.
+
+    Raises InputError where a treatment does not exist for a slave face, where a slave face of an
+    axisymmetric body lies on the axis, and where two zones share a slave face.
+    """
+    surfaces: Surfaces = []
+    for i, zone in enumerate(case.zones):
+        slave, master = (
+            faces_of(mesh, getattr(zone, side), case, case.zone_key(i, side))
+            for side in ("slave", "master")
+        )
+        _refuse_untreated(case, i, zone, slave)
+        if case.axisymmetric:
+            _refuse_on_axis(case, mesh, i, slave)
+        _refuse_common_faces(case, i, slave, surfaces)
+        surfaces.append((slave, master))
+    return surfaces
+
+
+def _refuse_untreated(case: Case, i: int, zone: Zone, slave: list[FaceBlock]) -> None:
+    treatment = TREATMENTS[zone.treatment]
+    for block in slave:
+        if block.type.name not in treatment.faces:
+            others = [name for name, t in TREATMENTS.items() if block.type.name in t.faces]
+            allowed = (
+                f"does not exist for slave faces {block.type.name} of {block.owner_type.name}: "
+                f"{treatment.why}; allowed there: {', '.join(others)}"
+            )
+            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
+
+
+def _refuse_common_faces(case: Case, i: int, slave: list[FaceBlock], others: Surfaces) -> None:
+    """A face has one multiplier, the pressure of one zone."""
+    for zone, (faces, _) in zip(case.zones, others, strict=False):
+        if common := sum(len(a.common(b)[0]) for a in slave for b in faces):
+            allowed = (
+                f"{common} of its faces are slave faces of zone {zone.name} too: give one zone "
+                "both master surfaces, as a list"
+            )
+            raise InputError(case.path, case.zone_key(i, "slave"), case.zones[i].slave, allowed)
+
+
+def _refuse_on_axis(case: Case, mesh: meshio.Mesh, i: int, slave: list[FaceBlock]) -> None:
+    """Refuse slave faces of no area, and treatments that divide by the area of one node."""
+    zone = case.zones[i]
+    for block in slave:
+        ends = mesh.points[block.nodes[:, : block.type.n_vertices], 0] == 0
+        if flat := int(ends.all(axis=1).sum()):
+            allowed = f"{flat} of its faces lie on the axis: they have no area"
+            raise InputError(case.path, case.zone_key(i, "slave"), zone.slave, allowed)
+        if ends.any() and zone.treatment == "node_to_segment" and block.type.order == 2:
+            allowed = (
+                f"does not exist for slave faces {block.type.name} that end on the axis: a uniform "
+                "pressure has no force at the node there; allowed there: lac, quadrature, nodal"
+            )
+            raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
+
+
+# Nodes are copies where they are nearer to the image than this share of the model's extent.
+_NEAR = 1e-6
+
+
+def ties_of(groups: CutGroups) -> dict[str, np.ndarray]:
+    """The degrees of freedom (n,) of nodes that move as one, by key of the case file."""
+    found: dict[str, np.ndarray] = {}
+    dim = groups.points.shape[1]
+    for i, support in enumerate(groups.case.supports):
+        if not support.together:
+            continue
+        key = f"supports[{i}].group"
+        nodes = groups.nodes(support.group, key)
+        if np.ptp(groups.body[nodes]):
+            allowed = "its nodes belong to several bodies; only one body is tied"
+            raise InputError(groups.case.path, key, support.group, allowed)
+        for direction in support.together:
+            found[f"supports[{i}].together.{direction}"] = dim * nodes + "xyz".index(direction)
+    return found
+
+
+def copies_of(groups: CutGroups) -> dict[str, Copies]:
+    """Nodes that move as another side's nodes do, by key of the case file."""
+    found: dict[str, Copies] = {}
+    points, dim = groups.points + groups.origin, groups.points.shape[1]
+    extent = float(np.ptp(points, axis=0).max())
+    for i, support in enumerate(groups.case.supports):
+        if (given := support.cyclic) is None:
+            continue
+        key = f"supports[{i}].cyclic"
+        of, copy = groups.nodes(given.of, f"{key}.of"), groups.nodes(support.group, key)
+        turn = np.eye(dim) if given.angle is None else _turn(dim, given.angle, given.axis)
+        image = points[of] @ turn.T + (given.shift or np.zeros(dim))
+        # Both surfaces of an interface are at the same place: bodies are apart by a further axis.
+        apart = [np.c_[x, extent * groups.body[n]] for x, n in ((image, of), (points[copy], copy))]
+        distance, nearest = cKDTree(apart[1]).query(apart[0])
+        lost = np.flatnonzero(distance > _NEAR * extent)
+        if len(lost) or len(of) != len(copy):
+            at = ", ".join(f"{x:.6g}" for x in image[lost[0]]) if len(lost) else ""
+            allowed = f"{len(of)} nodes have {len(copy)} copies"
+            allowed += f"; no copy is at ({at}), of the same body" if at else ""
+            raise InputError(groups.case.path, key, support.group, allowed)
+        found[key] = Copies(of, copy[nearest], turn)
+    return found
+
+
+def _turn(dim: int, degrees: float, axis: Sequence[float]) -> np.ndarray:
+    """The rotation (dim, dim) by an angle, in 3D about an axis (Rodrigues' formula)."""
+    angle = np.radians(degrees)
+    if dim == 2:
+        axis = (0.0, 0.0, 1.0)
+    unit = np.asarray(axis) / np.linalg.norm(axis)
+    across = np.cross(np.eye(3), unit)
+    whole = np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
+    return whole[:dim, :dim]
+
+
+def springs_of(groups: CutGroups) -> sparse.csr_matrix:
+    """The stiffness (n_dofs, n_dofs) of springs and foundations."""
+    total = sparse.csr_matrix((groups.points.size, groups.points.size))
+    for i, support in enumerate(groups.case.supports):
+        for direction, value in support.spring.items():
+            total = total + _spring(
+                groups, support.group, direction, value, f"supports[{i}].spring.{direction}"
+            )
+    return total
+
+
+def _spring(
+    groups: CutGroups, group: str, direction: str, value: Scalar, key: str
+) -> sparse.csr_matrix:
+    points, axis, stiffness = groups.points, "xyz".find(direction), _stiffness(groups, value, key)
+    if group == ALL or group in groups.mesh.point_sets:
+        nodes = groups.nodes(group, key)
+        return at_nodes(points, nodes, stiffness(points[nodes]), axis)
+    along = None if axis < 0 else np.eye(points.shape[1])[axis]
+    return sum(
+        foundation(points, nodes, name, stiffness, along, groups.axisymmetric)
+        for name, nodes in groups.faces(group, key)
+    )
+
+
+def _stiffness(groups: CutGroups, value: Scalar, key: str) -> Field:
+    """A stiffness as a field; refused where it is not positive."""
+    field = groups.field(value)
+
+    def stiffness(local: np.ndarray) -> np.ndarray:
+        found = field(local)
+        if (found <= 0).any():
+            allowed = "a stiffness must be positive everywhere on the group"
+            raise InputError(groups.case.path, key, float(found.min()), allowed)
+        return found
+
+    return stiffness
+
+
+def unit_springs(springs: sparse.csr_matrix) -> sparse.csr_matrix:
+    """The rows (k, n_dofs) of a stiffness of springs, the largest entry of each one.
+
+    They resist the same motions, soft springs beside stiff ones too. None where there are none.
+    """
+    if not springs.nnz:
+        return springs[:0]
+    largest = abs(springs).max(axis=1).toarray().ravel()
+    return (sparse.diags_array(1 / np.where(largest > 0, largest, 1.0)) @ springs).tocsr()

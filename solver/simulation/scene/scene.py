@@ -1,0 +1,349 @@
+"""From a case and its mesh to arrays: cut mesh, materials, supports, loads, gap operators."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import meshio
+import numpy as np
+from scipy import sparse
+
+from ...case.model import Case, Step, Zone
+from ...lac.cells.faces import FaceBlock
+from ...lac.cut import CutMesh, SubFaces, cut
+from ...lac.operator import GapOperator
+from ...mechanics.fem.block import Block
+from ...mechanics.fem.faces import volume_cells
+from ...mechanics.fem.initial import StrainLoads
+from ...mechanics.fem.mixed import MeanStress
+from ...mechanics.fem.supports import Fixed, FreeMotion
+from ...mechanics.mortar.held import merge_fixed_multipliers
+from ...mechanics.mortar.treatments import TREATMENTS, Treatment
+from ...system.clock import Clock
+from ...system.progress import stage
+from ..options import LEAN, Options
+from .attributes import Attributes, strain_factors, strain_loads_of
+from .cut_groups import CutZone, Surfaces, springs_of, surfaces_of
+from .groups import ON_AXIS, check_groups, named_parts
+from .operators import operator_of, with_contact_frames
+from .rigid import Frame
+from .selections import with_groups
+
+# An average initial gap below this many roundings of the coordinates is zero.
+_GAP_ROUND_OFF = 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZoneScene:
+    """One zone: the zone as solved (swapped or not), its multipliers' numbers and its faces.
+
+    `slave_faces`, `master_faces` as meshed, `sub_faces` after the cut (their `macro` counts from 0
+    within the zone). `count` macro-elements; the zone's multipliers, of which a treatment may have
+    others than one for each of these, start at `first` among all. `slips`: where its rows of slip
+    are, by tangent, after the multipliers of all zones; none without friction.
+    """
+
+    zone: Zone
+    first: int
+    count: int
+    slave_faces: list[FaceBlock]
+    master_faces: list[FaceBlock]
+    sub_faces: list[SubFaces]
+    operator: GapOperator
+    slips: tuple[slice, ...] = ()
+
+    @property
+    def treatment(self) -> Treatment:
+        """How the interface is treated."""
+        return TREATMENTS[self.zone.treatment]
+
+    @property
+    def numbers(self) -> slice:
+        """The zone's multipliers among all."""
+        return slice(self.first, self.first + len(self.operator.initial))
+
+    def at_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Values (k,) of all multipliers at the nodes (n,) that the zone's ones belong to."""
+        mine, nodes = values[self.numbers], self.operator.at_nodes
+        return mine if nodes is None else nodes @ mine
+
+    def forces(self, values: np.ndarray) -> np.ndarray:
+        """The contact forces (n_dofs,) of all rows (k,), those of tractions included."""
+        found = self.operator.matrix.T @ values[self.numbers] + self.tangential_forces(values)
+        return np.asarray(found)
+
+    def tangential_forces(self, values: np.ndarray) -> np.ndarray:
+        """Those of the tractions alone."""
+        found = np.zeros(self.operator.matrix.shape[1])
+        for matrix, rows in zip(self.operator.slip, self.slips, strict=True):
+            found += matrix.T @ values[rows]
+        return found
+
+    def couple(self, values: np.ndarray) -> np.ndarray:
+        """The couple (3,) of tractions on surfaces that are meshed apart."""
+        if self.operator.levers is None:
+            return np.zeros(3)
+        pairs = zip(self.operator.levers, self.slips, strict=True)
+        return np.sum([values[rows] @ lever[:, 0] for lever, rows in pairs], axis=0)
+
+    def by_macro_element(self, values: np.ndarray) -> np.ndarray:
+        """Values (k,) of all multipliers averaged over each macro-element of the zone (m,)."""
+        return np.asarray(self.operator.mean @ values[self.numbers])
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivenMesh:
+    """The mesh before the cut.
+
+    `cells`: the volume cells by type; `groups`: which of them (n,) each named group holds;
+    `unnamed`: how many groups of the mesh, and of its faces and edges, the case does not name.
+    """
+
+    cells: dict[str, np.ndarray]
+    groups: dict[str, dict[str, np.ndarray]]
+    unnamed: tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unloaded:
+    """What nothing moves (see `solver.simulation.scene.bodies`).
+
+    `unloaded_bodies` (b,) and `unloaded_multipliers` (k,) are left out of the solve, and the cells
+    of `fixed_bodies` (b,): `blocks` and `free` of the scene are without them.
+    """
+
+    unloaded_bodies: np.ndarray
+    fixed_bodies: np.ndarray
+    unloaded_multipliers: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """The discrete problem of a case as solved (see `Case.as_solved`).
+
+    `points` (n, dim) are counted from `origin` (dim,), the mean of the mesh's nodes: far from the
+    origin of the coordinates, differences would lose digits. `length` is the largest extent of the
+    mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
+    cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
+    up for it. `fixed`: the displacements that are held, by key of the case file, `rigid`: the rigid
+    bodies. `springs` (n_dofs, n_dofs) is the stiffness of springs to the ground. `probed`: nodes by
+    probe; `acted`: nodes by the key of the support, or of the load on a surface. `force` (n, dim),
+    all but that of `initial` strains, and `free.offset` are for load factor 1.
+    """
+
+    case: Case
+    options: Options
+    given: GivenMesh
+    origin: np.ndarray
+    length: float
+    rounding: float
+    points: np.ndarray
+    mesh: CutMesh
+    body: np.ndarray
+    blocks: list[Block]
+    mean: MeanStress
+    fixed: dict[str, Fixed]
+    rigid: dict[str, Frame]
+    free: FreeMotion
+    force: np.ndarray
+    initial: StrainLoads
+    springs: sparse.csr_matrix
+    probed: dict[str, np.ndarray]
+    acted: dict[str, np.ndarray]
+    histories: dict[str, tuple[np.ndarray, np.ndarray]]
+    zones: list[ZoneScene]
+    rest: Unloaded
+
+    def acting(self, step: Step) -> tuple[np.ndarray, np.ndarray]:
+        """Forces (n, dim) and imposed displacements (n_dofs,) of a step."""
+        strained = self.straining(step, self.initial.force)
+        if not isinstance(step, dict):
+            return step * self.force + strained, step * self.free.offset
+        parts = [(step.get(name, 1.0), *part) for name, part in self.histories.items()]
+        force = np.sum([f * force for f, force, _ in parts], axis=0)
+        return force + strained, np.sum([f * offset for f, _, offset in parts], axis=0)
+
+    def straining(self, step: Step, values: np.ndarray) -> np.ndarray:
+        """The sum of `values` (k, …) of the initial strains, with their factors in a step."""
+        return np.tensordot(strain_factors(self.case, step), values, axes=1)
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of degrees of freedom, held ones included."""
+        return self.points.size
+
+    @property
+    def space(self) -> int:
+        """The dimensions of the bodies: 3 where the mesh is a section of axisymmetric ones."""
+        return 3 if self.case.axisymmetric else self.points.shape[1]
+
+    @property
+    def n_bodies(self) -> int:
+        """Number of bodies."""
+        return len(self.rest.unloaded_bodies)
+
+    @property
+    def n_multipliers(self) -> int:
+        """Number of multipliers of all zones, those of friction left out."""
+        return len(self.rest.unloaded_multipliers)
+
+
+def build_scene(
+    case: Case, mesh: meshio.Mesh, options: Options = LEAN, clock: Clock | None = None
+) -> Scene:
+    """The discrete problem of a case; raises InputError where case and mesh do not fit."""
+    clock, safeguards = clock or Clock(), options.safeguards
+    mesh = with_groups(case, mesh)
+    check_groups(case, mesh)
+    mesh, unnamed = named_parts(case, mesh)
+    origin = mesh.points.mean(axis=0) * safeguards.local_coordinates
+    if case.axisymmetric:
+        mesh = replace_points(mesh, radial(mesh.points))
+        origin[0] = 0.0
+    local = replace_points(mesh, mesh.points - origin)
+    rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
+    with stage(clock, "cut"):
+        surfaces = surfaces_of(case, local)
+        cut_mesh, sub_faces = _cut(local, case.zones, surfaces)
+    cut_zones = [
+        CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
+    ]
+    groups = Attributes(case, local, cut_mesh, cut_zones, origin)
+    # The master surface of a zone may be the slave surface of another, and cut.
+    surfaces = [(slave, groups.as_cut(master)) for slave, master in surfaces]
+    with stage(clock, "pairing"):
+        noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
+        operators = [
+            operator_of(groups, zone, faces, master, noise, options)
+            for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
+        ]
+    with stage(clock, "assembly"):
+        blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
+        free = groups.supports()
+        force, springs = groups.forces(), springs_of(groups)
+        initial = strain_loads_of(groups, blocks, mean)
+        zones = _zones(case, cut_zones, surfaces, operators, free)
+        slave = np.zeros(len(cut_mesh.points), dtype=bool)
+        for block in (block for faces in sub_faces for block in faces):
+            slave[block.nodes] = True
+        free = with_contact_frames(free, operators, slave)
+    n_bodies = int(groups.body.max()) + 1
+    n_multipliers = sum(len(z.operator.initial) for z in zones)
+    return Scene(
+        case=case,
+        options=options,
+        given=GivenMesh(
+            cells=volume_cells(mesh),
+            groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
+            unnamed=unnamed,
+        ),
+        origin=origin,
+        length=float(np.ptp(local.points, axis=0).max()),
+        rounding=rounding,
+        points=cut_mesh.points,
+        mesh=cut_mesh,
+        body=groups.body,
+        blocks=blocks,
+        mean=mean,
+        fixed=groups.fixed,
+        rigid=groups.frames,
+        free=free,
+        force=force,
+        initial=initial,
+        springs=springs,
+        probed={p.name: groups.nodes(p.group, "probes") for p in case.probes if p.group},
+        acted={key: groups.nodes(group, key) for key, group in case.acting.items()},
+        histories=groups.histories(),
+        zones=zones,
+        rest=Unloaded(
+            unloaded_bodies=np.zeros(n_bodies, dtype=bool),
+            fixed_bodies=np.zeros(n_bodies, dtype=bool),
+            unloaded_multipliers=np.zeros(n_multipliers, dtype=bool),
+        ),
+    )
+
+
+def _zones(
+    case: Case,
+    cut_zones: Sequence[CutZone],
+    surfaces: Surfaces,
+    operators: Sequence[GapOperator],
+    free: FreeMotion,
+) -> list[ZoneScene]:
+    """The zones; multipliers of nodes that are fixed, or have one of another zone, are merged."""
+    found: list[ZoneScene] = []
+    first, taken = 0, None
+    if sum(operator.nodes is not None for operator in operators) > 1:
+        dim = operators[0].surface.centre.shape[1]
+        taken = np.zeros((free.basis.shape[0] // dim, dim, dim))
+    for i, zone in enumerate(case.zones):
+        operator, (slave, master) = operators[i], surfaces[i]
+        joins = TREATMENTS[zone.treatment].joins
+        if joins or (taken is not None and operator.nodes is not None):
+            basis = free.basis if joins else sparse.identity(free.basis.shape[0], format="csr")
+            operator = merge_fixed_multipliers(operator, basis, taken)
+        found.append(
+            ZoneScene(
+                zone=zone,
+                first=first,
+                count=cut_zones[i].count,
+                slave_faces=slave,
+                master_faces=master,
+                sub_faces=cut_zones[i].sub_faces,
+                operator=operator,
+            )
+        )
+        first += len(operator.initial)
+    return _with_slips(found, first)
+
+
+def _with_slips(zones: list[ZoneScene], first: int) -> list[ZoneScene]:
+    """The zones with their rows of slip, counted from `first` on."""
+    found = []
+    for zone in zones:
+        count = len(zone.operator.initial)
+        ends = [first + count * k for k in range(len(zone.operator.slip) + 1)]
+        found.append(replace(zone, slips=tuple(slice(*pair) for pair in pairwise(ends))))
+        first = ends[-1]
+    return found
+
+
+def carried_over(scene: Scene, mesh: meshio.Mesh, values: np.ndarray) -> np.ndarray:
+    """Values (n, dim) at the mesh's nodes, interpolated at the nodes of the scene's cut mesh."""
+    surfaces = [(zone.slave_faces, zone.master_faces) for zone in scene.zones]
+    return _cut(replace_points(mesh, values), scene.case.zones, surfaces)[0].points
+
+
+def radial(points: np.ndarray) -> np.ndarray:
+    """Points (n, 2) of a meridian plane; points on the axis up to rounding are put on it."""
+    found = points.copy()
+    found[np.abs(points[:, 0]) <= ON_AXIS * np.abs(points).max(), 0] = 0.0
+    return found
+
+
+def replace_points(mesh: meshio.Mesh, points: np.ndarray) -> meshio.Mesh:
+    """The same cells and groups on other points."""
+    return meshio.Mesh(points, mesh.cells, point_sets=mesh.point_sets, cell_sets=mesh.cell_sets)
+
+
+def _cut(
+    mesh: meshio.Mesh, zones: Sequence[Zone], surfaces: Surfaces
+) -> tuple[CutMesh, list[list[SubFaces]]]:
+    """The cut mesh, and each zone's sub-faces with macro-elements counted within the zone."""
+    faces, macro, into_hexahedra, uncut, first = [], [], [], [], [0]
+    for zone, (slave, _) in zip(zones, surfaces, strict=True):
+        for block in slave:
+            faces.append(block)
+            macro.append(first[-1] + block.number)
+            into_hexahedra.append(zone.hexahedra == "hexahedra")
+            uncut.append(not TREATMENTS[zone.treatment].cut)
+        first.append(first[-1] + sum(len(block.nodes) for block in slave))
+    cells = volume_cells(mesh)
+    cut_mesh = cut(mesh.points, cells, faces, macro, into_hexahedra, uncut)
+    sub_faces = []
+    for low, high in pairwise(first):
+        mine = [(f, (f.macro >= low) & (f.macro < high)) for f in cut_mesh.sub_faces]
+        sub_faces.append(
+            [SubFaces(f.type, f.nodes[m], f.macro[m] - low) for f, m in mine if m.any()]
+        )
+    return cut_mesh, sub_faces
