@@ -216,9 +216,9 @@ MUTANTS = (
     Mutant("spring-weight", "an elastic foundation is 1 % too stiff", FOUNDATION,
            "simulation.scene.cut_groups:foundation", changed(lambda k: 1.01 * k)),
     Mutant("spring-energy", "the energy in springs counts as strain energy", FOUNDATION,
-           "simulation.simulate:strain_energy", springs_counted),
+           "simulation.results.results:strain_energy", springs_counted),
     Mutant("initial-energy", "the energy of initial strain has the wrong sign", HEATED,
-           "simulation.simulate:strain_energy", given(
+           "simulation.results.results:strain_energy", given(
                lambda scene, state: (replace(scene, initial=replace(
                    scene.initial, energy=-scene.initial.energy)), state))),
     Mutant("axial-balance", "axisymmetric bodies have no balance along the axis", DISC,
@@ -264,7 +264,7 @@ MUTANTS = (
            "mechanics.fem.nodal_stress:extrapolation",
            changed(lambda fit: np.roll(fit, 1, axis=0))),
     Mutant("stress-bits", "σ_xx is off by 9e-4 of the load at every third node", PLANE,
-           "simulation.simulate:nodal_stress", changed(every_third_off)),
+           "simulation.results.results:nodal_stress", changed(every_third_off)),
     Mutant("poisson-digits", "ν of the lower block is 0.2991 instead of 0.3", PLANE,
            "simulation.scene.attributes:Attributes.by_material", lower_half_softer),
     Mutant("stale-system", "the factored system belongs to the first status", CLOSING,
@@ -359,7 +359,7 @@ MUTANTS = (
            "simulation.equilibrium.problem:ContactProblem.count_slip_from",
            given(lambda problem, jump: (problem, 0 * jump))),
     Mutant("traction-side", "the traction of friction is that on the master", SLIDING,
-           "simulation.simulate:zone_friction",
+           "simulation.results.results:zone_friction",
            changed(lambda f: f and replace(f, friction_traction=-f.friction_traction))),
     Mutant("tangents-exchanged", "the two tangents are exchanged", RIGHT,
            "lac.operator:slip_operator", changed(lambda rows: rows[::-1])),
@@ -370,7 +370,7 @@ MUTANTS = (
            "simulation.equilibrium.friction_recovery:_Loads.of",
            changed(lambda loads: replace(loads, slide=0 * loads.slide))),
     Mutant("traction-unrecovered", "the recovered traction is that on the master", RECOVERED,
-           "simulation.simulate:zone_friction",
+           "simulation.results.results:zone_friction",
            changed(lambda f: f and replace(f, recovered=-f.recovered))),
     Mutant("work-halved", "friction does half the work, as if it grew with the slip", STEPWISE,
            "simulation.equilibrium.friction:_work", changed(lambda work: work / 2)),

@@ -7,9 +7,9 @@ import pytest
 
 from solver.lac import operator
 from solver.lac.pairing import candidate_pairs
+from solver.simulation.equilibrium import constraints as first_status
 from solver.simulation.equilibrium.constraints import first_guess, moved
 from solver.simulation.equilibrium.problem import ContactProblem
-from solver.simulation.equilibrium.state import constraints as first_status
 from tests.simulation.test_rough_statuses import sphere
 
 

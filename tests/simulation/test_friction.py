@@ -9,8 +9,8 @@ import pytest
 from solver.case.reader import load_case, parse_case
 from solver.lac.errors import SolveError
 from solver.mechanics.mortar.tresca import coulomb_by_cones
+from solver.simulation.equilibrium import friction
 from solver.simulation.equilibrium.problem import ContactProblem
-from solver.simulation.equilibrium.state import friction
 from solver.simulation.judgement import plan
 from solver.simulation.options import Options
 from solver.simulation.scene.scene import build_scene

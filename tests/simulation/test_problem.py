@@ -13,8 +13,8 @@ from solver.mechanics.linear.choice import MULTIGRID
 from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.mesh import generate
+from solver.simulation.equilibrium import problem
 from solver.simulation.equilibrium.problem import ContactProblem
-from solver.simulation.equilibrium.state import problem
 from solver.simulation.judgement.consistency import inconsistency
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate

@@ -15,7 +15,7 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.reconstruction import FORMS
 from solver.lac.recovery import Recovery
 from solver.mesh import generate
-from solver.simulation.equilibrium.state import recovery as sweeps
+from solver.simulation.equilibrium import recovery as sweeps
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError

@@ -11,8 +11,9 @@ from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.choice import LinearSolver
 from solver.mechanics.linear.direct import force_solver
 from solver.mesh import generate
+from solver.simulation.equilibrium import problem
 from solver.simulation.equilibrium.problem import ContactProblem
-from solver.simulation.equilibrium.state import Equilibrium, problem
+from solver.simulation.equilibrium.state import Equilibrium
 from solver.simulation.options import LEAN
 from solver.simulation.scene.scene import Scene, build_scene
 from solver.system.clock import Clock
