@@ -5,7 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..case.checks import BY_NAME, ERRORS
-from . import overview, stages
+from . import stages
+from .overview import (WORK, cause, digit_chart, digits_kept, error_chart, extreme_cases, fewest_digits, in_words, left_out_by_family)
 from .charts import Chart
 from .html import TEMPLATES, render
 from .pictures import VIEWER, picture, profile
@@ -50,15 +51,15 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         bad=bad,
         causes=causes(bad),
         choices=choices(rows),
-        verified=overview.in_words(rows),
-        errors=overview.error_chart(ours(rows)),
-        digits=overview.digit_chart(rows),
-        extremes=overview.extreme_cases(folder),
-        fewest=overview.fewest_digits(rows),
-        digits_kept=overview.digits_kept,
-        cause=overview.cause,
-        left_out=overview.left_out_by_family(rows, folder),
-        switches=overview.WORK,
+        verified=in_words(rows),
+        errors=error_chart(ours(rows)),
+        digits=digit_chart(rows),
+        extremes=extreme_cases(folder),
+        fewest=fewest_digits(rows),
+        digits_kept=digits_kept,
+        cause=cause,
+        left_out=left_out_by_family(rows, folder),
+        switches=WORK,
         good=bool(rows) and not bad,
         outcome=outcome(rows),
         groups=grouped(sections),

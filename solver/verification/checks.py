@@ -19,7 +19,7 @@ from ..case.checks import CHECKS, Check
 from ..case.model import Exact
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
-from . import friction, numbers, samples, scales
+from . import numbers, samples, scales
 from .verdict import CheckResult, Regression
 
 
@@ -64,7 +64,7 @@ def run_checks(
 
 def sampler_of(check: Check) -> samples.Sampler:
     """The function that gives the values of a check."""
-    rooms = (samples, numbers, friction)
+    rooms = (samples, numbers)
     found: Any = next(getattr(r, check.sample) for r in rooms if hasattr(r, check.sample))
     sampler: samples.Sampler = found(check.of) if check.of else found
     return sampler

@@ -8,7 +8,7 @@ perturb: {amplitude: 0.2, seed: 1}  # random moves, as a share of the shortest e
                                     # node; with `group`, of the nodes of that group alone
 renumber: 1                         # a seed: another order of the nodes and of the cells
 shift: {group: top, by: [0, 0.1]}   # the nodes of a group's cells
-turn: {group: top, angle: 1.0e-9}   # degrees, about the last axis; see `parts.turned`
+turn: {group: top, angle: 1.0e-9}   # degrees, about the last axis; see `turned`
 pick: {from: bottom_contact, low: [0, -1], high: [0.5, 1], name: corner, rest: others}
                                     # two groups of a group's cells, by the place of their
                                     # nodes; or a list of such
@@ -24,7 +24,7 @@ from ...case.file import Perturbation, Pick, Renumbering, Rotation, Shift, Trans
 from ...case.typed import FieldError, read_as
 from ...system.errors import InputError, key_path
 from ..keys import LARGEST
-from . import parts
+from .parts import cells_of, nodes_of, picked, turned
 from .perturb import perturbed
 
 
@@ -115,7 +115,7 @@ def _renumber(mesh: meshio.Mesh, seed: int | Renumbering) -> meshio.Mesh:
 
 def _perturb(mesh: meshio.Mesh, given: float | Perturbation) -> meshio.Mesh:
     full = given if isinstance(given, Perturbation) else Perturbation(given)
-    chosen = None if full.group is None else parts.nodes_of(mesh, full.group)
+    chosen = None if full.group is None else nodes_of(mesh, full.group)
     points = perturbed(mesh, full.amplitude, full.seed, chosen)
     if points is None:
         problem = "folds cells over: must be smaller"
@@ -124,13 +124,13 @@ def _perturb(mesh: meshio.Mesh, given: float | Perturbation) -> meshio.Mesh:
 
 
 def _shift(mesh: meshio.Mesh, shift: Shift) -> meshio.Mesh:
-    chosen, by = parts.nodes_of(mesh, shift.group), _vector(mesh, shift.by, "by")
+    chosen, by = nodes_of(mesh, shift.group), _vector(mesh, shift.by, "by")
     return _moved(mesh, mesh.points + chosen[:, None] * by)
 
 
 def _turn(mesh: meshio.Mesh, turn: Turn) -> meshio.Mesh:
-    chosen = parts.nodes_of(mesh, turn.group)
-    points = parts.turned(mesh, chosen, np.radians(turn.angle))
+    chosen = nodes_of(mesh, turn.group)
+    points = turned(mesh, chosen, np.radians(turn.angle))
     if points is None:
         raise FieldError(("angle",), "folds cells over: must be smaller", value=turn.angle)
     return _moved(mesh, points)
@@ -138,9 +138,9 @@ def _turn(mesh: meshio.Mesh, turn: Turn) -> meshio.Mesh:
 
 def _pick(mesh: meshio.Mesh, given: Pick | tuple[Pick, ...]) -> meshio.Mesh:
     for pick in (given,) if isinstance(given, Pick) else given:
-        members = parts.cells_of(mesh, pick.source, "from")
+        members = cells_of(mesh, pick.source, "from")
         low, high = _vector(mesh, pick.low, "low"), _vector(mesh, pick.high, "high")
-        inside, outside = parts.picked(mesh, members, low, high)
+        inside, outside = picked(mesh, members, low, high)
         sets = {**mesh.cell_sets, pick.name: inside}
         if pick.rest is not None:
             sets[pick.rest] = outside
