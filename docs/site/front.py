@@ -7,7 +7,7 @@ error of every solve over its run time. `docs/cattaneo.svg`: pressure and fricti
 import sys
 from pathlib import Path
 
-from solver.report.overview import error_chart
+from solver.report.page import error_chart
 from solver.report.profile import draw_profile
 from solver.report.rows import read_rows
 from solver.system.files import write_text

@@ -104,7 +104,7 @@ def recipes() -> str:
 
 def transforms() -> str:
     """What the module of the transform says of its keys."""
-    return _told("solver.mesh.changes.transforms")
+    return _told("solver.mesh.transforms")
 
 
 def _told(module: str) -> str:

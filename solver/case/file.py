@@ -4,10 +4,23 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, field
 
-from .acting import LoadKeys, ProbeKeys, SelectionKeys, SupportKeys
-from .bodies import BodyKeys
+from .acting import (
+    Angle,
+    BodyKeys,
+    Group,
+    GroupList,
+    Groups,
+    LoadKeys,
+    Name,
+    ProbeKeys,
+    Scalar,
+    SelectionKeys,
+    SupportKeys,
+    Unit,
+    Vector,
+    Whole,
+)
 from .checks import CHECKS
-from .kinds import Angle, Group, GroupList, Groups, Name, Scalar, Unit, Vector, Whole
 from .reference import ReferenceKeys
 from .typed import FieldError, Number, Positive, Section
 

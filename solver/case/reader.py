@@ -14,10 +14,9 @@ from msgspec import structs
 
 from ..system.errors import InputError, key_path
 from ..system.files import is_file
-from .bodies import BodyKeys
+from .acting import BodyKeys
 from .expressions import Expression
 from .file import CaseFile
-from .material import Material
 from .model import (
     EXACT,
     LOAD_KINDS,
@@ -26,6 +25,7 @@ from .model import (
     Case,
     Cyclic,
     Load,
+    Material,
     Probe,
     Rigid,
     Selection,

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from .kinds import Group, Name, Scalar, Scalars, Vector
+from .acting import Group, Name, Scalar, Scalars, Vector
 from .typed import FieldError, Number, Section, Text, Version
 
 

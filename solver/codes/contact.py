@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ..case.expressions import evaluate
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import FACE_POINTS, surface_points, surface_vectors
-from ..lac.cells.gauss import gauss_rule
+from ..lac.cells.quadrature import gauss_rule
 from ..simulation.results.exact import ExactValues, computed_pressure
 from ..simulation.results.solution import NodalContact, ZoneResult
 from ..system.errors import InputError

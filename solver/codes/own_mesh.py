@@ -9,9 +9,8 @@ import meshio
 import numpy as np
 
 from ..lac.cells.catalogue import cell_type
-from ..lac.cells.faces import FACE_POINTS, surface_points, surface_vectors
-from ..lac.cells.gauss import gauss_rule
-from ..lac.cells.orient import right_side_out
+from ..lac.cells.faces import FACE_POINTS, right_side_out, surface_points, surface_vectors
+from ..lac.cells.quadrature import gauss_rule
 from ..mechanics.fem.faces import outer_faces
 from ..simulation.results.exact import computed_pressure
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult

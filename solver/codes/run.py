@@ -1,25 +1,256 @@
-"""Runs another code on a case, in a process of its own with a limit of time and of memory."""
+"""Runs another code on a case, in a process of its own with a limit of time and of memory.
 
+A code as a plug-in: a folder with `code.yaml`, its commands, or `code.py`, one class.
+
+The folder's name is the code's name. The codes of this program (`kratos`, `ngsolve`, `getfem`) and
+those of users have the same form. `code.yaml`:
+
+    command: ["{python}", "{code}/toy.py"]   # run in a folder that holds the input
+    version: "1.0"                           # or a command that prints it
+    input: plain                             # deck.json; or the input of calculix …
+    cells: [TRIA3, QUAD4]                    # left out: all
+    results: [displacement.csv, pressure.csv]
+    map: map.yaml                            # of names and units, see `check-result --map`
+    settings: {penalty: 100 E}               # shown beside the results
+    gave_up: "no convergence"                # a regular expression, of what it prints then
+
+The codes by name: modules of this folder, and plug-ins, this folder's and users' own.
+"""
+
+import importlib.util
 import re
 import shutil
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated, Any, Literal, Protocol
 
 import meshio
+import numpy as np
+from msgspec import Meta, field
 
 from ..case.model import Case
+from ..case.typed import Section, Text, Version, read_as
+from ..case.yaml import read_mapping
+from ..lac.cells.catalogue import cell_type
 from ..lac.errors import SolveError
-from ..system.clock import now
-from ..system.errors import InputError
-from ..system.process import run_in_subprocess
+from ..system.errors import InputError, hint
+from ..system.process import printed_by, run_in_subprocess
+from ..system.progress import now
 from ..verification.verdict import CRASHED, FAILED, REFUSED, Verdict, write_verdict
 from .compared import CHECKED_BY
 from .deck import Deck, UnsupportedError, deck_of
+from .files.map import CODE, Names, ResultMap
+from .files.read import read_result_files
 from .foreign import ForeignResult
-from .registry import Code
 from .verdicts import LOG, VERDICT, store, without_foreign
+
+FILE, _CLASS = "code.yaml", "code.py"
+_PROJECT = Path(__file__).resolve().parents[2]
+# How far from the middle of its edge, over the size of the mesh, a node is still in the middle.
+_STRAIGHT = 1e-9
+_NEEDED = ("layer", "install", "gave_up", "settings", "version", "write", "command", "read")
+
+
+class PluginFile(Section, frozen=True):
+    """The keys of `code.yaml`.
+
+    command: program and arguments; {code} is the folder of this file, {python} our Python,
+      {project} the folder of this program
+    version: of the code, shown beside its results; or a command that prints it
+    install: how it is installed
+    input: what is written for it
+    cells: the cell types that it takes, all if left out
+    lacks: what it is not given, and the words of the refusal: oblique (supports across the axes),
+      gap (another than as meshed), zones (more or less than one), curved (sides of cells), orders
+      (linear and quadratic cells together)
+    results: its files of results, as check-result reads them; by default as `input` writes them
+    map: a map of their names and units
+    settings: shown beside the results
+    layer: a plane case is one layer of cells in 3D
+    gave_up: what its output matches where it does not converge, a regular expression
+    """
+
+    command: Annotated[tuple[Text, ...], Meta(min_length=1)]
+    version: Version | Annotated[tuple[Text, ...], Meta(min_length=1)]
+    install: Text = "the folder of a user's own code"
+    input: Literal["plain", "calculix", "code_aster"] = "plain"
+    cells: tuple[Text, ...] = ()
+    lacks: dict[Literal["oblique", "gap", "zones", "curved", "orders"], Text] = field(
+        default_factory=dict
+    )
+    results: Names | None = None
+    map: Path | None = None
+    settings: dict[str, str] = field(default_factory=dict)
+    layer: bool = False
+    gave_up: str = ""
+
+
+def _has_curved_sides(deck: Deck) -> bool:
+    straight = deck.points.copy()
+    for name, cells in deck.cells.items():
+        cell_type(name).put_between(straight, cells)
+    return bool(np.abs(straight - deck.points).max() > _STRAIGHT * np.ptp(deck.points))
+
+
+_HAS: dict[str, Callable[[Deck], bool]] = {
+    "oblique": lambda deck: bool(deck.oblique),
+    "gap": lambda deck: any(p.gap is not None or p.zone.interference for p in deck.pairs),
+    "zones": lambda deck: len(deck.pairs) != 1,
+    "curved": _has_curved_sides,
+    "orders": lambda deck: len({cell_type(name).order for name in deck.cells}) == 2,
+}
+
+
+class PluginCode:
+    """A code whose commands are written down; `base` writes its input."""
+
+    def __init__(self, folder: Path, file: PluginFile, base: Any):
+        self.name, self.folder, self.file, self.base = folder.resolve().name, folder, file, base
+        self.layer, self.install = file.layer or base.layer, file.install
+        self.gave_up = file.gave_up or base.gave_up
+        self.settings: Mapping[str, str] = {**base.settings, **file.settings}
+
+    def version(self) -> str:
+        """As the file says, or as its command prints it; empty if the code is not installed."""
+        given = self.file.version
+        if not isinstance(given, tuple):
+            return str(given)
+        program, *arguments = self._placed(given)
+        return printed_by(Path(program), *arguments)
+
+    def write(self, deck: Deck, folder: Path) -> None:
+        """Write the input; UnsupportedError for what the file says that the code lacks."""
+        for name in deck.cells if self.file.cells else ():
+            if name not in self.file.cells:
+                raise UnsupportedError(f"{name}: not written for {self.name}")
+        for feature, words in self.file.lacks.items():
+            if _HAS[feature](deck):
+                raise UnsupportedError(words)
+        self.base.write(deck, folder)
+
+    def command(self, folder: Path) -> Sequence[str]:  # noqa: ARG002
+        """As the file says."""
+        return self._placed(self.file.command)
+
+    def _placed(self, words: Sequence[str]) -> list[str]:
+        places = {"{code}": str(self.folder.resolve()), "{python}": sys.executable}
+        places["{project}"] = str(_PROJECT)
+        found = list(words)
+        for word, place in places.items():
+            found = [part.replace(word, place) for part in found]
+        return found
+
+    def read(self, deck: Deck, folder: Path) -> ForeignResult:
+        """Its files of results, or the files of the code whose input it takes."""
+        if self.file.results is None:
+            return replace(self.base.read(deck, folder), code=self.name)
+        mapping = ResultMap()
+        if self.file.map:
+            mapping = read_as(ResultMap, read_mapping(self.file.map), self.file.map)
+        files = [folder / name for name in self.file.results]
+        try:
+            return read_result_files(files, mapping, self.file.map or "", self.name)
+        except InputError as error:
+            raise SolveError(f"its results: {error}") from None
+
+
+def plugin(folder: Path, find: Any) -> Any:
+    """The code in a folder. `find` gives the code whose input it takes, by name.
+
+    Raises InputError for a folder that holds none, and for a file or class that does not fit.
+    """
+    if not re.fullmatch(CODE, name := folder.resolve().name):
+        raise InputError(folder, "name", name, "must be letters, digits, -, _ and .")
+    if (path := folder / _CLASS).is_file():
+        return _of_class(path)
+    if not (path := folder / FILE).is_file():
+        raise InputError(folder, "code", None, f"a folder with {FILE} or {_CLASS} is needed")
+    file = read_as(PluginFile, read_mapping(path), path)
+    try:
+        re.compile(file.gave_up)
+    except re.error as error:
+        raise InputError(
+            path, "gave_up", file.gave_up, f"must be a regular expression: {error}"
+        ) from None
+    return PluginCode(folder, file, find(file.input))
+
+
+def _of_class(path: Path) -> Any:
+    """The class `Code` of a file, which needs what `registry.Code` lists."""
+    spec = importlib.util.spec_from_file_location(f"own_code_{path.parent.name}", path)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+        code = module.Code()
+    except Exception as error:  # noqa: BLE001 -- it is the user's
+        raise InputError(path, "Code", None, f"{type(error).__name__}: {error}") from None
+    code.name = path.resolve().parent.name
+    if missing := [name for name in _NEEDED if not hasattr(code, name)]:
+        raise InputError(path, "Code", None, f"it has no {', '.join(missing)}")
+    return code
+
+
+# The folders of plug-ins.
+_PLUGINS = {file.parent.name: file.parent for file in Path(__file__).parent.glob(f"*/{FILE}")}
+# Module and class, imported on demand.
+_CODES = {
+    "calculix": (".calculix", "CalculiX"),
+    "code_aster": (".code_aster", "CodeAster"),
+    "plain": (".plain", "Plain"),
+}
+
+
+class Code(Protocol):
+    """One code: writes its input, gives the command to run, reads its results.
+
+    `name` is its name in `<case>@<name>`. `layer`: a plane case is given to it as one layer of
+    cells in space. `settings` are shown beside its results. `install`: how it is installed.
+    `gave_up`: a regular expression that its output matches if the solve does not converge.
+    """
+
+    name: str
+    layer: bool
+    install: str
+    gave_up: str
+
+    @property
+    def settings(self) -> Mapping[str, str]:
+        """Its main settings, to be shown."""
+
+    def version(self) -> str:
+        """The version; empty if it is not installed."""
+
+    def write(self, deck: Deck, folder: Path) -> None:
+        """Write the input into `folder`; UnsupportedError for what the code lacks."""
+
+    def command(self, folder: Path) -> Sequence[str]:
+        """The command to run in `folder`."""
+
+    def read(self, deck: Deck, folder: Path) -> ForeignResult:
+        """The fields at the end; SolveError without a result."""
+
+
+def names() -> list[str]:
+    """The names of the codes of this folder."""
+    return sorted([*_CODES, *_PLUGINS])
+
+
+def find(name: str) -> Code:
+    """The code of a name, or in a folder of the user; InputError for an unknown name."""
+    if name in _PLUGINS or "/" in name or Path(name).is_dir():
+        found: Code = plugin(_PLUGINS.get(name, Path(name)), find)
+        return found
+    if name not in _CODES:
+        raise InputError("--code", "name", name, f"unknown; {hint(name, names())}")
+    module, kind = _CODES[name]
+    code: Code = getattr(import_module(module, __package__), kind)()
+    return code
 
 
 class CrashError(Exception):

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import meshio
 
     from ..case.model import Case
-    from ..codes.registry import Code
+    from ..codes.run import Code
 
 
 def add_commands(commands: Any) -> None:
@@ -43,7 +43,7 @@ def _add_case(command: argparse.ArgumentParser) -> None:
 def _chosen(options: argparse.Namespace) -> "tuple[Code, Case, meshio.Mesh]":
     """The code, the case as solved, and its mesh."""
     from ..case.reader import load_case
-    from ..codes.registry import find
+    from ..codes.run import find
     from ..mesh import read_mesh
     from ..verification.run import mesh_of
 
@@ -77,7 +77,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _codes(options: argparse.Namespace) -> int:
-    from ..codes.registry import find, names
+    from ..codes.run import find, names
 
     for name in [*names(), *map(str, options.folders)]:
         code = find(name)

@@ -9,7 +9,7 @@ from ..system.package import cases_folder
 from .options import add_command
 
 if TYPE_CHECKING:
-    from ..simulation.inspection import Group
+    from ..report.inspection import Group
 
 
 def add_commands(commands: Any) -> None:
@@ -63,7 +63,7 @@ def _list(options: argparse.Namespace) -> int:
 
 def _inspect(options: argparse.Namespace) -> int:
     from ..mesh import read_mesh
-    from ..simulation.inspection import gap_between, groups_of
+    from ..report.inspection import gap_between, groups_of
 
     mesh = read_mesh(options.mesh)
     gap = gap_between(mesh, options.gap, options.mesh) if options.gap else None
@@ -76,7 +76,7 @@ def _inspect(options: argparse.Namespace) -> int:
             f"{100 * gap.covered:.4g} % of the area faces it"
         )
     if options.output:
-        from ..report.mesh_picture import draw_mesh
+        from ..report.inspection import draw_mesh
 
         _write_picture(draw_mesh(mesh, options.mesh.name), options.output)
     return 0

@@ -14,7 +14,7 @@ from ..system.files import write_text
 FOLDER = Path(__file__).parents[1] / "case" / "schemas"
 TYPES = {
     "case": "..case.file:CaseFile",
-    "code": "..codes.plugin:PluginFile",
+    "code": "..codes.run:PluginFile",
     "family": "..report.families:FamilyFile",
     "map": "..codes.files.map:ResultMap",
     "recorded": "..codes.recorded:RecordedFile",

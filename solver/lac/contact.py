@@ -18,8 +18,7 @@ from scipy.sparse.linalg import splu
 
 from .cells.faces import surface_points
 from .errors import SolveError
-from .facets import Facets, facets, with_nodal_normals
-from .master_normals import with_master_normals
+from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
 from .operator import gap_operator
 from .reconstruction import form_of, vertex_neighbours

@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .cells.gauss import gauss_rule
-from .cells.quadrature import simplex_rule
+from .cells.quadrature import gauss_rule, simplex_rule
 from .clipping import triangles
 from .regions import Regions
 

@@ -6,11 +6,89 @@ iteration solves with the slips' bounds b = μp and directions d = w/|w| of the 
 problem of Tresca, whose matrix is symmetric. In 3D it takes Newton's term of b|w| along, a spring
 b/|w| across d. Source: Hüeber, Stadler, Wohlmuth, A primal-dual active set algorithm for
 three-dimensional contact problems with Coulomb friction, SIAM J. Sci. Comput. 30 (2008) 572–596.
+
+The slip operator of a zone: the jump of displacement along the tangents of macro-elements.
+
+The slip of macro-element i along its tangent t is w = (row i · u) / covered area, master relative
+to slave. A traction q on the master does the work q · w per area: its nodal forces are rowᵀ q.
+Rows are integrated at the points of the gap operator. Where a segment is flat they are its closed
+integrals ∫ N times t, so that a uniform shear acts on both sides as on whole faces.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+from .closure import MASTER, SLAVE, Integrals
+from .facets import tangents_of
+from .segments import Segments
+
+# Normals that differ by less within a segment are one normal.
+_FLAT = 1e-12
+
+
+def levers(given: Sequence[tuple[Segments, np.ndarray]], normal: np.ndarray, k: int) -> np.ndarray:
+    """The couples (dim − 1, m, k, 3) ∫ ψ g n × t dS of tractions ψ, by tangent.
+
+    Tractions act on both surfaces where these are meshed, a gap g apart. `given` are segments with
+    functions ψ (s, q, ≤ k) at their points; the couples of further ones are zero.
+
+    The edges are 1/2 apart over a length of 2, n × t is the axis across the plane:
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> one = np.ones((*segments.weight.shape, 1))
+    >>> levers([(segments, one)], np.array([[0.0, 1.0]]), 1)[0].round(15).tolist()
+    [[[0.0, 0.0, 1.0]]]
+    """
+    m, dim = normal.shape
+    couples = np.zeros((dim - 1, m, k, 3))
+    for by_macro, tangents in zip(couples, np.swapaxes(tangents_of(normal), 0, 1), strict=True):
+        for segments, psi in given:
+            pair = segments.normal, along_faces(segments, tangents)
+            n, t = (np.pad(v, [(0, 0), (0, 0), (0, 3 - dim)]) for v in pair)
+            weight = segments.weight * segments.gap
+            couple = np.einsum("sq,sqk,sqd->skd", weight, psi, np.cross(n, t))
+            np.add.at(by_macro[:, : psi.shape[-1]], segments.macro, couple)
+    return couples
+
+
+def along_faces(segments: Segments, tangents: np.ndarray) -> np.ndarray:
+    """Unit tangents (s, q, dim) in the face at the points of segments, next to `tangents` (m, dim).
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> along_faces(segments, np.array([[0.6, 0.8]]))[0, 0].tolist()
+    [1.0, 0.0]
+    """
+    normal, tangent = segments.normal, tangents[segments.macro][:, None]
+    found = tangent - (tangent * normal).sum(axis=-1, keepdims=True) * normal
+    return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+
+
+def turned_along(part: Integrals, tangents: np.ndarray) -> Integrals:
+    """The integrals of a part with ∫ N t in place of ∫ N n, t next to `tangents` (m, dim).
+
+    >>> (segments,) = intersect([slave], 0, [master], 1.0)
+    >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
+    >>> part = integrals(constants(data), segments)
+    >>> turned_along(part, np.array([[1.0, 0.0]])).vectors[MASTER][..., 0].round(15).tolist()
+    [[[0.5, 0.5]], [[0.5, 0.5]]]
+    """
+    slave, master = (_along(part, side, tangents)[:, None] for side in (SLAVE, MASTER))
+    return replace(part, vectors=(slave, master))
+
+
+def _along(part: Integrals, side: int, tangents: np.ndarray) -> np.ndarray:
+    """∫ N t (s, n_nodes, dim) over segments; t is the tangent in the face at each point."""
+    segments = part.segments
+    normal, t = segments.normal, along_faces(segments, tangents)
+    flat = np.abs(normal - normal[:, :1]).max(axis=(1, 2), initial=0.0) <= _FLAT
+    scalar = np.einsum("sad,sd->sa", part.vectors[side][:, 0], normal[:, 0])
+    exact = scalar[..., None] * t[:, :1]
+    values = segments.sides[side].values
+    return np.where(
+        flat[:, None, None], exact, np.einsum("sqa,sq,sqd->sad", values, segments.weight, t)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,7 @@ import numpy as np
 import skfem
 
 from .cells.catalogue import BY_NAME, CellType
-from .cells.faces import FaceBlock
-from .cells.orient import right_side_out
+from .cells.faces import FaceBlock, right_side_out
 from .cut import SubFaces, cut, needs_cut
 
 Names = str | Sequence[str]

@@ -14,6 +14,7 @@ from scipy import sparse
 from .cells.catalogue import cell_type
 from .closure import MASTER, SLAVE, Integrals, close_faces, integrals
 from .facets import Facets, tangents_of
+from .friction import levers, turned_along
 from .multipliers import (
     InterfaceData,
     Space,
@@ -23,7 +24,6 @@ from .partners import on_one_surface, uncovered
 from .recovery import Recovery, RecoveryRequest, recovery
 from .segments import Segments, intersect
 from .surface_points import Samples, Surface, face_samples
-from .tangential import levers, turned_along
 
 # Coefficients below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13

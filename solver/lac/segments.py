@@ -21,8 +21,7 @@ import numpy as np
 
 from .cells.faces import circumference
 from .cells.quadrature import simplex_rule
-from .cells.shape import shape_functions
-from .cells.small_matrices import invert
+from .cells.shape import invert, shape_functions
 from .clipping import clip, overlap
 from .facets import Facets, project_along
 from .fans import Image, Pieces, quadrature

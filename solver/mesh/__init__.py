@@ -33,7 +33,7 @@ def generate(recipe: Mapping[str, Any], where: str) -> meshio.Mesh:
 
 def transform(mesh: meshio.Mesh, spec: Mapping[str, Any], where: str = "transform") -> meshio.Mesh:
     """The mesh changed as a case file's `transform:` mapping says; see `transforms`."""
-    from .changes import transforms
+    from . import transforms
 
     return transforms.transform(mesh, spec, where)
 

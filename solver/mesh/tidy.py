@@ -4,7 +4,7 @@ import meshio
 import numpy as np
 
 from ..lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
-from ..lac.cells.orient import right_side_out
+from ..lac.cells.faces import right_side_out
 from ..system.errors import InputError
 from .keys import LARGEST
 

@@ -27,7 +27,7 @@ def write_report(
 
     from ..lac.threads import workers
     from ..system.files import write_text
-    from ..system.forks import in_forks
+    from ..system.process import in_forks
     from . import tables
     from .bench import write_bench
     from .charts import write_script

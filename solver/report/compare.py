@@ -1,12 +1,285 @@
-"""Two batches side by side: Markdown for the terminal, and a page in the style of the report's."""
+"""Two batches side by side: Markdown for the terminal, and a page in the style of the report's.
 
-from collections.abc import Sequence
+Differences of two batches: verdicts, numbers, times.
+
+A number has changed when it moved by more than accepted values may: 1e-9 of the check's scale. What
+round-off does is no change. Times are shown and never judged.
+"""
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
+from ..case.checks import ROUND_OFF
+from ..system.errors import InputError, hint
 from ..system.files import write_text
-from .differences import Comparison, Pair, read_batch
+from ..verification.verdict import WORDS, CheckResult, Verdict, typed
+from . import formats, stages
 from .html import TEMPLATES, render
-from .tables import md
+from .rows import Row, natural
+from .tables import md, outcome
+
+SUMMARY = "summary.json"
+# The name of our own solver beside the names of codes.
+OURS = "ours"
+# A solve whose time changed is worth a line from this ratio on, and from these seconds.
+_RATIO, _SECONDS, _MOST_JOBS = 1.5, 0.2, 10
+_SUMS = ("total", "processor time")
+_COUNTS = {
+    "dofs": "unknowns",
+    "macro_elements": "macro-elements",
+    "iterations": "iterations",
+    "linear_solver": "linear solver",
+}
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A batch: its summary.json, and its rows by family and name."""
+
+    file: Path
+    rows: Mapping[tuple[str, str], Row]
+
+    @property
+    def outcome(self) -> str:
+        """How many solves passed."""
+        return outcome(list(self.rows.values()))
+
+    @property
+    def origin(self) -> str:
+        """Revision and machine, if the solves have them."""
+        found = [row.verdict.provenance for row in self.rows.values()]
+        values = [sorted({str(o[k]) for o in found if o.get(k)}) for k in ("revision", "cpu")]
+        return "; ".join(", ".join(each) for each in values if each)
+
+
+@dataclass(frozen=True)
+class Change:
+    """A quantity of a solve that has changed; `size` is relative, None where there is no number."""
+
+    solve: str
+    quantity: str
+    base: str
+    this: str
+    size: float | None
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of a table."""
+        return self.solve, self.quantity, self.base, self.this, formats.error(self.size)
+
+
+@dataclass(frozen=True)
+class Time:
+    """Seconds of both batches, of a stage or a solve."""
+
+    name: str
+    base: float
+    this: float
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of a table: name, before, now, ratio."""
+        ratio = f"{self.this / self.base:.2f}" if self.base else formats.NOTHING
+        return self.name, formats.seconds(self.base), formats.seconds(self.this), ratio
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A solve in both batches, or in one of them."""
+
+    base: Row | None
+    this: Row | None
+
+    @property
+    def row(self) -> Row:
+        """The solve as it is now, or as it was where it vanished."""
+        row = self.this or self.base
+        assert row is not None
+        return row
+
+    @property
+    def name(self) -> str:
+        """Family and name."""
+        if self.base and self.this and self.base.name != self.this.name:
+            return f"{self.row.group}/{self.row.case}"
+        return self.row.anchor
+
+    @property
+    def step(self) -> int:
+        """How much worse the verdict is than before: negative where better.
+
+        A solve that was not there counts as one that had passed; one that vanished has no verdict.
+        """
+        if self.this is None:
+            return 0
+        before = self.base.word if self.base else self.this.word if self.this.sound else "passed"
+        return WORDS.index(before) - WORDS.index(self.this.word)
+
+    @property
+    def change(self) -> str:
+        """Change of the verdict: worse, better, still (not passed), new, vanished, or ""."""
+        if self.this is None:
+            return "vanished"
+        if self.step:
+            return "worse" if self.step > 0 else "better"
+        return "still" if not self.this.sound else "new" if self.base is None else ""
+
+    @property
+    def words(self) -> str:
+        """The verdicts, before and now."""
+        words = [row.word if row else "not there" for row in (self.base, self.this)]
+        return " → ".join(dict.fromkeys(words))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two batches side by side."""
+
+    base: Batch
+    this: Batch
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """All solves of either batch, in the order of their names."""
+        names = sorted({*self.base.rows, *self.this.rows}, key=lambda n: (n[0], natural(n[1])))
+        return [Pair(self.base.rows.get(name), self.this.rows.get(name)) for name in names]
+
+    @cached_property
+    def groups(self) -> dict[str, list[Pair]]:
+        """The solves by the change of their verdict (`Pair.change`), worst verdicts first."""
+        found: dict[str, list[Pair]] = defaultdict(list)
+        for pair in self.pairs:
+            found[pair.change].append(pair)
+        found["worse"].sort(key=lambda pair: WORDS.index(pair.row.word))
+        return found
+
+    @cached_property
+    def changes(self) -> list[Change]:
+        """Changes in solves that both have: those without a number first, then by size."""
+        found = [change for base, this in self._solved for change in _changes(base, this)]
+        return sorted(found, key=lambda c: (c.size is not None, -(c.size or 0)))
+
+    @property
+    def stages(self) -> list[Time]:
+        """Wall time by stage, in all, and processor time, over the solves that both have."""
+        sides = [list(map(_times, rows)) for rows in zip(*self._solved, strict=True)] or [[], []]
+        every = dict.fromkeys(name for rows in sides for row in rows for name in row)
+        names = [*(name for name in stages.colors(every) if name not in _SUMS), *_SUMS]
+        base, this = ({n: sum(row.get(n) or 0.0 for row in rows) for n in names} for rows in sides)
+        return [Time(name, base[name], this[name]) for name in names]
+
+    @property
+    def solves(self) -> list[Time]:
+        """The solves whose wall time changed most, of those that are worth a line."""
+        times = [
+            Time(this.anchor, base.total or 0.0, this.total or 0.0) for base, this in self._solved
+        ]
+        worth = [
+            (abs(time.this - time.base), time)
+            for time in times
+            if max(time.this, time.base) > _RATIO * min(time.this, time.base)
+        ]
+        found = sorted(((by, time) for by, time in worth if by > _SECONDS), key=lambda w: -w[0])
+        return [time for _, time in found[:_MOST_JOBS]]
+
+    @cached_property
+    def _solved(self) -> list[tuple[Row, Row]]:
+        """The rows of the solves that came to their end in both batches."""
+        both = [(pair.base, pair.this) for pair in self.pairs if pair.base and pair.this]
+        return [(base, this) for base, this in both if base.total and this.total]
+
+
+def read_batch(path: Path) -> Batch:
+    """A batch, by its folder of results, the folder of its report, or its summary.json.
+
+    `FOLDER@CODE` is what one code has in it, `FOLDER@ours` what our solver has; the solves go by
+    the names of their cases then. Raises `InputError` where the file is missing or is not what
+    a report writes.
+    """
+    code = ""
+    if not path.exists() and "@" in path.name:
+        name, _, code = path.name.partition("@")
+        path = path.with_name(name)
+    candidates = (path / "report" / SUMMARY, path / SUMMARY) if path.is_dir() else (path,)
+    file = next((each for each in candidates if each.is_file()), None)
+    if file is None:
+        allowed = f"must be a folder of results with a report, or its {SUMMARY}"
+        raise InputError(path, "batch", None, allowed)
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(file, "file", None, f"must be JSON ({error})") from None
+    verdicts = typed(list[Verdict], content, file)
+    rows = [Row(verdict, file.parent.parent / verdict.family) for verdict in verdicts]
+    if not code:
+        return Batch(file, {(row.group, row.name): row for row in rows})
+    mine = [row for row in rows if (row.verdict.code or OURS) == code]
+    if not mine:
+        there = {row.verdict.code or OURS for row in rows}
+        raise InputError(path, "code", code, f"it has no result there; {hint(code, there)}")
+    return Batch(file, {(row.group, row.case): row for row in mine})
+
+
+def _times(row: Row) -> dict[str, float | None]:
+    return {**row.stages, **dict(zip(_SUMS, (row.total, row.verdict.cpu_seconds), strict=True))}
+
+
+def _changes(base: Row, this: Row) -> Iterator[Change]:
+    solve = this.anchor
+    alike = base.verdict.code == this.verdict.code
+    for key, name in _COUNTS.items() if alike else ():
+        before, now = getattr(base.verdict, key), getattr(this.verdict, key)
+        if before != now:
+            yield Change(solve, name, _text(before), _text(now), None)
+    checks = [{c.title: c for c in row.verdict.checks} for row in (base, this)]
+    norms = {**base.norms, **this.norms}
+    if not alike:  # what only one code has is no change, nor is a tolerance of its own
+        both = checks[0].keys() & checks[1].keys()
+        checks = [{t: replace(of[t], tolerance=0.0) for t in of if t in both} for of in checks]
+        norms = {name: norms[name] for name in base.norms if name in this.norms}
+    yield from _checks(solve, *checks)
+    for name in norms:
+        yield from _number(solve, f"error {name}", base.norms.get(name), this.norms.get(name))
+
+
+def _checks(
+    solve: str, base: Mapping[str, CheckResult], this: Mapping[str, CheckResult]
+) -> Iterator[Change]:
+    for title in {**base, **this}:
+        if title not in base or title not in this:
+            before, now = ("there" if title in side else "not there" for side in (base, this))
+            yield Change(solve, title, before, now, None)
+            continue
+        old, new = base[title], this[title]
+        scale = 1.0 if math.isnan(old.scale) else old.scale or 1.0
+        for key, by in (("minimum", scale), ("maximum", scale), ("error", 1.0), ("tolerance", 1.0)):
+            yield from _number(solve, f"{title}: {key}", getattr(old, key), getattr(new, key), by)
+
+
+def _number(
+    solve: str, quantity: str, base: float | None, this: float | None, scale: float = 1.0
+) -> Iterator[Change]:
+    """The change of a number, if it is one."""
+    known = [value is not None and not math.isnan(value) for value in (base, this)]
+    if base is None or this is None or not all(known):
+        if any(known):
+            yield Change(solve, quantity, _text(base), _text(this), None)
+    elif abs(this - base) > ROUND_OFF * abs(scale):
+        size = abs((this - base) / scale)
+        yield Change(solve, quantity, _text(base), _text(this), size)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return formats.digits(value)
+    return formats.NOTHING if value is None else str(value)
+
 
 PAGE = "compare.html"
 CHANGES = ("solve", "quantity", "before", "now", "change")

@@ -11,9 +11,8 @@ import numpy as np
 
 from ..case.model import STATE, Case, Step
 from ..lac.errors import SolveError
-from ..system.clock import Clock, processor_time
 from ..system.memory import peak_mb
-from ..system.progress import OUTCOME, stage
+from ..system.progress import OUTCOME, Clock, processor_time, stage
 from .equilibrium.problem import ContactProblem
 from .equilibrium.recovery import Recovered, recovered
 from .equilibrium.state import Equilibrium

@@ -8,8 +8,8 @@ from ..mesh.size import check_memory, of_mesh
 from ..system.errors import InputError
 from ..verification.run import refined
 from .description import Series, Study, StudyGroup, Vary
+from .page import MeasuredGroup
 from .run import run_group
-from .shown import MeasuredGroup
 
 _TEXT = """Each quantity is computed on refined meshes. Its observed order gives the limit by
 Richardson's extrapolation, and a band around the value of the finest mesh (ASME V&V 20)."""

@@ -13,7 +13,7 @@ import numpy as np
 from ..case.model import MARGIN
 from ..case.reader import load_case
 from ..verification.run import mesh_of, refined, solve_checked
-from .fits import ROUND_OFF, fit_power
+from .theory import ROUND_OFF, fit_power
 
 LEVELS = (1, 2, 4)
 

@@ -13,15 +13,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..system.clock import now
 from ..system.errors import InputError
 from ..system.files import write_text
 from ..system.process import cores_for
-from ..system.progress import OUTCOME
+from ..system.progress import OUTCOME, now
 from . import measures
 from .description import FULL, Study, StudyGroup, read_study
 from .points import Point
-from .processes import measure_apart, surroundings
+from .timing import measure_apart, surroundings
 
 _LOG = logging.getLogger(__name__)
 Record = dict[str, Any]

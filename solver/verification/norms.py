@@ -43,7 +43,7 @@ import numpy as np
 from ..case.solutions.base import ElasticSolution, ExactSolution, lame_of
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import SlaveFaces, surface_points
-from ..lac.cells.gauss import gauss_rule
+from ..lac.cells.quadrature import gauss_rule
 from ..lac.cells.shape import shape_functions
 from ..lac.threads import prefetch
 from ..mechanics.fem import cell_loops

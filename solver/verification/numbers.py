@@ -1,6 +1,10 @@
 """Samples of single numbers: contact forces, reactions, strain energy, values at probes.
 
 See `solver.verification.samples`.
+
+Samples of friction: Coulomb's law itself, and what a reference gives.
+
+See `solver.verification.samples`.
 """
 
 from __future__ import annotations
@@ -11,9 +15,10 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..mechanics.fem.stress import COMPONENTS
+from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
-from .samples import Reference, Sample, Sampler
+from .samples import Reference, Sample, Sampler, by_component
 
 
 def contact_force(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
@@ -93,3 +98,78 @@ def strain_energy(solution: Solution, _: None, reference: Reference) -> Sample |
         return None
     found = np.array([solution.strain_energy])
     return Sample(found, np.array([reference]), lambda _: "the whole solve")
+
+
+def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample | None:
+    """By how much a zone breaks Coulomb's law: on each macro-element, and in each step.
+
+    The traction t on the slave is at most μp, and 0 where open; what sticks has no slip w; what
+    slips has t |w| = μp w. Relative to the largest μp, to the largest slip, to their product. The
+    work of friction is not negative, relative to that of all steps.
+    """
+    if zone.friction is None:
+        return None
+    mu = solution.case.zone_named(zone.name).friction
+    traction, slip, status = (
+        getattr(zone.friction, name) for name in ("friction_traction", "slip", "status")
+    )
+    bound, far = mu * zone.multiplier, np.linalg.norm(slip, axis=1)
+    largest, farthest = float(bound.max()) or 1.0, float(far.max()) or 1.0
+    size = np.linalg.norm(traction, axis=1)
+    apart = traction * far[:, None] - bound[:, None] * slip
+    work = np.array([step.dissipation for step in solution.steps])
+    rows = {
+        "traction beyond μp of": np.maximum(size - bound, 0.0) / largest,
+        "traction without contact on": np.where(status == 0, size, 0.0) / largest,
+        "slip without sliding of": np.where(status == 2, 0.0, far) / farthest,
+        "traction not along the slip of": np.linalg.norm(apart, axis=1) / (largest * farthest),
+        "negative work of friction in step": np.maximum(-work, 0.0) / (np.abs(work).sum() or 1.0),
+    }
+    places = [f"{what} {i}" for what, values in rows.items() for i in range(len(values))]
+    values = np.concatenate(list(rows.values()))
+    return Sample(values, np.zeros(len(values)), lambda i: places[i])
+
+
+def friction(quantity: str) -> Sampler:
+    """Sample the traction on the slave, or the slip of the master relative to it."""
+
+    def of_quantity(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+        if zone.friction is None:
+            return None
+        values = getattr(zone.friction, quantity)
+        # The case gives them for the surface that it lists as slave.
+        if solution.swapped and not isinstance(reference, ExactValues):
+            values = -values
+        sample = by_component(
+            values,
+            zone.centre,
+            "xyz"[: values.shape[1]],
+            reference,
+            lambda: reference.of_friction(zone, quantity),
+            "macro-element {}".format,
+        )
+        # Nothing slips where the surfaces are apart, however far they move along each other.
+        open_there = np.tile(zone.friction.status == 0, len(sample.values) // len(values))
+        sample.reference[open_there & (quantity == "slip")] = 0.0
+        return sample
+
+    return of_quantity
+
+
+def stick_area(_: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+    """The area that sticks."""
+    if zone.resultants is None or zone.resultants.stick is None:
+        return None
+    if isinstance(reference, ExactValues):
+        reference = reference.exact.stick_area
+    return Sample(zone.resultants.stick[:1], np.array([reference]), lambda _: "the whole zone")
+
+
+def dissipation(solution: Solution, _: None, reference: Reference) -> Sample | None:
+    """The work of friction in each step."""
+    if not solution.case.frictional:
+        return None
+    if isinstance(reference, ExactValues):
+        reference = reference.exact.dissipation
+    values = np.array([step.dissipation for step in solution.steps])
+    return Sample(values, np.array(reference), lambda i: f"step {i + 1}")

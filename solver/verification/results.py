@@ -48,10 +48,9 @@ from ..simulation.results.solution import BodyInfo, Line, Solution, Validity, Zo
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
 from ..system.hdf5 import new_file, read_file, read_table, write_table
-from .steps import read_probes, read_steps, write_probes, write_steps
+from .steps import read_probes, read_steps, read_zone, write_probes, write_steps, write_zone
 from .units import label_fields
 from .verdict import CheckResult
-from .zones import read_zone, write_zone
 
 GRID = "VTKHDF"
 _SCALARS = (

@@ -21,10 +21,9 @@ from ..mesh.tidy import tidy
 from ..simulation.options import LEAN, Options
 from ..simulation.results.solution import Solution
 from ..simulation.simulate import simulate
-from ..system.clock import Clock, processor_time
 from ..system.errors import InputError, MachineError, of_machine
 from ..system.files import last_line
-from ..system.progress import OUTCOME, stage
+from ..system.progress import OUTCOME, Clock, processor_time, stage
 from .checks import run_checks
 from .judge import judge, without_result
 from .norms import errors

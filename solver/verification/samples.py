@@ -18,6 +18,7 @@ from ..case.expressions import evaluate
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.shape import shape_functions
 from ..lac.threads import prefetch
+from ..mechanics.fem.block import volume_rule
 from ..mechanics.fem.elasticity import (
     hoop_values,
     lame_parameters,
@@ -25,7 +26,6 @@ from ..mechanics.fem.elasticity import (
     with_hoop,
 )
 from ..mechanics.fem.stress import COMPONENTS
-from ..mechanics.fem.volume_rules import volume_rule
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from ..simulation.scene.attributes import strain_at

@@ -12,8 +12,8 @@ import msgspec
 from ..case.model import Case
 from ..simulation.options import LEAN, Options
 from ..simulation.simulate import simulate
-from ..system.clock import processor_time
 from ..system.files import write_text
+from ..system.progress import processor_time
 from .results import read_result
 from .run import mesh_of
 from .verdict import read_verdict

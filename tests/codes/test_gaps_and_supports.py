@@ -13,8 +13,7 @@ from solver.codes.calculix import CalculiX, deck_lines
 from solver.codes.code_aster import CodeAster
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.codes.plain import Plain
-from solver.codes.registry import find
-from solver.codes.run import Limits, run_code
+from solver.codes.run import Limits, find, run_code
 from tests.codes.blocks import TURNED, case_of
 
 SIDES = {"name": "i", "slave": "bottom_contact", "master": "top_contact"}

@@ -8,8 +8,7 @@ import pytest
 
 from solver.case.reader import load_case
 from solver.codes.deck import UnsupportedError, deck_of
-from solver.codes.registry import find
-from solver.codes.run import Limits, run_case, run_code
+from solver.codes.run import Limits, find, run_case, run_code
 from solver.lac.cells.catalogue import BY_NAME
 from solver.verification.run import mesh_of
 from tests.codes.blocks import case_of

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from solver.codes.deck import UnsupportedError, deck_of
-from solver.codes.registry import find
-from solver.codes.run import Limits, run_code
+from solver.codes.run import Limits, find, run_code
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.errors import SolveError
 from tests.codes.blocks import TURNED, case_of

@@ -9,8 +9,7 @@ import pytest
 
 from solver.codes import plain
 from solver.codes.deck import UnsupportedError, deck_of
-from solver.codes.registry import find
-from solver.codes.run import Limits, run_case
+from solver.codes.run import Limits, find, run_case
 from solver.commands.cli import main
 from solver.system.errors import InputError
 from tests.codes.blocks import case_of

@@ -8,8 +8,7 @@ import pytest
 
 from solver.commands.cli import main
 from solver.mesh import write_mesh
-from solver.report.mesh_picture import draw_mesh
-from solver.simulation.inspection import gap_between, groups_of
+from solver.report.inspection import draw_mesh, gap_between, groups_of
 from solver.system.errors import InputError
 from solver.verification.results import write_result
 from tests import handmade

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import diags_array
 
-from solver.case.model import Material
+from solver.case.material import Material
 from solver.lac.closure import integrals
 
 # A segment below this share of the largest is round-off of the intersection.

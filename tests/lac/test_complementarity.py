@@ -6,9 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from solver.lac import complementarity
-from solver.lac.complementarity import complementary
+from solver.lac import status as complementarity
 from solver.lac.errors import SolveError
+from solver.lac.status import complementary
 
 
 def conditions(matrix, force, x):

@@ -9,9 +9,9 @@ import pytest
 
 from solver.lac.cells.catalogue import BY_NAME, cell_type
 from solver.lac.cut import cut, needs_cut
+from solver.mechanics.fem.block import volume_rule
 from solver.mechanics.fem.elasticity import physical_gradients
 from solver.mechanics.fem.faces import boundary_faces, volume_cells
-from solver.mechanics.fem.volume_rules import volume_rule
 
 VOLUMES = [n for n, t in BY_NAME.items() if t.dim > 1]
 SOLIDS = [n for n, t in BY_NAME.items() if t.dim == 3 and n != "HEXA27"]

@@ -9,7 +9,7 @@ import pytest
 from solver.lac import operator as operator_module
 from solver.lac import segments, threads
 from solver.lac.cells.catalogue import BY_NAME
-from solver.lac.cells.gauss import gauss_rule
+from solver.lac.cells.quadrature import gauss_rule
 from solver.lac.cells.shape import shape_functions
 from solver.lac.facets import facets, measured
 from solver.lac.fans import quadrature

@@ -5,7 +5,8 @@ import math
 
 import pytest
 
-from solver.report import formats, overview
+from solver.report import formats
+from solver.report import page as overview
 from solver.report.families import Family
 from solver.report.rows import Row
 from solver.report.sections import FamilySection

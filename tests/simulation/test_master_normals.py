@@ -5,8 +5,7 @@ import pytest
 
 from solver import solve_case
 from solver.lac.cells.catalogue import BY_NAME
-from solver.lac.facets import facets
-from solver.lac.master_normals import with_master_normals
+from solver.lac.facets import facets, with_master_normals
 from solver.system.errors import InputError
 
 

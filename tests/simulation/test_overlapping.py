@@ -3,7 +3,7 @@
 import pytest
 
 from solver import solve_case
-from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear.choice import force_solver
 from tests.scenes import PRESSURE, block_case, block_mesh
 from tests.simulation.test_stabilised import check_like_a_factor, waves
 

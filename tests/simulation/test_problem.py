@@ -9,8 +9,7 @@ import pytest
 from solver.case.reader import parse_case
 from solver.lac.errors import SolveError
 from solver.lac.status import StatusResult
-from solver.mechanics.linear.choice import MULTIGRID
-from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear.choice import MULTIGRID, force_solver
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.mesh import generate
 from solver.simulation.equilibrium import problem

@@ -8,15 +8,14 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.mechanics.linear import multigrid
-from solver.mechanics.linear.choice import LinearSolver
-from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear.choice import LinearSolver, force_solver
 from solver.mesh import generate
 from solver.simulation.equilibrium import problem
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.equilibrium.state import Equilibrium
 from solver.simulation.options import LEAN
 from solver.simulation.scene.scene import Scene, build_scene
-from solver.system.clock import Clock
+from solver.system.progress import Clock
 
 SPHERE = Path(__file__).resolve().parents[2] / "cases/hertz/sphere-hexa8.yaml"
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear.choice import force_solver
 from solver.simulation.judgement.plan import meshed
 from solver.simulation.scene.attributes import Attributes
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
-from solver.studies.constant import inf_sup_constant
+from solver.studies.measures import inf_sup_constant
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
 from tests.faults.mutants import CASES

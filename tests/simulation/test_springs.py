@@ -6,7 +6,7 @@ E = 2000, ν = 0.3; the pressure 25 acts downwards on the upper one.
 import numpy as np
 import pytest
 
-from solver.mechanics.fem.springs import foundation
+from solver.mechanics.fem.loads import foundation
 from solver.system.errors import InputError
 from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, solved
 

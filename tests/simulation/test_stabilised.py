@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver import solve_case
-from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear.choice import force_solver
 from solver.system.errors import InputError
 from tests.scenes import PRESSURE, block_case, block_mesh
 

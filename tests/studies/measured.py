@@ -7,8 +7,8 @@ import yaml
 
 from solver.case.typed import read_as
 from solver.studies.description import Study, read_study
+from solver.studies.page import MeasuredGroup
 from solver.studies.run import identity
-from solver.studies.shown import MeasuredGroup
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 STABILITY, INFSUP = CASES / "studies/stability.yaml", CASES / "studies/infsup.yaml"

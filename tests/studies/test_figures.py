@@ -9,9 +9,8 @@ import pytest
 from solver.studies.description import read_study
 from solver.studies.figures import growth, inf_sup, orders, profiles, ratios, work_precision
 from solver.studies.measures import attempt, profile
-from solver.studies.page import write_page
+from solver.studies.page import read_group, write_page
 from solver.studies.run import run_group, write_group
-from solver.studies.shown import read_group
 from solver.studies.theory import THEORY, element_size
 from tests.studies.measured import INFSUP, group, study
 
@@ -345,7 +344,7 @@ def test_a_timed_point_is_measured_in_a_process_of_its_own(tmp_path):
     quick = read_study(file, "quick")
     patch = next(g for g in quick.groups if g.name == "patch-2d")
     name = quick.points(patch)[0].name
-    from solver.studies.processes import measure_apart
+    from solver.studies.timing import measure_apart
 
     job = {"study": str(file), "level": "quick", "group": "patch-2d", "point": name}
     record = measure_apart(job, [0], 60.0)

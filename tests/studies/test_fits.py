@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.studies.fits import ROUND_OFF, fit_order, fit_power, is_rounding
+from solver.studies.theory import ROUND_OFF, fit_order, fit_power, is_rounding
 
 SIZES = 2.0 ** -np.arange(1, 6)
 

@@ -4,11 +4,11 @@ import meshio
 import numpy as np
 import pytest
 
-from solver.mechanics.fem.nodal_stress import nodal_stress
+from solver.mechanics.fem.stress import nodal_stress
 from solver.mesh import transform
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.scene.scene import build_scene
-from solver.studies.floor import floor, misplaced, upper_nodes
+from solver.studies.digits import floor, misplaced, upper_nodes
 from solver.studies.states import exact_state
 from tests.scenes import block_mesh, changed_case
 

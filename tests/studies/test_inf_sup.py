@@ -5,10 +5,9 @@ from dataclasses import replace
 import pytest
 
 from solver.simulation.scene.scene import build_scene
-from solver.studies.constant import inf_sup_constant
 from solver.studies.description import read_study
 from solver.studies.figures.inf_sup import levels_off
-from solver.studies.measures import inf_sup
+from solver.studies.measures import inf_sup, inf_sup_constant
 from tests.scenes import block_mesh, changed_case
 from tests.studies.measured import INFSUP
 

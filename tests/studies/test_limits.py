@@ -11,9 +11,8 @@ from solver.case.file import HALVINGS_TEXT
 from solver.case.reader import load_case
 from solver.commands.cli import main
 from solver.studies.converge import convergence
-from solver.studies.figures.limits import limits, outcome, settled
+from solver.studies.figures.limits import extrapolate, limits, observed_order, outcome, settled
 from solver.studies.quantities import known_peak
-from solver.studies.richardson import extrapolate, observed_order
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 HALVED = (4.0, 2.0, 1.0)

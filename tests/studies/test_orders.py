@@ -9,8 +9,7 @@ from solver.case.yaml import parse_mapping
 from solver.commands.cli import main
 from solver.simulation.simulate import simulate
 from solver.studies.expected import at_first
-from solver.studies.fits import fit_order
-from solver.studies.theory import element_size
+from solver.studies.theory import element_size, fit_order
 from solver.system.errors import InputError
 from solver.verification.norms import errors
 from solver.verification.run import mesh_of, refined

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from solver.studies.processes import run_compiled
+from solver.studies.timing import run_compiled
 from solver.system.compiled import available
 from solver.system.process import cores_for
 

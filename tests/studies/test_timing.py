@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.studies.timing import TOTAL, Spread, medians, repeated, spread
-from solver.system.clock import Clock
+from solver.system.progress import Clock
 
 
 def test_median_and_range():

@@ -4,7 +4,7 @@ import resource
 import subprocess
 import sys
 
-from solver.system.clock import Clock
+from solver.system.progress import Clock
 
 
 def processor_time_of_children() -> float:

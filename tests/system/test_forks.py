@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from solver.system.forks import in_forks
+from solver.system.process import in_forks
 
 forking = pytest.mark.skipif(sys.platform != "linux", reason="forks are for Linux")
 

@@ -8,7 +8,7 @@ import pytest
 
 from solver import solve_case
 from solver.case.reader import load_case
-from solver.mesh.changes.transforms import transform
+from solver.mesh.transforms import transform
 from solver.verification.run import mesh_of
 from solver.verification.scatter import LIMIT, oscillating, scatter
 from tests.sector import sector

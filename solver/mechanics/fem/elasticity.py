@@ -16,8 +16,7 @@ from scipy import sparse
 
 from ...lac.cells.catalogue import CellType
 from ...lac.cells.faces import circumference
-from ...lac.cells.shape import shape_functions
-from ...lac.cells.small_matrices import invert
+from ...lac.cells.shape import invert, shape_functions
 from ...lac.errors import SolveError
 from ...lac.threads import prefetch
 from . import cell_loops

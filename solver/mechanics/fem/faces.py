@@ -7,13 +7,7 @@ import meshio
 import numpy as np
 
 from ...lac.cells.catalogue import BY_MESHIO, CellType, cell_type
-from ...lac.cells.faces import (
-    FACE_POINTS,
-    FaceBlock,
-    SlaveFaces,
-    surface_points,
-    surface_vectors,
-)
+from ...lac.cells.faces import FACE_POINTS, FaceBlock, SlaveFaces, surface_points, surface_vectors
 from ...lac.cells.quadrature import face_rule
 from ...lac.threads import prefetch
 

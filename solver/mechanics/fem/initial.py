@@ -15,7 +15,7 @@ import numpy as np
 from .block import Block
 from .elasticity import chunks, shapes_in
 from .mixed import MeanStress
-from .nodal_stress import extrapolation
+from .stress import extrapolation
 
 # Strains (k, n, q, 6) of the cells of a block at its quadrature points, as COMPONENTS.
 Strains = Callable[[Block], np.ndarray]

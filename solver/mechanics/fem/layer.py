@@ -12,8 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ...lac.cells.catalogue import BY_NAME, CellType, cell_type
-from ...lac.cells.faces import area_vectors, nodal_normals
-from ...lac.cells.orient import right_side_out
+from ...lac.cells.faces import area_vectors, nodal_normals, right_side_out
 from ...lac.cells.shape import shape_functions
 
 # Thickness of a layer in parts of the face's size.

@@ -1,16 +1,19 @@
-"""Nodal forces of pressures, tractions and body forces."""
+"""Nodal forces of pressures, tractions and body forces.
+
+Springs to the ground: the stiffness of elastic foundations, and of springs at nodes.
+"""
 
 from collections.abc import Callable
 
 import numpy as np
+from scipy import sparse
 
 from ...lac.cells.faces import circumference, surface_vectors
 from ...lac.cells.quadrature import face_rule
-from ...lac.cells.shape import shape_functions
-from ...lac.cells.small_matrices import invert
+from ...lac.cells.shape import invert, shape_functions
 from ...lac.errors import SolveError
+from .block import volume_rule
 from .stress import traction
-from .volume_rules import volume_rule
 
 # A value of position: points (n, dim) to values (n,) or (n, dim).
 Field = Callable[[np.ndarray], np.ndarray]
@@ -96,3 +99,44 @@ def _gather(points: np.ndarray, nodes: np.ndarray, forces: np.ndarray) -> np.nda
     for d in range(points.shape[1]):
         total[:, d] = np.bincount(nodes.ravel(), forces[..., d].ravel(), minlength=len(points))
     return total
+
+
+def foundation(
+    points: np.ndarray,
+    nodes: np.ndarray,
+    face_type: str,
+    stiffness: Field,
+    direction: np.ndarray | None,
+    axisymmetric: bool = False,
+) -> sparse.csr_matrix:
+    """∫ k (N d)(N d)ᵀ dS (n_dofs, n_dofs) on faces (n, n_nodes), k a force per volume.
+
+    `direction` (dim,) is the unit vector d; None: the normal at each place (Winkler's foundation).
+    """
+    reference, weights = face_rule(face_type)
+    values, vectors = surface_vectors(points, nodes, face_type, reference, axisymmetric)
+    area = np.linalg.norm(vectors, axis=2)
+    place = np.einsum("qa,fad->fqd", values, points[nodes])
+    given = stiffness(place.reshape(-1, points.shape[1])).reshape(area.shape)
+    unit = (
+        vectors / area[..., None] if direction is None else np.broadcast_to(direction, place.shape)
+    )
+    weight = given * area * weights
+    entries = np.einsum(
+        "fq,qa,qb,fqc,fqd->facbd", weight, values, values, unit, unit, optimize=True
+    )
+    dim = points.shape[1]
+    dofs = (dim * nodes[..., None] + np.arange(dim)).reshape(len(nodes), -1)
+    size = dofs.shape[1]
+    rows, columns = np.repeat(dofs, size, axis=1).ravel(), np.tile(dofs, (1, size)).ravel()
+    shape = (points.size, points.size)
+    return sparse.csr_matrix((entries.ravel(), (rows, columns)), shape=shape)
+
+
+def at_nodes(
+    points: np.ndarray, nodes: np.ndarray, stiffness: np.ndarray, axis: int
+) -> sparse.csr_matrix:
+    """Springs (n_dofs, n_dofs) of stiffness (n,), force per length, at nodes (n,) along an axis."""
+    diagonal = np.zeros(points.shape)
+    diagonal[nodes, axis] = stiffness
+    return sparse.diags_array(diagonal.ravel()).tocsr()

@@ -5,6 +5,13 @@ constraints added to the stiffness, A = K + Ĝᵀ w Ĝ, the solution does not ch
 definite, and the multipliers follow from A by few steps p ← p + w (b − Ĝ x). Sources: Fortin,
 Glowinski, Augmented Lagrangian methods, North-Holland 1983, ch. 1; Golub, Greif, On solving
 block-structured indefinite linear systems, SIAM J. Sci. Comput. 24 (2003) 2076–2092.
+
+Elasticity under closed contact constraints that give way to pressures that scatter.
+
+K x = f + Gᵀ p, G x + S p = b with a compliance S = Lᵀ D L of the constraints. With s unknowns
+r = D L p more, those of springs of the stiffness D⁻¹, these are the constraints [G Lᵀ] (x, r) = b
+of the stiffness diag(K, D⁻¹): the second row of its equilibrium is D⁻¹ r = L p. They are condensed
+like any others, and the condensed matrix is positive definite.
 """
 
 from dataclasses import dataclass
@@ -13,13 +20,93 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.errors import SolveError
-from .choice import LinearSolver, prepare
+from .choice import Factor, LinearSolver, Shared, factorise, prepare
+from .condensation import CondensedSystem, condense
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .direct import Factor, factorise
 from .krylov import EPSILON
-from .nodal_matrix import Stiffness
-from .shared import Shared
+from .symmetric_blocks import Stiffness
 from .unknowns import Unknowns
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """S = Lᵀ D L of c closed multipliers: `scatter` L (s, c) and `weight` D (s,)."""
+
+    scatter: sparse.csr_matrix
+    weight: np.ndarray
+
+
+@dataclass(frozen=True)
+class StabilisedSystem:
+    """The system `condensed` of displacement and springs (n + s,), for a displacement (n,).
+
+    The springs are the ones of the pressures that balance the forces. See `ConstrainedSystem`.
+    """
+
+    condensed: CondensedSystem
+    compliance: Compliance
+
+    @property
+    def factor(self) -> LinearSolver:
+        """The solver of the condensed system."""
+        return self.condensed.factor
+
+    @property
+    def why(self) -> str:
+        """Why it was chosen."""
+        return self.condensed.why
+
+    @property
+    def warning(self) -> str:
+        """See `CondensedSystem`."""
+        return self.condensed.warning
+
+    def correction(
+        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
+    ) -> np.ndarray:
+        """The change of x under the whole pressure p, which the forces do not contain yet."""
+        force, violation = self._left(force, violation)
+        return self.condensed.correction(force, violation, accuracy)[: self._size]
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """From the equilibrium of the pivots."""
+        return -(self.condensed.inverse.T @ force[self.condensed.pivot])
+
+    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
+        """The largest force left, with that brought up by gaps that do not fit the pressures."""
+        system, (force, violation) = self.condensed, self._left(force, violation)
+        pulled = system.coupling.T @ (system.inverse @ violation)
+        return system.imbalance(force - pulled, violation)
+
+    @property
+    def _size(self) -> int:
+        return self.condensed.coupling.shape[1] - len(self.compliance.weight)
+
+    def _left(self, force: np.ndarray, violation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces (n + s,) and violation (m,) left, the springs in equilibrium with the pressure."""
+        stretch = self.compliance.scatter @ self.multiplier(force)
+        moved = (stretch.T * self.compliance.weight).T
+        return np.concatenate([force, -stretch]), violation - self.compliance.scatter.T @ moved
+
+
+def stabilise(
+    matrix: Stiffness,
+    constraints: sparse.csr_matrix,
+    own: np.ndarray,
+    compliance: Compliance,
+    unknowns: Unknowns | None = None,
+    gave_up: str = "",
+    shared: Shared | None = None,
+) -> StabilisedSystem:
+    """Condense K (n, n) and its springs by G (m, n) and the `compliance`; see `condense`.
+
+    Raises SolveError where a constraint has no unknown of its own, or the system is singular.
+    """
+    whole = sparse.hstack([constraints, compliance.scatter.T], format="csr")
+    springs = 1 / compliance.weight
+    condensed = condense(matrix, whole, own, unknowns, gave_up, shared, springs)
+    return StabilisedSystem(condensed, compliance)
+
 
 # A step leaves about 1 / (w λ) of a violation, with the smallest eigenvalue λ of Ĝ D⁻¹ Ĝᵀ, whose
 # diagonal is one; the factor loses as many digits as w has, which refinement returns.

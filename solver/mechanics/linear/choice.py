@@ -1,20 +1,216 @@
-"""The linear solver for a positive definite system, chosen by size and dimension."""
+"""The linear solver for a positive definite system, chosen by size and dimension.
+
+Sparse direct solution of symmetric positive definite systems by CHOLMOD.
+
+The matrix is first scaled symmetrically to a diagonal near one, by powers of two, which rounds
+nothing. The rest does not depend on units, and a pivot or an eigenvalue of the scaled matrix can be
+compared with the machine precision.
+
+What the solvers of one part of a problem share, whatever is closed.
+"""
+
+from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from scipy.sparse import diags
+from scipy.sparse import csr_matrix, diags, sparray, spmatrix
 
 from ...lac.errors import SolveError
 from .condensed_matrix import Symmetric
-from .direct import Factor, factorise, wanted
 from .krylov import EPSILON
-from .shared import Shared
 from .unknowns import Unknowns
 
 if TYPE_CHECKING:
+    from .hierarchy import Hierarchy
     from .multigrid import Multigrid
+
+
+SINGULAR = 4 * EPSILON
+"""A scaled matrix (largest entry 1) whose smallest eigenvalue is not larger counts as singular."""
+Solve = Callable[[np.ndarray], np.ndarray]
+_auto: ContextVar[str] = ContextVar("auto", default="auto")
+
+
+@contextmanager
+def force_solver(kind: str) -> Iterator[None]:
+    """Within the block `auto` means `kind`: `cholmod` or `multigrid`."""
+    token = _auto.set(kind)
+    try:
+        yield
+    finally:
+        _auto.reset(token)
+
+
+def wanted() -> str:
+    """The present meaning of `auto`: `auto`, `cholmod` or `multigrid`."""
+    return _auto.get()
+
+
+class Factor:
+    """A factored matrix; closing or dropping it releases the memory."""
+
+    name = "CHOLMOD"
+    iterative = False
+    iterations = 0
+
+    def __init__(self, solve: Solve, scale: np.ndarray, smallest: float = 1.0):
+        """`solve` takes columns (n, k) of the system scaled by `scale` (n,).
+
+        `smallest`: about the smallest eigenvalue of the scaled matrix, whose largest entry is 1.
+        """
+        self.smallest = smallest
+        self._scale = scale
+        self._solve: Solve | None = solve
+
+    def solve(self, right: np.ndarray, accuracy: float = EPSILON) -> np.ndarray:  # noqa: ARG002
+        """Solve A x = `right`, of shape (n,) or (n, k); the result has the same shape.
+
+        A factor has the full `accuracy`. Raises SolveError where the solution is not finite.
+        """
+        if self._solve is None:
+            raise ValueError("the factor is closed")
+        right = np.asarray(right, dtype=float)
+        columns = right if right.ndim == 2 else right[:, None]
+        solution = self._scale[:, None] * self._solve(self._scale[:, None] * columns)
+        if not np.isfinite(solution).all():
+            raise SolveError(f"the solution by {self.name} is not finite")
+        return solution.reshape(right.shape)
+
+    def close(self) -> None:
+        """Release the memory; the factor cannot solve afterwards."""
+        self._solve = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+
+def factorise(matrix: spmatrix | sparray, least: float = SINGULAR) -> Factor:
+    """Factor a symmetric positive definite `matrix` (n, n), of which the upper triangle is read.
+
+    Raises SolveError where the matrix is not positive definite, or singular to working precision:
+    the smallest eigenvalue of the matrix scaled to a diagonal near one is at most `least`.
+    """
+    upper = _upper_triangle(matrix)
+    if upper.shape[0] == 0:
+        return Factor(lambda right: right, np.ones(0))
+    diagonal = upper.diagonal()
+    if not (diagonal > 0).all():
+        worst = int(np.argmin(np.where(np.isnan(diagonal), -np.inf, diagonal)))
+        raise SolveError(
+            f"the matrix is not positive definite: diagonal entry {worst} is {diagonal[worst]:g}"
+        )
+    # The nearest power of two.
+    scale = np.exp2(np.rint(np.log2(1 / np.sqrt(diagonal))))
+    upper.data *= np.repeat(scale, np.diff(upper.indptr)) * scale[upper.indices]
+    solve = _cholmod(upper)
+    smallest = _smallest_eigenvalue(solve, upper.shape[0])
+    if not smallest > least:
+        raise SolveError(
+            f"the matrix is singular to working precision: scaled to a largest entry of 1, its "
+            f"smallest eigenvalue is about {smallest:.0e} (more than {least:.0e} is needed)"
+        )
+    return Factor(solve, scale, smallest)
+
+
+def factorise_roughly(matrix: csr_matrix) -> Solve:
+    """Factor a positive definite `matrix` (n, n) with a diagonal near one, for a preconditioner.
+
+    The solve takes columns (n, k). Raises SolveError where a pivot fails.
+    """
+    return _cholmod(_upper_triangle(matrix))
+
+
+def _cholmod(upper: csr_matrix) -> Solve:
+    """The solve of columns (n, k); raises SolveError at a pivot that is not positive."""
+    from cvxopt import cholmod, matrix, spmatrix
+
+    columns = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
+    rows = upper.indices.astype(np.int64)
+    lower = spmatrix(matrix(upper.data), matrix(rows), matrix(columns), upper.shape)
+    factor = cholmod.symbolic(lower)
+    try:
+        cholmod.numeric(lower, factor)
+    except ArithmeticError:
+        raise SolveError("the matrix is not positive definite: a pivot fails in CHOLMOD") from None
+
+    def solve(right: np.ndarray) -> np.ndarray:
+        solution = matrix(np.asfortranarray(right, dtype=float))
+        cholmod.solve(factor, solution)
+        return np.array(solution)
+
+    return solve
+
+
+def _smallest_eigenvalue(solve: Solve, size: int) -> float:
+    """Estimate, from above, of the smallest modulus of an eigenvalue: two inverse iterations.
+
+    The first brings out the near-null vector even where the start hardly contains it.
+    """
+    vector = np.random.default_rng(0).uniform(-1, 1, (size, 1))
+    growth = 1.0
+    for _ in range(2):
+        vector /= np.linalg.norm(vector)
+        with np.errstate(all="ignore"):
+            vector = solve(vector)
+            growth = float(np.linalg.norm(vector))
+        if not 0 < growth < np.inf:
+            return 0.0
+    return 1 / growth
+
+
+def _upper_triangle(matrix: spmatrix | sparray) -> csr_matrix:
+    """A copy of the upper triangle: rows sorted, every diagonal entry stored, int32 indices."""
+    whole = csr_matrix(matrix, dtype=float)
+    if not whole.has_canonical_format:
+        whole = whole.copy()
+        whole.sum_duplicates()
+    size = whole.shape[0]
+    rows = np.repeat(np.arange(size, dtype=np.int32), np.diff(whole.indptr))
+    kept = whole.indices >= rows
+    rows, columns, values = rows[kept], whole.indices[kept].astype(np.int32), whole.data[kept]
+    if not np.isfinite(values).all():
+        raise SolveError("the matrix holds entries that are not finite")
+    if np.count_nonzero(rows == columns) < size:
+        every = np.arange(size, dtype=np.int32)
+        rows, columns = np.append(rows, every), np.append(columns, every)
+        values = np.append(values, np.zeros(size))
+        return csr_matrix((values, (rows, columns)), shape=whole.shape)
+    starts = np.zeros(size + 1, dtype=np.int32)
+    np.cumsum(np.bincount(rows, minlength=size), out=starts[1:])
+    return csr_matrix((values, columns, starts), shape=whole.shape)
+
+
+class Shared:
+    """The hierarchy of one stiffness matrix, set up once for all contact statuses.
+
+    `slow`: whether iterations were so slow that coarse levels take two steps each from then on.
+    """
+
+    def __init__(self) -> None:
+        """Nothing is set up yet."""
+        self._hierarchy: Hierarchy | None = None
+        self.slow = False
+
+    def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
+        """The hierarchy of `matrix`, the same at each call until it is closed."""
+        if self._hierarchy is None:
+            from .hierarchy import Hierarchy
+
+            self._hierarchy = Hierarchy(matrix, unknowns)
+        return self._hierarchy
+
+    def close(self) -> None:
+        """Release its memory."""
+        self._hierarchy = None
+
 
 _LOG = logging.getLogger(__name__)
 
@@ -37,7 +233,7 @@ class LinearSolver:
     round-off: what it solves is a solution only if refinement converges.
     """
 
-    def __init__(self, matrix: Symmetric, solver: "Factor | Multigrid | None", why: str):
+    def __init__(self, matrix: Symmetric, solver: Factor | Multigrid | None, why: str):
         """Without a `solver` the matrix is factored."""
         self._matrix, self._why = matrix, why
         self.gave_up = self.warning = ""
@@ -113,7 +309,7 @@ def prepare(
     against = gave_up or against_multigrid(size, unknowns)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if not against:
-        from .multigrid import Multigrid  # only where it solves
+        from .multigrid import Multigrid
 
         why = f"{MULTIGRID_FROM} unknowns or more in 3D: faster and smaller than a factor"
         try:

@@ -15,11 +15,10 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.errors import SolveError
-from .choice import LinearSolver, prepare
+from .choice import LinearSolver, Shared, prepare
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .krylov import EPSILON, ROUGH
-from .nodal_matrix import Stiffness
-from .shared import Shared
+from .symmetric_blocks import Stiffness
 from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
-from .nodal_matrix import NodalMatrix
+from .symmetric_blocks import NodalMatrix
 from .unknowns import Unknowns, places
 
 _ROWS_AT_ONCE = 30_000  # whole nodes

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
 
+from .choice import factorise_roughly
 from .condensed_matrix import CondensedMatrix
-from .direct import factorise_roughly
 from .products import InParts, chosen_rows
 
 # A share of the diagonal: rows with less, those of pivots, are not smoothed.

@@ -14,15 +14,13 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...lac.errors import SolveError
-from .aggregation import aggregate
+from .aggregation import aggregate, smoothed_along
 from .condensed_matrix import Symmetric, in_blocks
 from .contact_levels import Correction, Interface
 from .galerkin import coarse, smoothed
 from .krylov import eigenvalue_bound
-from .nodal_matrix import NodalMatrix
 from .products import multiply, pattern, scale_blocks, sums_of_sizes
-from .slender import smoothed_along
-from .symmetric_blocks import SymmetricBlocks, halved
+from .symmetric_blocks import NodalMatrix, SymmetricBlocks, halved
 from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 COARSEST = 600

@@ -12,13 +12,11 @@ from scipy import sparse
 
 from ...lac.errors import SolveError
 from ..fem.bodies import joined_bodies
-from .augmented import augment
-from .choice import LinearSolver
+from .augmented import Compliance, augment, stabilise
+from .choice import LinearSolver, Shared
 from .condensation import ConstrainedSystem, condense
 from .krylov import EPSILON
-from .nodal_matrix import Stiffness
-from .shared import Shared
-from .stabilised import Compliance, stabilise
+from .symmetric_blocks import Stiffness
 from .unknowns import Unknowns
 
 _MANY = "a factor serves many right-hand sides at once"

@@ -2,17 +2,106 @@
 
 They share everything else: pairing, segments, gap operator, active set, solve, checks, results.
 `docs/treatments.md` has the formulas.
+
+Which area of macro-elements has lost its partner: a measure that is independent of segments.
+
+It is found by lines through points of the faces, a route that shares nothing with the segments but
+the projection onto a face.
+
+Slave nodes that cannot answer a multiplier: it is added to the neighbours' multipliers.
+
+Supports hold the displacement of a node along the normal; or the node has a multiplier of another
+zone in nearly the same direction, where zones share nodes. Where the master follows node by node
+the constraints would depend on one another. The node's function is added in equal parts to
+those of the free nodes on the same faces: functions still sum to one, and a uniform pressure stays
+exact. Source: Bernardi, Maday, Patera, A new nonconforming approach to domain decomposition: the
+mortar element method, in: Nonlinear Partial Differential Equations and Their Applications, 1994
+(elements at the ends of an interface, and points where several meet); Puso, Laursen, Mesh tying on
+curved interfaces in 3D, Eng. Comput. 20 (2003) 305–319.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+from scipy import sparse
+
 from ...lac.cells.catalogue import BY_NAME
-from ...lac.operator import LAC, Scheme, meet_in_segments
-from .lost import without_partner
-from .nodal import dual, linear
-from .points import at_nodes, gauss, meet_at_points, one_each
+from ...lac.cells.quadrature import gauss_rule
+from ...lac.facets import Facets
+from ...lac.operator import LAC, GapOperator, Scheme, meet_in_segments
+from ...lac.partners import MISSED, bare_faces, extents, missed_area
+from ...lac.segments import Segments
+from ...lac.surface_points import Samples, sampled
+from .lines import all_hits
+from .points import at_nodes, dual, gauss, linear, meet_at_points, one_each
+
+# Lines through so many Gauss points each way tell whether a face lies within the master's outline.
+_LINES = 4
+
+
+def _lines(block: Facets) -> Samples:
+    """Points of faces: their nodes, without weight, and Gauss points.
+
+    If all see the master, so does the whole face.
+    """
+    places, weights = gauss_rule(block.type.name, _LINES)
+    nodes = block.type.nodes
+    rule = np.concatenate([nodes, places]), np.concatenate([np.zeros(len(nodes)), weights])
+    return sampled(block, rule)
+
+
+def without_partner(
+    slaves: Sequence[Facets],
+    masters: Sequence[Facets],
+    samples: Sequence[Samples],
+    found: Sequence[Segments],
+    reach: float,
+    n_macro: int,
+) -> np.ndarray:
+    """The area (m,) of macro-elements that lies opposite the master but in no segment.
+
+    Of faces that are not covered whole, lines along the normal tell how much is opposite a master
+    face: one that looks at the point, and is no farther from the segments of the macro-element
+    than its own size. What lies beyond is a step. Faces that the master's edge crosses are known
+    to one of their points.
+
+    >>> samples, found = face_samples([slave]), meet_in_segments([slave], [], [master], 1.0)
+    >>> both = [slave], [master], samples
+    >>> [without_partner(*both, some, 1.0, 1).round(12).tolist()
+    ...  for some in (found, [found[0].of(np.array([0]))])]
+    [[0.0], [1.0]]
+    """
+    lost = np.zeros(n_macro)
+    missed = missed_area(samples, found)
+    bare = bare_faces(samples, missed)
+    if not any(len(faces) for faces in bare):
+        return lost
+    low, high = np.full(n_macro, np.inf), np.full(n_macro, -np.inf)
+    for segments in found:
+        np.minimum.at(low, segments.macro, segments.gap.min(axis=1))
+        np.maximum.at(high, segments.macro, segments.gap.max(axis=1))
+    size = extents(slaves, n_macro)
+    low, high = (np.where(high < low, sign * reach, x) for x, sign in ((low, -1), (high, 1)))
+    for a, (block, faces) in enumerate(zip(slaves, bare, strict=True)):
+        if not len(faces):
+            continue
+        sample = _lines(block)
+        point, gap = all_hits(block, sample, masters, reach, faces)
+        face = point // len(sample.values)
+        macro = block.number[face]
+        near = (gap >= low[macro] - size[macro]) & (gap <= high[macro] + size[macro])
+        met = np.zeros(sample.weight.shape, dtype=bool)
+        met.flat[point[near]] = True
+        opposite = np.where(met, sample.weight, 0.0).sum(axis=1)[faces]
+        whole, largest = sample.weight.sum(axis=1)[faces], sample.weight.max(axis=1)[faces]
+        # The edge of the master is known to the share of one row of points.
+        unsure = np.where(met[faces].all(axis=1), 0.0, _LINES ** (block.type.dim - 1) * largest)
+        beyond = opposite - (whole - missed[a][faces]) - unsure
+        np.add.at(lost, block.number[faces], np.where(beyond > MISSED * whole, beyond, 0.0))
+    return lost
+
 
 DEFAULT_POINTS = 4
 # Slave nodes at the end of a bent surface may look past the master's by this part of a face.
@@ -86,3 +175,80 @@ def scheme_of(name: str, points: int | None) -> Scheme:
     """
     scheme = TREATMENTS[name].scheme(points or DEFAULT_POINTS)
     return replace(scheme, lost=without_partner)
+
+
+# A node is held along its normal where less than this share of a motion that way is free.
+_HELD = 1e-12
+# Normals of two zones at a node are independent from an angle of this sine on, 30 degrees: half the
+# angle between two faces of a coarse smooth surface is no corner.
+_INDEPENDENT = 0.5
+
+
+def merge_fixed_multipliers(
+    operator: GapOperator, basis: sparse.csr_matrix, taken: np.ndarray | None = None
+) -> GapOperator:
+    """The operator without multipliers of held nodes; `basis` (n_dofs, n_free) is what is free.
+
+    `taken` (n_nodes, dim, dim): the projection on the directions of multipliers that other zones
+    have at each node; those of the operator are added to it. The operator stays as it is where all
+    nodes are held, or none.
+
+    A support holds node 0, so that the multiplier of node 1 stands for the whole edge:
+
+    >>> operator = gap_operator([slave], [master], 1, 5, 1.0, scheme_of("nodal", None))
+    >>> operator.area.round(15).tolist()
+    [1.0, 1.0]
+    >>> free = sparse.identity(10, format="csr")[:, 2:]
+    >>> merge_fixed_multipliers(operator, free).area.round(15).tolist()
+    [2.0]
+    """
+    if operator.nodes is None:
+        raise ValueError("the multipliers do not belong to nodes")
+    held = _held(operator, operator.nodes, basis, taken)
+    if held.all() or not held.any():
+        return operator
+    of_nodes = _of_nodes(operator.mean, held)
+    onto = of_nodes.T.tocsr()
+    return replace(
+        operator,
+        matrix=(onto @ operator.matrix).tocsr(),
+        initial=onto @ operator.initial,
+        area=onto @ operator.area,
+        covered=onto @ operator.covered,
+        mean=(operator.mean @ of_nodes).tocsr(),
+        at_nodes=of_nodes,
+    )
+
+
+def _of_nodes(mean: sparse.csr_matrix, held: np.ndarray) -> sparse.csr_matrix:
+    """Values of all nodes (n, k) by those of the free ones: held ones take the mean around them."""
+    sharing = (mean != 0).astype(float)
+    shares = (sharing[:, held].T @ sharing[:, ~held] != 0).astype(float)
+    count = np.asarray(shares.sum(axis=1)).ravel()
+    shares = (sparse.diags(1 / np.maximum(count, 1)) @ shares).tocoo()
+    free = np.flatnonzero(~held)
+    rows = np.concatenate([free, np.flatnonzero(held)[shares.row]])
+    columns = np.concatenate([np.arange(len(free)), shares.col])
+    values = np.concatenate([np.ones(len(free)), shares.data])
+    return sparse.coo_matrix((values, (rows, columns)), shape=(len(held), len(free))).tocsr()
+
+
+def _held(
+    operator: GapOperator, nodes: np.ndarray, basis: sparse.csr_matrix, taken: np.ndarray | None
+) -> np.ndarray:
+    """Which multipliers (k,), each at its node, see a node without a free direction for them."""
+    k, dim = len(nodes), operator.surface.centre.shape[1]
+    rows = np.repeat(np.arange(k), dim)
+    columns = (dim * nodes[:, None] + np.arange(dim)).ravel()
+    own = np.asarray(operator.matrix[rows, columns]).ravel()
+    normal = sparse.coo_matrix((own, (rows, columns)), shape=operator.matrix.shape).tocsr()
+    size, free = sparse.linalg.norm(normal, axis=1), (normal @ basis).tocsr()
+    held = (size > 0) & (sparse.linalg.norm(free, axis=1) <= _HELD * size)
+    if taken is not None:
+        along = np.asarray((free @ basis.T).tocsr()[rows, columns]).reshape(k, dim)
+        rest = along - np.einsum("nij,nj->ni", taken[nodes], along)
+        length, left = (np.linalg.norm(v, axis=1) for v in (along, rest))
+        held |= left < _INDEPENDENT * length
+        unit = rest[~held] / np.where(left > 0, left, 1.0)[~held, None]
+        taken[nodes[~held]] += unit[:, :, None] * unit[:, None]
+    return held

@@ -12,7 +12,7 @@ from pathlib import Path
 import meshio
 
 from ...system.errors import InputError
-from ...system.forks import fork
+from ...system.process import fork
 
 # Processor time that a reader may take: fixed, and for each megabyte.
 _SECONDS, _SECONDS_PER_MB = 8.0, 5.0

@@ -16,7 +16,7 @@ import numpy as np
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...system.errors import InputError
 from ...system.hdf5 import read_file
-from .combinations import combinations
+from .msh import combinations
 
 _TYPES = {kind.med: name for name, kind in BY_NAME.items()}
 _NAME = 80  # characters of a group's name

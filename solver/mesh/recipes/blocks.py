@@ -18,6 +18,8 @@ Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (th
 bottom block), `press` (the upper side of the top block), `symx` (x = 0) and `symy` (y = 0, 3D) of
 both blocks, `farx` and `fary` opposite to them. `refine` multiplies all divisions and divides
 `inner` (1).
+
+The sides of a block and their groups.
 """
 
 from collections.abc import Sequence
@@ -31,7 +33,26 @@ from ...lac.cells.catalogue import BY_NAME
 from ..keys import BlockKeys, BlocksKeys, Recipe, each
 from ..size import fills_by_hxt
 from .gmsh_session import current_model, session
-from .sides import side_name
+
+
+def side_name(block: str, corners: np.ndarray) -> str:
+    """Group of the side of the unit square or cube on which the corners (n, dim) lie.
+
+    `block` is `bottom` (interface at height 1) or `top` (interface at height 0). Empty where the
+    corners lie on no side.
+    """
+    dim = corners.shape[1]
+    for axis in range(dim):
+        height = corners[0, axis]
+        if height not in (0, 1) or np.ptp(corners[:, axis]) > 0:
+            continue
+        if axis < dim - 1:
+            return f"{'sym' if height == 0 else 'far'}{'xy'[axis]}"
+        if (height == 0) == (block == "top"):
+            return f"{block}_contact"
+        return "base" if block == "bottom" else "press"
+    return ""
+
 
 # gmsh's algorithms for surfaces, in the words of the recipe.
 _ALGORITHMS = {"frontal": 6, "delaunay": 5, "meshadapt": 1}

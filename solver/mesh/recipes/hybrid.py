@@ -20,8 +20,8 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_NAME, CellType
 from ..keys import BlockKeys, each
+from .blocks import side_name
 from .gmsh_session import current_model, session
-from .sides import side_name
 
 _CUBE = BY_NAME["HEXA8"]
 _STANDING = [(0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)]

@@ -37,7 +37,6 @@ import numpy as np
 
 from ...case.typed import FieldError
 from ...lac.cells.catalogue import cell_type
-from ..changes.parts import nodes_of
 from ..keys import (
     HertzKeys,
     ParabolaKeys,
@@ -48,6 +47,7 @@ from ..keys import (
     WavyKeys,
     each,
 )
+from ..transforms import nodes_of
 from .blocks import stacked
 
 # Nodes as near as this share of the side to the place where it is divided lie on it.

@@ -23,7 +23,7 @@ from ...mechanics.fem.elasticity import stiffness
 from ...mechanics.fem.vertices import from_vertices, linear_unknowns
 from ...mechanics.linear.choice import against_multigrid
 from ...mechanics.linear.condensation import choose_pivots
-from ...mechanics.linear.nodal_matrix import NodalMatrix, Stiffness
+from ...mechanics.linear.symmetric_blocks import NodalMatrix, Stiffness
 from ...mechanics.linear.unknowns import Unknowns
 from ...system.errors import InputError
 from ..scene.bodies import body_names

@@ -12,9 +12,9 @@ from ...case.model import Step
 from ...lac.errors import SolveError
 from ...lac.status import StatusResult, Trial, find_status
 from ...mechanics.fem.bodies import rigid_motions, unsupported
+from ...mechanics.linear.augmented import Compliance
 from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
-from ...mechanics.linear.nodal_matrix import Stiffness
-from ...mechanics.linear.stabilised import Compliance
+from ...mechanics.linear.symmetric_blocks import Stiffness
 from ...mechanics.linear.systems import Systems, parts_of
 from ...system.memory import release
 from ..scene.cut_groups import unit_springs

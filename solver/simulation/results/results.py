@@ -13,8 +13,7 @@ from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import nodal_normals
 from ...lac.facets import tangents_of
 from ...mechanics.fem.locate import Located, locate
-from ...mechanics.fem.nodal_stress import nodal_stress
-from ...mechanics.fem.stress import normal_stress
+from ...mechanics.fem.stress import nodal_stress, normal_stress
 from ...system.errors import InputError
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.recovery import Recovered, RecoveredZone

@@ -22,8 +22,7 @@ from ...lac.cells.faces import FaceBlock
 from ...lac.cut import CutMesh, SubFaces
 from ...mechanics.fem.bodies import body_numbers
 from ...mechanics.fem.faces import FaceError, boundary_faces, volume_cells
-from ...mechanics.fem.loads import Field
-from ...mechanics.fem.springs import at_nodes, foundation
+from ...mechanics.fem.loads import Field, at_nodes, foundation
 from ...mechanics.fem.supports import Copies
 from ...mechanics.mortar.treatments import TREATMENTS
 from ...system.errors import InputError

@@ -16,8 +16,7 @@ from ...case.model import Zone
 from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import FACE_POINTS, FaceBlock, nodal_normals, surface_points
 from ...lac.cut import SubFaces
-from ...lac.facets import Facets, facets, with_nodal_normals
-from ...lac.master_normals import with_directions, with_master_normals
+from ...lac.facets import Facets, facets, with_directions, with_master_normals, with_nodal_normals
 from ...lac.multipliers import constants
 from ...lac.operator import GapOperator, Scheme, gap_operator, without_round_off
 from ...lac.reconstruction import form_of, vertex_neighbours

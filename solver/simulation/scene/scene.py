@@ -17,10 +17,8 @@ from ...mechanics.fem.faces import volume_cells
 from ...mechanics.fem.initial import StrainLoads
 from ...mechanics.fem.mixed import MeanStress
 from ...mechanics.fem.supports import Fixed, FreeMotion
-from ...mechanics.mortar.held import merge_fixed_multipliers
-from ...mechanics.mortar.treatments import TREATMENTS, Treatment
-from ...system.clock import Clock
-from ...system.progress import stage
+from ...mechanics.mortar.treatments import TREATMENTS, Treatment, merge_fixed_multipliers
+from ...system.progress import Clock, stage
 from ..options import LEAN, Options
 from .attributes import Attributes, strain_factors, strain_loads_of
 from .cut_groups import CutZone, Surfaces, springs_of, surfaces_of

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from ...report import formats
 from ...report.charts import ORANGE, Chart, Spec, tooltip
 from ..description import Study
-from ..shown import MeasuredGroup, PageSection, Shown, Table, TableRow, lost_points
+from ..page import MeasuredGroup, PageSection, Shown, Table, TableRow, lost_points
 
 Record = Mapping[str, Any]
 # Fewest digits and colour, dark is good, also in greyscale (viridis; van der Walt and Smith).

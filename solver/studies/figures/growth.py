@@ -25,8 +25,7 @@ from ...report.charts import (
 from ...report.formats import count, duration
 from ...report.formats import error as shown_error
 from ..description import Goal, Study
-from ..fits import Fit, fit_power
-from ..shown import (
+from ..page import (
     MeasuredGroup,
     PageSection,
     Shown,
@@ -36,6 +35,7 @@ from ..shown import (
     measured,
     why_not,
 )
+from ..theory import Fit, fit_power
 
 Record = Mapping[str, Any]
 WHOLE, OTHER, GROWTH = "whole", "start-up", "growth of "

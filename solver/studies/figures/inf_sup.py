@@ -7,8 +7,8 @@ from typing import Any
 
 from ...report.charts import Axis, distinct, look_of, series_chart
 from ..description import Study
-from ..fits import fit_power
-from ..shown import MeasuredGroup, PageSection, Shown, Table, TableRow, lost_points
+from ..page import MeasuredGroup, PageSection, Shown, Table, TableRow, lost_points
+from ..theory import fit_power
 
 LEVEL = 0.4
 """β_h falls with the size of the faces to this power at most."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...report.charts import INK, ORANGE, Axis, Chart, Look, series_chart
 from ..description import Study
-from ..shown import MeasuredGroup, PageSection, Shown, Table, TableRow, grouped, lost_points
+from ..page import MeasuredGroup, PageSection, Shown, Table, TableRow, grouped, lost_points
 from .inf_sup import UNCUT
 
 OSCILLATION = 0.15

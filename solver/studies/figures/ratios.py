@@ -6,7 +6,7 @@ from typing import Any
 
 from ...report.formats import error as shown_error
 from ..description import Study
-from ..shown import (
+from ..page import (
     MeasuredGroup,
     PageSection,
     Shown,

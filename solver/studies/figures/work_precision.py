@@ -23,8 +23,7 @@ from ...report.charts import (
 from ...report.formats import duration
 from ...report.formats import error as shown_error
 from ..description import Study
-from ..fits import ROUND_OFF, fit_order
-from ..shown import (
+from ..page import (
     REFUSED,
     MeasuredGroup,
     PageSection,
@@ -35,6 +34,7 @@ from ..shown import (
     lost_points,
     measured,
 )
+from ..theory import ROUND_OFF, fit_order
 from ..timing import TOTAL, Spread, medians, spread
 
 Record = Mapping[str, Any]

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import solver.lac.cells.orient
+import solver.lac.cells.faces
 import solver.lac.threads
 from solver.lac.cells.catalogue import BY_NAME
-from solver.lac.cells.orient import right_side_out, vertex_jacobians
+from solver.lac.cells.faces import right_side_out, vertex_jacobians
 from solver.mesh.tidy import tidy
 from solver.system.errors import InputError
 from tests.mesh.curved import KINDS
@@ -61,7 +61,7 @@ def test_orientation_does_not_depend_on_size_or_aspect(name, size, stretch, seed
 @pytest.mark.parametrize("many", [1, 3, 100])
 def test_cells_in_parts_are_judged_as_one_by_one(monkeypatch, many, threads):
     """Sound, mirrored and flat triangles in turn."""
-    monkeypatch.setattr(solver.lac.cells.orient, "_AT_ONCE", many)
+    monkeypatch.setattr(solver.lac.cells.faces, "_AT_ONCE", many)
     monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     points = np.array([(0, 0), (1, 0), (0, 1), (2, 0)], dtype=float)
     cells = np.array([(0, 1, 2), (0, 2, 1), (0, 1, 3)] * 4)

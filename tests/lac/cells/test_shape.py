@@ -8,7 +8,7 @@ import pytest
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.cells.quadrature import simplex_rule
 from solver.lac.cells.shape import shape_functions
-from solver.mechanics.fem.volume_rules import volume_rule
+from solver.mechanics.fem.block import volume_rule
 
 TYPES = list(BY_NAME)
 VOLUME = {"SEG": 1, "TRIA": 1 / 2, "QUAD": 1, "TETRA": 1 / 6, "HEXA": 1, "PENTA": 1 / 2}

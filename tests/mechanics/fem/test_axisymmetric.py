@@ -20,7 +20,7 @@ from solver.mechanics.fem.elasticity import (
 from solver.mechanics.fem.faces import face_integrals
 from solver.mechanics.fem.loads import body_forces, face_forces, stress_forces
 from solver.mechanics.fem.mixed import split
-from solver.mechanics.fem.nodal_stress import nodal_stress
+from solver.mechanics.fem.stress import nodal_stress
 from solver.mechanics.fem.supports import free_motion
 from solver.mechanics.mortar.edge import contact_edges
 

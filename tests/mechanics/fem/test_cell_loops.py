@@ -9,7 +9,7 @@ from solver.mechanics.fem import cell_loops
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepest
 from solver.mechanics.fem.elasticity import internal_force, stiffness
-from solver.mechanics.fem.nodal_stress import nodal_stress
+from solver.mechanics.fem.stress import nodal_stress
 from solver.system.compiled import available
 from tests.scenes import block_mesh, grid
 

@@ -6,8 +6,7 @@ import pytest
 from solver.mechanics.fem.elasticity import internal_force
 from solver.mechanics.fem.initial import strain_loads
 from solver.mechanics.fem.mixed import split
-from solver.mechanics.fem.nodal_stress import nodal_stress
-from solver.mechanics.fem.stress import COMPONENTS
+from solver.mechanics.fem.stress import COMPONENTS, nodal_stress
 from tests.mechanics.fem.test_mixed import VOLUMES, one_cell
 
 

@@ -11,7 +11,7 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import internal_force
 from solver.mechanics.fem.mixed import split
-from solver.mechanics.fem.nodal_stress import nodal_stress
+from solver.mechanics.fem.stress import nodal_stress
 from solver.mesh import generate
 from solver.simulation.options import LEAN, Options, Safeguards
 from solver.simulation.scene.scene import build_scene

@@ -6,10 +6,10 @@ from scipy.sparse import block_diag, bsr_matrix, csr_matrix, eye, random_array
 from scipy.sparse.linalg import spsolve
 
 from solver.mechanics.linear import multigrid
+from solver.mechanics.linear.choice import force_solver
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.contact_levels import Correction, correction_of
-from solver.mechanics.linear.direct import force_solver
 from solver.mechanics.linear.hierarchy import Hierarchy, Level
 from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.symmetric_blocks import halved

@@ -10,7 +10,7 @@ from scipy.sparse import block_array, csc_matrix, csr_matrix, diags, eye, kron, 
 from scipy.sparse.linalg import spsolve
 
 from solver.lac.errors import SolveError
-from solver.mechanics.linear.direct import factorise, factorise_roughly
+from solver.mechanics.linear.choice import factorise, factorise_roughly
 
 
 def springs(count: int, ends: float = 1.0) -> csr_matrix:

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
-from solver.mechanics.linear.nodal_matrix import NodalMatrix
 from solver.mechanics.linear.products import _PRODUCTS, _TRANSPOSED, scale_blocks
+from solver.mechanics.linear.symmetric_blocks import NodalMatrix
 from solver.system.compiled import available
 
 

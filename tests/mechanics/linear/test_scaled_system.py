@@ -6,10 +6,8 @@ from scipy.sparse import csr_matrix
 
 from solver.mechanics.linear import contact_levels, products, symmetric_blocks
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
-from solver.mechanics.linear.multigrid import Multigrid
-from solver.mechanics.linear.nodal_matrix import NodalMatrix
-from solver.mechanics.linear.scaled_system import ScaledSystem
-from solver.mechanics.linear.symmetric_blocks import halved
+from solver.mechanics.linear.multigrid import Multigrid, ScaledSystem
+from solver.mechanics.linear.symmetric_blocks import NodalMatrix, halved
 from solver.system.compiled import available
 from tests.mechanics.linear.test_contact_levels import condensed, pressed
 from tests.mechanics.linear.test_symmetric_blocks import symmetric

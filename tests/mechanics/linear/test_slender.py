@@ -11,10 +11,11 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem import vertices
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
-from solver.mechanics.linear import aggregation, multigrid, slender
-from solver.mechanics.linear.direct import force_solver
+from solver.mechanics.linear import aggregation, multigrid
+from solver.mechanics.linear import aggregation as slender
+from solver.mechanics.linear.aggregation import Near, filtered, smoothed_along
+from solver.mechanics.linear.choice import force_solver
 from solver.mechanics.linear.multigrid import Multigrid
-from solver.mechanics.linear.slender import Near, filtered, smoothed_along
 from solver.mechanics.linear.unknowns import LevelNodes
 from tests.mechanics.linear.test_multigrid import held, motions
 from tests.scenes import grid, replaced, solved

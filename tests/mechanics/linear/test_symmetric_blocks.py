@@ -6,8 +6,7 @@ from scipy.sparse import bsr_matrix
 
 from solver.lac import threads
 from solver.mechanics.linear import products, symmetric_blocks
-from solver.mechanics.linear.nodal_matrix import NodalMatrix
-from solver.mechanics.linear.symmetric_blocks import SymmetricBlocks, halved
+from solver.mechanics.linear.symmetric_blocks import NodalMatrix, SymmetricBlocks, halved
 from solver.system import compiled
 
 NUMBA = pytest.param(True, marks=pytest.mark.skipif(not compiled.available(), reason="no Numba"))

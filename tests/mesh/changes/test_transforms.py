@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.lac.cells.catalogue import cell_type
-from solver.lac.cells.orient import vertex_jacobians
+from solver.lac.cells.faces import vertex_jacobians
 from solver.mesh import generate, transform
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError

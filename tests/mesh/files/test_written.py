@@ -5,8 +5,8 @@ import pytest
 
 from solver.lac.cells.catalogue import BY_NAME
 from solver.mesh import generate, read_mesh, write_mesh
-from solver.mesh.files.combinations import combinations
 from solver.mesh.files.formats import WRITTEN
+from solver.mesh.files.msh import combinations
 from solver.system.errors import InputError
 
 CELLS = ["TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9"]

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from solver.lac.cells.catalogue import BY_NAME, CellType, cell_type
-from solver.lac.cells.orient import vertex_jacobians
+from solver.lac.cells.faces import vertex_jacobians
 from solver.mesh import generate, write_mesh
 from solver.system.errors import InputError
 from tests.mesh.curved import KINDS

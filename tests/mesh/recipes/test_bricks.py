@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from solver.mesh import generate
-from solver.mesh.changes.parts import nodes_of
 from solver.mesh.size import of_mesh
+from solver.mesh.transforms import nodes_of
 from solver.system.errors import InputError
 
 SEAT = {

@@ -1,1 +1,0 @@
-"""Changes of a mesh: transforms, parts, moved nodes."""
