@@ -1,9 +1,4 @@
-"""The keys of a case file for what acts on the bodies: supports, loads; groups, and probes.
-
-The kinds of values that several keys of a case file share.
-
-The keys of a case file for bodies: rigid ones, their surfaces without a mesh, their motion.
-"""
+"""The keys of a case file for groups, supports, loads, probes and rigid bodies, and their values."""
 
 from typing import Annotated, Literal
 

@@ -17,6 +17,7 @@ from ..system.files import is_file
 from .acting import BodyKeys
 from .expressions import Expression
 from .file import CaseFile
+from .material import Material
 from .model import (
     EXACT,
     LOAD_KINDS,
@@ -25,7 +26,6 @@ from .model import (
     Case,
     Cyclic,
     Load,
-    Material,
     Probe,
     Rigid,
     Selection,

@@ -1,6 +1,6 @@
-"""Runs another code on a case, in a process of its own with a limit of time and of memory.
+"""Other codes as plug-ins, and their runs on a case, with a limit of time and of memory.
 
-A code as a plug-in: a folder with `code.yaml`, its commands, or `code.py`, one class.
+A code is a folder with `code.yaml`, its commands, or `code.py`, one class.
 
 The folder's name is the code's name. The codes of this program (`kratos`, `ngsolve`, `getfem`) and
 those of users have the same form. `code.yaml`:
@@ -13,8 +13,6 @@ those of users have the same form. `code.yaml`:
     map: map.yaml                            # of names and units, see `check-result --map`
     settings: {penalty: 100 E}               # shown beside the results
     gave_up: "no convergence"                # a regular expression, of what it prints then
-
-The codes by name: modules of this folder, and plug-ins, this folder's and users' own.
 """
 
 import importlib.util

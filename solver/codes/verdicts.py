@@ -4,7 +4,7 @@
 `pressure.csv` with the contact pressure by place; `log` with the output of the code, written by
 `run`.
 
-At how many of the places of its case a foreign result has values: what a verdict speaks of.
+A verdict speaks of the places of its case at which a foreign result has values.
 """
 
 from __future__ import annotations

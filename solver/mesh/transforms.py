@@ -1,11 +1,4 @@
-"""Random moves of the nodes of a mesh that keep its plane sides plane and its edges straight.
-
-Nodes on a plane side move in it, nodes on an edge of the body along it, its corners and the nodes
-of curved sides stay, and mid-nodes go with the vertices they lie between.
-
-Steps of `transform:` that work on a part of the mesh: its nodes and cells by group.
-
-The key `transform:` of a case file: changes of the mesh, applied in the order of the keys.
+"""The key `transform:` of a case file: changes of the mesh, applied in the order of the keys.
 
 scale: 1.0e-3                       # by one positive number
 stretch: [1, 1, 10]                 # by one along each axis
@@ -19,6 +12,10 @@ turn: {group: top, angle: 1.0e-9}   # degrees, about the last axis; see `turned`
 pick: {from: bottom_contact, low: [0, -1], high: [0.5, 1], name: corner, rest: others}
                                     # two groups of a group's cells, by the place of their
                                     # nodes; or a list of such
+
+Random moves keep plane sides plane and edges straight: nodes on a plane side move in it, nodes on
+an edge of the body along it, its corners and the nodes of curved sides stay, and mid-nodes go with
+the vertices they lie between.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,8 +1,6 @@
 """Two batches side by side: Markdown for the terminal, and a page in the style of the report's.
 
-Differences of two batches: verdicts, numbers, times.
-
-A number has changed when it moved by more than accepted values may: 1e-9 of the check's scale. What
+Verdicts, numbers and times differ. A number has changed when it moved by more than accepted values may: 1e-9 of the check's scale. What
 round-off does is no change. Times are shown and never judged.
 """
 

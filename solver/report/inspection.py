@@ -1,7 +1,4 @@
-"""What a mesh file contains, for someone who writes a case on it: groups, sizes, gaps.
-
-The picture of a mesh file: its groups of cells and of faces by colour.
-"""
+"""What a mesh file contains, for someone who writes a case on it: groups, sizes, gaps, a picture."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """The pages for people: the main one, and one a family; no network is needed.
 
-The first screen of the report: how well, error against run time, digits kept, work left out.
+The first screen has how well, error against run time, digits kept, work left out.
 """
 
 import csv

@@ -1,7 +1,4 @@
-"""The page of a study: one template for all figures, a table, and what does not hold.
-
-What a page of a study consists of: sections with charts and tables, and what does not hold.
-"""
+"""The page of a study: one template for all figures, sections with charts and tables."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence

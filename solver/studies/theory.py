@@ -8,9 +8,8 @@ interpolation allows, 2 in H1 and 3 in L2 for degree two. The pressure error in 
 macro-elements have no such bound. A pressure recovered from the constants is a polynomial of degree
 one or two, of order two or three where the solution is smooth and its means are as exact.
 
-Powers fitted to measurements: value ~ size^power, by least squares in log–log.
-
-Orders of convergence are powers of the mesh size, growth of cost is a power of the unknowns.
+Powers are fitted to measurements by least squares in log–log: orders are powers of the mesh size,
+growth of cost is a power of the unknowns.
 """
 
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
 """Times that can be trusted: repeated in one warm process, by stage, with their spread.
 
-Points that need the machine for themselves: each is measured in a process of its own.
+A point that needs the machine for itself is measured in a process of its own.
 """
 
 import gc

@@ -1,7 +1,4 @@
-"""A command in a separate process: pinned to cores, stopped at a limit, its cost measured.
-
-Work that is shared among forks of this process.
-"""
+"""A command in a separate process: pinned to cores, stopped at a limit, its cost measured."""
 
 import os
 import resource

@@ -5,7 +5,7 @@ Modules log to the logger of their own name: outcomes at the level `OUTCOME`, wh
 information, which `details` writes with the time. Without either nothing is written, unless the
 program that uses the solver listens to the package's logger, `solver` or `mortarcheck`.
 
-Time by stage: wall time, and processor time of all threads and of processes that have ended.
+A clock adds up wall time by stage, and processor time of all threads and of ended processes.
 """
 
 import logging

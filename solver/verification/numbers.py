@@ -1,11 +1,4 @@
-"""Samples of single numbers: contact forces, reactions, strain energy, values at probes.
-
-See `solver.verification.samples`.
-
-Samples of friction: Coulomb's law itself, and what a reference gives.
-
-See `solver.verification.samples`.
-"""
+"""Samples of single numbers (forces, energy, probes) and of friction: see `samples`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Load steps and probes in a result file: see `solver.verification.results`.
-
-A contact zone in a result file: see `solver.verification.results`.
-"""
+"""Load steps, probes and contact zones in a result file: see `solver.verification.results`."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields

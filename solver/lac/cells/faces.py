@@ -1,7 +1,4 @@
-"""Faces of cells: who owns them, their outward normals, and quadrature points on them.
-
-Orientation: every cell right side out.
-"""
+"""Faces of cells: who owns them, outward normals, quadrature points; cells right side out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

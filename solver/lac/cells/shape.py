@@ -2,8 +2,6 @@
 
 Those of edges and faces are products of a matrix and monomials, since contact evaluates them at
 many points; solid cells have scikit-fem's.
-
-Small dense linear algebra on stacks of matrices.
 """
 
 from collections.abc import Callable

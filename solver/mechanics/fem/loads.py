@@ -1,7 +1,4 @@
-"""Nodal forces of pressures, tractions and body forces.
-
-Springs to the ground: the stiffness of elastic foundations, and of springs at nodes.
-"""
+"""Nodal forces of pressures, tractions and body forces; springs and elastic foundations."""
 
 from collections.abc import Callable
 

@@ -1,7 +1,4 @@
-"""Stress as six components xx, yy, zz, xy, yz, xz, seen along directions.
-
-Stress at nodes, from the stress in the cells around them.
-"""
+"""Stress as six components xx, yy, zz, xy, yz, xz: along directions, and at nodes from cells."""
 
 from functools import partial
 

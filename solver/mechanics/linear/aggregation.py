@@ -1,8 +1,6 @@
 """Aggregates of nodes, by PyAMG, and the prolongation from their rigid motions.
 
-Prolongations where cells are slender: smoothed along their short edges alone.
-
-Only near neighbours share an aggregate there (`aggregation`). A prolongation smoothed by the whole
+Where cells are slender, prolongations are smoothed along short edges alone. Only near neighbours share an aggregate there. A prolongation smoothed by the whole
 matrix would join each aggregate to those beside its long edges as well, and coarse levels would
 fill in. So it is smoothed by a filtered matrix: couplings along long edges are dropped, and what
 they make of a translation is added to the diagonal, so that translations stay free of force

@@ -9,10 +9,8 @@ factor of the unknowns beside it solves there exactly, before and after each cyc
 Where iterations are slow, each coarse level takes two steps of conjugate gradients instead of one
 cycle: a K-cycle (Notay and Vassilevski, Numer. Linear Algebra Appl. 15 (2008) 473).
 
-A system scaled as multigrid has it, in the rows of the first level.
-
-Conjugate gradients pass over their vectors many times: scales and numbers of unknowns are for the
-first and the last of these alone.
+The system is scaled, in the rows of the first level: conjugate gradients pass over their vectors
+many times, and scales are for the first and the last of these alone.
 """
 
 import logging

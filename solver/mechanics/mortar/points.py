@@ -9,9 +9,8 @@ area, it is the node-to-segment method: Hughes, Taylor, Sackman, Curnier, Kanokn
 element method for a class of contact-impact problems, CMAME 8 (1976) 249–276; Wriggers,
 Computational Contact Mechanics, 2006, §9.
 
-Standard mortar: multipliers at the slave vertices, standard or dual, on exact segments.
-
-On quadratic faces the pressure is linear between the vertices. Multipliers of the faces' own
+Standard mortar has multipliers at the slave vertices, standard or dual, on exact segments. On
+quadratic faces the pressure is linear between the vertices. Multipliers of the faces' own
 quadratic functions are no use for contact: their integrals, which weight the gap, are zero at the
 vertices of TRIA6 and negative at those of QUAD8, so that a sign says nothing about contact; and the
 linear ones are stable. Sources: Puso, Laursen, A mortar segment-to-segment contact method for large

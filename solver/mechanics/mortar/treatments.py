@@ -3,14 +3,11 @@
 They share everything else: pairing, segments, gap operator, active set, solve, checks, results.
 `docs/treatments.md` has the formulas.
 
-Which area of macro-elements has lost its partner: a measure that is independent of segments.
-
-It is found by lines through points of the faces, a route that shares nothing with the segments but
+Which area has lost its partner is found by lines through points of the faces, a route that shares nothing with the segments but
 the projection onto a face.
 
-Slave nodes that cannot answer a multiplier: it is added to the neighbours' multipliers.
-
-Supports hold the displacement of a node along the normal; or the node has a multiplier of another
+Multipliers of slave nodes that cannot answer one are added to those of their neighbours. Supports
+hold the displacement of such a node along the normal; or the node has a multiplier of another
 zone in nearly the same direction, where zones share nodes. Where the master follows node by node
 the constraints would depend on one another. The node's function is added in equal parts to
 those of the free nodes on the same faces: functions still sum to one, and a uniform pressure stays

@@ -1,6 +1,6 @@
 """Mesh files of gmsh: versions 2 and 4 are read, 4 is written, by gmsh itself.
 
-Groups that share members, as files know them in which a member belongs to one set alone.
+Groups that share members are written as the sets that a member alone can belong to.
 """
 
 from collections.abc import Mapping, Sequence

@@ -18,8 +18,6 @@ Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (th
 bottom block), `press` (the upper side of the top block), `symx` (x = 0) and `symy` (y = 0, 3D) of
 both blocks, `farx` and `fary` opposite to them. `refine` multiplies all divisions and divides
 `inner` (1).
-
-The sides of a block and their groups.
 """
 
 from collections.abc import Sequence

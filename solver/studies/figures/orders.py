@@ -1,6 +1,6 @@
 """Orders of convergence: error against size of the macro-elements, and fitted slopes.
 
-The gain of recovery on each ladder: order and error of the recovered pressure, and the goals.
+The gain of recovery is the order and the error of the recovered pressure, beside the goals.
 """
 
 from collections.abc import Mapping, Sequence
