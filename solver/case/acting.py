@@ -1,4 +1,4 @@
-"""The keys of a case file for groups, supports, loads, probes and rigid bodies, and their values."""
+"""The keys of a case file for groups, supports, loads, probes and rigid bodies."""
 
 from typing import Annotated, Literal
 

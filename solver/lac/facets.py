@@ -1,7 +1,8 @@
 """Faces as the mortar module sees them: frames, sizes, shape, and points found along a line.
 
-Contact may follow the normals of the master, of planes and smooth obstacles. A slave of linear cells is faceted where it is bent, and its own normals jump from face to face. The
-normal of the obstacle does not: gaps are then distances from it, and forces are along its normal.
+Contact may follow the normals of the master, of planes and smooth obstacles. A slave of linear
+cells is faceted where it is bent, and its own normals jump from face to face. The normal of the
+obstacle does not: gaps are then distances from it, and forces are along its normal.
 """
 
 from collections.abc import Sequence

@@ -7,10 +7,11 @@ problem of Tresca, whose matrix is symmetric. In 3D it takes Newton's term of b|
 b/|w| across d. Source: Hüeber, Stadler, Wohlmuth, A primal-dual active set algorithm for
 three-dimensional contact problems with Coulomb friction, SIAM J. Sci. Comput. 30 (2008) 572–596.
 
-The slip operator has the jump of displacement along the tangents of macro-elements. The slip of macro-element i along its tangent t is w = (row i · u) / covered area, master relative
-to slave. A traction q on the master does the work q · w per area: its nodal forces are rowᵀ q.
-Rows are integrated at the points of the gap operator. Where a segment is flat they are its closed
-integrals ∫ N times t, so that a uniform shear acts on both sides as on whole faces.
+The slip operator has the jump of displacement along the tangents of macro-elements. The slip of
+macro-element i along its tangent t is w = (row i · u) / covered area, master relative to slave. A
+traction q on the master does the work q · w per area: its nodal forces are rowᵀ q. Rows are
+integrated at the points of the gap operator. Where a segment is flat they are its closed integrals
+∫ N times t, so that a uniform shear acts on both sides as on whole faces.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """Two batches side by side: Markdown for the terminal, and a page in the style of the report's.
 
-Verdicts, numbers and times differ. A number has changed when it moved by more than accepted values may: 1e-9 of the check's scale. What
-round-off does is no change. Times are shown and never judged.
+Verdicts, numbers and times differ. A number has changed when it moved by more than accepted values
+may: 1e-9 of the check's scale. What round-off does is no change. Times are shown and never judged.
 """
 
 import json

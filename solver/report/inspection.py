@@ -1,4 +1,4 @@
-"""What a mesh file contains, for someone who writes a case on it: groups, sizes, gaps, a picture."""
+"""What a mesh file contains, for someone who writes a case: groups, sizes, gaps, a picture."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

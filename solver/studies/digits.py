@@ -7,12 +7,12 @@ of its accuracy bounds its errors: there it must only know what it does not know
 
 The floor: the error of the exact answer by rounding alone, before anything is solved.
 
-The exact displacement at the nodes of the exact geometry is rounded to double precision in the
-form in which the solver keeps it, as rigid motions plus a remainder (one number for each unknown;
-the second part of the solver's remainder goes below this floor) and, in mixed form, a mean stress,
-and read on the mesh of the stored coordinates by the solver's own recovery: the pressure from the residual at each macro-element's own
-unknown, the stress at the nodes. Sums are in extended precision, so that the rounding of
-displacements and coordinates alone is seen.
+The exact displacement at the nodes of the exact geometry is rounded to double precision in the form
+in which the solver keeps it, as rigid motions plus a remainder (one number for each unknown; the
+second part of the solver's remainder goes below this floor) and, in mixed form, a mean stress, and
+read on the mesh of the stored coordinates by the solver's own recovery: the pressure from the
+residual at each macro-element's own unknown, the stress at the nodes. Sums are in extended
+precision, so that the rounding of displacements and coordinates alone is seen.
 
 Rounded to nearest, nodes at one height have one and the same error, and the strain between them
 none: luck of a mesh along the axes. So the floor is the largest of several roundings, to nearest

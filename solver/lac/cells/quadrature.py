@@ -1,8 +1,9 @@
 """Quadrature on faces: rules that integrate their shape functions exactly where they are planar.
 
-For other functions there is Gauss quadrature of any degree on every cell type: products of Gauss–Legendre points on lines, squares and cubes; on simplices and pyramids these are
-collapsed towards a vertex, with Gauss–Jacobi points for the shrinking cross-section (Stroud,
-Approximate Calculation of Multiple Integrals, 1971, §2.4–2.5). No weight is negative.
+For other functions there is Gauss quadrature of any degree on every cell type: products of
+Gauss–Legendre points on lines, squares and cubes; on simplices and pyramids these are collapsed
+towards a vertex, with Gauss–Jacobi points for the shrinking cross-section (Stroud, Approximate
+Calculation of Multiple Integrals, 1971, §2.4–2.5). No weight is negative.
 """
 
 from functools import cache

@@ -1,9 +1,10 @@
 """Cells of one type with their material: what elasticity is assembled from.
 
-Quadrature makes the patch test exact, which asks that the integrals of the shape functions' physical gradients be exact. The
-degrees below are the lowest found to suffice for straight-edged cells; on pyramids a conical
-product of Gauss and Gauss–Jacobi points turns the integrals of the rational gradients into
-polynomials (Stroud, Approximate Calculation of Multiple Integrals, 1971, §2.4–2.5).
+Quadrature makes the patch test exact, which asks that the integrals of the shape functions'
+physical gradients be exact. The degrees below are the lowest found to suffice for straight-edged
+cells; on pyramids a conical product of Gauss and Gauss–Jacobi points turns the integrals of the
+rational gradients into polynomials (Stroud, Approximate Calculation of Multiple Integrals, 1971,
+§2.4–2.5).
 """
 
 from dataclasses import dataclass, replace

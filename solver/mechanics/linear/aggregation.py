@@ -1,10 +1,11 @@
 """Aggregates of nodes, by PyAMG, and the prolongation from their rigid motions.
 
-Where cells are slender, prolongations are smoothed along short edges alone. Only near neighbours share an aggregate there. A prolongation smoothed by the whole
-matrix would join each aggregate to those beside its long edges as well, and coarse levels would
-fill in. So it is smoothed by a filtered matrix: couplings along long edges are dropped, and what
-they make of a translation is added to the diagonal, so that translations stay free of force
-(Vanek, Mandel, Brezina, Computing 56 (1996) 179, §5).
+Where cells are slender, prolongations are smoothed along short edges alone. Only near neighbours
+share an aggregate there. A prolongation smoothed by the whole matrix would join each aggregate to
+those beside its long edges as well, and coarse levels would fill in. So it is smoothed by a
+filtered matrix: couplings along long edges are dropped, and what they make of a translation is
+added to the diagonal, so that translations stay free of force (Vanek, Mandel, Brezina, Computing 56
+(1996) 179, §5).
 
 A node without near neighbours, as the one that the cut adds in the middle of a flat slave face,
 follows all its neighbours: its rows of the prolongation leave no force on it.

@@ -6,10 +6,11 @@ definite, and the multipliers follow from A by few steps p ← p + w (b − Ĝ x
 Glowinski, Augmented Lagrangian methods, North-Holland 1983, ch. 1; Golub, Greif, On solving
 block-structured indefinite linear systems, SIAM J. Sci. Comput. 24 (2003) 2076–2092.
 
-Stabilised constraints give way to pressures that scatter: K x = f + Gᵀ p, G x + S p = b with a compliance S = Lᵀ D L of the constraints. With s unknowns
-r = D L p more, those of springs of the stiffness D⁻¹, these are the constraints [G Lᵀ] (x, r) = b
-of the stiffness diag(K, D⁻¹): the second row of its equilibrium is D⁻¹ r = L p. They are condensed
-like any others, and the condensed matrix is positive definite.
+Stabilised constraints give way to pressures that scatter: K x = f + Gᵀ p, G x + S p = b with a
+compliance S = Lᵀ D L of the constraints. With s unknowns r = D L p more, those of springs of the
+stiffness D⁻¹, these are the constraints [G Lᵀ] (x, r) = b of the stiffness diag(K, D⁻¹): the second
+row of its equilibrium is D⁻¹ r = L p. They are condensed like any others, and the condensed matrix
+is positive definite.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """The linear solver for a positive definite system, chosen by size and dimension.
 
-CHOLMOD solves directly. The matrix is first scaled symmetrically to a diagonal near one, by powers of two, which rounds
-nothing. The rest does not depend on units, and a pivot or an eigenvalue of the scaled matrix can be
-compared with the machine precision.
+CHOLMOD solves directly. The matrix is first scaled symmetrically to a diagonal near one, by powers
+of two, which rounds nothing. The rest does not depend on units, and a pivot or an eigenvalue of the
+scaled matrix can be compared with the machine precision.
 """
 
 from __future__ import annotations

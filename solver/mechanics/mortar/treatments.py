@@ -3,8 +3,8 @@
 They share everything else: pairing, segments, gap operator, active set, solve, checks, results.
 `docs/treatments.md` has the formulas.
 
-Which area has lost its partner is found by lines through points of the faces, a route that shares nothing with the segments but
-the projection onto a face.
+Which area has lost its partner is found by lines through points of the faces, a route that shares
+nothing with the segments but the projection onto a face.
 
 Multipliers of slave nodes that cannot answer one are added to those of their neighbours. Supports
 hold the displacement of such a node along the normal; or the node has a multiplier of another
