@@ -110,7 +110,7 @@ def test_accepted_values_that_are_none(tmp_path, text, message):
 
 
 def test_a_solve_whose_fields_are_not_sound(monkeypatch):
-    from solver.simulation import simulate as simulation
+    from solver.simulation.results import results as simulation
 
     mesh = block_mesh("QUAD4", "QUAD4")
     monkeypatch.setattr(simulation, "normal_stress", lambda *_: np.full(3, np.nan))

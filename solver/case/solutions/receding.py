@@ -1,8 +1,8 @@
 """A layer on a rigid base, pressed down in its middle: beside the load it lifts off.
 
 The layer of thickness h, without weight, carries the pressure q on |x| < c and touches the base on
-|x| < a; a is the same for any load. With H = h/2, a wave of normal pressure p̂ on the lower face
-and q̂ on the upper one lifts the lower face by
+|x| < a; a is the same for any load. With H = h/2, a wave of normal pressure p̂ on the lower face and
+q̂ on the upper one lifts the lower face by
 
     v̂ = ((S + A) p̂ + (S − A) q̂)/(E′ k),
     S = sinh² kH/(sinh kH cosh kH + kH),   A = cosh² kH/(sinh kH cosh kH − kH),

@@ -9,11 +9,11 @@ p̄ + p₁ φ makes
     B = p₁ sinh kH / (2 μ k (sinh kH cosh kH + kH)),    A = −B (2 (1 − ν) + kH coth kH)
 
 and the uniform state of confined compression by p̄. At the surface u_ζ = −(2 p₁ / (E′ k)) S φ with
-S = sinh² kH / (sinh kH cosh kH + kH) and E′ = E / (1 − ν²), so that the gap closes with p₁ = Δ / Σ
-2 S / (E′ k), and everywhere if p̄ ≥ p₁. The far face of the upper layer then has moved by Δ + p̄ Σ
-H / M, M the confined modulus. Derived from the Papkovich–Neuber potentials of a layer; its limit of
-high layers is in Johnson, Contact Mechanics (1985), §13.2, and Johnson, Greenwood, Higginson, Int.
-J. Mech. Sci. 27 (1985) 383–396.
+S = sinh² kH / (sinh kH cosh kH + kH) and E′ = E / (1 − ν²), so that the gap closes with
+p₁ = Δ / Σ 2 S / (E′ k), and everywhere if p̄ ≥ p₁. The far face of the upper layer then has moved by
+Δ + p̄ Σ H / M, M the confined modulus. Derived from the Papkovich–Neuber potentials of a layer;
+its limit of high layers is in Johnson, Contact Mechanics (1985), §13.2, and Johnson, Greenwood,
+Higginson, Int. J. Mech. Sci. 27 (1985) 383–396.
 """
 
 from dataclasses import dataclass, field
