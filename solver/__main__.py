@@ -8,6 +8,6 @@ from pathlib import Path
 with suppress(OSError):
     sys.path[:] = [folder for folder in sys.path if Path(folder) != Path.cwd()]
 
-from .commands.cli import run
+from .commands.cli import main
 
-sys.exit(run())
+sys.exit(main())

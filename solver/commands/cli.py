@@ -50,19 +50,15 @@ Exit status: 0 all checks hold; 1 a check fails; 2 the input is refused; 3 there
 Batches and studies are targets of make: make help."""
 
 
-def run() -> int:
-    """Run the command of this process; its exit status."""
-    # Lines leave as they are written, so that the last line of a log is what was said last.
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(line_buffering=True)
-    # An unsound result is refused in one line, to which earlier warnings of libraries add nothing.
-    if not sys.warnoptions:
-        warnings.simplefilter("ignore")
-    return main()
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; the exit status."""
+    """Run one command, by default that of this process; the exit status."""
+    if arguments is None:
+        # Lines leave as they are written, so that the last line of a log is what was said last.
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(line_buffering=True)
+        # An unsound result is refused in one line: earlier warnings of libraries add nothing.
+        if not sys.warnoptions:
+            warnings.simplefilter("ignore")
     options = parser().parse_args(arguments)
     if options.threads:
         limit_threads(options.threads)

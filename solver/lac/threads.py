@@ -2,7 +2,7 @@
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache
 from threading import current_thread
@@ -39,8 +39,14 @@ def prefetch(function: Callable[[Part], Result], parts: Iterable[Part]) -> Itera
     parts = list(parts)
     count = min(workers(), len(parts))
     if count < 2 or current_thread().name.startswith(_NAME):
-        yield from map(function, parts)
-        return
+        return map(function, parts)
+    return _ahead(function, parts, count)
+
+
+def _ahead(
+    function: Callable[[Part], Result], parts: Sequence[Part], count: int
+) -> Iterator[Result]:
+    """The results in the order of the parts, a few more than `count` of them computed ahead."""
     waiting: deque[Future[Result]] = deque()
     pool = _pool(count)
     try:

@@ -59,12 +59,34 @@ def simulate(
 
 
 def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
-    """Solve an assembled problem at all load factors; how it was assembled goes on record."""
+    """Solve an assembled problem step by step, each from the status of the one before.
+
+    How it was assembled goes on record.
+    """
     plan = list(decided(problem))
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
+    case, states, fields = problem.scene.case, list[Equilibrium](), list[Recovered]()
     with stage(clock, "solve"):
-        states, fields = _walk(problem)
+        for factor, step in zip(case.factors, case.steps, strict=True):
+            last = states[-1] if states else None
+            if case.frictional:
+                from .equilibrium.friction_recovery import solve_and_recover  # friction alone
+
+                state, field = solve_and_recover(problem, step, last)
+            else:
+                before = case.steps[len(states) - 1] if states else None
+                state = problem.solve(step, last.status.closed if last else None, before=before)
+                if (state.trial.violation(state.iterate.closed) > 1).any():
+                    what = f"{_called(step, factor)}: contact bears tension or surfaces overlap"
+                    raise SolveError(what)
+                state, field = recovered(problem, state, step)
+            states.append(state)
+            fields.append(field)
+            closed = int(state.status.closed[: problem.scene.n_multipliers].sum())
+            count = state.status.iterations
+            values = _called(step, factor), count, "s" * (count != 1), closed, state.residual
+            _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *values)
     plan += plan_notes(problem, states)
     with stage(clock, "recovery"):
         solution = solution_of(problem, states, fields, plan)
@@ -125,36 +147,6 @@ def _without_noise(length: float, most: float, found: Any) -> Any:
         force=np.where(np.abs(force) < _NOISE * most, 0.0, force),
         moment=np.where(np.abs(moment) < _NOISE * most * length, 0.0, moment),
     )
-
-
-def _walk(problem: ContactProblem) -> tuple[list[Equilibrium], list[Recovered]]:
-    """Solve the steps in turn, each from the status of the one before.
-
-    With each state the pressure recovered in it.
-    """
-    states: list[Equilibrium] = []
-    fields: list[Recovered] = []
-    case = problem.scene.case
-    for factor, step in zip(case.factors, case.steps, strict=True):
-        start = states[-1].status.closed if states else None
-        before = case.steps[len(states) - 1] if states else None
-        if case.frictional:
-            from .equilibrium.friction_recovery import solve_and_recover
-
-            state, field = solve_and_recover(problem, step, states[-1] if states else None)
-        else:
-            state = problem.solve(step, start, before=before)
-            if (state.trial.violation(state.iterate.closed) > 1).any():
-                what = f"{_called(step, factor)}: contact bears tension or surfaces overlap"
-                raise SolveError(what)
-            state, field = recovered(problem, state, step)
-        states.append(state)
-        fields.append(field)
-        closed = int(state.status.closed[: problem.scene.n_multipliers].sum())
-        count = state.status.iterations
-        values = _called(step, factor), count, "" if count == 1 else "s", closed, state.residual
-        _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *values)
-    return states, fields
 
 
 def _called(step: Step, factor: float) -> str:

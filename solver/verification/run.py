@@ -118,27 +118,49 @@ def solve(
 ) -> Verdict:
     """Solve and check; the verdict. The result and the verdict are written where files are given.
 
-    `then` is called at the end with a solution that has a result.
-
-    Without a result the verdict gives the reason, and the exception goes on: InputError,
-    SolveError, or any other one for an error of the program.
+    `then` is called at the end with a solution that has a result. Without one the verdict gives the
+    reason, and the exception goes on: InputError, SolveError, or any other one for an error of the
+    program.
     """
     case: Case | None = None
+    started, clock, sha256 = processor_time(), Clock(), None
     try:
         case = job.of(refined(load_case(job.case), job.refine))
-        solution, verdict = _solve(job, case, output, verdict_file)
+        if output:  # refuse before the solve, not after it
+            check_name(output)
+            output.parent.mkdir(parents=True, exist_ok=True)
+        mesh = _mesh_of(job, case, clock)
+        options = Options.everything() if job.everything else Options()
+        # Accepted values belong to the case's own mesh.
+        solution, checks = solve_checked(case, mesh, options, job.refine == 1, clock)
+        solution.cpu_seconds = processor_time() - started
+        provenance = gather(job.case, job.mesh or case.mesh.get("path"))
+        if output:
+            with stage(clock, "write"):
+                sha256 = write_result(output, solution, checks, provenance)
     except Exception as error:
         if verdict_file:
             word, reason, transient = _ending(error)
             ended = without_result(word, reason, case or job.case, job.solved_as, transient)
             write_verdict(verdict_file, ended)
         raise
+    name = os.path.relpath(output, (verdict_file or output).parent) if output else None
+    verdict = judge(solution, checks, name, provenance, sha256)
     if verdict_file:
         write_verdict(verdict_file, verdict)
     _LOG.log(OUTCOME, "%s", verdict.summary)
     if then:
         then(solution, verdict)
     return verdict
+
+
+def _mesh_of(job: Job, case: Case, clock: Clock) -> meshio.Mesh:
+    """The mesh of a job, which a solve on it fits into memory with."""
+    with stage(clock, "read" if job.mesh or "path" in case.mesh else "mesh"):
+        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check, limited=True)
+    if job.memory_check:
+        check_memory(len(mesh.points), mesh.points.shape[1], case.path)
+    return mesh
 
 
 def solve_checked(
@@ -210,32 +232,6 @@ def _death(status: int) -> str:
     hints["SIGALRM"] = f": meshing took longer than {MESHING_SECONDS} s"
     hint = hints.get(names[status], "")
     return f"{died}, ended by {names[status]}{hint}"
-
-
-def _solve(
-    job: Job, case: Case, output: Path | None, verdict_file: Path | None
-) -> tuple[Solution, Verdict]:
-    """A solve that comes to its end, and its verdict."""
-    started, clock = processor_time(), Clock()
-    if output:  # refuse before the solve, not after it
-        check_name(output)
-        output.parent.mkdir(parents=True, exist_ok=True)
-    with stage(clock, "read" if job.mesh or "path" in case.mesh else "mesh"):
-        mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check, limited=True)
-    if job.memory_check:
-        check_memory(len(mesh.points), mesh.points.shape[1], case.path)
-    # Accepted values belong to the case's own mesh.
-    accepted = job.refine == 1
-    options = Options.everything() if job.everything else Options()
-    solution, checks = solve_checked(case, mesh, options, accepted, clock)
-    solution.cpu_seconds = processor_time() - started
-    provenance = gather(job.case, job.mesh or case.mesh.get("path"))
-    if not output:
-        return solution, judge(solution, checks, provenance=provenance)
-    with stage(clock, "write"):
-        sha256 = write_result(output, solution, checks, provenance)
-    name = os.path.relpath(output, (verdict_file or output).parent)
-    return solution, judge(solution, checks, name, provenance, sha256)
 
 
 def _ending(error: Exception) -> tuple[str, str, bool]:

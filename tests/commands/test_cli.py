@@ -370,9 +370,9 @@ def test_a_plane_solve_imports_little(small):
     assert main(["mesh", str(small / "c.yaml"), "-o", str(small / "m.vtkhdf")]) == 0
     command = f"solve {small}/c.yaml --mesh {small}/m.vtkhdf -o {small}/r.vtkhdf --quiet".split()
     code = (
-        "import sys; from solver.commands.cli import run\n"
+        "import sys; from solver.commands.cli import main\n"
         f"sys.argv[1:] = {command}\n"
-        f"print(run(), sorted({unused} & sys.modules.keys()), 'scipy.sparse' in sys.modules)"
+        f"print(main(), sorted({unused} & sys.modules.keys()), 'scipy.sparse' in sys.modules)"
     )
     root = Path(__file__).parents[2]
     done = subprocess.run(

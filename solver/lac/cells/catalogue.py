@@ -44,12 +44,12 @@ class CellType:
     mirror: tuple[int, ...]
     centred: bool
 
-    @property
+    @cached_property
     def dim(self) -> int:
         """Dimension of the reference cell."""
         return self.nodes.shape[1]
 
-    @property
+    @cached_property
     def n_nodes(self) -> int:
         """Number of nodes."""
         return len(self.nodes)

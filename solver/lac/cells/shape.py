@@ -120,12 +120,11 @@ class _Polynomials(ShapeFunctions):
         return (self._monomials(points).T @ self._values).reshape(shape)
 
     def gradients(self, points: np.ndarray) -> np.ndarray:
-        return self.both(points)[1]
+        shape = (*np.shape(points)[:-1], self.type.n_nodes, self.type.dim)
+        return (self._monomials(points).T @ self._gradients).reshape(shape)
 
     def both(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        monomials, shape = self._monomials(points).T, (*np.shape(points)[:-1], self.type.n_nodes)
-        slopes = monomials @ self._gradients
-        return (monomials @ self._values).reshape(shape), slopes.reshape(*shape, self.type.dim)
+        return self.values(points), self.gradients(points)
 
     def _monomials(self, points: np.ndarray) -> np.ndarray:
         """Monomials (n_nodes, n) at points (..., dim), of which there are n."""

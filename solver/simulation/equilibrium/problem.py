@@ -167,7 +167,7 @@ class ContactProblem:
                 if (eligible & (trial.violation(closed) > 1)).any():
                     return trial
                 first = known
-            latest[:] = [self._solve_closed(first, correction, _force_scale(rest))]
+            latest[:] = [self._refined(first, _force_scale(rest), correction)]
             return latest[0].trial
 
         def stiffness() -> np.ndarray:
@@ -186,7 +186,7 @@ class ContactProblem:
     ) -> Equilibrium:
         """Equilibrium with the rows `closed` (k,) and no others, under further forces (n, dim)."""
         first = self._at_rest(closed, step, correction)
-        return self._solve_closed(first, correction, _force_scale(first))
+        return self._refined(first, _force_scale(first), correction)
 
     def count_slip_from(self, jump: np.ndarray) -> None:
         """Slip is what the jump of displacement (k,) has more than this, in the rows of slip."""
@@ -215,7 +215,8 @@ class ContactProblem:
         """
         start = state.iterate.under(state.force + correction)
         scale = max(state.force_scale, np.abs(correction).max())
-        return self._refined(start, scale, state.status, correction, _CORRECTED * ROUND_OFF)
+        found = self._refined(start, scale, correction, _CORRECTED * ROUND_OFF)
+        return replace(found, status=state.status)
 
     def pressure_change(self, closed: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The change of pressure (k,) by forces (n_dofs,), with the `closed` (k,) kept closed.
@@ -266,13 +267,6 @@ class ContactProblem:
         words = "the loads part the bodies or overcome friction"
         return f"once {count} macro-elements are open or slip: {words}"
 
-    def _solve_closed(
-        self, start: ContactIterate, correction: np.ndarray | float, scale: float
-    ) -> Equilibrium:
-        """Equilibrium with the multipliers closed that are so at the start."""
-        correction = np.zeros(self.scene.force.shape) + correction
-        return self._refined(start, scale, StatusResult(start.closed, 1, []), correction)
-
     def _roughly(
         self, start: ContactIterate, known: ContactIterate | None
     ) -> tuple[ContactIterate, Trial]:
@@ -300,51 +294,45 @@ class ContactProblem:
         self,
         start: ContactIterate,
         scale: float,
-        status: StatusResult,
-        correction: np.ndarray,
+        correction: np.ndarray | float,
         round_off: float = ROUND_OFF,
     ) -> Equilibrium:
-        """Solved from an iterate; in extended precision where that gains digits."""
-        system, cures = self._constrained(start.closed), self.scene.options.safeguards
-        found = self._once(system, start, scale, status, correction, round_off)
-        if self.single and found.residual > _SINGLE_SERVES:
-            _LOG.info("the stiffness is assembled again, in double precision")
-            self.single = False
-            self._systems.forget()
-            # Nothing holds the first stiffness while the second is made.
-            del system, self.matrix, self._systems
-            self._assemble()
-            system = self._constrained(start.closed)
-            found = self._once(system, start, scale, status, correction, round_off)
-        if cures.refinement and cures.extended and found.accuracy.of_sums > _EXTEND:
-            extended = replace(found.iterate, extended=True)
-            found = self._once(system, extended, scale, status, correction, round_off)
-        return found
+        """Equilibrium with the multipliers closed that are so at the start.
 
-    def _once(
-        self,
-        system: ConstrainedSystem,
-        start: ContactIterate,
-        scale: float,
-        status: StatusResult,
-        correction: np.ndarray,
-        round_off: float,
-    ) -> Equilibrium:
-        refine = self.scene.options.safeguards.refinement
-        # In a stretched model a force of the size of round-off may be a large one elsewhere.
-        round_off = 0.0 if start.extended else round_off
-        iterate, multiplier, residual = solve(system, start, scale, refine, round_off)
-        pressure = np.zeros(len(start.closed))
-        pressure[start.closed] = multiplier
-        return Equilibrium(
-            iterate=iterate,
-            trial=judged(iterate, pressure, self.diagonal),
-            status=status,
-            residual=residual,
-            force_scale=scale,
-            accuracy=estimate(iterate, pressure, self.diagonal, self._rough, residual, scale),
-            correction=correction,
-        )
+        Solved again where that gains digits: with the stiffness in double precision, or with
+        residuals summed in extended precision.
+        """
+        safeguards = self.scene.options.safeguards
+        correction = np.zeros(start.force.shape) + correction
+        while True:
+            system, refine = self._constrained(start.closed), safeguards.refinement
+            # In a stretched model a force of the size of round-off may be a large one elsewhere.
+            small = 0.0 if start.extended else round_off
+            iterate, multiplier, residual = solve(system, start, scale, refine, small)
+            if self.single and residual > _SINGLE_SERVES:
+                _LOG.info("the stiffness is assembled again, in double precision")
+                self.single = False
+                self._systems.forget()
+                # Nothing holds the first stiffness while the second is made.
+                del system, self.matrix, self._systems
+                self._assemble()
+                continue
+            pressure = np.zeros(len(start.closed))
+            pressure[start.closed] = multiplier
+            accuracy = estimate(iterate, pressure, self.diagonal, self._rough, residual, scale)
+            extends = refine and safeguards.extended and not start.extended
+            if extends and accuracy.of_sums > _EXTEND:
+                start = replace(iterate, extended=True)
+                continue
+            return Equilibrium(
+                iterate=iterate,
+                trial=judged(iterate, pressure, self.diagonal),
+                status=StatusResult(start.closed, 1, []),
+                residual=residual,
+                force_scale=scale,
+                accuracy=accuracy,
+                correction=correction,
+            )
 
     def _compliance(self, closed: np.ndarray) -> Compliance:
         """The compliance of the closed multipliers (k,); zones without one have no part of it."""
