@@ -1,17 +1,16 @@
-"""Expressions of position in a case file: `25*(1 - r**2/100)`, parsed from a whitelist.
+"""Expressions of position in a case file: `25*(1 - r**2/100)`, of names on a list.
 
-The text is parsed into Python's syntax tree, and each of its nodes must be on the list below; it is
-never compiled or run. All numbers are floats, so that no power can grow without bound.
+The text is parsed into Python's syntax tree. Each of its nodes must be on the list below, and all
+numbers become floats, so that no power can grow without bound, before it is evaluated.
 """
 
 import ast
 import math
-import operator
 import re
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import lru_cache, reduce
+from types import CodeType
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import InputError
@@ -20,22 +19,15 @@ if TYPE_CHECKING:
     import numpy as np
 
 MAX_LENGTH = 10_000
-MAX_DEPTH = 300
-MAX_EXPONENT = 32.0
-MAX_NUMBER = 1e300
-
 ALLOWED = (
     "a number or an expression of x, y, z, r, pi, sqrt, sin, cos, atan2, abs, min, max, "
     "+ - * / **, parentheses"
 )
 _COORDINATES = ("x", "y", "z")
-_BINARY: dict[type, Callable] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-}
+_NODES = (
+    *(ast.Constant, ast.Name, ast.Load, ast.UnaryOp, ast.UAdd, ast.USub, ast.Call),
+    *(ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow),
+)
 # The numpy function of each name, and the least and the largest number of its arguments.
 _FUNCTIONS: dict[str, tuple[str, int, int]] = {
     "sqrt": ("sqrt", 1, 1),
@@ -46,7 +38,6 @@ _FUNCTIONS: dict[str, tuple[str, int, int]] = {
     "min": ("minimum", 2, 32),
     "max": ("maximum", 2, 32),
 }
-_UNARY: dict[type, Callable] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
 
 
 @dataclass(frozen=True)
@@ -55,36 +46,45 @@ class Expression:
 
     `axisymmetric`: r is the radius x, of a point of the meridian plane. `where` and `key` (file and
     key that hold the text) serve the messages of `InputError`, raised for a text that is not on the
-    whitelist and for a value that is not finite.
+    list and for a value that is not finite.
     """
 
     text: str
     where: str = field(default="expression", compare=False)
     key: str = field(default="text", compare=False)
     axisymmetric: bool = False
-    _tree: ast.expr = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Parse the text."""
-        object.__setattr__(self, "_tree", self._parse())
+        """Refuse what is no expression."""
+        try:
+            _compiled(self.text)
+        except ValueError as error:
+            raise self._error(str(error)) from None
 
     @property
     def names(self) -> frozenset[str]:
         """The names that occur in the expression."""
-        return frozenset(node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name))
+        return frozenset(_compiled(self.text).co_names)
 
     def __call__(self, points: "np.ndarray") -> "np.ndarray":
         """Values (n,) at points (n, dim), dim = 2 or 3; `InputError` where one is not finite."""
         import numpy as np
 
         points = np.asarray(points, dtype=float)
-        names = dict(zip(_COORDINATES, points.T, strict=False))
-        if "z" in self.names and "z" not in names:
+        names: dict[str, Any] = dict(zip(_COORDINATES, points.T, strict=False))
+        if "z" not in names and "z" in self.names:
             raise self._error("z in a plane case; allowed are x, y and r")
-        radius = points[:, 0] if self.axisymmetric else np.linalg.norm(points, axis=1)
-        names |= {"r": radius, "pi": np.float64(math.pi)}
-        with np.errstate(all="ignore"):
-            values = np.broadcast_to(_value(self._tree, names), len(points)).astype(float)
+        names["r"] = points[:, 0] if self.axisymmetric else np.linalg.norm(points, axis=1)
+        names["pi"] = np.float64(math.pi)
+        for name, (function, _, most) in _FUNCTIONS.items():
+            names[name] = _folded(getattr(np, function)) if most > 2 else getattr(np, function)
+        try:
+            with np.errstate(all="ignore"):
+                found = eval(_compiled(self.text), {"__builtins__": {}}, names)  # noqa: S307
+                values = np.broadcast_to(found, len(points)).astype(complex)
+        except ArithmeticError:  # of numbers alone: too large, or over zero
+            raise self._error("not a finite number") from None
+        values = np.where(values.imag == 0, values.real, np.nan)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             raise self._error(f"not a finite number at {points[bad[0]].tolist()}")
@@ -93,49 +93,53 @@ class Expression:
     def _error(self, allowed: str) -> InputError:
         return InputError(self.where, self.key, self.text, allowed)
 
-    def _parse(self) -> ast.expr:
-        if len(self.text) > MAX_LENGTH:
-            raise self._error(f"longer than {MAX_LENGTH} characters")
-        if re.fullmatch(r"[-+]?\d+,\d+", self.text.strip()):
-            raise self._error(f"write numbers with a point: {self.text.replace(',', '.')}")
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                tree = ast.parse(self.text.strip(), mode="eval").body
-        except (SyntaxError, ValueError, MemoryError, RecursionError):
-            raise self._error(f"must be {ALLOWED}") from None
-        level, depth = [tree], 0
-        while level:
-            depth += 1
-            if depth > MAX_DEPTH:
-                raise self._error(f"nested deeper than {MAX_DEPTH} levels")
-            level = [child for node in level for child in self._operands(node)]
-        return tree
 
-    def _operands(self, node: ast.expr) -> list[ast.expr]:
-        """The sub-expressions of an allowed node; refuses any other node."""
-        match node:
-            case ast.Constant() if _number(node) is not None:
-                return []
-            case ast.Name(id="x" | "y" | "z" | "r" | "pi"):
-                return []
-            case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
-                return [operand]
-            case ast.BinOp(op=ast.Pow(), left=left, right=right):
-                exponent = _number(right)
-                if exponent is None or not abs(exponent) <= MAX_EXPONENT:
-                    limit = f"{MAX_EXPONENT:g}"
-                    raise self._error(f"an exponent must be a number from -{limit} to {limit}")
-                return [left]
-            case ast.BinOp(op=op, left=left, right=right) if type(op) in _BINARY:
-                return [left, right]
-            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
-                _, least, most = _FUNCTIONS[name]
-                if least <= len(args) <= most:
-                    return args
-        shown = ast.get_source_segment(self.text.strip(), node) or ""
-        shown = f"`{shown}` is not allowed in it; " if len(shown) < 40 else ""
-        raise self._error(f"{shown}it must be {ALLOWED}")
+@lru_cache(1000)
+def _compiled(text: str) -> CodeType:
+    """The code of an expression of allowed nodes alone; ValueError says why it is none."""
+    text = text.strip()
+    if len(text) > MAX_LENGTH:
+        raise ValueError(f"longer than {MAX_LENGTH} characters")
+    if re.fullmatch(r"[-+]?\d+,\d+", text):
+        raise ValueError(f"write numbers with a point: {text.replace(',', '.')}")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(text, mode="eval")
+        nodes = list(ast.walk(tree.body))
+        called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
+        refused = next((n for n in nodes if not _is_allowed(n, id(n) in called)), None)
+        for node in nodes:
+            if refused is None and isinstance(node, ast.Constant):
+                node.value = float(node.value)  # type: ignore[arg-type]
+        code = compile(tree, "<expression>", "eval")
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        raise ValueError(f"must be {ALLOWED}") from None
+    if refused is not None:
+        shown = ast.get_source_segment(text, refused) or ""
+        shown = f"`{shown}` is not allowed in it; " if 0 < len(shown) < 40 else ""
+        raise ValueError(f"{shown}it must be {ALLOWED}")
+    return code
+
+
+def _is_allowed(node: ast.AST, called: bool) -> bool:
+    """Whether a node may be in an expression; `called`: as the name of a function."""
+    match node:
+        case ast.Constant(value=bool()):
+            return False
+        case ast.Constant(value=value):
+            return isinstance(value, int | float) and abs(value) < 1e300
+        case ast.Name(id=name):
+            return name in _FUNCTIONS if called else name in (*_COORDINATES, "r", "pi")
+        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
+            _, least, most = _FUNCTIONS.get(name, ("", 0, -1))
+            return least <= len(args) <= most
+    return isinstance(node, _NODES) and not isinstance(node, ast.Call)
+
+
+def _folded(function: Any) -> Any:
+    """A function of two arguments, for any number of them."""
+    return lambda *values: reduce(function, values)
 
 
 def evaluate(scalar: float | Expression, points: "np.ndarray") -> "np.ndarray":
@@ -145,37 +149,3 @@ def evaluate(scalar: float | Expression, points: "np.ndarray") -> "np.ndarray":
     if isinstance(scalar, Expression):
         return scalar(points)
     return np.full(len(points), float(scalar))
-
-
-def _number(node: ast.expr) -> float | None:
-    """The value of a signed number literal; None for anything else."""
-    match node:
-        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant() as operand):
-            inner = _number(operand)
-            return None if inner is None else -inner
-        case ast.UnaryOp(op=ast.UAdd(), operand=ast.Constant() as operand):
-            return _number(operand)
-        case ast.Constant(value=bool()):
-            return None
-        case ast.Constant(value=int() | float() as number) if abs(number) < MAX_NUMBER:
-            return float(number)
-    return None
-
-
-def _value(node: ast.expr, names: dict[str, Any]) -> Any:
-    import numpy as np
-
-    match node:
-        case ast.Constant():
-            return np.float64(_number(node))
-        case ast.Name(id=name):
-            return names[name]
-        case ast.UnaryOp(op=op, operand=operand):
-            return _UNARY[type(op)](_value(operand, names))
-        case ast.BinOp(op=op, left=left, right=right):
-            return _BINARY[type(op)](_value(left, names), _value(right, names))
-        case ast.Call(func=ast.Name(id=name), args=args):
-            function = getattr(np, _FUNCTIONS[name][0])
-            values = [_value(argument, names) for argument in args]
-            return reduce(function, values) if len(values) > 1 else function(*values)
-    raise AssertionError(node)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.case.expressions import MAX_DEPTH, MAX_LENGTH, Expression, evaluate
+from solver.case.expressions import MAX_LENGTH, Expression, evaluate
 from solver.system.errors import InputError
 
 POINTS = np.array([[0.5, 2.0, -1.5], [3.0, 0.25, 4.0], [1.0, 1.0, 1.0]])
@@ -108,25 +108,21 @@ def test_everything_else_is_refused(text):
         Expression(text, where="c.yaml", key="loads[0].pressure")
 
 
-@pytest.mark.parametrize("text", ["x**y", "2**x", "x**33", "x**-33", "x**2**3", "x**True"])
-def test_exponents_are_moderate_numbers(text):
-    with pytest.raises(InputError, match="an exponent must be a number from -32 to 32"):
-        Expression(text)
-
-
-def test_length_and_depth_are_limited():
+def test_length_is_limited():
     with pytest.raises(InputError, match=f"longer than {MAX_LENGTH} characters"):
         Expression("+".join("x" * MAX_LENGTH))
-    with pytest.raises(InputError, match=f"nested deeper than {MAX_DEPTH} levels"):
-        Expression("-" * MAX_DEPTH + "x")
-    assert Expression("-" * (MAX_DEPTH - 1) + "1")(POINTS).tolist() == [-1.0] * 3
 
 
 def test_a_long_sum_has_its_value():
-    text = "+".join(["(0.5 * sin(x) / cos(x))"] * (MAX_DEPTH - 10))
-    assert 1000 < len(text) < MAX_LENGTH
+    text = "+".join(["(0.5 * sin(x) / cos(x))"] * 300)
     there = pickle.loads(pickle.dumps(Expression(text)))
-    np.testing.assert_allclose(there(POINTS), (MAX_DEPTH - 10) / 2 * np.tan(X), rtol=1e-13)
+    np.testing.assert_allclose(there(POINTS), 150 * np.tan(X), rtol=1e-13)
+
+
+@pytest.mark.parametrize("text", ["9**9**9**9", "1/0", "(0 - 2)**0.5"])
+def test_numbers_alone_that_are_not_finite_are_refused(text):
+    with pytest.raises(InputError, match=r"not a finite number"):
+        Expression(text)(POINTS)
 
 
 @pytest.mark.parametrize("text", ["1/(x - 3)", "sqrt(-x)", "1/(pi - pi)", "(1e200*x)**2"])

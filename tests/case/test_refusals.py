@@ -251,7 +251,7 @@ REFUSED = [
     ),
     ("counts: {top: {cells: 1.5}}", "counts.top.cells = 1.5: must be a whole number"),
     # what the reader of the text refuses
-    ("name: again", "name: the key is given twice (line 5)"),
+    ("name: again", "the key name is given twice"),
 ]
 
 

@@ -110,9 +110,10 @@ def test_accepted_values_that_are_none(tmp_path, text, message):
 
 
 def test_a_solve_whose_fields_are_not_sound(monkeypatch):
-    from solver.simulation.results import results as simulation
+    from solver.simulation.results import results
+    from solver.simulation.simulate import simulate
 
     mesh = block_mesh("QUAD4", "QUAD4")
-    monkeypatch.setattr(simulation, "normal_stress", lambda *_: np.full(3, np.nan))
+    monkeypatch.setattr(results, "normal_stress", lambda *_: np.full(3, np.nan))
     with pytest.raises(SolveError, match="the solve came to no sound end: "):
-        simulation.simulate(block_case(2), mesh)
+        simulate(block_case(2), mesh)
