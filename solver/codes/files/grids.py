@@ -15,7 +15,6 @@ import numpy as np
 from ...lac.cells.catalogue import BY_NAME
 from ...mesh.files import med
 from ...system.errors import InputError
-from ...system.hdf5 import read_file
 from .raw import Raw, RawField, at_cells, at_nodes, plain_mesh
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
@@ -41,7 +40,7 @@ def of_mesh(found: meshio.Mesh) -> Raw:
 
 def read_vtkhdf(path: Path) -> Raw:
     """Point and cell data of an unstructured grid in one piece, written by us or by others."""
-    with read_file(path) as file:
+    with h5py.File(path) as file:
         group = file.get("VTKHDF")
         if group is None or "Connectivity" not in group:
             raise InputError(path, "grid", None, "not an unstructured grid of VTKHDF")
@@ -75,7 +74,7 @@ def read_med(path: Path) -> Raw:
     found = med.read(path)
     mesh = plain_mesh(found.points, [(block.type, block.data) for block in found.cells])
     fields: dict[str, RawField] = {}
-    with read_file(path) as file:
+    with h5py.File(path) as file:
         for name, folder in file.get("CHA", {}).items():
             steps = [step for step in folder.values() if "NOE" in step]
             if not steps:
@@ -112,7 +111,7 @@ _UPRIGHT = {
 def read_exodus(path: Path) -> Raw:
     """The nodal variables of an Exodus II file, in either format of NetCDF, at its last time."""
     if h5py.is_hdf5(path):
-        with read_file(path) as file:
+        with h5py.File(path) as file:
             return _exodus(path, file, lambda item: item.attrs.get("elem_type", b""))
     from scipy.io import netcdf_file
 

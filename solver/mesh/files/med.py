@@ -15,7 +15,6 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...system.errors import InputError
-from ...system.hdf5 import read_file
 from .msh import combinations
 
 _TYPES = {kind.med: name for name, kind in BY_NAME.items()}
@@ -33,7 +32,7 @@ def read(path: Path) -> meshio.Mesh:
     """
     if not h5py.is_hdf5(path):
         raise InputError(path, "mesh", None, "no MED file (MED files are HDF5 files)")
-    with read_file(path) as file:
+    with h5py.File(path) as file:
         name, step = _mesh_of(file, path)
         nodes = step["NOE"]
         points = nodes["COO"][()].reshape(-1, int(nodes["COO"].attrs["NBR"])).T

@@ -15,7 +15,7 @@ import numpy as np
 from ...lac.cells.catalogue import BY_NAME, cell_type
 from ...system.errors import InputError
 from ...system.files import seal, seal_of
-from ...system.hdf5 import new_file, read_file
+from ...system.hdf5 import new_file
 
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
 _GROUPS = "mesh_groups"
@@ -109,7 +109,7 @@ def read(path: Path) -> meshio.Mesh:
         raise InputError(path, "mesh", None, lines[0] if lines else "the file is empty")
     if not seal_of(path):
         raise InputError(path, "mesh", None, "damaged, or no mesh that this program wrote")
-    with read_file(path) as file:
+    with h5py.File(path) as file:
         if "VTKHDF" not in file or _GROUPS not in file:
             raise InputError(path, "mesh", None, "no mesh that this program wrote")
         return read_grid(file["VTKHDF"])[0]

@@ -63,7 +63,7 @@ class Resultants:
     `moment` (3,) about the origin of the coordinates; `edges`: where contact ends in 2D. In 3D the
     edge is known to one macro-element only: the area is that of the closed ones, its bounds those
     without their rim and with the open ones around it. `pressure` (2,): the smallest and the
-    largest of the macro-elements; None in files of earlier versions. With friction: `friction`
+    largest of the macro-elements. With friction: `friction`
     (dim,), its part of the force, and `stick` (3,), the area that sticks as that of contact.
     """
 

@@ -122,7 +122,7 @@ class ZoneResult:
     these do not determine it (see `results.balance`). `pressure_error` (m,) estimates the
     L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
     where multipliers belong to nodes. `recovered` is p* where the case asks for one. `resultants`:
-    area, force, moment and edges of contact; None in files of earlier versions. `friction`: see
+    area, force, moment and edges of contact. `friction`: see
     there; None without.
     """
 
@@ -207,7 +207,7 @@ class StepResult:
 
     `observations` holds one mapping per observed macro-element, in the order of the case file:
     zone, macro_element (number), pressure, gap, status (0 or 1), coverage. `resultants` of contact
-    by zone, `reactions` and motions of `rigid` bodies; all empty in files of earlier versions.
+    by zone, `reactions` and motions of `rigid` bodies.
     `dissipation`: the work of friction in the step; `contraction`: see `problem.Friction`.
     """
 
@@ -239,7 +239,7 @@ class Solution:
     form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
     `strain_energy` is that of the last load factor, and so is `reaction` (n, dim), the forces at
     nodes with which supports, rigid bodies, springs and ties hold the bodies; `probes` by name.
-    `acted`: nodes by the key of the support, or of the load on a surface; empty in older files.
+    `acted`: nodes by the key of the support, or of the load on a surface.
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
     `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
     the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
