@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from msgspec import structs
 
 from ..system.errors import InputError, key_path
-from ..system.files import is_file
 from .acting import BodyKeys
 from .expressions import Expression
 from .file import CaseFile
@@ -79,7 +78,7 @@ def parse_case(text: str, path: Path) -> Case:
 def check_mesh_file(case: Case) -> None:
     """Raise `InputError` where the case names a mesh file that is not there."""
     path = case.mesh.get("path")
-    if path and not is_file(path):
+    if path and not path.is_file():
         raise InputError(case.path, "mesh.file", str(path), "no such file")
 
 

@@ -22,7 +22,6 @@ import msgspec
 from msgspec import Meta, Struct
 
 from ..system.errors import InputError, hint, key_path
-from ..system.files import is_file
 
 Text = Annotated[str, Meta(min_length=1, description="text")]
 Version = Annotated[str, Meta(min_length=1, description="text (in quotes if it is a number)")]
@@ -97,7 +96,7 @@ def _file_beside(where: str | Path, kind: type, value: object) -> Path:
     if kind is not Path or not isinstance(value, str) or not value:
         raise FieldError((), f"must be {_WORDS[Path]}")
     file = Path(where).parent / value
-    if not is_file(file):
+    if not file.is_file():
         raise FieldError((), "no such file")
     return file
 

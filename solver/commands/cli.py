@@ -246,7 +246,7 @@ def _solve(options: argparse.Namespace) -> int:
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
-    with details(options.verbose, options.quiet), report_outcomes(log):
+    with details(options.verbose and not options.quiet), report_outcomes(log):
         drawn = options.pictures and options.output
         draw = partial(_draw, options.pictures, options.output.parent) if drawn else None
         verdict = solve(job, options.output, options.verdict, draw)

@@ -2,19 +2,14 @@
 
 import hashlib
 import os
-import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
-from glob import escape
 from pathlib import Path
 
 # The last bytes of a sealed file; HDF5 leaves alone what follows its own end.
 _SEAL = b"\nsha256 %s\n"
 _SEAL_SIZE = len(_SEAL % (b"0" * 64))
 _CHUNK = 1 << 20
-
-# Folders may be shared among machines; a process number is valid on one.
-_HOST = platform.node()
 
 
 @contextmanager
@@ -26,9 +21,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    _remove_abandoned(path)
-    # The suffix is kept: writers choose the format by it.
-    temporary = path.with_name(f".{path.stem}.{_HOST}.{os.getpid()}{path.suffix}")
+    # The suffix is kept: writers choose the format by it. What a kill leaves is written over.
+    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         yield temporary
         _to_disk(temporary)
@@ -47,14 +41,11 @@ def write_text(path: str | Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def last_line(path: Path | None, most: int = 4096) -> str:
-    """The last line that is not blank among the `most` last bytes of a file; empty if none is."""
-    try:
-        with Path(path or os.devnull).open("rb") as file:
-            file.seek(max(0, file.seek(0, os.SEEK_END) - most))
-            lines = file.read().decode(errors="replace").split("\n")
-    except OSError:
+def last_line(path: Path | None) -> str:
+    """The last line of a file that is not blank; empty if none is."""
+    if path is None or not path.is_file():
         return ""
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     return next((line.strip() for line in reversed(lines) if line.strip()), "")
 
 
@@ -99,29 +90,3 @@ def _to_disk(path: Path) -> None:
     """Wait until the content is on the disk: a file renamed before may be empty after a crash."""
     with path.open("rb") as file:
         os.fsync(file.fileno())
-
-
-def _remove_abandoned(path: Path) -> None:
-    """Remove temporary files of the same name left by killed processes of this machine."""
-    for left in path.parent.glob(f".{escape(path.stem)}.{escape(_HOST)}.*{escape(path.suffix)}"):
-        process = left.name.removesuffix(path.suffix).rpartition(".")[2]
-        if process.isdigit() and not _lives(int(process)):
-            left.unlink(missing_ok=True)
-
-
-def _lives(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:  # of another user
-        return True
-    return True
-
-
-def is_file(path: Path) -> bool:
-    """Whether there is a file of that name, which may be too long for any."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False

@@ -14,8 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from logging.handlers import MemoryHandler
-from threading import Timer, get_ident
+from threading import get_ident
 
 from .package import PACKAGE
 
@@ -56,8 +55,6 @@ class Clock:
 OUTCOME = 25
 """The level of the outcomes of a solve, between information and warnings."""
 _LOG = logging.getLogger(__name__)
-# A solve that ends sooner prints no details on a terminal.
-PATIENCE = 2.0
 
 
 @contextmanager
@@ -96,36 +93,22 @@ def report_outcomes(say: Callable[[str], object]) -> Iterator[None]:
 
 
 @contextmanager
-def details(verbose: bool, quiet: bool = False) -> Iterator[None]:
-    """Write the details that the solver logs to standard error: on a terminal, or if `verbose`.
-
-    On a terminal all details are held back for the first `PATIENCE` seconds.
-    """
-    if quiet or not (verbose or sys.stderr.isatty()):
+def details(verbose: bool) -> Iterator[None]:
+    """If `verbose`, write the details that the solver logs to standard error, with the time."""
+    if not verbose:
         yield
         return
     lines = logging.StreamHandler(sys.stderr)
     lines.setFormatter(logging.Formatter("%(asctime)s %(message)s", "%H:%M:%S"))
     lines.addFilter(lambda record: record.levelno < OUTCOME)
-    held = MemoryHandler(0 if verbose else sys.maxsize, sys.maxsize, lines, flushOnClose=False)
-    patience = Timer(PATIENCE, _release, [held])
-    patience.daemon = True
     logger = logging.getLogger(PACKAGE)
     before = logger.level, logger.propagate
-    logger.addHandler(held)
+    logger.addHandler(lines)
     logger.setLevel(logging.INFO)
     logger.propagate = False
-    if not verbose:
-        patience.start()
     try:
         yield
     finally:
-        patience.cancel()
-        logger.removeHandler(held)
+        logger.removeHandler(lines)
         logger.setLevel(before[0])
         logger.propagate = before[1]
-
-
-def _release(held: MemoryHandler) -> None:
-    held.capacity = 0
-    held.flush()

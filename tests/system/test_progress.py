@@ -2,7 +2,6 @@
 
 import logging
 import re
-import sys
 from threading import Thread
 
 import pytest
@@ -27,10 +26,6 @@ def solve(tmp_path, capsys):
     return run
 
 
-def terminal(monkeypatch):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-
-
 def test_stages_unknowns_iterations_and_residuals_with_the_time(solve):
     lines = solve("--verbose")
     assert all(LINE.fullmatch(line) for line in lines)
@@ -43,32 +38,10 @@ def test_stages_unknowns_iterations_and_residuals_with_the_time(solve):
     assert re.search(r"^contact status: iteration 1, 3 of 3 closed, 0 wrong$", text, re.MULTILINE)
 
 
-def test_nothing_where_nobody_asked(solve, monkeypatch):
+def test_nothing_where_nobody_asked(solve):
     assert solve() == []
-    terminal(monkeypatch)
-    monkeypatch.setattr(progress, "PATIENCE", 0.0)
     assert solve("--quiet") == []
     assert solve("--quiet", "--verbose") == []
-
-
-def test_on_a_terminal_only_what_takes_long_is_told(solve, monkeypatch):
-    terminal(monkeypatch)
-    monkeypatch.setattr(progress, "PATIENCE", 60.0)
-    assert solve() == []
-
-
-def test_what_was_held_back_is_told_once_it_takes_long(capsys, monkeypatch):
-    terminal(monkeypatch)
-    monkeypatch.setattr(progress, "PATIENCE", 60.0)
-    log = logging.getLogger("solver.any")
-    with progress.details(verbose=False):
-        [held] = logging.getLogger("solver").handlers
-        log.info("first")
-        assert capsys.readouterr().err == ""
-        progress._release(held)
-        log.info("second")
-        lines = capsys.readouterr().err.splitlines()
-    assert [line[9:] for line in lines] == ["first", "second"]
 
 
 def test_outcomes_of_a_thread_go_to_its_function():
