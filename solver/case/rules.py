@@ -1,13 +1,17 @@
-"""The rules of a case file that concern several keys; they need no mesh."""
+"""The rules of a case file that concern several keys; they need no mesh.
 
-from collections.abc import Iterable, Sequence
+Each rule yields what is wrong: a key, its value, and what is allowed.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..system.errors import InputError, hint
 from .checks import BY_NAME, ERRORS
 from .expressions import Expression
-from .model import SWAPPED, Case, Load, Rigid, Scalar, Support
+from .model import SWAPPED, Case, Load, Rigid, Scalar, Support, Zone
 
+Fault = tuple[str, object, str]
 # Keys of the reference that need contact.
 _OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
 # Those that need friction.
@@ -20,25 +24,38 @@ _PARTS = {"plane": ("point", "normal"), "sphere": ("centre",), "box": ("low", "h
 
 def check_rules(case: Case) -> None:
     """Raise `InputError` for what neither the types of the keys nor the mesh decide."""
-    if case.name.endswith(SWAPPED):
-        allowed = f"must not end in {SWAPPED}: that is the name of the other direction"
-        raise InputError(case.path, "name", case.name, allowed)
-    _check_names(case)
-    _check_steps(case)
-    _check_listed_twice(case)
-    _check_probes(case)
-    _check_errors(case)
-    _check_reference(case)
-    _check_rigid(case)
+    _refuse_first(case, _faults(case))
     if case.plane:
         check_dimension(case, 2)
+
+
+def check_dimension(case: Case, dim: int) -> None:
+    """Raise `InputError` for a vector, direction or expression that does not fit the dimension."""
+    _refuse_first(case, _of_dimension(case, dim))
+
+
+def _refuse_first(case: Case, faults: Iterator[Fault]) -> None:
+    if fault := next(faults, None):
+        raise InputError(case.path, *fault)
+
+
+def _faults(case: Case) -> Iterator[Fault]:
+    if case.name.endswith(SWAPPED):
+        yield "name", case.name, f"must not end in {SWAPPED}: so is the other direction called"
+    yield from _in_zones(case)
+    yield from _in_steps(case)
+    yield from _listed_twice(case)
+    yield from _in_probes(case)
+    yield from _in_errors(case)
+    yield from _in_reference(case)
+    yield from _in_rigid(case)
     for group, material in case.materials.items():
         if case.thin and material.form == "mixed":
             allowed = "plane stress has no incompressible limit; allowed: automatic, displacement"
-            raise InputError(case.path, f"materials.{group}.form", material.form, allowed)
+            yield f"materials.{group}.form", material.form, allowed
 
 
-def _check_steps(case: Case) -> None:
+def _in_steps(case: Case) -> Iterator[Fault]:
     """Steps are all factors, or all factors of the same names; only these have the names."""
     acting: dict[str, Support | Load | Rigid] = {
         **{f"supports[{i}].name": s for i, s in enumerate(case.supports) if s.name},
@@ -50,76 +67,63 @@ def _check_steps(case: Case) -> None:
         given = set(step) if isinstance(step, dict) else set()
         if isinstance(step, dict) != isinstance(case.steps[0], dict):
             allowed = "steps are factors, or mappings of names to factors, not both"
-            raise InputError(case.path, f"steps[{i}]", step, allowed)
+            yield f"steps[{i}]", step, allowed
         if given - names and not case.states:
             name = min(given - names)
             allowed = f"no load, support or rigid body has this name; {hint(name, names)}"
-            raise InputError(case.path, f"steps[{i}].{name}", None, allowed)
+            yield f"steps[{i}].{name}", None, allowed
         if names - given:
-            allowed = f"gives no factor of {min(names - given)}"
-            raise InputError(case.path, f"steps[{i}]", step, allowed)
+            yield f"steps[{i}]", step, f"gives no factor of {min(names - given)}"
     for key, one in acting.items():
         if isinstance(one, Support) and not any(one.fix.values()):
-            allowed = "only a support with imposed values has a factor"
-            raise InputError(case.path, key, one.name, allowed)
+            yield key, one.name, "only a support with imposed values has a factor"
 
 
-def _check_names(case: Case) -> None:
+def _in_zones(case: Case) -> Iterator[Fault]:
+    """Zones have names and surfaces of their own, and settings that go together."""
     names: set[str] = set()
     for i, zone in enumerate(case.zones):
         if zone.slave == zone.master:
             allowed = "the slave is its own master: they must be two groups"
-            raise InputError(case.path, f"contact[{i}].master", zone.master, allowed)
+            yield f"contact[{i}].master", zone.master, allowed
         if zone.name in names:
             allowed = "the name is given to two zones; each needs its own"
-            raise InputError(case.path, f"contact[{i}].name", zone.name, allowed)
-        if zone.points and zone.treatment != "quadrature":
-            allowed = "only the treatment quadrature has points"
-            raise InputError(case.path, f"contact[{i}].points", zone.points, allowed)
-        if zone.sweeps and zone.recovery == "none":
-            allowed = "only a recovery has sweeps"
-            raise InputError(case.path, f"contact[{i}].sweeps", zone.sweeps, allowed)
-        if zone.normal != "element" and zone.treatment in ("quadrature", "node_to_segment"):
-            allowed = f"the treatment {zone.treatment} has normals of its own; allowed: element"
-            raise InputError(case.path, f"contact[{i}].normal", zone.normal, allowed)
-        if zone.stabilised and zone.treatment not in ("lac", "quadrature"):
-            allowed = f"the treatment {zone.treatment} has no pressure that could be stabilised; "
-            allowed += "allowed there: lac, quadrature"
-            raise InputError(case.path, f"contact[{i}].stabilised", "true", allowed)
-        _check_friction(case, i)
+            yield f"contact[{i}].name", zone.name, allowed
+        yield from _in_zone(f"contact[{i}]", zone)
         names.add(zone.name)
     for i, item in enumerate(case.observe):
         if item.zone not in names:
-            allowed = f"no such zone; {hint(item.zone, names)}"
-            raise InputError(case.path, f"observe[{i}].zone", item.zone, allowed)
+            yield f"observe[{i}].zone", item.zone, f"no such zone; {hint(item.zone, names)}"
 
 
-def _check_friction(case: Case, number: int) -> None:
-    """Friction is that of constants by macro-element, along the normals of their own faces."""
-    zone, key = case.zones[number], f"contact[{number}]"
-    if not zone.friction:
-        return
-    allowed = "a zone with friction must have the {} {}"
-    if zone.treatment != "lac":
-        raise InputError(
-            case.path, f"{key}.treatment", zone.treatment, allowed.format("treatment", "lac")
-        )
-    if zone.normal != "element":
-        raise InputError(
-            case.path, f"{key}.normal", zone.normal, allowed.format("normal", "element")
-        )
-    if zone.stabilised:
-        allowed = "a zone with friction cannot be stabilised; allowed: false"
-        raise InputError(case.path, f"{key}.stabilised", "true", allowed)
+def _in_zone(key: str, zone: Zone) -> Iterator[Fault]:
+    """Settings that go together."""
+    treatment = zone.treatment
+    if zone.points and treatment != "quadrature":
+        yield f"{key}.points", zone.points, "only the treatment quadrature has points"
+    if zone.sweeps and zone.recovery == "none":
+        yield f"{key}.sweeps", zone.sweeps, "only a recovery has sweeps"
+    if zone.normal != "element" and treatment in ("quadrature", "node_to_segment"):
+        allowed = f"the treatment {treatment} has normals of its own; allowed: element"
+        yield f"{key}.normal", zone.normal, allowed
+    if zone.stabilised and treatment not in ("lac", "quadrature"):
+        allowed = f"the treatment {treatment} has no pressure that could be stabilised"
+        yield f"{key}.stabilised", "true", f"{allowed}; allowed there: lac, quadrature"
+    if zone.friction:  # of constants by macro-element, along the normals of their own faces
+        needed = {"treatment": "lac", "normal": "element", "stabilised": False}
+        for name, value in needed.items():
+            if (given := getattr(zone, name)) != value:
+                shown = str(value).lower()
+                yield f"{key}.{name}", given, f"must be {shown} in a zone with friction"
 
 
-def _check_probes(case: Case) -> None:
+def _in_probes(case: Case) -> Iterator[Fault]:
     """A probe's zone is one of the case; a reference names a probe that has such a value."""
     zones = {zone.name for zone in case.zones}
     for probe in case.probes:
         if probe.zone and probe.zone not in zones:
             allowed = f"no such zone; {hint(probe.zone, zones)}"
-            raise InputError(case.path, f"probes.{probe.name}.zone", probe.zone, allowed)
+            yield f"probes.{probe.name}.zone", probe.zone, allowed
     for key in PROBED:
         names = {p.name for p in case.probes if bool(p.zone) == (key == "pressure_at")}
         given = case.reference.get(key)
@@ -127,111 +131,118 @@ def _check_probes(case: Case) -> None:
             if name not in names:
                 kind = "with a zone" if key == "pressure_at" else "without a zone"
                 allowed = f"no probe {kind} has this name; {hint(name, names)}"
-                raise InputError(case.path, f"reference.{key}.{name}", None, allowed)
+                yield f"reference.{key}.{name}", None, allowed
 
 
-def _check_errors(case: Case) -> None:
+def _in_errors(case: Case) -> Iterator[Fault]:
     """An error against an exact solution can have a tolerance only where there is such a one."""
-    if not case.tolerance:
-        return
     for error in case.tolerance.keys() & ERRORS.keys():
+        key, value = f"tolerance.{error}", case.tolerance[error]
         if case.solution is None:
-            allowed = "needs an exact solution: reference.solution names none"
+            yield key, value, "needs an exact solution: reference.solution names none"
         elif BY_NAME[error].needs not in case.solution.quantities:
-            allowed = f"{case.solution.name} has no {BY_NAME[error].needs}"
-        else:
-            continue
-        raise InputError(case.path, f"tolerance.{error}", case.tolerance[error], allowed)
+            yield key, value, f"{case.solution.name} has no {BY_NAME[error].needs}"
 
 
-def _check_reference(case: Case) -> None:
+def _in_reference(case: Case) -> Iterator[Fault]:
     """Every value of the reference feeds a check; no tolerance admits any result at all."""
     for check, tolerance in case.tolerance.items():
         if tolerance > 1:
             allowed = "must be at most 1: then the error is as large as the reference"
-            raise InputError(case.path, f"tolerance.{check}", tolerance, allowed)
+            yield f"tolerance.{check}", tolerance, allowed
     for key in case.reference.keys() & _OF_CONTACT if not case.zones else ():
         allowed = "cannot be compared: the case has no contact"
-        raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+        yield f"reference.{key}", str(case.reference[key]), allowed
     for key in case.reference.keys() & _OF_FRICTION if not case.frictional else ():
         allowed = "cannot be compared: no contact zone has friction"
-        raise InputError(case.path, f"reference.{key}", str(case.reference[key]), allowed)
+        yield f"reference.{key}", str(case.reference[key]), allowed
     given = case.reference.get("dissipation")
     if isinstance(given, tuple) and len(given) != len(case.steps):
         allowed = f"must have a number for each of the {len(case.steps)} steps"
-        raise InputError(case.path, "reference.dissipation", list(given), allowed)
+        yield "reference.dissipation", list(given), allowed
     if "coverage" in case.reference and "contact_pressure" not in case.reference:
         allowed = "needs contact_pressure: it says where that acts"
-        raise InputError(case.path, "reference.coverage", case.reference["coverage"], allowed)
+        yield "reference.coverage", case.reference["coverage"], allowed
     if case.reference_kind and not case.reference and case.solution is None:
         allowed = "gives no value to compare with, such as contact_pressure"
-        raise InputError(case.path, "reference.kind", case.reference_kind, allowed)
+        yield "reference.kind", case.reference_kind, allowed
     if case.solution and not case.reference and not case.tolerance.keys() & ERRORS.keys():
         known = [name for name in ERRORS if BY_NAME[name].needs in case.solution.quantities]
         allowed = "nothing is compared with it; give a value (`contact_pressure: solution`) or a "
         allowed += f"tolerance for one of {', '.join(known)}"
-        raise InputError(case.path, "reference.solution", case.solution.name, allowed)
+        yield "reference.solution", case.solution.name, allowed
 
 
-def _check_listed_twice(case: Case) -> None:
+def _listed_twice(case: Case) -> Iterator[Fault]:
     """A direction of a group is fixed once, a kind of load on a group is given once."""
-    fixed = [
-        (f"supports[{i}]", s.group, axis) for i, s in enumerate(case.supports) for axis in s.fix
-    ]
-    sprung = [
-        (f"supports[{i}]", s.group, f"spring {axis}")
-        for i, s in enumerate(case.supports)
-        for axis in s.spring
-    ]
-    loaded = [(f"loads[{i}]", load.group, load.kind) for i, load in enumerate(case.loads)]
-    for given in (fixed, sprung, loaded):
-        seen: set[tuple[str, str]] = set()
-        for key, group, what in given:
-            if (group, what) in seen:
-                allowed = f"the group is listed twice with {what}"
-                raise InputError(case.path, f"{key}.group", group, allowed)
-            seen.add((group, what))
+    supports = [(f"supports[{i}].group", s) for i, s in enumerate(case.supports)]
+    given = [(key, s.group, axis) for key, s in supports for axis in s.fix]
+    given += [(key, s.group, f"spring {axis}") for key, s in supports for axis in s.spring]
+    given += [(f"loads[{i}].group", load.group, load.kind) for i, load in enumerate(case.loads)]
+    seen: set[tuple[str, str]] = set()
+    for key, group, what in given:
+        if (group, what) in seen:
+            yield key, group, f"the group is listed twice with {what}"
+        seen.add((group, what))
 
 
-def _check_rigid(case: Case) -> None:
+def _in_rigid(case: Case) -> Iterator[Fault]:
     """A rigid surface without a mesh is the master of a zone, and nothing else."""
-    masters = {zone.master for zone in case.zones}
+    sides = {side for zone in case.zones for side in (zone.master, zone.slave)}
     for name, body in case.rigid.items():
-        if body.surface and name not in masters | {zone.slave for zone in case.zones}:
+        if body.surface and name not in sides:
             allowed = "has no mesh and is the master of no contact zone"
-            raise InputError(case.path, f"bodies.{name}", body.surface, allowed)
+            yield f"bodies.{name}", body.surface, allowed
         for i, zone in enumerate(case.zones) if body.surface else ():
-            if name == zone.slave or (name == zone.master and case.directions == "both"):
-                allowed = f"is a rigid {body.surface}; a rigid side is always the master"
-                key, side = ("slave", zone.slave) if name == zone.slave else ("master", name)
-                allowed += ", so directions must be `first`" * (key == "master")
-                raise InputError(case.path, f"contact[{i}].{key}", side, allowed)
+            allowed = f"is a rigid {body.surface}; a rigid side is always the master"
+            if name == zone.slave:
+                yield f"contact[{i}].slave", name, allowed
+            if name == zone.master and case.directions == "both":
+                yield f"contact[{i}].master", name, f"{allowed}, so directions must be `first`"
 
 
-def _check_motion(case: Case, dim: int) -> None:
+def _of_dimension(case: Case, dim: int) -> Iterator[Fault]:
+    allowed = f"must have {dim} components: the case is {'plane' if dim == 2 else 'in 3D'}"
+    for key, vector in _vectors(case):
+        if len(vector) != dim:
+            shown = [v.text if isinstance(v, Expression) else v for v in vector]
+            yield key, shown, allowed
+    yield from _in_motion(case, dim)
+    yield from _in_strains(case, dim)
+    if dim == 3:
+        return
+    for i, support in enumerate(case.supports):
+        for key in ("fix", "spring", "together"):
+            if "z" in getattr(support, key):
+                allowed = "z in a plane case; allowed are x, y and normal"
+                yield f"supports[{i}].{key}", "z", allowed
+    for expression in _expressions(case):
+        if "z" in expression.names:
+            yield expression.key, expression.text, "z in a plane case; allowed are x, y and r"
+
+
+def _in_motion(case: Case, dim: int) -> Iterator[Fault]:
     """The components in which rigid bodies move, and the shapes that they have."""
     known = ["x", "y", "z", "rx", "ry", "rz"] if dim == 3 else ["x", "y", "rz"]
     known = ["y"] if case.axisymmetric else known
     for name, body in case.rigid.items():
         for key in ("move", "force"):
-            for component in getattr(body, key):
-                if component not in known:
-                    allowed = f"allowed here: {', '.join(known)}"
-                    raise InputError(case.path, f"bodies.{name}.{key}", component, allowed)
+            for component in getattr(body, key).keys() - set(known):
+                yield f"bodies.{name}.{key}", component, f"allowed here: {', '.join(known)}"
         if body.surface == "cylinder" and dim == 2:
             allowed = "is 3D: a circle is a `sphere` here, the side of a shaft a `plane`"
-            raise InputError(case.path, f"bodies.{name}", body.surface, allowed)
+            yield f"bodies.{name}", body.surface, allowed
     moments = case.reference.get("moment", {})
     for name, value in moments.items() if isinstance(moments, dict) else ():
+        key = f"reference.moment.{name}"
         if name not in case.rigid:
-            allowed = f"is no rigid body; {hint(name, case.rigid)}"
-            raise InputError(case.path, f"reference.moment.{name}", None, allowed)
+            yield key, None, f"is no rigid body; {hint(name, case.rigid)}"
         if isinstance(value, tuple) != (dim == 3):
-            allowed = f"must be {'a list of three numbers' if dim == 3 else 'a number'} here"
-            raise InputError(case.path, f"reference.moment.{name}", value, allowed)
+            number = "a list of three numbers" if dim == 3 else "a number"
+            yield key, value, f"must be {number} here"
 
 
-def _check_strains(case: Case, dim: int) -> None:
+def _in_strains(case: Case, dim: int) -> Iterator[Fault]:
     """Initial strains have the components of the mesh; exact solutions know none."""
     for i, load in enumerate(case.loads):
         if not load.strains:
@@ -239,33 +250,11 @@ def _check_strains(case: Case, dim: int) -> None:
         key = f"loads[{i}].{load.kind}"
         if case.solution:
             allowed = f"{case.solution.name} has no initial strain; allowed: a reference without it"
-            raise InputError(case.path, key, None, allowed)
+            yield key, None, allowed
         across = {"yz", "xz"} & load.value.keys() if isinstance(load.value, dict) else set()
         if across and dim == 2:
             allowed = "across the plane of a plane case; allowed are xx, yy, zz and xy"
-            raise InputError(case.path, key, max(across), allowed)
-
-
-def check_dimension(case: Case, dim: int) -> None:
-    """Raise `InputError` for a vector, direction or expression that does not fit the dimension."""
-    allowed = f"must have {dim} components: the case is {'plane' if dim == 2 else 'in 3D'}"
-    for key, vector in _vectors(case):
-        if len(vector) != dim:
-            shown = [v.text if isinstance(v, Expression) else v for v in vector]
-            raise InputError(case.path, key, shown, allowed)
-    _check_motion(case, dim)
-    _check_strains(case, dim)
-    if dim == 3:
-        return
-    for i, support in enumerate(case.supports):
-        for key in ("fix", "spring", "together"):
-            if "z" in getattr(support, key):
-                allowed = "z in a plane case; allowed are x, y and normal"
-                raise InputError(case.path, f"supports[{i}].{key}", "z", allowed)
-    for expression in _expressions(case):
-        if "z" in expression.names:
-            allowed = "z in a plane case; allowed are x, y and r"
-            raise InputError(case.path, expression.key, expression.text, allowed)
+            yield key, max(across), allowed
 
 
 def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:

@@ -1,4 +1,4 @@
-"""The page of refusals follows from the sources; and refusals that no other test meets."""
+"""Refusals that no other test meets."""
 
 import re
 
@@ -17,16 +17,9 @@ from solver.mechanics.linear.choice import factorise
 from solver.mesh import read_mesh
 from solver.system.errors import InputError
 from solver.verification.regression import accepted_values, regression_file
-from tests.faults.refusals import ROOT, page, refusals
 from tests.handmade import plane
 from tests.mesh.one_cell import write_by_gmsh
 from tests.scenes import block_case, block_mesh
-
-
-def test_the_page_is_that_of_the_sources():
-    assert (ROOT / "docs" / "design" / "refusals.md").read_text(encoding="utf-8") == page()
-    assert len(refusals()) > 100
-
 
 FOLDED = np.array([(0, 0), (1, 0), (0.2, 0.2), (0, 1)], dtype=float)
 QUAD = np.array([[0, 1, 2, 3]])
