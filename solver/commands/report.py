@@ -1,7 +1,6 @@
 """The commands that report batches: a batch, and two side by side."""
 
 import argparse
-import os
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +10,17 @@ from .options import FAILED, PASSED, add_command
 
 def add_commands(commands: Any) -> None:
     """Add `report` and `compare`."""
-    command = add_command(commands, "report", _report, "write the report of many verdicts")
-    command.add_argument("verdicts", type=Path, nargs="*", metavar="VERDICT.json")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    command.add_argument("--results", type=Path, metavar="DIR", help="use all verdicts in DIR")
-    command.add_argument("--list", type=Path, metavar="FILE", help="use those in FILE, one a line")
+    command = add_command(commands, "report", _report, "write the report of a batch")
     command.add_argument(
-        "--older",
+        "results", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="of a batch"
+    )
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    command.add_argument(
+        "--run",
         type=Path,
+        dest="asked",
         metavar="FILE",
-        help="also show those in FILE; they are no failures of this batch",
+        help="folders of solves; others there are older ones",
     )
     command.add_argument(
         "--families",
@@ -45,34 +45,23 @@ def add_commands(commands: Any) -> None:
     command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
 
 
-def _verdicts(options: argparse.Namespace) -> list[Path]:
-    """The verdicts named, listed, or in the folder of results, but those of ladders' levels."""
-    verdicts = list(options.verdicts)
-    if options.list:
-        verdicts += _listed(options.list)
-    if options.results:
-        found = sorted(options.results.glob("**/verdict.json"))
-        # The levels of ladders have a page of their own.
-        verdicts += [p for p in found if "orders" not in p.relative_to(options.results).parts]
-    if not verdicts:
-        where = options.results or options.run.__name__.strip("_")
-        raise InputError(where, "VERDICT.json", None, "no verdict is named or found")
-    return verdicts
-
-
-def _listed(file: Path) -> list[Path]:
-    """The paths in a file, one a line."""
-    return [Path(os.fsdecode(line)) for line in file.read_bytes().splitlines()]
-
-
 def _report(options: argparse.Namespace) -> int:
     from ..report import write_report
 
-    verdicts = _verdicts(options)
+    found = {file.parent for file in options.results.glob("*/*/verdict.json")}
+    run = found
+    if options.asked:
+        run = {Path(line) for line in options.asked.read_text(encoding="utf-8").splitlines()}
+        # What other codes made of a solve belongs to it.
+        run |= {f for f in found if f.with_name(f.name.partition("@")[0]) in run}
+    if not run:
+        raise InputError(options.results, "verdict.json", None, "there is none in this folder")
     families = options.families
     if families is None:
         families = sorted(Path("cases").glob("*/family.yaml"))
-    older = _listed(options.older) if options.older else []
+    verdicts, older = (
+        [folder / "verdict.json" for folder in sorted(folders)] for folders in (run, found - run)
+    )
     print(write_report(verdicts, options.output, families, options.processes, older))
     return FAILED if (options.output / "failures.txt").stat().st_size else PASSED
 

@@ -16,14 +16,14 @@ def test_a_folder_and_a_title_of_special_characters(tmp_path, monkeypatch):
     text = CASE.replace("{file: %s}", str(RECIPE)).replace("Two blocks", f'"{TITLE}"')
     (folder / "case.yaml").write_text(text, encoding="utf-8")
     out = folder / "out"
-    verdict = str(out / "verdict.json")
+    verdict = str(out / "all" / "family" / "a" / "verdict.json")
     solve = ["solve", str(folder / "case.yaml"), "-o", str(out / "r.vtkhdf"), "--verdict", verdict]
     assert main([*solve, "--quiet"]) == 0
     broken = folder / "broken.yaml"
     broken.write_text(text.replace("young: 2000.0", f'young: "{TITLE}"'), encoding="utf-8")
-    bad = str(out / "broken.json")
+    bad = str(out / "all" / "family" / "broken" / "verdict.json")
     assert main(["solve", str(broken), "-o", str(out / "b.vtkhdf"), "--verdict", bad]) == 2
-    assert main(["report", verdict, bad, "-o", str(out / "report")]) == 1
+    assert main(["report", str(out / "all"), "-o", str(out / "report")]) == 1
     for page in (out / "report").glob("*.html"):
         html = page.read_text(encoding="utf-8")
         assert "<script>alert" not in html

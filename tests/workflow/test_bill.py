@@ -42,9 +42,9 @@ def audit(event, details):
 sys.addaudithook(audit)
 from solver.commands.cli import main
 case, result, folder = sys.argv[1:]
-assert main(["solve", case, "-o", result, "--verdict", f"{folder}/verdict.json"]) == 0
+assert main(["solve", case, "-o", result, "--verdict", f"{folder}/f/a/verdict.json"]) == 0
 assert main(["check", result]) == 0
-assert main(["report", f"{folder}/verdict.json", "-o", f"{folder}/report"]) == 0
+assert main(["report", folder, "-o", f"{folder}/report"]) == 0
 print("no network")
 try:
     socket.create_connection(("192.0.2.1", 9), timeout=0.1)

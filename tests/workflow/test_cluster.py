@@ -1,4 +1,4 @@
-"""Jobs sent elsewhere: what they ask for, and those that are ended before they can say anything.
+"""Jobs sent elsewhere: what they ask for.
 
 The batch on a real cluster is tried by `make cluster-test`.
 """
@@ -16,49 +16,7 @@ import pytest
 import yaml
 
 from tests.workflow.cluster import missing
-from tests.workflow.projects import ROOT, jobs, new_project, snakemake, summary, write_case
-
-
-def let_die(project):
-    """Solves and meshes die with their shell while there is a file killed-RULE-NAME."""
-    for rule, wildcard in (("solve", "job"), ("mesh", "case")):
-        rules = project / "workflow" / "rules" / f"{rule}.smk"
-        die = f"test ! -e killed-{rule}-{{wildcards.{wildcard}}} || kill -9 $$; "
-        text, changed = re.subn(r'(    shell:\n        ")', rf"\g<1>{die}", rules.read_text())
-        assert changed == 1
-        rules.write_text(text)
-
-
-def test_what_is_ended_from_outside_is_crashed_and_done_by_the_next_run(tmp_path):
-    project = new_project(tmp_path / "project")
-    write_case(project / "cases" / "tiny", "doomed")
-    write_case(project / "cases" / "other", "other-a")
-    let_die(project)
-    # tiny-a: its mesh, without which neither direction is solved.
-    marks = [project / "killed-solve-doomed", project / "killed-mesh-tiny-a"]
-    for mark in marks:
-        mark.touch()
-
-    killed = snakemake(project)
-
-    assert killed.returncode != 0
-    verdicts = {name: (v["verdict"], v["transient"]) for name, v in summary(project).items()}
-    crashed = dict.fromkeys(("doomed", "tiny-a", "tiny-a-swapped"), ("crashed", True))
-    assert verdicts == {**crashed, "tiny-b": ("passed", False), "other-a": ("passed", False)}
-    assert "5 solves: 3 crashed, 2 passed." in killed.stdout
-    failures = project / "results" / "report" / "failures.txt"
-    assert re.search(r"^doomed: crashed: ended from outside$", failures.read_text(), re.MULTILINE)
-
-    # A batch of others does not take that report for its own.
-    assert "report of all cases" in jobs(project, "--config", "family=other")
-    for mark in marks:
-        mark.unlink()
-    again = snakemake(project)
-    assert again.returncode == 0, again.stdout
-    log = max((project / ".snakemake" / "log").glob("*.log")).read_text()
-    solved = re.findall(r"^Job \d+: (mesh|solve) (\S+)", log, re.MULTILINE)
-    assert sorted(solved) == [("mesh", "tiny-a"), *(("solve", name) for name in sorted(crashed))]
-    assert "All 5 solves passed." in again.stdout
+from tests.workflow.projects import ROOT, new_project, snakemake
 
 
 def asked(project, *calls):

@@ -127,7 +127,7 @@ def test_missing_libraries_are_named_with_their_packages(tmp_path, monkeypatch):
     monkeypatch.setattr(libraries.shutil, "which", lambda tool: None)
     said = libraries.provide(tmp_path)
     assert "libGLU.so.1, libodd.so.2 not found" in said
-    assert "libglu1-mesa libodd.so.2" in said
+    assert "libglu1-mesa" in said
     assert "\n" not in said
 
 
@@ -153,15 +153,3 @@ def test_all_missing_libraries_are_found_by_name(tmp_path, library):
     for name in absent:
         subprocess.run([patchelf, "--add-needed", name, library], check=True)
     assert set(absent) <= set(libraries.missing(tmp_path))
-
-
-def test_unpacked_libraries_look_beside_themselves(tmp_path, library):
-    room = tmp_path / "root" / "usr" / "lib"
-    room.mkdir(parents=True)
-    shutil.copy(library, room / "libsample.so.1.2")
-    (room / "libsample.so.1").symlink_to("libsample.so.1.2")
-    libraries.adopt(tmp_path / "root", tmp_path)
-    assert (tmp_path / "lib" / "libsample.so.1").resolve().name == "libsample.so.1.2"
-    command = [tmp_path / "bin" / "patchelf", "--print-rpath", tmp_path / "lib" / "libsample.so.1"]
-    run = subprocess.run(command, check=True, capture_output=True, text=True)
-    assert run.stdout.strip() == "$ORIGIN"

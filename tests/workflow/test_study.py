@@ -52,6 +52,7 @@ def test_groups_are_measured_once_and_the_page_lists_all(tmp_path):
     assert jobs(project, "study") <= {"all points hold?"}
     # As an interrupted run leaves it: what is measured is not measured again.
     (records / "patch.json").unlink()
+    (project / "results/report/study-failures.txt").unlink()
     again = {"measure study/patch", "page of study", "all points hold?"}
     assert jobs(project, "study") <= again
     assert "measure study/patch" in jobs(project, "study")

@@ -82,13 +82,6 @@ def test_a_changed_solver_runs_all_and_a_changed_report_only_itself(project):
     assert jobs(project) == solves | SAVED | REPORT
 
 
-def test_all_runs_again_where_snakemake_remembers_nothing(project):
-    shutil.rmtree(project / ".snakemake")
-    run = snakemake(project)
-    assert run.returncode == 0, run.stdout
-    assert run.stdout.count(": passed, ") == 3
-
-
 def test_one_case_again_is_one_case(project):
     verdict = "results/tiny/tiny-a-swapped"
     assert jobs(project, "--forcerun", verdict) == {"solve tiny-a-swapped"} | SAVED | REPORT

@@ -3,39 +3,28 @@
 
 
 @cache
-def codes_to_run():
-    """The codes by name: those configured, else all that are installed."""
-    registry, chosen = part("codes.registry"), listed(config["codes"])
+def codes():
+    """What --code takes and the version, by name of the code: those configured, else all installed."""
+    run, chosen = part("codes.run"), listed(config["codes"])
     try:
-        found = {registry.find(c).name: c for c in chosen or registry.names()}
+        found = {(code := run.find(c)).name: (c, code.version()) for c in chosen or run.names()}
     except part("system.errors").InputError as error:
         refuse(error)
-    if chosen:
-        return found
-    return {name: code for name, code in found.items() if version_of(code)}
-
-
-@cache
-def version_of(code):
-    return part("codes.registry").find(code).version()
-
-
-def sources_of(code):
-    """The files of a user's own code; empty for the codes of the solver."""
-    return sorted(str(f) for f in Path(code).rglob("*") if f.is_file())
+    return {name: code for name, code in found.items() if chosen or code[1]}
 
 
 def foreign_runs():
     """The folders of all runs of other codes: both directions, the case's own cut."""
     jobs = [job for job in RUN.values() if not job.hexahedra and not job.refusal]
-    return [f"{job.folder}@{code}" for code in codes_to_run() for job in jobs]
+    return [f"{job.folder}@{code}" for code in codes() for job in jobs]
 
 
 rule run_code:
     input:
         files=lambda w: batch(w).inputs,
         mesh=lambda w: batch(w).mesh_folder or [],
-        code=lambda w: sources_of(codes_to_run()[w.code]),
+        # The files of a user's own code.
+        code=lambda w: sorted(f for f in Path(codes()[w.code][0]).rglob("*") if f.is_file()),
     output:
         directory("results/{family}/{job}@{code}"),
     log:
@@ -46,8 +35,8 @@ rule run_code:
         case=lambda w: batch(w).file,
         mesh=mesh_option,
         options=lambda w: batch(w).options,
-        code=lambda w: codes_to_run()[w.code],
-        program=lambda w: SOLVER_HASH + version_of(codes_to_run()[w.code]),
+        code=lambda w: codes()[w.code][0],
+        program=lambda w: SOLVER_HASH + codes()[w.code][1],
     message:
         "{wildcards.code}: {wildcards.job}"
     shell:
@@ -64,4 +53,4 @@ rule bench:
     message:
         "report of all codes"
     shell:
-        "program report --results results -o results/report"
+        "program report -o results/report"

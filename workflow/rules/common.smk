@@ -41,9 +41,7 @@ def read_config():
     except WorkflowError as error:
         found = re.search(r"^\w*Error: (.*)$", str(error), re.MULTILINE)
         place = re.search(r"^On instance\['(\w+)'\]", str(error), re.MULTILINE)
-        refuse(
-            f"config: {place[1] + ': ' if place else ''}{found[1] if found else error}"
-        )
+        refuse(f"config: {place[1] + ': ' if place else ''}{found[1] if found else error}")
     cores = workflow.resource_settings.cores  # none where a cluster has the jobs
     if cores is not None and cores < 1:
         refuse(f"cores = {cores}: must be 1 or more, or `all`")
@@ -84,9 +82,7 @@ def hash_of(files):
     return found.hexdigest()
 
 
-REPORT_SOURCES = files_in(
-    "report/**/*.*", "studies/page*", "studies/shown.py", "studies/figures/*.py"
-)
+REPORT_SOURCES = files_in("report/**/*.*", "studies/page*", "studies/figures/*.py")
 REPORT_HASH = hash_of(REPORT_SOURCES)
 SOLVER_HASH = hash_of(files_in("**/*.py", "case/schemas/*") - REPORT_SOURCES)
 MESH_HASH = hash_of(files_in("case/**/*.*", "mesh/**/*.py", "system/*.py"))
@@ -110,49 +106,30 @@ def chosen(key, known):
     found = {pattern: fnmatch.filter(known, pattern) for pattern in listed(config[key])}
     for pattern in found:
         if not found[pattern]:
-            refuse(
-                f"{key} = {pattern}: unknown; {part('system.errors').hint(pattern, known)}"
-            )
+            refuse(f"{key} = {pattern}: unknown; {part('system.errors').hint(pattern, known)}")
     return set().union(*found.values()) if found else set(known)
 
 
 def choose_jobs():
-    """The jobs of this run: of the configured families and cases, and of these, if it is configured,
-    those that have not passed."""
-    jobs = {key: job for key, job in BATCH.items() if job.family in FAMILIES}
-    files = {}  # a case may be named by its file
-    for job in jobs.values():
-        files.setdefault(job.file, []).append(job.name)
-    given = listed(config["case"])
-    config["case"] = [name for case in given for name in files.get(case, [case])]
-    names = chosen("case", {job.name for job in jobs.values()})
-    jobs = {key: job for key, job in jobs.items() if job.name in names}
-    if config["failed"] in (True, "true"):
-        jobs = {key: job for key, job in jobs.items() if not job.passed}
-        if not jobs and workflow.is_main_process:
-            print("Nothing to be done: all chosen cases have passed.")
-            sys.exit(0)
-    return jobs
+    """The jobs of the configured families and cases; `failed`: of these, those that have not passed."""
+    jobs = [job for job in BATCH.values() if job.family in FAMILIES]
+    # A case may be named by its file.
+    named = [job.name for case in listed(config["case"]) for job in jobs if job.file == case]
+    config["case"] = named or config["case"]
+    names = chosen("case", {job.name for job in jobs})
+    failed = config["failed"] in (True, "true")
+    jobs = [job for job in jobs if job.name in names and not (failed and job.passed)]
+    if not jobs and workflow.is_main_process:
+        print("Nothing to be done: all chosen cases have passed.")
+        sys.exit(0)
+    return {job.key: job for job in jobs}
 
 
 BATCH = find_jobs()
 FAMILIES = chosen("family", {job.family for job in BATCH.values()})
 RUN = choose_jobs()
-# Without Snakemake's records the inputs of the results are unknown.
-LOST = not any(Path(".snakemake/metadata").glob("*"))
-
-
-def is_damaged(job):
-    """Whether results of a job are there and cannot be kept."""
-    return LOST and os.path.isdir(job.folder) or job.damaged
-
-
-def is_damaged_mesh(job):
-    """The same of its mesh."""
-    if not os.path.isdir(job.mesh_folder):
-        return False
-    made = (Path(job.mesh_folder, name) for name in ("mesh.vtkhdf", "refused"))
-    return LOST or not any(file.is_file() for file in made)
+# The folders of the solves of this run, for the report: too many for a command line.
+RUN_LIST = ".snakemake/run-list"
 
 
 def batch(w):
@@ -165,6 +142,32 @@ def mesh_option(w):
     if not (folder := batch(w).mesh_folder):
         return ""
     return f'$(test ! -e {folder}/mesh.vtkhdf || echo "--mesh {folder}/mesh.vtkhdf")'
+
+
+# What jobs ask for that are sent elsewhere.
+# In a job Snakemake runs in Snakemake, with its plugins' libraries: memory beside the solve's own.
+AROUND_MB = 900
+# From a cold shared folder three interpreters start before the solve does.
+START_MINUTES = 10
+# Contact takes several linear solves, and a node may be slower than where the model was measured.
+SLACK = 10
+# What asks for more (bytes, seconds) is for the solver to refuse, by its own estimate.
+MOST_MEMORY, MOST_SECONDS = 1e15, 1e9
+
+
+def memory(job, attempt):
+    """Megabytes that a job of this case asks for, more each time it has to be run again."""
+    return attempt * round(AROUND_MB + min(job.size.memory.most, MOST_MEMORY) / 1e6)
+
+
+def seconds(job):
+    """Estimated seconds of a case, the priority of its jobs: the longest cases start first."""
+    return min(job.size.seconds, MOST_SECONDS)
+
+
+def minutes(job, attempt):
+    """Minutes that a job of this case asks for, more each time it has to be run again."""
+    return attempt * round(START_MINUTES + SLACK * seconds(job) / 60)
 
 
 wildcard_constraints:

@@ -19,7 +19,6 @@ rule mesh:
         mem_mb=lambda w, attempt: memory(recipe(w), attempt),
         runtime=lambda w, attempt: minutes(recipe(w), attempt),
     params:
-        damaged=lambda w: is_damaged_mesh(recipe(w)),
         program=MESH_HASH,
     message:
         "mesh {wildcards.case}"

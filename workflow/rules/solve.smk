@@ -17,7 +17,7 @@ rule solve:
         mesh=mesh_option,
         options=lambda w: batch(w).options,
         refusal=lambda w: shlex.quote(batch(w).refusal),
-        damaged=lambda w: is_damaged(batch(w)),
+        damaged=lambda w: batch(w).damaged,
         program=SOLVER_HASH,
     message:
         "solve {wildcards.job}"

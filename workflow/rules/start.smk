@@ -1,14 +1,13 @@
-"""Before jobs run: lock the folder, remove results that cannot be kept, report progress."""
+"""Before jobs run: lock the folder, remove results that cannot be kept, start what jobs are forks of."""
 
+import atexit
 import fcntl
 import logging
 import shutil
-import signal
+import socket
+import tempfile
 
 from snakemake.settings.enums import Quietness
-
-# Whether somebody has pressed Ctrl-C: what has no verdict then has not failed.
-INTERRUPTED = []
 
 
 def take_lock():
@@ -21,55 +20,67 @@ def take_lock():
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        refuse(
-            f"{Path.cwd()}: another run is at work in this folder; wait until it ends"
-        )
+        refuse(f"{Path.cwd()}: another run is at work in this folder; wait until it ends")
     return lock
-
-
-def remove_damaged():
-    """Remove results that cannot be kept, so that Snakemake finds them missing."""
-    for job in RUN.values():
-        if is_damaged(job):
-            shutil.rmtree(job.folder)
-        if is_damaged_mesh(job):
-            shutil.rmtree(job.mesh_folder)
-
-
-def note_interruption(*_):
-    INTERRUPTED.append(True)
-    raise KeyboardInterrupt
 
 
 def report_progress():
     """Report the jobs in place of Snakemake's own lines; nothing in a quiet run."""
-    settings = workflow.output_settings
-    shown = [each for each in logger.handlers if each.name == "DefaultStreamHandler"]
+    settings, progress = workflow.output_settings, part("commands.progress")
     quiet = {Quietness.PROGRESS, Quietness.ALL} & set(settings.quiet or ())
-    for handler in shown:
-        if quiet:
+    for handler in logger.handlers:
+        if quiet and handler.name == "DefaultStreamHandler":
             handler.setLevel(logging.WARNING)
-        if not settings.verbose:
-            handler.addFilter(
-                lambda record: not part("commands.progress").hides(record)
-            )
+        if not settings.verbose and handler.name == "DefaultStreamHandler":
+            handler.addFilter(lambda record: not progress.hides(record))
     if not quiet:
-        logger.addFilter(part("commands.progress").Progress(sys.stdout))
+        logger.addFilter(progress.Progress(sys.stdout))
+
+
+def begin_warm():
+    """Start the warm process, which forks for each job on this machine and ends with the run.
+
+    Jobs wait until it has loaded its packages; without it each loads them itself. On other systems
+    than Linux libraries start threads, and forks may hang.
+    """
+    if sys.platform != "linux" or not workflow.local_exec:
+        return
+    folder = tempfile.TemporaryDirectory()
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(f"{folder.name}/warm")
+        listener.listen()
+        server = subprocess.Popen(
+            [sys.executable, "-Es", "-m", PACKAGE, "serve", str(listener.fileno())],
+            stdin=subprocess.PIPE,  # closed when this run ends
+            pass_fds=[listener.fileno()],
+            env={**os.environ, **dict.fromkeys(part("system.process").THREADS, "1")},
+        )
+    os.environ["WARM_SOLVER"] = f"{folder.name}/warm"
+    atexit.register(end_warm, server, folder)
+
+
+def end_warm(server, folder):
+    """Let the warm process end; one that hangs is killed."""
+    try:
+        server.communicate(timeout=10)
+    except subprocess.TimeoutExpired:
+        server.kill()
+    folder.cleanup()
 
 
 def begin(record):
     """A filter of the log that lets all through: before the first job. A module has no `onstart`."""
     if str(getattr(record, "event", None)) == "run_info":
-        signal.signal(signal.SIGINT, note_interruption)
-        list_verdicts()
+        Path(RUN_LIST).write_text("".join(f"{job.folder}\n" for job in RUN.values()))
         begin_warm()
     return True
 
 
 # A dry run changes nothing, and Snakemake reports it well.
-RUNS = workflow.is_main_process and not workflow.output_settings.dryrun
-if RUNS:
+if workflow.is_main_process and not workflow.output_settings.dryrun:
     LOCK = take_lock()  # as long as this process lives
-    remove_damaged()
+    for job in RUN.values():
+        if job.damaged:  # Snakemake finds it missing
+            shutil.rmtree(job.folder)
     report_progress()
     logger.addFilter(begin)

@@ -1,6 +1,7 @@
 # Studies: each group of a study's file is a job with a record, each study a page and a gate.
 LEVEL = config["level"]
 SUFFIX = "" if LEVEL == "full" else f"-{LEVEL}"
+RECORDS = f"results/studies/{{study}}/{LEVEL}"
 # The targets, and the files of their studies: `stability` has the theory too.
 TARGETS = {f.stem: [str(f)] for f in sorted(Path("cases/studies").glob("*.yaml"))}
 if {"stability", "infsup"} <= TARGETS.keys():
@@ -8,13 +9,6 @@ if {"stability", "infsup"} <= TARGETS.keys():
 TARGETS["orders"] = sorted(
     str(f) for f in Path("cases").glob("*/orders.yaml") if f.parent.name in FAMILIES
 )
-
-
-def records_of(study):
-    return [
-        f"results/studies/{study.name}/{LEVEL}/{group.name}.json"
-        for group in study.groups
-    ]
 
 
 @cache
@@ -34,24 +28,23 @@ def study_of(w):
     return next(studies(t)[w.study] for t in TARGETS if w.study in studies(t))
 
 
-def is_timed(w):
-    """Whether a group has the machine for itself."""
-    _, study = study_of(w)
-    return (study.group(w.group).measure or study.measure) in part("studies.run").APART
+def cores_of(w):
+    """A timed group has the machine for itself."""
+    study = study_of(w)[1]
+    timed = (study.group(w.group).measure or study.measure) in part("studies.run").APART
+    return workflow.cores if timed else 1
 
 
 rule measure:
     input:
         study=lambda w: study_of(w)[0],
-        cases=lambda w: sorted(
-            {str(s.case) for s in study_of(w)[1].group(w.group).series}
-        ),
+        cases=lambda w: sorted({str(s.case) for s in study_of(w)[1].group(w.group).series}),
     output:
-        record=f"results/studies/{{study}}/{LEVEL}/{{group}}.json",
-        benchmark=f"results/studies/{{study}}/{LEVEL}/{{group}}.benchmark",
+        record=f"{RECORDS}/{{group}}.json",
+        benchmark=f"{RECORDS}/{{group}}.benchmark",
     log:
-        f"results/studies/{{study}}/{LEVEL}/{{group}}.log",
-    threads: lambda w: workflow.cores if is_timed(w) else 1
+        f"{RECORDS}/{{group}}.log",
+    threads: cores_of
     resources:
         mem_mb=lambda w, attempt: 2000 * attempt,
         runtime=lambda w, attempt: 120 * attempt,
@@ -60,21 +53,22 @@ rule measure:
     message:
         "measure {wildcards.study}/{wildcards.group}"
     shell:
-        "warm {output.benchmark:q} measure {input.study:q} {wildcards.group:q}"
-        f" --level {LEVEL}"
+        f"warm {{output.benchmark:q}} measure {{input.study:q}} {{wildcards.group:q}} --level {LEVEL}"
         " -o {output.record:q} > {log:q} 2>&1"
 
 
 rule study_page:
     input:
-        records=lambda w: records_of(study_of(w)[1]),
+        records=lambda w: [
+            f"{RECORDS.format(study=w.study)}/{group.name}.json" for group in study_of(w)[1].groups
+        ],
         study=lambda w: study_of(w)[0],
     output:
         f"results/report/{{study}}{SUFFIX}.html",
         f"results/report/{{study}}{SUFFIX}.csv",
         f"results/report/{{study}}{SUFFIX}-failures.txt",
     log:
-        f"results/studies/{{study}}/{LEVEL}/page.log",
+        f"{RECORDS}/page.log",
     params:
         program=REPORT_HASH,
     message:
@@ -93,13 +87,7 @@ for target in TARGETS:
             target
         input:
             failures=lambda w, target=target: [
-                f"results/report/{study}{SUFFIX}-failures.txt"
-                for study in studies(target)
-            ],
-            records=lambda w, target=target: [
-                record
-                for _, study in studies(target).values()
-                for record in records_of(study)
+                f"results/report/{study}{SUFFIX}-failures.txt" for study in studies(target)
             ],
         localrule: True
         message:
