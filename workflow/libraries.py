@@ -14,7 +14,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-VENV = Path(__file__).resolve().parents[1] / ".venv"
 # The packages of Debian that bring them, with what they depend on.
 PACKAGES = ["libglu1-mesa", "libxcursor1", "libxft2", "libxinerama1", "libfontconfig1", "libgomp1"]
 # Packages that only drawing on a screen would use; unpacked they are 200 MB.
@@ -87,4 +86,4 @@ def apt(*command: str, cwd: Path | None = None) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(provide(VENV) or 0)
+    sys.exit(provide(Path(__file__).resolve().parents[1] / ".venv") or 0)

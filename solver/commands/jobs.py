@@ -149,6 +149,8 @@ def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[BatchJob]
     names its case as another file of the family does is refused, under a free name. Raises
     InputError as `check_names`.
     """
+    if not folders:
+        raise InputError("config", "cases", None, "no folder with case files (*.yaml) in it")
     for folder in folders:
         check_names(folder)
     listed = [list(jobs_of(file, variants)) for folder in folders for file in case_files(folder)]

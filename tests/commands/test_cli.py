@@ -282,16 +282,17 @@ def test_accept_shows_the_difference_and_check_holds_it(small, capsys, monkeypat
     assert "accepted 25 … 25" in verdict["reason"]
 
 
-def test_report_takes_verdicts_by_name_or_by_folder(small, capsys):
+def test_report_takes_the_verdicts_of_a_folder(small, capsys):
     solve(small)
-    assert main(["report", str(small / "out/v.json"), "-o", str(small / "one")]) == 0
-    (small / "out/v.json").rename(small / "out/verdict.json")
-    assert main(["report", "--results", str(small), "-o", str(small / "two")]) == 0
-    for folder in ("one", "two"):
-        (told,) = json.loads((small / folder / "summary.json").read_text())
-        assert (told["case"], told["passed"]) == ("small", True)
+    folder = small / "all" / "family" / "small"
+    folder.mkdir(parents=True)
+    (small / "out/v.json").rename(folder / "verdict.json")
+    (small / "out/r.vtkhdf").rename(folder / "r.vtkhdf")
+    assert main(["report", str(small / "all"), "-o", str(small / "report")]) == 0
+    (told,) = json.loads((small / "report" / "summary.json").read_text())
+    assert (told["case"], told["passed"]) == ("small", True)
     capsys.readouterr()
-    assert main(["report", "-o", str(small / "three")]) == 2
+    assert main(["report", str(small), "-o", str(small / "none")]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 

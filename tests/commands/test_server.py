@@ -128,8 +128,8 @@ load()
 before = set(sys.modules)
 for command in (
     "mesh good.yaml -o m.vtkhdf",
-    "solve good.yaml --mesh m.vtkhdf -o r.vtkhdf --verdict v.json",
-    "report v.json -o report",
+    "solve good.yaml --mesh m.vtkhdf -o all/f/a/r.vtkhdf --verdict all/f/a/verdict.json",
+    "report all -o report",
 ):
     assert main(command.split()) == 0, command
 print(*(set(sys.modules) - before))

@@ -343,13 +343,17 @@ def test_a_batch_of_nothing_is_no_success(tmp_path):
     assert 'class="outcome bad"' in (tmp_path / "report" / "summary.html").read_text()
 
 
-def test_verdicts_come_from_a_list_as_from_the_command_line(tmp_path, capsys):
-    files = [put(tmp_path / "fam" / job / "verdict.json", {"job": job}) for job in ("b c", "aé")]
-    (tmp_path / "list").write_text("".join(f"{file}\n" for file in files), encoding="utf-8")
-    named, listed = tmp_path / "named", tmp_path / "listed"
-    assert main(["report", *map(str, files), "-o", str(named), "--families"]) == 0
-    assert main(["report", "--list", str(tmp_path / "list"), "-o", str(listed), "--families"]) == 0
-    assert (listed / "summary.json").read_text() == (named / "summary.json").read_text()
-    assert len(json.loads((listed / "summary.json").read_text())) == 2
-    assert main(["report", "--list", str(tmp_path / "none"), "-o", str(listed)]) == 2
-    assert "none" in capsys.readouterr().err
+def test_what_a_run_did_not_ask_for_is_older(tmp_path, capsys):
+    results = tmp_path / "all"
+    for job, word in (("asked", "passed"), ("asked@code", "failed"), ("other", "failed")):
+        code = job.partition("@")[2] or None
+        content = {"job": job, "verdict": word, "family": "fam", "code": code}
+        put(results / "fam" / job / "verdict.json", content)
+    (tmp_path / "run").write_text(f"{results}/fam/asked\n", encoding="utf-8")
+    command = ["report", str(results), "-o", str(tmp_path / "report"), "--families"]
+    assert main([*command, "--run", str(tmp_path / "run")]) == 0
+    assert (
+        "Older results in the report, not of this run: 1 solve: 1 failed" in capsys.readouterr().out
+    )
+    assert len(json.loads((tmp_path / "report" / "summary.json").read_text())) == 3
+    assert main(command) == 1

@@ -6,10 +6,8 @@
 def codes():
     """What --code takes and the version, by name of the code: those configured, else all installed."""
     run, chosen = part("codes.run"), listed(config["codes"])
-    try:
-        found = {(code := run.find(c)).name: (c, code.version()) for c in chosen or run.names()}
-    except part("system.errors").InputError as error:
-        refuse(error)
+    given = {c: checked(run.find, c) for c in chosen or run.names()}
+    found = {code.name: (c, code.version()) for c, code in given.items()}
     return {name: code for name, code in found.items() if chosen or code[1]}
 
 

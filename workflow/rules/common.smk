@@ -34,6 +34,14 @@ def refuse(line):
     sys.exit(2)
 
 
+def checked(call, *arguments):
+    """What a function of the program returns; where it refuses, the run ends."""
+    try:
+        return call(*arguments)
+    except part("system.errors").InputError as error:
+        refuse(error)
+
+
 def read_config():
     """Validate the configuration by its schema, which also fills in defaults."""
     try:
@@ -55,7 +63,6 @@ def listed(value):
 read_config()
 # Jobs share their bytecode: compiling the sources in each costs a third of a small solve.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-VARIANTS = config["variants"] in (True, "true")
 # What jobs call: `program COMMAND`, and `warm FILE COMMAND`, which runs in a fork of the warm process,
 # if there is one, and writes its cost to a file. These processes ignore PYTHONPATH and the user's own
 # packages. As functions of the shell they are no part of the code of a rule, and known in a module.
@@ -92,13 +99,8 @@ def find_jobs():
     """All jobs by family and name: ours, and those of the configured folders."""
     ours = {f.parent for f in Path("cases").glob("*/*.yaml")} - {Path("cases/studies")}
     folders = [*sorted(ours), *(Path(f).expanduser() for f in listed(config["cases"]))]
-    if not folders:
-        refuse("cases: no folder with case files (*.yaml) in it")
-    try:
-        found = part("commands.jobs").list_jobs(folders, VARIANTS)
-    except part("system.errors").InputError as error:
-        refuse(error)
-    return {job.key: job for job in found}
+    variants = config["variants"] in (True, "true")
+    return {job.key: job for job in checked(part("commands.jobs").list_jobs, folders, variants)}
 
 
 def chosen(key, known):
@@ -114,8 +116,11 @@ def choose_jobs():
     """The jobs of the configured families and cases; `failed`: of these, those that have not passed."""
     jobs = [job for job in BATCH.values() if job.family in FAMILIES]
     # A case may be named by its file.
-    named = [job.name for case in listed(config["case"]) for job in jobs if job.file == case]
-    config["case"] = named or config["case"]
+    config["case"] = [
+        name
+        for case in listed(config["case"])
+        for name in [job.name for job in jobs if job.file == case] or [case]
+    ]
     names = chosen("case", {job.name for job in jobs})
     failed = config["failed"] in (True, "true")
     jobs = [job for job in jobs if job.name in names and not (failed and job.passed)]

@@ -14,14 +14,9 @@ TARGETS["orders"] = sorted(
 @cache
 def studies(target):
     """The studies of a target by name, with their files."""
-    found = {}
-    for file in TARGETS[target]:
-        try:
-            study = part("studies.description").read_study(Path(file), LEVEL)
-        except part("system.errors").InputError as error:
-            refuse(error)
-        found[study.name] = file, study
-    return found
+    read = part("studies.description").read_study
+    found = [(file, checked(read, Path(file), LEVEL)) for file in TARGETS[target]]
+    return {study.name: (file, study) for file, study in found}
 
 
 def study_of(w):
