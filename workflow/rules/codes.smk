@@ -1,5 +1,4 @@
-# Other codes on the same cases: each run makes a folder with a verdict beside the folder of our own
-# solve.
+# Other codes on the same cases: each run makes a folder with a verdict beside that of our own solve.
 
 
 @cache

@@ -149,7 +149,6 @@ def mesh_option(w):
     return f'$(test ! -e {folder}/mesh.vtkhdf || echo "--mesh {folder}/mesh.vtkhdf")'
 
 
-# What jobs ask for that are sent elsewhere.
 # In a job Snakemake runs in Snakemake, with its plugins' libraries: memory beside the solve's own.
 AROUND_MB = 900
 # From a cold shared folder three interpreters start before the solve does.
