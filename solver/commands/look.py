@@ -2,44 +2,23 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..system.errors import InputError, hint
 from ..system.package import cases_folder
-from .options import add_command
 
 if TYPE_CHECKING:
     from ..report.inspection import Group
 
 
-def add_commands(commands: Any) -> None:
-    """Add `list`, `inspect` and `plot`."""
-    command = add_command(commands, "list", _list, "list families, or the cases of a family")
+def add_list(command: argparse.ArgumentParser) -> None:
     command.add_argument("family", nargs="?", metavar="FAMILY", help="default: all families")
     command.add_argument(
         "--cases", type=Path, default=cases_folder(), metavar="DIR", help="default: the program's"
     )
 
-    command = add_command(
-        commands, "inspect", _inspect, "show groups, cells and sizes of a mesh file"
-    )
-    command.add_argument("mesh", type=Path, metavar="MESH")
-    command.add_argument(
-        "--gap", nargs=2, metavar=("SLAVE", "MASTER"), help="the gap between two groups of faces"
-    )
-    command.add_argument("-o", "--output", type=Path, metavar="PICTURE", help="SVG or PNG")
 
-    command = add_command(commands, "plot", _plot, "draw a result: meshes, contact pressure")
-    command.add_argument("result", type=Path, metavar="RESULT.vtkhdf")
-    command.add_argument(
-        "-o", "--output", type=Path, metavar="PICTURE", help="SVG, PNG or HTML to turn"
-    )
-    command.add_argument(
-        "--profile", action="store_true", help="the pressure along the interface instead"
-    )
-
-
-def _list(options: argparse.Namespace) -> int:
+def run_list(options: argparse.Namespace) -> int:
     from ..report.families import read_family
     from .jobs import case_files, families_in, list_jobs
 
@@ -61,7 +40,15 @@ def _list(options: argparse.Namespace) -> int:
     return 0
 
 
-def _inspect(options: argparse.Namespace) -> int:
+def add_inspect(command: argparse.ArgumentParser) -> None:
+    command.add_argument("mesh", type=Path, metavar="MESH")
+    command.add_argument(
+        "--gap", nargs=2, metavar=("SLAVE", "MASTER"), help="the gap between two groups of faces"
+    )
+    command.add_argument("-o", "--output", type=Path, metavar="PICTURE", help="SVG or PNG")
+
+
+def run_inspect(options: argparse.Namespace) -> int:
     from ..mesh import read_mesh
     from ..report.inspection import gap_between, groups_of
 
@@ -93,7 +80,17 @@ def _row(group: "Group") -> str:
     return f"{group.name or 'all cells':<24}{'; '.join(parts)}"
 
 
-def _plot(options: argparse.Namespace) -> int:
+def add_plot(command: argparse.ArgumentParser) -> None:
+    command.add_argument("result", type=Path, metavar="RESULT.vtkhdf")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="PICTURE", help="SVG, PNG or HTML to turn"
+    )
+    command.add_argument(
+        "--profile", action="store_true", help="the pressure along the interface instead"
+    )
+
+
+def run_plot(options: argparse.Namespace) -> int:
     from ..report.pictures import draw, draw_pressure, page
     from ..verification.results import read_result
 

@@ -2,32 +2,13 @@
 
 import argparse
 import os
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..verification.verdict import CheckResult, Verdict
 
 # Exit statuses.
 PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
-
-
-def add_command(
-    commands: Any,
-    name: str,
-    run: Callable[[argparse.Namespace], int],
-    purpose: str,
-    listed: bool = True,
-) -> argparse.ArgumentParser:
-    """Add a command by its name, what runs it, and its purpose in words.
-
-    Commands of the workflow are not `listed` in the help.
-    """
-    text = f"{purpose[0].upper()}{purpose[1:]}."
-    shown = {"help": purpose} if listed else {}
-    command: argparse.ArgumentParser = commands.add_parser(name, description=text, **shown)
-    command.set_defaults(run=run)
-    return command
 
 
 def add_threads(command: argparse.ArgumentParser) -> None:

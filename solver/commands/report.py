@@ -2,15 +2,12 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from ..system.errors import InputError
-from .options import FAILED, PASSED, add_command
+from .options import FAILED, PASSED
 
 
-def add_commands(commands: Any) -> None:
-    """Add `report` and `compare`."""
-    command = add_command(commands, "report", _report, "write the report of a batch")
+def add_report(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "results", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="of a batch"
     )
@@ -33,19 +30,8 @@ def add_commands(commands: Any) -> None:
         "--processes", type=int, metavar="N", help="to draw pictures; default: one for each core"
     )
 
-    command = add_command(
-        commands, "saved", _saved, "measure the time that a family saves", listed=False
-    )
-    command.add_argument("results", type=Path, metavar="DIR", help="the family's results")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.json")
 
-    command = add_command(commands, "compare", _compare, "compare with another batch")
-    command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
-    command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
-    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
-
-
-def _report(options: argparse.Namespace) -> int:
+def run_report(options: argparse.Namespace) -> int:
     from ..report import write_report
 
     found = {file.parent for file in options.results.glob("*/*/verdict.json")}
@@ -66,14 +52,25 @@ def _report(options: argparse.Namespace) -> int:
     return FAILED if (options.output / "failures.txt").stat().st_size else PASSED
 
 
-def _saved(options: argparse.Namespace) -> int:
+def add_saved(command: argparse.ArgumentParser) -> None:
+    command.add_argument("results", type=Path, metavar="DIR", help="the family's results")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.json")
+
+
+def run_saved(options: argparse.Namespace) -> int:
     from ..verification.savings import write_savings
 
     write_savings(options.results, options.output)
     return PASSED
 
 
-def _compare(options: argparse.Namespace) -> int:
+def add_compare(command: argparse.ArgumentParser) -> None:
+    command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
+    command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
+    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
+
+
+def run_compare(options: argparse.Namespace) -> int:
     from ..report.compare import compare
 
     found, text = compare(options.base, options.this, options.output)

@@ -5,6 +5,7 @@ It runs the command as `python -m solver` does, on the standard output and error
 (`solver.commands.warm`).
 """
 
+import argparse
 import gc
 import importlib
 import os
@@ -178,3 +179,14 @@ def _end(run: Callable[[], int]) -> NoReturn:
     finally:
         sys.stderr.flush()
         os._exit(status)
+
+
+def add_serve(command: argparse.ArgumentParser) -> None:
+    command.add_argument("socket", type=int, metavar="FD", help="an open, listening socket")
+
+
+def run_serve(options: argparse.Namespace) -> int:
+    """Serve on the socket."""
+    with socket.socket(fileno=options.socket) as listener:
+        serve(listener)
+    return 0

@@ -7,45 +7,13 @@ import argparse
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from ..system.errors import InputError
 from ..system.progress import report_outcomes
 from .jobs import case_file
-from .options import add_command, add_threads
+from .options import add_threads
 
 LEVELS = (1, 2, 4)
-
-
-def add_commands(commands: Any) -> None:
-    """Add the commands of studies to the program."""
-    purpose = "the errors that refined meshes predict for a case's own: its `expected`"
-    command = add_command(commands, "expect", _expect, purpose)
-    command.add_argument("case", type=Path, metavar="CASE", help="a case file, or a name")
-    _add_levels(command)
-
-    purpose = "the order, the limit and its uncertainty of results, by refined meshes"
-    command = add_command(commands, "converge", _converge, purpose)
-    command.add_argument("cases", type=Path, nargs="+", metavar="CASE", help="files, or names")
-    command.add_argument("--swap", action="store_true", help="exchange slave and master")
-    _add_levels(command)
-    command.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="and a page in this folder"
-    )
-    add_threads(command)
-
-    purpose = "measure a group of a study"
-    command = add_command(commands, "measure", _measure, purpose, listed=False)
-    command.add_argument("study", type=Path, metavar="STUDY.yaml")
-    command.add_argument("group", metavar="GROUP")
-    _add_common(command, "RECORD.json")
-    add_threads(command)
-
-    purpose = "write the page of a study"
-    command = add_command(commands, "study-page", _page, purpose, listed=False)
-    command.add_argument("study", type=Path, metavar="STUDY.yaml")
-    command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the records")
-    _add_common(command, "DIR")
 
 
 def _add_levels(command: argparse.ArgumentParser) -> None:
@@ -58,7 +26,12 @@ def _add_common(command: argparse.ArgumentParser, output: str) -> None:
     command.add_argument("-o", "--output", type=Path, required=True, metavar=output)
 
 
-def _expect(options: argparse.Namespace) -> int:
+def add_expect(command: argparse.ArgumentParser) -> None:
+    command.add_argument("case", type=Path, metavar="CASE", help="a case file, or a name")
+    _add_levels(command)
+
+
+def run_expect(options: argparse.Namespace) -> int:
     from ..studies.expected import expected_errors
 
     print("expected:")
@@ -67,7 +40,17 @@ def _expect(options: argparse.Namespace) -> int:
     return 0
 
 
-def _converge(options: argparse.Namespace) -> int:
+def add_converge(command: argparse.ArgumentParser) -> None:
+    command.add_argument("cases", type=Path, nargs="+", metavar="CASE", help="files, or names")
+    command.add_argument("--swap", action="store_true", help="exchange slave and master")
+    _add_levels(command)
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="and a page in this folder"
+    )
+    add_threads(command)
+
+
+def run_converge(options: argparse.Namespace) -> int:
     from ..studies.converge import convergence
 
     cases = [case_file(case) for case in options.cases]
@@ -81,7 +64,14 @@ def _converge(options: argparse.Namespace) -> int:
     return 0
 
 
-def _measure(options: argparse.Namespace) -> int:
+def add_measure(command: argparse.ArgumentParser) -> None:
+    command.add_argument("study", type=Path, metavar="STUDY.yaml")
+    command.add_argument("group", metavar="GROUP")
+    _add_common(command, "RECORD.json")
+    add_threads(command)
+
+
+def run_measure(options: argparse.Namespace) -> int:
     from ..studies.description import read_study
     from ..studies.run import write_group
 
@@ -91,7 +81,13 @@ def _measure(options: argparse.Namespace) -> int:
     return 0
 
 
-def _page(options: argparse.Namespace) -> int:
+def add_study_page(command: argparse.ArgumentParser) -> None:
+    command.add_argument("study", type=Path, metavar="STUDY.yaml")
+    command.add_argument("--results", type=Path, required=True, metavar="DIR", help="the records")
+    _add_common(command, "DIR")
+
+
+def run_study_page(options: argparse.Namespace) -> int:
     from ..studies.description import read_study
     from ..studies.page import write_study
 

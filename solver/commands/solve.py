@@ -1,0 +1,159 @@
+"""The commands that solve a case, check its result again, and accept its values."""
+
+import argparse
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..system.errors import InputError
+from . import jobs
+from .options import FAILED, PASSED, add_threads, print_checks
+
+if TYPE_CHECKING:
+    from ..simulation.results.solution import Solution
+    from ..verification.run import Job
+    from ..verification.verdict import Verdict
+
+
+def add_solve(command: argparse.ArgumentParser) -> None:
+    _add_job(command)
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="RESULT.vtkhdf", help="without it nothing is written"
+    )
+    command.add_argument(
+        "--verdict", type=Path, metavar="VERDICT.json", help="written for every outcome"
+    )
+    command.add_argument(
+        "--pictures", type=Path, metavar="DIR", help="draw the pictures of the report, kept there"
+    )
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    command.add_argument("--verbose", action="store_true", help="print each stage, with the time")
+    add_threads(command)
+    command.add_argument(
+        "--everything", action="store_true", help="also do the work that the case does not need"
+    )
+    command.add_argument(
+        "--no-memory-check", action="store_true", help="start even if memory cannot suffice"
+    )
+
+
+def _add_job(command: argparse.ArgumentParser) -> None:
+    """The arguments that identify a solve: case, mesh, direction, variant."""
+    command.add_argument(
+        "case",
+        type=Path,
+        metavar="CASE",
+        help="a case file, or the name of a case that `list` lists",
+    )
+    command.add_argument("--mesh", type=Path, help="a mesh written by `mesh`, used unchanged")
+    command.add_argument("--swap", action="store_true", help="exchange slave and master")
+    command.add_argument(
+        "--hexahedra", choices=("pyramids", "hexahedra"), help="how to cut slave hexahedra"
+    )
+    command.add_argument(
+        "--recovery",
+        choices=("none", "linear", "quadratic", "smooth", "automatic"),
+        help="how to recover a pressure of higher order, instead of the case's own setting",
+    )
+    command.add_argument(
+        "--refine", type=int, default=1, metavar="N", help="a mesh so many times finer"
+    )
+
+
+def run_solve(options: argparse.Namespace) -> int:
+    from ..system.progress import details, report_outcomes
+    from ..verification.run import solve
+
+    log = _silent if options.quiet else partial(print, flush=True)
+    checked, everything = not options.no_memory_check, options.everything
+    job = replace(_job(options), memory_check=checked, everything=everything)
+    with details(options.verbose and not options.quiet), report_outcomes(log):
+        drawn = options.pictures and options.output
+        draw = partial(_draw, options.pictures, options.output.parent) if drawn else None
+        verdict = solve(job, options.output, options.verdict, draw)
+    return PASSED if verdict.sound else FAILED
+
+
+def _job(options: argparse.Namespace) -> "Job":
+    from ..verification.run import Job
+
+    given = vars(options)
+    chosen = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
+    file, swapped = jobs.named(options.case)
+    return Job(swapped=options.swap != swapped, **chosen | {"case": file})
+
+
+def _draw(pictures: Path, folder: Path, solution: "Solution", verdict: "Verdict") -> None:
+    """Draw what the report shows of a solve; it draws what is missing, and says why it cannot."""
+    from ..report.pictures import draw_all
+    from ..report.rows import Row
+
+    with suppress(Exception):
+        draw_all(Row(verdict, folder), pictures, solution)
+
+
+def _silent(line: str) -> None:
+    """Print nothing."""
+
+
+def add_crashed(command: argparse.ArgumentParser) -> None:
+    _add_job(command)
+    command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
+    command.add_argument("--log", type=Path, help="its last line is the reason")
+    command.add_argument("--status", type=int, metavar="N", help="its exit status")
+    command.add_argument("--refusal", help="it was not started, for this reason: refused")
+
+
+def run_crashed(options: argparse.Namespace) -> int:
+    from ..verification.run import record_crash, record_refusal
+
+    if options.refusal:
+        print(record_refusal(options.case, options.verdict, options.refusal).summary)
+        return PASSED
+    print(record_crash(_job(options), options.verdict, options.log, options.status).summary)
+    return PASSED
+
+
+def add_check(command: argparse.ArgumentParser) -> None:
+    command.add_argument("results", type=Path, nargs="+", metavar="RESULT.vtkhdf")
+    command.add_argument("--json", action="store_true", help="print a list of verdicts")
+
+
+def run_check(options: argparse.Namespace) -> int:
+    from ..verification.run import check
+    from ..verification.verdict import to_json
+
+    verdicts = [check(result) for result in options.results]
+    if options.json:
+        print(to_json([verdict.plain() for verdict in verdicts]))
+    else:
+        for verdict in verdicts:
+            print_checks(verdict)
+    return PASSED if all(verdict.sound for verdict in verdicts) else FAILED
+
+
+def add_accept(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "results", type=Path, nargs="+", metavar="RESULT.vtkhdf", help="or a case file"
+    )
+
+
+def run_accept(options: argparse.Namespace) -> int:
+    from ..verification.checks import run_checks
+    from ..verification.regression import accept, accepted_values, regression_file
+    from ..verification.results import read_result
+
+    for path in (result for given in options.results for result in jobs.results_of(given)):
+        solution = read_result(path).solution
+        case, target = solution.case.path, regression_file(solution).resolve()
+        if not (case.is_file() and target.is_relative_to(Path.cwd())):
+            allowed = "must be a file below the current folder, where its accepted values lie"
+            raise InputError(path, "case", str(case), allowed)
+        checks = run_checks(solution, accepted_values(solution))
+        changes = accept(solution, checks)
+        print(f"{solution.job}: {len(changes)} new accepted values of {len(checks)}")
+        for line in changes:
+            print(f"  {line}")
+    return PASSED
