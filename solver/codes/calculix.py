@@ -28,12 +28,10 @@ from .foreign import Field, ForeignResult
 from .shifted import with_layers
 
 PROGRAM = "ccx"
-# Cells whose nodes have the same order here and there.
-ELEMENTS = {
-    "TETRA4": "C3D4", "TETRA10": "C3D10", "PENTA6": "C3D6", "PENTA15": "C3D15",
-    "HEXA8": "C3D8", "HEXA20": "C3D20",
-}  # fmt: skip
-RINGS = {"TRIA3": "CAX3", "TRIA6": "CAX6", "QUAD4": "CAX4", "QUAD8": "CAX8"}
+# Abaqus's cells but the pyramids, plane ones as rings.
+_CELLS = [k for k in BY_NAME.values() if k.abaqus and k.shape != "PYRA"]
+ELEMENTS = {k.name: k.abaqus for k in _CELLS if k.dim == 3}
+RINGS = {k.name: f"CAX{k.n_nodes}" for k in _CELLS if k.dim == 2}
 # Pressure by overlap, over Young's modulus by the size of a slave face: results do not depend on
 # the unit of length. On curved surfaces the overlap of facets is pressure, and a softer contact is
 # the better one: the manual's advice of 5 to 50 E for millimetres.

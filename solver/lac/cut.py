@@ -19,8 +19,6 @@ from .cells.catalogue import BY_NAME, CellType, cell_type
 from .cells.faces import FaceBlock
 from .cells.shape import has_straight_edges, shape_functions
 
-# Faces without a node strictly inside, and TRIA6 and QUAD8, whose inner nodes are on the rim.
-CUT_FACES = ("SEG2", "TRIA3", "TRIA6", "QUAD4", "QUAD8")
 # Shape functions below this at a new node are zero there up to round-off.
 _NO_SHARE = 1e-14
 
@@ -53,12 +51,13 @@ class CutMesh:
 
 
 def needs_cut(face_type: str) -> bool:
-    """Whether a slave face of that type has no node strictly inside (2D: SEG3 has one).
+    """Whether a slave face of that type has no node in its middle (2D: SEG3 has one).
 
     >>> needs_cut("SEG2"), needs_cut("SEG3")
     (True, False)
     """
-    return face_type in CUT_FACES
+    kind = BY_NAME[face_type]
+    return all(len(owners) < kind.n_vertices for owners in kind.owners)
 
 
 def cut(

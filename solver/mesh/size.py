@@ -19,35 +19,16 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-from ..lac.cells.catalogue import BY_NAME
+from ..lac.cells.catalogue import BY_NAME, CellType
 from ..system.errors import MachineError
 from ..system.memory import available
 from ..system.progress import OUTCOME
 
 _LOG = logging.getLogger(__name__)
 
-# Nodes of a piece of a grid: at its corner, and within each of its edges, faces and volume. A piece
-# is one cell, two prisms, or six pyramids about a point.
-_GRID: dict[str, tuple[float, ...]] = {
-    "QUAD4": (1, 0, 0),
-    "QUAD8": (1, 1, 0),
-    "QUAD9": (1, 1, 1),
-    "HEXA8": (1, 0, 0, 0),
-    "HEXA20": (1, 1, 0, 0),
-    "HEXA27": (1, 1, 1, 1),
-    "PENTA6": (1, 0, 0, 0),
-    "PENTA15": (1, 1, 1 / 3, 0),
-    "PYRA5": (1, 0, 0, 1),
-    "PYRA13": (1, 1, 0, 9),
-}
-# Nodes of an unstructured mesh for each product of its divisions, and of those of a side: counted
-# to within a tenth.
-_SIMPLICES = {
-    "TRIA3": (1.155, 2.4),
-    "TRIA6": (4.62, 5.0),
-    "TETRA4": (0.674, 4.8),
-    "TETRA10": (5.0, 26.0),
-}
+# Nodes of an unstructured mesh for each product of its divisions, and of those of a side, by
+# dimension and degree of the cells: counted to within a tenth.
+_SIMPLICES = {(2, 1): (1.155, 2.4), (2, 2): (4.62, 5.0), (3, 1): (0.674, 4.8), (3, 2): (5.0, 26.0)}
 # Pieces of a block, the product of its divisions, from which gmsh fills it with tetrahedra by HXT:
 # that takes a tenth of the time and makes fewer nodes, by this factor.
 _HXT_FROM, _HXT_NODES = 1_500_000, 0.89
@@ -111,17 +92,31 @@ def of_body(cells: str, divisions: Sequence[int], refine: int = 1) -> Size:
     """
     kind = BY_NAME[cells]
     along = [refine * n for n in divisions] * (1 if len(divisions) == kind.dim else kind.dim)
-    if cells in _SIMPLICES:
-        inside, outside = _SIMPLICES[cells]
+    if kind.shape in ("TRIA", "TETRA"):
+        inside, outside = _SIMPLICES[kind.dim, kind.order]
         nodes = inside * prod(along) + outside * prod(along[:-1])
         nodes *= _HXT_NODES if fills_by_hxt(cells, along) else 1.0
     else:
         # An edge of the grid has n places along its own axis and n + 1 along each other.
         nodes = sum(
-            _GRID[cells][sum(within)] * prod(n + 1 - w for n, w in zip(along, within, strict=True))
+            _in_grid(kind)[sum(within)]
+            * prod(n + 1 - w for n, w in zip(along, within, strict=True))
             for within in product((0, 1), repeat=kind.dim)
         )
     return Size(nodes, kind.dim, kind.order)
+
+
+def _in_grid(kind: CellType) -> Sequence[float]:
+    """Nodes of a piece of a grid: at its corner, within each of its edges, faces and volume.
+
+    A piece is one cell, two prisms, or six pyramids about a point.
+    """
+    edge, middle = kind.order - 1, int(kind.centred)
+    if kind.shape == "PENTA":
+        return 1, edge, edge / 3, 0
+    if kind.shape == "PYRA":
+        return 1, edge, 0, 1 + 8 * edge
+    return 1, edge, middle, middle
 
 
 def fills_by_hxt(cells: str, divisions: Sequence[int]) -> bool:
@@ -164,7 +159,8 @@ def _body(section: Any) -> tuple[str, list[int]] | None:
     cells, divisions = str(section.get("cells")), section.get("divisions")
     divisions = divisions if isinstance(divisions, list) else [divisions]
     whole = all(isinstance(n, int) and 0 < n < _MANY for n in divisions)
-    valid = cells in {*_GRID, *_SIMPLICES} and len(divisions) in (1, BY_NAME[cells].dim)
+    kind = BY_NAME.get(cells)
+    valid = kind and kind.dim > 1 and len(divisions) in (1, kind.dim)
     return (cells, divisions) if valid and whole else None
 
 

@@ -126,7 +126,7 @@ def test_a_plane_solve_imports_nothing_of_three_dimensions_or_friction(tmp_path)
     loaded = set(done.stdout.split("\n")[-2].split())
     assert "solver.lac.cells.shape" in loaded
     of_space = {
-        "solver.mechanics.fem.extra_elements",
+        "solver.lac.cells.extra_elements",
         "solver.mesh.recipes.hybrid",
         "solver.simulation.equilibrium.friction",
         "solver.report.case_picture",

@@ -23,11 +23,12 @@ class Face:
 class CellType:
     """One cell type.
 
-    `meshio`, `vtk`, `gmsh`, `med`: its name or number there; `nodes` (n_nodes, dim) are the
-    reference coordinates; `owners` the vertices in whose middle each node lies; `edges` the vertex
-    pairs, in the order of the mid-edge nodes; `mirror` the node permutation that reverses the
-    orientation; `skeleton` the name of the linear type with the same vertices; `centred`: whether a
-    node lies in the middle.
+    `meshio`, `vtk`, `gmsh`, `med`, `abaqus`: its name or number there, empty where it has none;
+    `element` the class of its shape functions; `nodes` (n_nodes, dim) are the reference
+    coordinates; `owners` the vertices in whose middle each node lies; `edges` the vertex pairs, in
+    the order of the mid-edge nodes; `mirror` the node permutation that reverses the orientation;
+    `skeleton` the name of the linear type with the same vertices; `centred`: whether a node lies in
+    the middle.
     """
 
     name: str
@@ -35,6 +36,8 @@ class CellType:
     vtk: int
     gmsh: int
     med: str
+    abaqus: str
+    element: str
     order: int
     skeleton: str
     nodes: np.ndarray
@@ -50,6 +53,11 @@ class CellType:
         return self.nodes.shape[1]
 
     @cached_property
+    def shape(self) -> str:
+        """The name without the number of nodes."""
+        return _shape_of(self.name)
+
+    @cached_property
     def n_nodes(self) -> int:
         """Number of nodes."""
         return len(self.nodes)
@@ -57,7 +65,7 @@ class CellType:
     @cached_property
     def n_vertices(self) -> int:
         """Number of vertices; they come first in the node order."""
-        return len(_SHAPES[_shape_of(self.name)].vertices)
+        return len(_SHAPES[self.shape].vertices)
 
     @property
     def degree(self) -> int:
@@ -69,12 +77,12 @@ class CellType:
     @property
     def layer(self) -> "CellType":
         """The type of the cells of one layer over cells of this type."""
-        over = {"SEG": "QUAD", "TRIA": "PENTA", "QUAD": "HEXA"}[_shape_of(self.name)]
+        over = {"SEG": "QUAD", "TRIA": "PENTA", "QUAD": "HEXA"}[self.shape]
         return BY_NAME[_type_of(over, self.order, self.centred)]
 
     def of(self, order: int, centred: bool) -> "CellType":
         """The type of an order on these vertices, with a node in its middle if there is one."""
-        return BY_NAME[_type_of(_shape_of(self.name), order, centred)]
+        return BY_NAME[_type_of(self.shape, order, centred)]
 
     def put_between(self, values: np.ndarray, nodes: np.ndarray) -> None:
         """Give the nodes of cells (n, n_nodes) that are no vertices the mean of their vertices'.
@@ -143,24 +151,26 @@ _SHAPES = {
     ),
 }
 
-# name: (names in meshio, VTK, gmsh and MED, order, has face centres, has a cell centre)
+# name: (names in meshio, VTK, gmsh, MED and Abaqus, class of its shape functions, order, has face
+# centres, has a cell centre). The class is scikit-fem's or one of `extra_elements`; edges and faces
+# need none.
 _TYPES = {
-    "SEG2": ("line", 3, 1, "SE2", 1, False, False),
-    "SEG3": ("line3", 21, 8, "SE3", 2, False, False),
-    "TRIA3": ("triangle", 5, 2, "TR3", 1, False, False),
-    "TRIA6": ("triangle6", 22, 9, "TR6", 2, False, False),
-    "QUAD4": ("quad", 9, 3, "QU4", 1, False, False),
-    "QUAD8": ("quad8", 23, 16, "QU8", 2, False, False),
-    "QUAD9": ("quad9", 28, 10, "QU9", 2, False, True),
-    "TETRA4": ("tetra", 10, 4, "TE4", 1, False, False),
-    "TETRA10": ("tetra10", 24, 11, "T10", 2, False, False),
-    "HEXA8": ("hexahedron", 12, 5, "HE8", 1, False, False),
-    "HEXA20": ("hexahedron20", 25, 17, "H20", 2, False, False),
-    "HEXA27": ("hexahedron27", 29, 12, "H27", 2, True, True),
-    "PENTA6": ("wedge", 13, 6, "PE6", 1, False, False),
-    "PENTA15": ("wedge15", 26, 18, "P15", 2, False, False),
-    "PYRA5": ("pyramid", 14, 7, "PY5", 1, False, False),
-    "PYRA13": ("pyramid13", 27, 19, "P13", 2, False, False),
+    "SEG2": ("line", 3, 1, "SE2", "", "", 1, False, False),
+    "SEG3": ("line3", 21, 8, "SE3", "", "", 2, False, False),
+    "TRIA3": ("triangle", 5, 2, "TR3", "CPE3", "", 1, False, False),
+    "TRIA6": ("triangle6", 22, 9, "TR6", "CPE6", "", 2, False, False),
+    "QUAD4": ("quad", 9, 3, "QU4", "CPE4", "", 1, False, False),
+    "QUAD8": ("quad8", 23, 16, "QU8", "CPE8", "", 2, False, False),
+    "QUAD9": ("quad9", 28, 10, "QU9", "", "", 2, False, True),
+    "TETRA4": ("tetra", 10, 4, "TE4", "C3D4", "ElementTetP1", 1, False, False),
+    "TETRA10": ("tetra10", 24, 11, "T10", "C3D10", "ElementTetP2", 2, False, False),
+    "HEXA8": ("hexahedron", 12, 5, "HE8", "C3D8", "ElementHex1", 1, False, False),
+    "HEXA20": ("hexahedron20", 25, 17, "H20", "C3D20", "ElementHexS2", 2, False, False),
+    "HEXA27": ("hexahedron27", 29, 12, "H27", "", "ElementHex2", 2, True, True),
+    "PENTA6": ("wedge", 13, 6, "PE6", "C3D6", "ElementWedge1", 1, False, False),
+    "PENTA15": ("wedge15", 26, 18, "P15", "C3D15", "ElementWedgeS2", 2, False, False),
+    "PYRA5": ("pyramid", 14, 7, "PY5", "C3D5", "ElementPyramid", 1, False, False),
+    "PYRA13": ("pyramid13", 27, 19, "P13", "", "ElementPyramid", 2, False, False),
 }
 
 
@@ -170,12 +180,12 @@ def _shape_of(name: str) -> str:
 
 def _type_of(shape: str, order: int, centred: bool) -> str:
     """The type of a shape and order, with a node in its middle if there is one."""
-    found = [n for n in _TYPES if _shape_of(n) == shape and _TYPES[n][4] == order]
-    return next((n for n in found if _TYPES[n][6] == centred), found[0])
+    found = [n for n in _TYPES if _shape_of(n) == shape and _TYPES[n][6] == order]
+    return next((n for n in found if _TYPES[n][8] == centred), found[0])
 
 
 def _build(name: str) -> CellType:
-    meshio_name, vtk, gmsh, med, order, face_centres, cell_centre = _TYPES[name]
+    *names, order, face_centres, cell_centre = _TYPES[name]
     shape = _SHAPES[_shape_of(name)]
     vertices = np.array(shape.vertices, dtype=float)
     # Each node is known by the set of vertices whose mean it is.
@@ -201,11 +211,8 @@ def _build(name: str) -> CellType:
             Face(_type_of(("SEG", "TRIA", "QUAD")[len(face) - 2], order, face_centres), nodes)
         )
     return CellType(
-        name=name,
-        meshio=meshio_name,
-        vtk=vtk,
-        gmsh=gmsh,
-        med=med,
+        name,
+        *names,
         order=order,
         skeleton=next(t for t in _TYPES if _shape_of(t) == _shape_of(name)),
         nodes=np.array([vertices[sorted(owner)].mean(axis=0) for owner in owners]),

@@ -23,7 +23,7 @@ def gauss_rule(name: str, n: int) -> Rule:
 
     Exact to degree 2 n − 1.
     """
-    shape = name.rstrip("0123456789")
+    shape = BY_NAME[name].shape
     line = _line(n, 0)
     if shape == "SEG":
         return line

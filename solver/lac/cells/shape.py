@@ -4,7 +4,6 @@ Those of edges and faces are products of a matrix and monomials, since contact e
 many points; solid cells have scikit-fem's.
 """
 
-from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any
 
@@ -35,8 +34,6 @@ def invert(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return determinant, np.moveaxis(adjugate / determinant, (0, 1), (-2, -1))
 
 
-MORE_ELEMENTS: dict[str, Callable[[], Any]] = {}
-"""Elements by cell type that scikit-fem does not have; `solver.mechanics.fem` adds them."""
 # Mid-edge nodes off the middle by less than this share of the edge make no bent edge.
 _STRAIGHT = 1e-9
 # Values at points of at most so many coordinates are kept.
@@ -52,7 +49,7 @@ class ShapeFunctions:
 
     def __init__(self, name: str):
         self.type = BY_NAME[name]
-        self._element = _scikit_fem_element(name)
+        self._element = _element_of(self.type)
         places = np.asarray(self._element.doflocs)
         distance = np.linalg.norm(self.type.nodes[:, None] - places[None], axis=2)
         self._order = distance.argmin(axis=1)
@@ -157,17 +154,12 @@ def has_straight_edges(kind: CellType, corner: np.ndarray) -> np.ndarray:
     return (np.linalg.norm(offset, axis=2) <= _STRAIGHT * length).all(axis=1)
 
 
-def _scikit_fem_element(name: str) -> Any:
-    import skfem.element as element
+def _element_of(kind: CellType) -> Any:
+    import skfem.element
 
-    if name in MORE_ELEMENTS:
-        return MORE_ELEMENTS[name]()
-    makers = {
-        "TETRA4": element.ElementTetP1,
-        "TETRA10": element.ElementTetP2,
-        "HEXA8": element.ElementHex1,
-        "HEXA20": element.ElementHexS2,
-        "HEXA27": element.ElementHex2,
-        "PENTA6": element.ElementWedge1,
-    }
-    return makers[name]()
+    found = getattr(skfem.element, kind.element, None)
+    if found:
+        return found()
+    from . import extra_elements
+
+    return getattr(extra_elements, kind.element)(kind.name)

@@ -34,7 +34,7 @@ def volume_rule(name: str, straight: bool = True) -> Rule:
     Cells whose edges are not `straight` need more points where the type is TETRA10; the rules of
     the others suffice for bent cells as well.
     """
-    shape = name.rstrip("0123456789")
+    shape = BY_NAME[name].shape
     if name == "TETRA10" and not straight:
         return simplex_rule(3, 4)
     degrees = _DEGREES[shape][BY_NAME[name].order - 1]

@@ -101,7 +101,7 @@ def _inverted(kind: CellType, corner: np.ndarray, place: np.ndarray) -> np.ndarr
 
 def _within(kind: CellType, reference: np.ndarray) -> np.ndarray:
     """Reference coordinates (n, dim) moved into the cell."""
-    shape, found = kind.name.rstrip("0123456789"), reference.copy()
+    shape, found = kind.shape, reference.copy()
     if shape == "PYRA":
         found[:, 2] = found[:, 2].clip(0, _APEX)
         reach = 1 - found[:, 2:]

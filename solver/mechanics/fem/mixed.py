@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from ...lac.cells.catalogue import CellType
 from ...lac.cells.shape import shape_functions
 from .assembly import degrees_of_freedom
 from .block import Block
@@ -33,7 +34,6 @@ from .elasticity import chunks, shapes_in
 
 AUTOMATIC_ABOVE = 0.499
 """Poisson's ratio above which the mixed form is taken where a case does not choose."""
-_AT_VERTICES, _LINEAR = ("TRIA6", "QUAD8"), ("QUAD9", "HEXA27")
 _CELLS_AT_ONCE = 2048
 
 
@@ -232,14 +232,22 @@ def _mean_stress(
     return MeanStress(cells, compliance, n_nodes, dim)
 
 
+def _at_vertices(kind: CellType) -> bool:
+    return kind.order == 2 and kind.dim == 2 and not kind.centred
+
+
+def _is_linear(kind: CellType) -> bool:
+    return kind.order == 2 and kind.centred
+
+
 def _keys(block: Block, meshed: np.ndarray, dim: int) -> np.ndarray:
     """What identifies the unknowns s of a block's cells: (n, k, 3) numbers."""
-    if block.type.name in _AT_VERTICES:
+    if _at_vertices(block.type):
         # s jumps where the material changes.
         material = np.stack([block.lame, block.shear], axis=1).view(np.int64)
         own, number = material[:, None], block.cells[:, : block.type.n_vertices]
     else:
-        count = dim + 1 if block.type.name in _LINEAR else 1
+        count = dim + 1 if _is_linear(block.type) else 1
         number = np.repeat(meshed[:, None], count, axis=1)
         own = np.stack([np.arange(count), np.full(count, -1)], axis=1)[None]
     own = np.broadcast_to(own, (*number.shape, 2))
@@ -278,7 +286,7 @@ def _chunk(
     values = _functions(points, block, cells, places, measure)
     inside, at_nodes = values[:, : len(weights)], values[:, len(weights) :]
     flux = np.einsum("cq,cqk,cqai->ckai", measure, inside, found.divergence, optimize=True)
-    once = np.ones_like(inside) if block.type.name in _AT_VERTICES else inside
+    once = np.ones_like(inside) if _at_vertices(block.type) else inside
     return flux, at_nodes, np.einsum("cq,cqk,cqk->ck", measure, inside, once, optimize=True)
 
 
@@ -289,11 +297,11 @@ def _functions(
 
     Those linear in the cell are made orthogonal, with the weights `measure` (n, q) at the first q.
     """
-    if block.type.name in _AT_VERTICES:
+    if _at_vertices(block.type):
         values = shape_functions(block.type.skeleton).values(places)
         return np.broadcast_to(values, (len(cells), *values.shape))
     one = np.ones((len(cells), len(places), 1))
-    if block.type.name not in _LINEAR:
+    if not _is_linear(block.type):
         return one
     corner = points[cells] - points[cells].mean(axis=1, keepdims=True)
     shape = shape_functions(block.type.name).values(places)

@@ -145,7 +145,7 @@ def _type_of(kind: CellType, n_vertices: int) -> CellType:
 def _vertices(kind: CellType) -> list[np.ndarray]:
     """The vertices (v, dim) of each child in the parent's reference cell."""
     own = kind.nodes[: kind.n_vertices]
-    shape = kind.name.rstrip("0123456789")
+    shape = kind.shape
     middle = np.array([own[list(edge)].mean(axis=0) for edge in kind.edges])
     if shape == "TETRA":
         every = np.concatenate([own, middle])

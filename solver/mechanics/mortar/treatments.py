@@ -103,8 +103,8 @@ def without_partner(
 DEFAULT_POINTS = 4
 # Slave nodes at the end of a bent surface may look past the master's by this part of a face.
 _BEYOND = 0.05
-_LINEAR = ("SEG2", "TRIA3", "QUAD4")
 _ALL = tuple(name for name, kind in BY_NAME.items() if kind.dim < 3)
+_LINEAR = tuple(name for name in _ALL if BY_NAME[name].order == 1)
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,7 @@ import numpy as np
 from ...lac.cells.catalogue import BY_NAME, CellType
 from ...system.errors import InputError
 
-_SOLIDS = {
-    4: "TETRA4", 10: "TETRA10", 5: "PYRA5", 6: "PENTA6", 15: "PENTA15", 8: "HEXA8", 20: "HEXA20",
-}  # fmt: skip
+_SOLIDS = {k.n_nodes: name for name, k in BY_NAME.items() if k.dim == 3 and k.abaqus}
 _SURFACES = {kind.n_nodes: name for name, kind in BY_NAME.items() if kind.dim == 2}
 _LINES = {
     "T2D2": "SEG2", "T3D2": "SEG2", "B21": "SEG2", "B31": "SEG2", "R2D2": "SEG2",
@@ -234,7 +232,7 @@ class _Deck:
                 yield self._face(*self.cells[number], label[0].upper() if label else "")
 
     def _face(self, cell: CellType, nodes: list[int], label: str) -> tuple[CellType, list[int]]:
-        corners = FACES[cell.name.rstrip("0123456789")]
+        corners = FACES[cell.shape]
         number = int(label[1:]) if re.fullmatch(r"S\d", label) else 0
         if not 0 < number <= len(corners):
             # Without a number, or as SPOS and SNEG: the shell itself is the face.

@@ -10,11 +10,7 @@ from ...lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
 from ...system.errors import InputError
 from .abaqus import FACES
 
-_NAMES = {
-    "TRIA3": "CPE3", "TRIA6": "CPE6", "QUAD4": "CPE4", "QUAD8": "CPE8", "TETRA4": "C3D4",
-    "TETRA10": "C3D10", "PYRA5": "C3D5", "PENTA6": "C3D6", "PENTA15": "C3D15", "HEXA8": "C3D8",
-    "HEXA20": "C3D20",
-}  # fmt: skip
+_NAMES = {name: kind.abaqus for name, kind in BY_NAME.items() if kind.abaqus}
 # Entries of a data line.
 _IN_LINE = 15
 
@@ -105,7 +101,7 @@ def face_number(cell: CellType, local: int) -> int:
     """
     face = cell.faces[local]
     corners = set(face.nodes[: BY_NAME[face.type].n_vertices])
-    labels = [{int(c) - 1 for c in text} for text in FACES[cell.name.rstrip("0123456789")]]
+    labels = [{int(c) - 1 for c in text} for text in FACES[cell.shape]]
     return next(i for i, label in enumerate(labels, start=1) if label <= corners)
 
 

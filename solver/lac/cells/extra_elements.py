@@ -8,7 +8,7 @@ import numpy as np
 from skfem.element.element_h1 import ElementH1
 from skfem.refdom import RefHex, RefWedge
 
-from ...lac.cells.catalogue import BY_NAME
+from .catalogue import BY_NAME
 
 
 class _NodeElement(ElementH1):
@@ -75,9 +75,6 @@ class ElementWedgeS2(_NodeElement):
 
     refdom = RefWedge
     maxdeg = 4
-
-    def __init__(self) -> None:
-        super().__init__("PENTA15")
 
     def lbasis(self, X: np.ndarray, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Value (n,) and gradient (3, n) of function `i` at the points `X` (3, n)."""
