@@ -185,7 +185,7 @@ def _type_of(shape: str, order: int, centred: bool) -> str:
 
 
 def _build(name: str) -> CellType:
-    *names, order, face_centres, cell_centre = _TYPES[name]
+    meshio_name, vtk, gmsh, med, abaqus, element, order, face_centres, cell_centre = _TYPES[name]
     shape = _SHAPES[_shape_of(name)]
     vertices = np.array(shape.vertices, dtype=float)
     # Each node is known by the set of vertices whose mean it is.
@@ -211,8 +211,13 @@ def _build(name: str) -> CellType:
             Face(_type_of(("SEG", "TRIA", "QUAD")[len(face) - 2], order, face_centres), nodes)
         )
     return CellType(
-        name,
-        *names,
+        name=name,
+        meshio=meshio_name,
+        vtk=vtk,
+        gmsh=gmsh,
+        med=med,
+        abaqus=abaqus,
+        element=element,
         order=order,
         skeleton=next(t for t in _TYPES if _shape_of(t) == _shape_of(name)),
         nodes=np.array([vertices[sorted(owner)].mean(axis=0) for owner in owners]),
