@@ -28,7 +28,7 @@ class CellType:
     coordinates; `owners` the vertices in whose middle each node lies; `edges` the vertex pairs, in
     the order of the mid-edge nodes; `mirror` the node permutation that reverses the orientation;
     `skeleton` the name of the linear type with the same vertices; `centred`: whether a node lies in
-    the middle.
+    the middle of each quadrangle.
     """
 
     name: str
@@ -151,9 +151,9 @@ _SHAPES = {
     ),
 }
 
-# name: (names in meshio, VTK, gmsh, MED and Abaqus, class of its shape functions, order, has face
-# centres, has a cell centre). The class is scikit-fem's or one of `extra_elements`; edges and faces
-# need none.
+# name: (names in meshio, VTK, gmsh, MED and Abaqus, class of its shape functions, order, has nodes
+# in the middle of quadrangular faces, of the cell). The class is scikit-fem's or one of
+# `extra_elements`; edges and faces need none.
 _TYPES = {
     "SEG2": ("line", 3, 1, "SE2", "", "", 1, False, False),
     "SEG3": ("line3", 21, 8, "SE3", "", "", 2, False, False),
@@ -179,9 +179,9 @@ def _shape_of(name: str) -> str:
 
 
 def _type_of(shape: str, order: int, centred: bool) -> str:
-    """The type of a shape and order, with a node in its middle if there is one."""
+    """The type of a shape and order, with nodes in the middle of quadrangles if there is one."""
     found = [n for n in _TYPES if _shape_of(n) == shape and _TYPES[n][6] == order]
-    return next((n for n in found if _TYPES[n][8] == centred), found[0])
+    return next((n for n in found if any(_TYPES[n][7:]) == centred), found[0])
 
 
 def _build(name: str) -> CellType:
@@ -193,7 +193,7 @@ def _build(name: str) -> CellType:
     if order == 2:
         owners += [frozenset(edge) for edge in shape.edges]
     if face_centres:
-        owners += [frozenset(face) for face in shape.faces]
+        owners += [frozenset(face) for face in shape.faces if len(face) == 4]
     if cell_centre:
         owners.append(frozenset(range(len(vertices))))
     number = {owner: i for i, owner in enumerate(owners)}
@@ -204,7 +204,7 @@ def _build(name: str) -> CellType:
         if order == 2:
             rim = zip(face, (*face[1:], face[0]), strict=True)
             parts += [frozenset(e) for e in (rim if len(face) > 2 else [face])]
-        if face_centres:
+        if face_centres and len(face) == 4:
             parts.append(frozenset(face))
         nodes = tuple(number[p] for p in parts)
         faces.append(
@@ -225,7 +225,7 @@ def _build(name: str) -> CellType:
         edges=shape.edges,
         faces=tuple(faces),
         mirror=tuple(number[m] for m in mirrored),
-        centred=cell_centre,
+        centred=face_centres or cell_centre,
     )
 
 

@@ -43,7 +43,7 @@ def cube(
     halves, pieces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     nodes, pieces = halves / (2 * divisions), pieces.reshape(corners.shape[:2])
     linear = BY_NAME[cell.skeleton]
-    with session(Mesh__SecondOrderIncomplete=1):
+    with session(Mesh__SecondOrderIncomplete=not cell.centred):
         volume = gmsh.model.addDiscreteEntity(3)
         numbers = np.arange(1, len(nodes) + 1)
         gmsh.model.mesh.addNodes(3, volume, numbers, (origin + nodes * size).ravel())
