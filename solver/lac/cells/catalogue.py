@@ -169,7 +169,6 @@ _TYPES = {
     "HEXA27": ("hexahedron27", 29, 12, "H27", "", "ElementHex2", 2, True, True),
     "PENTA6": ("wedge", 13, 6, "PE6", "C3D6", "ElementWedge1", 1, False, False),
     "PENTA15": ("wedge15", 26, 18, "P15", "C3D15", "ElementWedgeS2", 2, False, False),
-    "PENTA18": ("wedge18", 32, 13, "P18", "", "ElementWedge2", 2, True, False),
     "PYRA5": ("pyramid", 14, 7, "PY5", "C3D5", "ElementPyramid", 1, False, False),
     "PYRA13": ("pyramid13", 27, 19, "P13", "", "ElementPyramid", 2, False, False),
 }

@@ -95,22 +95,3 @@ class ElementWedgeS2(_NodeElement):
             return 2 * v * w * end, 2 * gradient
         w, dw = barycentric[i - 12], slopes[i - 12]
         return w * (1 - t**2), dw * (1 - t**2) - 2 * t * dt * w
-
-
-class ElementWedge2(_NodeElement):
-    """PENTA18: the products of TRIA6 and SEG3."""
-
-    refdom = RefWedge
-    maxdeg = 4
-
-    def lbasis(self, X: np.ndarray, i: int) -> tuple[np.ndarray, np.ndarray]:
-        """Value (n,) and gradient (3, n) of function `i` at the points `X` (3, n)."""
-        from .shape import shape_functions
-
-        triangle, line = shape_functions("TRIA6"), shape_functions("SEG3")
-        place = self.doflocs[i]
-        base = np.linalg.norm(triangle.type.nodes - place[:2], axis=1).argmin()
-        end = np.abs(line.type.nodes[:, 0] - place[2]).argmin()
-        value, slope = (f[..., base, :] if f.ndim == 3 else f[:, base] for f in triangle.both(X[:2].T))
-        across, along = (f[:, end] for f in line.both(X[2:].T))
-        return value * across, np.concatenate([slope.T * across, (value * along[:, 0])[None]])
