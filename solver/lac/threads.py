@@ -37,10 +37,10 @@ def prefetch(function: Callable[[Part], Result], parts: Iterable[Part]) -> Itera
     [0, 1, 4, 9, 16]
     """
     parts = list(parts)
-    count = min(workers(), len(parts))
-    if count < 2 or current_thread().name.startswith(_NAME):
+    if len(parts) < 2 or current_thread().name.startswith(_NAME):
         return map(function, parts)
-    return _ahead(function, parts, count)
+    count = min(workers(), len(parts))
+    return _ahead(function, parts, count) if count > 1 else map(function, parts)
 
 
 def _ahead(

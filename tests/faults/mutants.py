@@ -268,7 +268,7 @@ MUTANTS = (
     Mutant("poisson-digits", "ν of the lower block is 0.2991 instead of 0.3", PLANE,
            "simulation.scene.attributes:Attributes.by_material", lower_half_softer),
     Mutant("stale-system", "the factored system belongs to the first status", CLOSING,
-           "simulation.equilibrium.problem:ContactProblem._constrained", first_system_kept),
+           "mechanics.linear.systems:Systems.closed", first_system_kept),
     Mutant("wrong-factor", "the factorisation belongs to half the stiffness", PLANE,
            "mechanics.linear.condensation:prepare", factor_of_half),
     Mutant("multiplier-sign", "the multiplier has the wrong sign in the equilibrium", PLANE,

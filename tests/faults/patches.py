@@ -89,12 +89,12 @@ def never_closing(true: Wrapped) -> Wrapped:
 def first_system_kept(true: Wrapped) -> Wrapped:
     kept: dict[int, Any] = {}
 
-    def constrained(problem: Any, closed: np.ndarray) -> Any:
-        if id(problem) not in kept:
-            kept[id(problem)] = true(problem, closed)
-        return kept[id(problem)]
+    def closed_at_first(systems: Any, closed: np.ndarray) -> Any:
+        if id(systems) not in kept:
+            kept[id(systems)] = true(systems, closed)
+        return kept[id(systems)]
 
-    return constrained
+    return closed_at_first
 
 
 def factor_of_half(true: Wrapped) -> Wrapped:

@@ -19,8 +19,8 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.errors import SolveError
-from .choice import Factor, LinearSolver, Shared, factorise, prepare
-from .condensation import CondensedSystem, condense
+from .choice import Factor, Shared, factorise, prepare
+from .condensation import CondensedSystem, ConstrainedSystem, condense
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .krylov import EPSILON
 from .symmetric_blocks import Stiffness
@@ -35,8 +35,8 @@ class Compliance:
     weight: np.ndarray
 
 
-@dataclass(frozen=True)
-class StabilisedSystem:
+@dataclass(frozen=True, kw_only=True)
+class StabilisedSystem(ConstrainedSystem):
     """The system `condensed` of displacement and springs (n + s,), for a displacement (n,).
 
     The springs are the ones of the pressures that balance the forces. See `ConstrainedSystem`.
@@ -44,21 +44,6 @@ class StabilisedSystem:
 
     condensed: CondensedSystem
     compliance: Compliance
-
-    @property
-    def factor(self) -> LinearSolver:
-        """The solver of the condensed system."""
-        return self.condensed.factor
-
-    @property
-    def why(self) -> str:
-        """Why it was chosen."""
-        return self.condensed.why
-
-    @property
-    def warning(self) -> str:
-        """See `CondensedSystem`."""
-        return self.condensed.warning
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
@@ -104,9 +89,10 @@ def stabilise(
     whole = sparse.hstack([constraints, compliance.scatter.T], format="csr")
     springs = 1 / compliance.weight
     condensed = condense(matrix, whole, own, unknowns, gave_up, shared, springs)
-    return StabilisedSystem(condensed, compliance)
+    return StabilisedSystem(factor=condensed.factor, condensed=condensed, compliance=compliance)
 
 
+_NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
 # A step leaves about 1 / (w λ) of a violation, with the smallest eigenvalue λ of Ĝ D⁻¹ Ĝᵀ, whose
 # diagonal is one; the factor loses as many digits as w has, which refinement returns.
 _WEIGHT, _REDUCTION = 1e4, 10.0
@@ -117,8 +103,8 @@ _MOST_STEPS = 12
 _GAIN = 0.5
 
 
-@dataclass(frozen=True)
-class AugmentedSystem:
+@dataclass(frozen=True, kw_only=True)
+class AugmentedSystem(ConstrainedSystem):
     """`scaled` Ĝ (m, n): constraints, each divided by its `size` (m,); the `factor` of A.
 
     `compliance` (n,): the inverse of the diagonal D of K; the factor `gram` of Ĝ D⁻¹ Ĝᵀ;
@@ -127,21 +113,9 @@ class AugmentedSystem:
 
     scaled: sparse.csr_matrix
     size: np.ndarray
-    factor: LinearSolver
     compliance: np.ndarray
     gram: Factor
     weight: float
-    reason: str
-
-    @property
-    def why(self) -> str:
-        """Why it was chosen."""
-        return f"{self.reason}; {self.factor.why}"
-
-    @property
-    def warning(self) -> str:
-        """See `LinearSolver`."""
-        return self.factor.warning
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
@@ -191,12 +165,11 @@ class AugmentedSystem:
 def augment(
     matrix: Stiffness,
     constraints: sparse.csr_matrix,
-    why: str,
     unknowns: Unknowns | None = None,
     gave_up: str = "",
     shared: Shared | None = None,
 ) -> AugmentedSystem:
-    """Prepare K x = f + Gᵀ p, G x = b; `matrix` K (n, n), `constraints` G (m, n), `why`: so solved.
+    """Prepare K x = f + Gᵀ p, G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
     `unknowns`, `gave_up`, `shared`: see `prepare`. Raises SolveError where constraints nearly
     depend on one another, or a factor finds that they leave a motion free.
@@ -212,7 +185,15 @@ def augment(
     factor = prepare(_augmented(matrix, scaled, weight), unknowns, gave_up, shared)
     if factor.warning:
         raise SolveError(factor.warning)
-    return AugmentedSystem(scaled, size, factor, compliance, gram, weight, why)
+    return AugmentedSystem(
+        factor=factor,
+        about=_NOTHING_OWN,
+        scaled=scaled,
+        size=size,
+        compliance=compliance,
+        gram=gram,
+        weight=weight,
+    )
 
 
 def _augmented(matrix: Stiffness, scaled: sparse.csr_matrix, weight: float) -> Symmetric:

@@ -14,7 +14,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags, sparray, spmatrix
+from scipy.sparse import csr_matrix, sparray, spmatrix
 
 from ...lac.errors import SolveError
 from .condensed_matrix import Symmetric
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 SINGULAR = 4 * EPSILON
 """A scaled matrix (largest entry 1) whose smallest eigenvalue is not larger counts as singular."""
 Solve = Callable[[np.ndarray], np.ndarray]
+# Shares of the diagonal added to a matrix that is singular to working precision: its round-off.
+_SHIFTS = 1e-15, 1e-14
 _auto: ContextVar[str] = ContextVar("auto", default="auto")
 
 
@@ -54,12 +56,13 @@ class Factor:
     iterative = False
     iterations = 0
 
-    def __init__(self, solve: Solve, scale: np.ndarray, smallest: float = 1.0):
+    def __init__(self, solve: Solve, scale: np.ndarray, smallest: float = 1.0, warning: str = ""):
         """`solve` takes columns (n, k) of the system scaled by `scale` (n,).
 
         `smallest`: about the smallest eigenvalue of the scaled matrix, whose largest entry is 1.
+        `warning`: the matrix is singular to working precision, and the factor near that.
         """
-        self.smallest = smallest
+        self.smallest, self.warning = smallest, warning
         self._scale = scale
         self._solve: Solve | None = solve
 
@@ -88,11 +91,12 @@ class Factor:
         self.close()
 
 
-def factorise(matrix: spmatrix | sparray, least: float = SINGULAR) -> Factor:
+def factorise(matrix: spmatrix | sparray, least: float = SINGULAR, nearly: bool = False) -> Factor:
     """Factor a symmetric positive definite `matrix` (n, n), of which the upper triangle is read.
 
     Raises SolveError where the matrix is not positive definite, or singular to working precision:
     the smallest eigenvalue of the matrix scaled to a diagonal near one is at most `least`.
+    `nearly`: the factor is then that of a matrix that differs by round-off, with a warning.
     """
     upper = _upper_triangle(matrix)
     if upper.shape[0] == 0:
@@ -106,14 +110,23 @@ def factorise(matrix: spmatrix | sparray, least: float = SINGULAR) -> Factor:
     # The nearest power of two.
     scale = np.exp2(np.rint(np.log2(1 / np.sqrt(diagonal))))
     upper.data *= np.repeat(scale, np.diff(upper.indptr)) * scale[upper.indices]
-    solve = _cholmod(upper)
-    smallest = _smallest_eigenvalue(solve, upper.shape[0])
-    if not smallest > least:
-        raise SolveError(
-            f"the matrix is singular to working precision: scaled to a largest entry of 1, its "
-            f"smallest eigenvalue is about {smallest:.0e} (more than {least:.0e} is needed)"
-        )
-    return Factor(solve, scale, smallest)
+    on_diagonal, diagonal, warning = upper.indptr[:-1], upper.diagonal(), ""
+    for shift in (0.0, *_SHIFTS) if nearly else (0.0,):
+        upper.data[on_diagonal] = diagonal + shift * diagonal
+        try:
+            solve = _cholmod(upper)
+        except SolveError as error:
+            warning = warning or str(error)
+            continue
+        smallest = _smallest_eigenvalue(solve, upper.shape[0])
+        if not smallest > least:
+            warning = warning or (
+                "the matrix is singular to working precision: scaled to a largest entry of 1, its "
+                f"smallest eigenvalue is about {smallest:.0e} (more than {least:.0e} is needed)"
+            )
+        if not warning or (nearly and smallest > 0):
+            return Factor(solve, scale, smallest, warning)
+    raise SolveError(warning)
 
 
 def factorise_roughly(matrix: csr_matrix) -> Solve:
@@ -211,8 +224,6 @@ class Shared:
 _LOG = logging.getLogger(__name__)
 
 MULTIGRID = "multigrid"
-# Shares of the diagonal added to a matrix that is singular to working precision: its round-off.
-_SHIFTS = 0.0, 1e-15, 1e-14
 _SOFT = "displacements along the softest motions are not determined"
 _ASKED = "as asked for"
 # Unknowns in 3D from which multigrid takes less time than a factor and at most half the memory. In
@@ -224,16 +235,18 @@ class LinearSolver:
     """A solver of one system for any number of right-hand sides: `name`, and `why` it was chosen.
 
     Multigrid is replaced by a factor when it does not converge (thin cells, nearly incompressible
-    material); `gave_up` then says why and is empty otherwise. Where the matrix is singular to
-    working precision, which `warning` then says, the factor is that of a matrix that differs by
-    round-off: what it solves is a solution only if refinement converges.
+    material); `gave_up` then says why and is empty otherwise. With the `warning` of a factor, what
+    it solves is a solution only if refinement converges.
     """
 
-    def __init__(self, matrix: Symmetric, solver: Factor | Multigrid | None, why: str):
-        """Without a `solver` the matrix is factored."""
-        self._matrix, self._why = matrix, why
-        self.gave_up = self.warning = ""
-        self._solver = self._factor() if solver is None else solver
+    def __init__(self, matrix: Symmetric, solver: Factor | Multigrid, why: str, gave_up: str = ""):
+        """`solver` solves with `matrix`."""
+        self._matrix, self._solver, self._why, self.gave_up = matrix, solver, why, gave_up
+
+    @property
+    def warning(self) -> str:
+        """See `Factor`."""
+        return self._solver.warning if isinstance(self._solver, Factor) else ""
 
     @property
     def why(self) -> str:
@@ -268,22 +281,8 @@ class LinearSolver:
             self._why = self.gave_up = _fallback_reason(error)
             _LOG.info("%s", self.why)
         self._solver.close()
-        self._solver = self._factor()
+        self._solver = factorise(self._matrix.tocsr(), nearly=True)
         return self._solver.solve(right, accuracy)
-
-    def _factor(self) -> Factor:
-        matrix = self._matrix.tocsr()
-        try:
-            return factorise(matrix)
-        except SolveError as error:
-            self.warning = str(error)
-        for shift in _SHIFTS:
-            try:
-                shifted = matrix + shift * diags(matrix.diagonal())
-                return factorise(shifted, least=0.0)
-            except SolveError:
-                continue
-        raise SolveError(self.warning)
 
 
 def prepare(
@@ -299,12 +298,11 @@ def prepare(
     SolveError where the matrix is not positive definite beyond round-off; see `LinearSolver`.
     A singular matrix that multigrid solves for a consistent right-hand side goes unnoticed.
     """
-    if unknowns is None:
-        return LinearSolver(matrix, None, "what multigrid asks for is not known")
-    size = matrix.shape[0]
-    against = gave_up or against_multigrid(size, unknowns)
+    size, against = matrix.shape[0], "what multigrid asks for is not known"
+    if unknowns is not None:
+        against = gave_up or against_multigrid(size, unknowns)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
-    if not against:
+    if unknowns is not None and not against:
         from .multigrid import Multigrid
 
         why = f"{MULTIGRID_FROM} unknowns or more in 3D: faster and smaller than a factor"
@@ -315,9 +313,7 @@ def prepare(
             # A factor decides whether the matrix is to blame.
             against = gave_up = _fallback_reason(error)
             _LOG.info("%s", against)
-    chosen = LinearSolver(matrix, None, against)
-    chosen.gave_up = gave_up
-    return chosen
+    return LinearSolver(matrix, factorise(matrix.tocsr(), nearly=True), against, gave_up)
 
 
 def against_multigrid(size: int, unknowns: Unknowns) -> str:

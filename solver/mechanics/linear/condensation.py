@@ -8,6 +8,7 @@ are taken first, and the degree of freedom is the only one's among those that ar
 """
 
 import logging
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol, Self, TypeVar
 
@@ -42,21 +43,27 @@ _NO_SPRINGS = np.empty(0)
 AnyIterate = TypeVar("AnyIterate", bound="Iterate")
 
 
-class ConstrainedSystem(Protocol):
-    """A factored system K x = f + Gᵀ p under constraints G x = b."""
+@dataclass(frozen=True, kw_only=True)
+class ConstrainedSystem(ABC):
+    """A factored system K x = f + Gᵀ p under constraints G x = b; `factor` is its solver.
 
-    @property
-    def factor(self) -> LinearSolver:
-        """The solver of the system."""
+    `about`: what to know of it beside its solver.
+    """
+
+    factor: LinearSolver
+    about: str = ""
 
     @property
     def why(self) -> str:
-        """Why it was chosen."""
+        """Why the solver was chosen, and what there is to know."""
+        return "; ".join(filter(None, [self.factor.why, self.about]))
 
     @property
     def warning(self) -> str:
         """Why a residual that stays large means no solution; empty for a sound factor."""
+        return self.factor.warning
 
+    @abstractmethod
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
     ) -> np.ndarray:
@@ -66,15 +73,17 @@ class ConstrainedSystem(Protocol):
         The forces left may be `accuracy` of those given, where another correction follows.
         """
 
+    @abstractmethod
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """The multipliers p (m,) that balance f − K x = `force`."""
 
+    @abstractmethod
     def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
         """The largest force that no multiplier balances, or that `violation` brings up."""
 
 
-@dataclass(frozen=True)
-class CondensedSystem:
+@dataclass(frozen=True, kw_only=True)
+class CondensedSystem(ConstrainedSystem):
     """x = Z v + shift · b for constraints G x = b, and the factor of ZᵀKZ.
 
     v are the unknowns `kept` (k,), which `follow` (m, k) leads to the eliminated ones `pivot` (m,):
@@ -85,7 +94,6 @@ class CondensedSystem:
     follow: sparse.csr_matrix
     pivot: np.ndarray
     inverse: sparse.csr_matrix
-    factor: LinearSolver
     coupling: sparse.csr_matrix
 
     @property
@@ -93,16 +101,6 @@ class CondensedSystem:
         """Z (n, k), formed anew at each call: a solve does without it."""
         k, rows = len(self.kept), np.concatenate([self.kept, self.pivot])
         return sparse.vstack([sparse.identity(k), self.follow], format="csr")[np.argsort(rows)]
-
-    @property
-    def why(self) -> str:
-        """Why it was chosen."""
-        return self.factor.why
-
-    @property
-    def warning(self) -> str:
-        """The factor of a nearly singular matrix belongs to another one."""
-        return self.factor.warning
 
     def correction(
         self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
@@ -191,13 +189,19 @@ def condense(
         )
     kept = np.ones(constraints.shape[1], dtype=bool)
     kept[pivot] = False
-    kept_columns, coupling = np.flatnonzero(kept), _wide(matrix[pivot], len(springs))
+    kept_columns = np.flatnonzero(kept)
     inverse = inverse_of(constraints[:, pivot])
     follow = -(inverse @ constraints[:, kept_columns])
     parts = kept_columns, pivot, follow, springs
     condensed = _condensed(matrix, *parts) if len(pivot) else matrix
-    factor = prepare(condensed, unknowns, gave_up, shared)
-    return CondensedSystem(kept_columns, follow.tocsr(), pivot, inverse, factor, coupling)
+    return CondensedSystem(
+        factor=prepare(condensed, unknowns, gave_up, shared),
+        kept=kept_columns,
+        follow=follow.tocsr(),
+        pivot=pivot,
+        inverse=inverse,
+        coupling=_wide(matrix[pivot], len(springs)),
+    )
 
 
 def _condensed(

@@ -13,7 +13,7 @@ from scipy import sparse
 from ...lac.errors import SolveError
 from ..fem.bodies import joined_bodies
 from .augmented import Compliance, augment, stabilise
-from .choice import LinearSolver, Shared
+from .choice import Shared
 from .condensation import ConstrainedSystem, condense
 from .krylov import EPSILON
 from .symmetric_blocks import Stiffness
@@ -22,7 +22,6 @@ from .unknowns import Unknowns
 _MANY = "a factor serves many right-hand sides at once"
 # A factor of so many unknowns takes too much memory to be tried for that.
 _LARGEST = 300_000
-_NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
 
 
 @dataclass(frozen=True)
@@ -49,26 +48,15 @@ def parts_of(constraints: sparse.csr_matrix, bodies: np.ndarray, n_bodies: int) 
     return [Part(m, np.diff(constraints[:, np.flatnonzero(m)].tocsr().indptr) > 0) for m in mine]
 
 
-@dataclass(frozen=True)
-class IndependentSystems:
-    """Systems without common unknowns: `parts` with their unknowns and closed multipliers."""
+@dataclass(frozen=True, kw_only=True)
+class IndependentSystems(ConstrainedSystem):
+    """Systems without common unknowns: `parts` with their unknowns and closed multipliers.
+
+    `factor` is the solver of the largest system.
+    """
 
     parts: Sequence[tuple[np.ndarray, np.ndarray, ConstrainedSystem]]
     n_multipliers: int
-
-    @property
-    def _largest(self) -> ConstrainedSystem:
-        return max(self.parts, key=lambda part: len(part[0]))[2]
-
-    @property
-    def factor(self) -> LinearSolver:
-        """The solver of the largest system."""
-        return self._largest.factor
-
-    @property
-    def why(self) -> str:
-        """Why it was chosen."""
-        return f"{self._largest.why}; largest of {len(self.parts)} systems"
 
     @property
     def warning(self) -> str:
@@ -130,21 +118,34 @@ class Systems:
 
     def _drop(self, number: int) -> None:
         """Drop a part's system, and remember why multigrid failed on it, if it did."""
-        factor = self._kept.pop(number)[1].factor
+        self.latest, factor = None, self._kept.pop(number)[1].factor
         if factor.gave_up:
             self._gave_up[number] = factor.gave_up
 
     def closed(self, closed: np.ndarray) -> ConstrainedSystem:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
-        if len(self._parts) == 1:
-            self.latest = self._of(0, None, closed)
-            return self.latest
-        found = []
         for number, part in enumerate(self._parts):
-            unknowns = np.flatnonzero(part.unknowns)
-            system = self._of(number, unknowns, closed & part.multipliers)
-            found.append((unknowns, np.flatnonzero(part.multipliers[closed]), system))
-        self.latest = IndependentSystems(found, int(closed.sum()))
+            mine = closed & part.multipliers
+            if number not in self._kept or self._kept[number][0] != mine.tobytes():
+                if number in self._kept:  # releases its memory first
+                    self._drop(number)
+                self._kept[number] = mine.tobytes(), self._factored(number, part, mine)
+        if len(self._parts) == 1:
+            self.latest = self._kept[0][1]
+            return self.latest
+        kept = [self._kept[number][1] for number in range(len(self._parts))]
+        largest = kept[int(np.argmax([part.unknowns.sum() for part in self._parts]))]
+        about = filter(None, [largest.about, f"largest of {len(kept)} systems"])
+        parts = [
+            (np.flatnonzero(part.unknowns), np.flatnonzero(part.multipliers[closed]), system)
+            for part, system in zip(self._parts, kept, strict=True)
+        ]
+        self.latest = IndependentSystems(
+            factor=largest.factor,
+            about="; ".join(about),
+            parts=parts,
+            n_multipliers=int(closed.sum()),
+        )
         return self.latest
 
     def factored(self, closed: np.ndarray) -> ConstrainedSystem:
@@ -163,39 +164,23 @@ class Systems:
                 self._gave_up = before
         return self.closed(closed)
 
-    def _of(self, number: int, chosen: np.ndarray | None, closed: np.ndarray) -> ConstrainedSystem:
-        """The system of one part, of the `chosen` unknowns; None: of all."""
-        key = closed.tobytes()
-        if number not in self._kept or self._kept[number][0] != key:
-            # The previous factor releases its memory first.
-            if number in self._kept:
-                self._drop(number)
-            self._kept[number] = key, self._factored(number, chosen, closed)
-        return self._kept[number][1]
-
-    def _factored(
-        self, number: int, chosen: np.ndarray | None, closed: np.ndarray
-    ) -> ConstrainedSystem:
+    def _factored(self, number: int, part: Part, closed: np.ndarray) -> ConstrainedSystem:
+        """The system of one part, factored."""
         matrix, constraints = self._matrix, self._constraints[closed]
         own, unknowns = self._own, self._unknowns
-        if chosen is not None:
+        if len(self._parts) > 1:
+            chosen = np.flatnonzero(part.unknowns)
             matrix, constraints = matrix.tocsr()[chosen][:, chosen], constraints[:, chosen]
             own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
-        known = self._gave_up.get(number, ""), self._shared[number]
-        if own is None:
-            return _augmented(matrix, constraints, unknowns, *known)
-        if self._compliance is not None and len((soft := self._compliance(closed)).weight):
-            return stabilise(matrix, constraints, own, soft, unknowns, *known)
-        return condense(matrix, constraints, own, unknowns, *known)
-
-
-def _augmented(
-    matrix: Stiffness, constraints: sparse.csr_matrix, unknowns: Unknowns, why: str, shared: Shared
-) -> ConstrainedSystem:
-    try:
-        return augment(matrix, constraints, _NOTHING_OWN, unknowns, why, shared)
-    except SolveError as error:
-        raise SolveError(
-            f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
-            "another, as where they outnumber the slave nodes or supports hold these"
-        ) from None
+        known = unknowns, self._gave_up.get(number, ""), self._shared[number]
+        if own is not None:
+            if self._compliance is not None and len((soft := self._compliance(closed)).weight):
+                return stabilise(matrix, constraints, own, soft, *known)
+            return condense(matrix, constraints, own, *known)
+        try:
+            return augment(matrix, constraints, *known)
+        except SolveError as error:
+            raise SolveError(
+                f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
+                "another, as where they outnumber the slave nodes or supports hold these"
+            ) from None

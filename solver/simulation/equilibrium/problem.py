@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -30,7 +30,7 @@ from .constraints import (
     refuse_unsolvable,
 )
 from .iterate import ContactIterate, Displacement
-from .state import Equilibrium, Roughness, estimate, judged, roughness
+from .state import Equilibrium, estimate, judged, roughness
 
 _LOG = logging.getLogger(__name__)
 
@@ -82,6 +82,7 @@ class ContactProblem:
         self.single = refined and large
         del motions  # memory for the stiffness
         self._assemble()
+        self._rough = roughness(scene)
 
     def _assemble(self) -> None:
         scene, on_free = self.scene, self.constraints.on_free
@@ -102,10 +103,6 @@ class ContactProblem:
             compliance=soft,
         )
         self._systems = self._systems_of(self.matrix)
-
-    @cached_property
-    def _rough(self) -> Roughness:
-        return roughness(self.scene)
 
     @property
     def system(self) -> ConstrainedSystem | None:
@@ -162,7 +159,7 @@ class ContactProblem:
             if not scene.options.shortcuts.status:
                 self._systems.forget()
             first = rest = self._at_rest(closed, step, correction)
-            if rough and self._constrained(closed).factor.iterative:
+            if rough and self._systems.closed(closed).factor.iterative:
                 known, trial = self._roughly(rest, known)
                 if (eligible & (trial.violation(closed) > 1)).any():
                     return trial
@@ -223,7 +220,7 @@ class ContactProblem:
 
         Two digits more than the change has, for a factor that iterates.
         """
-        system, pushed = self._constrained(closed), self.scene.free.gathered(force)
+        system, pushed = self._systems.closed(closed), self.scene.free.gathered(force)
         change = system.correction(pushed, np.zeros(int(closed.sum())), _CHANGE)
         found = np.zeros(len(closed))
         found[closed] = system.multiplier(pushed - self.matrix @ change)
@@ -276,7 +273,7 @@ class ContactProblem:
         """
         accuracy = _ROUGH_CHANGE if known else _ROUGH_STATUS
         start = known.with_closed(start.closed) if known else start
-        system = self._constrained(start.closed)
+        system = self._systems.closed(start.closed)
         force = start.condensed(start.residual())
         found = start.advanced(system.correction(force, start.violation(), accuracy))
         pressure = np.zeros(len(start.closed))
@@ -305,7 +302,7 @@ class ContactProblem:
         safeguards = self.scene.options.safeguards
         correction = np.zeros(start.force.shape) + correction
         while True:
-            system, refine = self._constrained(start.closed), safeguards.refinement
+            system, refine = self._systems.closed(start.closed), safeguards.refinement
             # In a stretched model a force of the size of round-off may be a large one elsewhere.
             small = 0.0 if start.extended else round_off
             iterate, multiplier, residual = solve(system, start, scale, refine, small)
@@ -345,9 +342,6 @@ class ContactProblem:
             else:
                 parts.append(sparse.csr_matrix((0, int(mine.sum()))))
         return Compliance(sparse.block_diag(parts, format="csr"), np.concatenate(weight))
-
-    def _constrained(self, closed: np.ndarray) -> ConstrainedSystem:
-        return self._systems.closed(closed)
 
     def _gap_stiffness(self, step: Step) -> np.ndarray:
         """The forces (e, e) that average gaps bring up, each imposed with all others closed.

@@ -46,7 +46,7 @@ def test_equilibrium_under_overlapping_constraints(held, ratio, unit):
     matrix, constraints = sparse.block_diag(blocks).tocsr(), unit * overlapping(COUNT)
     rng = np.random.default_rng(0)
     force, violation = rng.standard_normal((60, 2)), unit * rng.standard_normal((10, 2))
-    system = augment(matrix, constraints, "tried")
+    system = augment(matrix, constraints)
     found = system.correction(force, violation)
     true, multiplier = exact(matrix, constraints, force, violation)
     np.testing.assert_allclose(constraints @ found, violation, atol=1e-12 * np.abs(violation).max())
@@ -61,7 +61,7 @@ def test_equilibrium_under_overlapping_constraints(held, ratio, unit):
 def test_a_force_that_no_multiplier_balances_is_seen():
     """Unknown 1 lies in no constraint: what acts there stays."""
     matrix = sparse.identity(3, format="csr")
-    system = augment(matrix, sparse.csr_matrix([[1.0, 0.0, -1.0]]), "tried")
+    system = augment(matrix, sparse.csr_matrix([[1.0, 0.0, -1.0]]))
     assert system.imbalance(np.array([2.0, 5.0, -2.0]), np.zeros(1)) == pytest.approx(5.0)
     assert system.multiplier(np.array([2.0, 5.0, -2.0])) == pytest.approx([-2.0])
 
@@ -70,12 +70,12 @@ def test_what_leaves_no_solution_is_refused():
     matrix = springs(4)
     twice = sparse.csr_matrix([[1.0, 1.0, 0.0, 0.0], [1.0, 1.0 + 1e-7, 0.0, 0.0]])
     with pytest.raises(SolveError, match="singular to working precision"):
-        augment(matrix, twice, "tried")
+        augment(matrix, twice)
     with pytest.raises(SolveError, match="a constraint holds no unknown"):
-        augment(matrix, 0 * twice, "tried")
+        augment(matrix, 0 * twice)
     floating = sparse.block_diag([springs(2, held=False), springs(2)]).tocsr()
     with pytest.raises(SolveError):
-        augment(floating, sparse.csr_matrix([[0.0, 0.0, 1.0, 0.0]]), "tried")
+        augment(floating, sparse.csr_matrix([[0.0, 0.0, 1.0, 0.0]]))
 
 
 def sharing(slave: int, master: int):
@@ -101,7 +101,7 @@ def test_multigrid_of_overlapping_constraints(slave, master, monkeypatch):
     matrix, constraints, unknowns = sharing(slave, master)
     force, violation, exact, multiplier = loaded(matrix, constraints)
     with force_solver("multigrid"):
-        system = augment(matrix, constraints, "tried", unknowns)
+        system = augment(matrix, constraints, unknowns)
     found = system.correction(force, violation)
     assert "multigrid" in system.factor.name
     assert system.factor.iterations <= 50
@@ -116,7 +116,7 @@ def test_each_correction_gains_the_digits_asked_for():
     matrix, constraints, unknowns = sharing(8, 6)
     force, violation, exact, _ = loaded(matrix, constraints)
     with force_solver("multigrid"):
-        system = augment(matrix, constraints, "tried", unknowns)
+        system = augment(matrix, constraints, unknowns)
     found, errors = np.zeros(len(force)), [1.0]
     for _ in range(3):
         left = force - matrix @ found, violation - constraints @ found
