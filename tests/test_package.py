@@ -99,7 +99,7 @@ def test_the_command_solves_checks_and_reports(installed, fresh, tmp_path):
     assert verdict["provenance"]["command"].startswith("mortarcheck solve block.yaml")
     assert verdict["provenance"]["mortarcheck"] == "0.1.0"
     assert fresh(command, "check", "r.vtkhdf").returncode == 0
-    reported = fresh(command, "report", "verdict.json", "-o", "report")
+    reported = fresh(command, "report", ".", "-o", "report")
     assert reported.returncode == 0, reported.stderr
     assert "block" in (tmp_path / "report" / "summary.html").read_text()
     validated = fresh("-m", "mortarcheck", "validate", "block.yaml")

@@ -34,7 +34,7 @@ def add_report(command: argparse.ArgumentParser) -> None:
 def run_report(options: argparse.Namespace) -> int:
     from ..report import write_report
 
-    found = {file.parent for file in options.results.glob("*/*/verdict.json")}
+    found = {file.parent for file in options.results.rglob("verdict.json")}
     run = found
     if options.asked:
         run = {Path(line) for line in options.asked.read_text(encoding="utf-8").splitlines()}

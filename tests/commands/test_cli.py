@@ -292,7 +292,7 @@ def test_report_takes_the_verdicts_of_a_folder(small, capsys):
     (told,) = json.loads((small / "report" / "summary.json").read_text())
     assert (told["case"], told["passed"]) == ("small", True)
     capsys.readouterr()
-    assert main(["report", str(small), "-o", str(small / "none")]) == 2
+    assert main(["report", str(small / "out"), "-o", str(small / "none")]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
