@@ -17,7 +17,7 @@ from ..case.checks import ROUND_OFF
 from ..system.errors import InputError, hint
 from ..system.files import write_text
 from ..verification.verdict import WORDS, CheckResult, Verdict, typed
-from . import formats, stages
+from . import formats
 from .html import TEMPLATES, render
 from .rows import Row, natural
 from .tables import md, outcome
@@ -25,9 +25,6 @@ from .tables import md, outcome
 SUMMARY = "summary.json"
 # The name of our own solver beside the names of codes.
 OURS = "ours"
-# A solve whose time changed is worth a line from this ratio on, and from these seconds.
-_RATIO, _SECONDS, _MOST_JOBS = 1.5, 0.2, 10
-_SUMS = ("total", "processor time")
 _COUNTS = {
     "dofs": "unknowns",
     "macro_elements": "macro-elements",
@@ -70,21 +67,6 @@ class Change:
     def cells(self) -> tuple[str, ...]:
         """A row of a table."""
         return self.solve, self.quantity, self.base, self.this, formats.error(self.size)
-
-
-@dataclass(frozen=True)
-class Time:
-    """Seconds of both batches, of a stage or a solve."""
-
-    name: str
-    base: float
-    this: float
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """A row of a table: name, before, now, ratio."""
-        ratio = f"{self.this / self.base:.2f}" if self.base else formats.NOTHING
-        return self.name, formats.seconds(self.base), formats.seconds(self.this), ratio
 
 
 @dataclass(frozen=True)
@@ -164,27 +146,14 @@ class Comparison:
         return sorted(found, key=lambda c: (c.size is not None, -(c.size or 0)))
 
     @property
-    def stages(self) -> list[Time]:
-        """Wall time by stage, in all, and processor time, over the solves that both have."""
-        sides = [list(map(_times, rows)) for rows in zip(*self._solved, strict=True)] or [[], []]
-        every = dict.fromkeys(name for rows in sides for row in rows for name in row)
-        names = [*(name for name in stages.colors(every) if name not in _SUMS), *_SUMS]
-        base, this = ({n: sum(row.get(n) or 0.0 for row in rows) for n in names} for rows in sides)
-        return [Time(name, base[name], this[name]) for name in names]
-
-    @property
-    def solves(self) -> list[Time]:
-        """The solves whose wall time changed most, of those that are worth a line."""
-        times = [
-            Time(this.anchor, base.total or 0.0, this.total or 0.0) for base, this in self._solved
-        ]
-        worth = [
-            (abs(time.this - time.base), time)
-            for time in times
-            if max(time.this, time.base) > _RATIO * min(time.this, time.base)
-        ]
-        found = sorted(((by, time) for by, time in worth if by > _SECONDS), key=lambda w: -w[0])
-        return [time for _, time in found[:_MOST_JOBS]]
+    def times(self) -> str:
+        """Wall and processor time of the solves that both have, in words."""
+        told = []
+        for rows in zip(*self._solved, strict=True):
+            wall = formats.seconds(sum(row.total or 0.0 for row in rows))
+            processor = formats.seconds(sum(row.verdict.cpu_seconds or 0.0 for row in rows))
+            told.append(f"wall time {wall}, processor time {processor}")
+        return f"{len(self._solved)} solves in both: {', before; '.join(told)} now."
 
     @cached_property
     def _solved(self) -> list[tuple[Row, Row]]:
@@ -222,10 +191,6 @@ def read_batch(path: Path) -> Batch:
         there = {row.verdict.code or OURS for row in rows}
         raise InputError(path, "code", code, f"it has no result there; {hint(code, there)}")
     return Batch(file, {(row.group, row.case): row for row in mine})
-
-
-def _times(row: Row) -> dict[str, float | None]:
-    return {**row.stages, **dict(zip(_SUMS, (row.total, row.verdict.cpu_seconds), strict=True))}
 
 
 def _changes(base: Row, this: Row) -> Iterator[Change]:
@@ -281,7 +246,6 @@ def _text(value: Any) -> str:
 
 PAGE = "compare.html"
 CHANGES = ("solve", "quantity", "before", "now", "change")
-TIMES = ("before", "now", "ratio")
 # By the change of a verdict: the words of the outcome, and the heading of the list.
 SAID = {
     "worse": "got worse",
@@ -328,19 +292,17 @@ def sections(found: Comparison) -> dict[str, list[Pair]]:
 
 
 def to_markdown(found: Comparison) -> str:
-    """Verdicts, numbers and times as Markdown."""
+    """Verdicts and numbers as Markdown."""
     parts = [f"# Two batches\n\n{verdict(found)}\n"]
     for name, batch in (("Before", found.base), ("Now", found.this)):
         parts.append(f"- {name}: `{batch.file}`, {md(batch.outcome)} {md(batch.origin)}")
+    parts.append(f"- {found.times}")
     for heading, pairs in sections(found).items():
         changed = [(pair.name, pair.words, pair.row.why) for pair in pairs]
         parts += [f"\n## {heading}\n", *_table(("solve", "verdict", "reason"), changed)]
     if found.changes:
         rows = [change.cells for change in found.changes]
         parts += ["\n## Numbers\n", *_table(CHANGES, rows)]
-    parts += ["\n## Times\n", *_table(("stage", *TIMES), [t.cells for t in found.stages])]
-    if found.solves:
-        parts += ["", *_table(("solve", *TIMES), [t.cells for t in found.solves])]
     return "\n".join(parts) + "\n"
 
 
@@ -363,5 +325,4 @@ def to_html(found: Comparison) -> str:
         outcome=verdict(found),
         sections=sections(found),
         changes=CHANGES,
-        times=TIMES,
     )
