@@ -19,10 +19,9 @@ from ..verification import samples
 from ..verification.norms import errors
 from ..verification.samples import Reference, Sample
 from ..verification.verdict import CheckResult
-from .contact import SurfaceValues, pressure_force, surfaces
+from .contact import SurfaceValues, own_solution, pressure_force, surfaces
 from .faults import fault, summed_up
 from .model import Model
-from .own_mesh import own_solution
 from .placing import Placed, Placer, flattened
 
 if TYPE_CHECKING:

@@ -32,7 +32,7 @@ def add_expect(command: argparse.ArgumentParser) -> None:
 
 
 def run_expect(options: argparse.Namespace) -> int:
-    from ..studies.expected import expected_errors
+    from ..studies.converge import expected_errors
 
     print("expected:")
     for name, error in expected_errors(case_file(options.case), options.levels).items():

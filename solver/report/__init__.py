@@ -32,11 +32,11 @@ def write_report(
     from .bench import write_bench
     from .charts import write_script
     from .html import PAGE
-    from .junit import to_junit
     from .page import family_page, main_page
     from .pictures import write_viewer
     from .rows import read_rows
     from .sections import sections
+    from .tables import to_junit
 
     folder.mkdir(parents=True, exist_ok=True)
     files = {file.resolve().parent.name: file for file in families}

@@ -36,10 +36,9 @@ from .charts import (
 )
 from .families import page_name
 from .html import TEMPLATES, render
-from .junit import to_junit
 from .profile import PRESSED, expected, position
 from .rows import Row, natural
-from .tables import as_csv
+from .tables import as_csv, to_junit
 from .tables import to_json as rows_to_json
 
 PAGE = "bench.html"

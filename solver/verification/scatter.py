@@ -24,7 +24,7 @@ from ..lac.facets import tangents_of
 from ..lac.reconstruction import vertex_neighbours
 from ..simulation.equilibrium.state import stress_of_motion
 from ..simulation.results.solution import Solution, ZoneResult
-from .oscillation import macro_neighbours
+from .norms import macro_neighbours
 
 LIMIT = 0.04
 """A pressure whose means over master faces oscillate by more than this share of its peak is

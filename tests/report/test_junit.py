@@ -6,8 +6,8 @@ import pytest
 import xmlschema
 from junitparser import Error, Failure, JUnitXml
 
-from solver.report.junit import to_junit
 from solver.report.rows import Row
+from solver.report.tables import to_junit
 from tests.report.test_report import BATCH, NASTY, unfinished, verdict
 from tests.report.verdicts import record
 

@@ -14,7 +14,7 @@ from solver.mesh import generate, transform
 from solver.simulation.equilibrium.state import Accuracy
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study
-from solver.studies.states import exact_state
+from solver.studies.digits import exact_state
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from tests.scenes import POISSON, YOUNG, block_mesh, changed_case, with_points

@@ -8,8 +8,7 @@ from solver.mechanics.fem.stress import nodal_stress
 from solver.mesh import transform
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.scene.scene import build_scene
-from solver.studies.digits import floor, misplaced, upper_nodes
-from solver.studies.states import exact_state
+from solver.studies.digits import exact_state, floor, misplaced, upper_nodes
 from tests.scenes import block_mesh, changed_case
 
 MESHES = {2: ("TRIA3", "QUAD4"), 3: ("TETRA4", "HEXA8")}

@@ -8,7 +8,7 @@ from solver.case.reader import load_case
 from solver.case.yaml import parse_mapping
 from solver.commands.cli import main
 from solver.simulation.simulate import simulate
-from solver.studies.expected import at_first
+from solver.studies.converge import at_first
 from solver.studies.theory import element_size, fit_order
 from solver.system.errors import InputError
 from solver.verification.norms import errors

@@ -8,8 +8,7 @@ import pytest
 
 import solver.lac.threads
 import solver.verification.norms
-from solver.case.material import Material
-from solver.case.model import Rigid
+from solver.case.model import Material, Rigid
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d

@@ -7,7 +7,7 @@ import pytest
 
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study
-from solver.verification.oscillation import oscillation
+from solver.verification.norms import oscillation
 from solver.verification.run import mesh_of
 from tests.studies.measured import WORK
 
