@@ -37,6 +37,7 @@ from .tables import outcome
 
 _DIMENSIONS = {2: "2D", 3: "3D"}
 _DIGITS_OF_DOUBLE = -math.log10(EPSILON)
+_SHOWN = 0.0, 16.0  # whole marks at the upper end
 # With fewer digits a result is unreliable (`solver.simulation.equilibrium.state`).
 _FEWEST = 4
 _WORST = 10
@@ -123,7 +124,7 @@ def digit_chart(rows: Sequence[Row]) -> Chart | None:
         "Digits that rounding leaves in each solve",
         records,
         Axis("unknowns", "unknowns", log=True),
-        Axis("digits", "digits kept", domain=(0.0, _DIGITS_OF_DOUBLE)),
+        Axis("digits", "digits kept", domain=_SHOWN),
         {name: look for name, look in looks.items() if name in found},
         lines=False,
         tips={"case": "case", "cause": "lost by"},
@@ -152,7 +153,7 @@ def extreme_cases(folder: Path) -> Chart | None:
     ]
     titles = {"quantity": "varied", "value": "value", "mesh": "mesh", "digits": "digits kept"}
     names: Spec = {"field": "quantity", "type": "nominal", "sort": None, "title": None}
-    x = Axis("digits", "digits of the pressure", domain=(0.0, _DIGITS_OF_DOUBLE)).channel()
+    x = Axis("digits", "digits of the pressure", domain=_SHOWN).channel()
     marks = {"type": "tick", "thickness": 2, "color": BLUE, "cursor": "pointer"}
     channels: Spec = {"x": x, "y": names | {"axis": {"labelLimit": 260, "grid": True}}}
     channels |= {"href": {"field": "url"}, "tooltip": tooltip(records, titles)}
