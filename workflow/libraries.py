@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 
 # The packages of Debian that bring them, with what they depend on.
-PACKAGES = ["libglu1-mesa", "libxcursor1", "libxft2", "libxinerama1", "libfontconfig1", "libgomp1"]
+PACKAGES = ["libgl1", "libglu1-mesa", "libxcursor1", "libxft2", "libxinerama1", "libgomp1"]
 # Packages that only drawing on a screen would use; unpacked they are 200 MB.
 DRIVERS = re.compile(r"libgl1-mesa-dri|mesa-libgallium|libllvm|libdrm|libglx-mesa|libglapi")
 

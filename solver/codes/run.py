@@ -178,7 +178,7 @@ def plugin(folder: Path, find: Any) -> Any:
 
 
 def _of_class(path: Path) -> Any:
-    """The class `Code` of a file, which needs what `registry.Code` lists."""
+    """The class `Code` of a file, which needs what the protocol `Code` lists."""
     spec = importlib.util.spec_from_file_location(f"own_code_{path.parent.name}", path)
     assert spec
     assert spec.loader

@@ -50,7 +50,7 @@ CAUSES = {
     "slender": "small faces of slender cells",
     "sums": "cells with many nodes",
 }
-# What each switch of `Shortcuts` leaves out, in a few words.
+# What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
 WORK = {
     "quadrature": "more Gauss points",
     "unloaded": "bodies that nothing moves",
@@ -185,16 +185,16 @@ def fewest_digits(rows: Sequence[Row]) -> list[Row]:
 
 
 def left_out_by_family(
-    rows: Sequence[Row], folder: Path, switches: Sequence[str] = tuple(WORK)
+    rows: Sequence[Row], folder: Path
 ) -> dict[str, tuple[int, list[int], Savings | None]]:
-    """By family: how many solves, how many of them left out the work of each switch, time saved.
+    """By family: how many solves, how many of them left out each kind of `WORK`, time saved.
 
     The times are in `folder`, that of the report.
     """
     found: dict[str, tuple[int, list[int], Savings | None]] = {}
     solved = [row for row in ours(rows) if row.verdict.dofs]
     for family, mine in families(solved).items():
-        counts = [sum(switch in row.verdict.switches for row in mine) for switch in switches]
+        counts = [sum(switch in row.verdict.switches for row in mine) for switch in WORK]
         found[family] = len(mine), counts, read_savings(folder / "saved" / f"{family}.json")
     return found
 
@@ -218,13 +218,6 @@ _PAGES = {
 _TABLES = {"JSON": "summary.json", "CSV": "summary.csv", "Markdown": "summary.md"}
 # Where `make docs` writes the documentation, from the folder of a report.
 _DOCS = "../docs/index.html"
-
-# What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
-LEFT_OUT = {
-    "quadrature": "more Gauss points, closure of integrals",
-    "unloaded": "groups of bodies that nothing moves",
-    "status": "further active-set solves and factors",
-}
 
 
 def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
@@ -300,7 +293,7 @@ def _links(folder: Path) -> dict[str, str]:
 def left_out(rows: Sequence[Row]) -> list[tuple[str, str, int]]:
     """Shortcuts by switch: title, reasons given, number of solves."""
     found = []
-    for switch, title in LEFT_OUT.items():
+    for switch, title in WORK.items():
         lines = [(row.name, line) for row in rows for line in row.verdict.plan]
         reasons = [(name, line[1]) for name, line in lines if switch in line[2:]]
         if reasons:

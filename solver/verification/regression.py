@@ -13,13 +13,13 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import msgspec
+
 from ..simulation.results.solution import Solution
 from ..system.errors import InputError
 from ..system.files import write_text
 from .checks import Accepted
 from .verdict import CheckResult
-
-_KEYS = {"minimum", "maximum"}
 
 
 def regression_file(solution: Solution) -> Path:
@@ -36,12 +36,10 @@ def accepted_values(solution: Solution) -> dict[str, Accepted]:
     if not path.is_file():
         return {}
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(path, "file", None, f"must be JSON ({error})") from None
-    if not isinstance(content, dict):
-        raise InputError(path, "file", content, "must map checks to accepted values")
-    return {title: _accepted(path, title, value) for title, value in content.items()}
+        return msgspec.json.decode(path.read_bytes(), type=dict[str, Accepted])
+    except (OSError, msgspec.DecodeError) as error:
+        allowed = f"must map checks to {{minimum: number, maximum: number}} ({error})"
+        raise InputError(path, "file", None, allowed) from None
 
 
 def accept(solution: Solution, checks: Sequence[CheckResult]) -> list[str]:
@@ -68,20 +66,6 @@ def accept(solution: Solution, checks: Sequence[CheckResult]) -> list[str]:
     if lines:
         _write(path, new)
     return sorted(lines)
-
-
-def _accepted(path: Path, title: str, value: object) -> Accepted:
-    if (
-        not isinstance(value, dict)
-        or value.keys() != _KEYS
-        or not all(map(_number, value.values()))
-    ):
-        raise InputError(path, title, value, "must be {minimum: number, maximum: number}")
-    return Accepted(**value)
-
-
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _rounded(value: float, scale: float) -> float:

@@ -74,10 +74,10 @@ def test_work_left_out_is_counted_by_family(rows, tmp_path):
     saved = {"jobs": ["a"], "seconds": 9.0, "cost": 2.0, "lean": 1.0, "everything": 1.5}
     write_text(tmp_path / "saved" / "fam.json", json.dumps(saved))
     write_text(tmp_path / "saved" / "other.json", "null")
-    found = overview.left_out_by_family(rows, tmp_path, ["status", "quadrature"])
+    found = overview.left_out_by_family(rows, tmp_path)
     time = Savings(**saved)
     assert time.saved == 2.25
-    assert found == {"fam": (3, [2, 0], time), "other": (1, [0, 0], None)}
+    assert found == {"fam": (3, [0, 0, 2], time), "other": (1, [0, 0, 0], None)}
 
 
 @pytest.mark.parametrize(("status", "is_one"), [([1, 1], True), ([0, 1], False), ([0, 0], False)])

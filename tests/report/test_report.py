@@ -12,7 +12,7 @@ import pytest
 
 from solver.commands.cli import main
 from solver.report import write_report
-from solver.report.page import LEFT_OUT, left_out
+from solver.report.page import WORK, left_out
 from solver.report.rows import Row
 from solver.simulation.options import Shortcuts
 from solver.verification.judge import without_result
@@ -332,10 +332,10 @@ def test_what_the_solves_of_a_family_left_out():
     ]
     rows = [Row(record(verdict(name, "passed", plan=plan)), Path()) for name in "ab"]
     assert left_out(rows) == [
-        (LEFT_OUT["quadrature"], "every face is an affine image", 2),
-        (LEFT_OUT["status"], "complementary", 2),
+        (WORK["quadrature"], "every face is an affine image", 2),
+        (WORK["status"], "complementary", 2),
     ]
-    assert LEFT_OUT.keys() == vars(Shortcuts()).keys()
+    assert WORK.keys() == vars(Shortcuts()).keys()
 
 
 def test_a_batch_of_nothing_is_no_success(tmp_path):
