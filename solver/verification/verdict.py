@@ -308,6 +308,8 @@ def read_verdict(path: str | Path) -> Verdict:
     path = Path(path)
     try:
         content = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        raise InputError(path, "file", None, "there is no verdict: the job was ended") from None
     except (OSError, ValueError, RecursionError) as error:
         raise _damaged(path, " ".join(str(error).split())) from None
     verdict = typed(Verdict, content, path)
