@@ -86,19 +86,20 @@ def test_a_text_that_is_no_med_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "reason"),
     [
-        ("{", "must be JSON ("),
-        ('{"multiplier interface": 25}', "must be {minimum: number, maximum: number}"),
-        ('{"multiplier interface": {"minimum": 1, "maximum": "x"}}', "must be {minimum: number"),
+        ("{", "Input data was truncated"),
+        ('{"multiplier interface": 25}', "Expected `object`, got `int`"),
+        ('{"multiplier interface": {"minimum": 1, "maximum": "x"}}', "Expected `float`, got `str`"),
+        ('{"multiplier interface": {"minimum": NaN, "maximum": 1}}', "invalid character"),
     ],
 )
-def test_accepted_values_that_are_none(tmp_path, text, message):
+def test_accepted_values_that_are_none(tmp_path, text, reason):
     solution = plane(tmp_path)
     path = regression_file(solution)
     path.parent.mkdir()
     path.write_text(text)
-    with pytest.raises(InputError, match=re.escape(message)):
+    with pytest.raises(InputError, match="must map checks to {minimum: number, .*" + reason):
         accepted_values(solution)
 
 
