@@ -96,7 +96,7 @@ class Expression:
 
 @lru_cache(1000)
 def _compiled(text: str) -> CodeType:
-    """The code of an expression of allowed nodes alone; ValueError says why it is none."""
+    """Compile an expression of allowed nodes; raise ValueError with the reason for any other."""
     text = text.strip()
     if len(text) > MAX_LENGTH:
         raise ValueError(f"longer than {MAX_LENGTH} characters")
@@ -109,9 +109,9 @@ def _compiled(text: str) -> CodeType:
         nodes = list(ast.walk(tree.body))
         called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
         refused = next((n for n in nodes if not _is_allowed(n, id(n) in called)), None)
-        for node in nodes:
-            if refused is None and isinstance(node, ast.Constant):
-                node.value = float(node.value)  # type: ignore[arg-type]
+        if refused is None:
+            for number in (node for node in nodes if isinstance(node, ast.Constant)):
+                number.value = float(number.value)  # type: ignore[arg-type]
         code = compile(tree, "<expression>", "eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise ValueError(f"must be {ALLOWED}") from None

@@ -47,14 +47,8 @@ COMMANDS = {
     "compare": ("report", "compare with another batch"),
     "accept": ("solve", "store results as the accepted values"),
     "init": ("cases", "make a family in a repository of your own: a case, its page, workflow, CI"),
-    "expect": (
-        "studies",
-        "the errors that refined meshes predict: the `expected` of a case",
-    ),
-    "converge": (
-        "studies",
-        "order, limit and uncertainty of results, by refined meshes",
-    ),
+    "expect": ("studies", "the errors that refined meshes predict: the `expected` of a case"),
+    "converge": ("studies", "order, limit and uncertainty of results, by refined meshes"),
 }
 # Those that the workflow calls; help does not list them.
 _OF_WORKFLOW = {

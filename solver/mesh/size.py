@@ -98,9 +98,9 @@ def of_body(cells: str, divisions: Sequence[int], refine: int = 1) -> Size:
         nodes *= _HXT_NODES if fills_by_hxt(cells, along) else 1.0
     else:
         # An edge of the grid has n places along its own axis and n + 1 along each other.
+        grid = _in_grid(kind)
         nodes = sum(
-            _in_grid(kind)[sum(within)]
-            * prod(n + 1 - w for n, w in zip(along, within, strict=True))
+            grid[sum(within)] * prod(n + 1 - w for n, w in zip(along, within, strict=True))
             for within in product((0, 1), repeat=kind.dim)
         )
     return Size(nodes, kind.dim, kind.order)

@@ -179,7 +179,7 @@ def _shape_of(name: str) -> str:
 
 
 def _type_of(shape: str, order: int, centred: bool) -> str:
-    """The type of a shape and order, with nodes in the middle of quadrangles if there is one."""
+    """The type of a shape and order; of two, the one whose quadrangles are `centred` or not."""
     found = [n for n in _TYPES if _shape_of(n) == shape and _TYPES[n][6] == order]
     return next((n for n in found if any(_TYPES[n][7:]) == centred), found[0])
 

@@ -54,7 +54,7 @@ class StabilisedSystem(ConstrainedSystem):
 
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """From the equilibrium of the pivots."""
-        return -(self.condensed.inverse.T @ force[self.condensed.pivot])
+        return self.condensed.multiplier(force)
 
     def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
         """The largest force left, with that brought up by gaps that do not fit the pressures."""

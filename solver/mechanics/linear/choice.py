@@ -246,7 +246,7 @@ class LinearSolver:
     @property
     def warning(self) -> str:
         """See `Factor`."""
-        return self._solver.warning if isinstance(self._solver, Factor) else ""
+        return self._solver.warning
 
     @property
     def why(self) -> str:
@@ -261,7 +261,7 @@ class LinearSolver:
     @property
     def iterative(self) -> bool:
         """Whether a less accurate solution takes less time."""
-        return not isinstance(self._solver, Factor)
+        return self._solver.iterative
 
     @property
     def iterations(self) -> int:
@@ -276,7 +276,7 @@ class LinearSolver:
         try:
             return self._solver.solve(right, accuracy)
         except SolveError as error:
-            if isinstance(self._solver, Factor):
+            if not self._solver.iterative:
                 raise
             self._why = self.gave_up = _fallback_reason(error)
             _LOG.info("%s", self.why)

@@ -128,6 +128,9 @@ _MOST_BESIDE = 1 / 4
 class Multigrid:
     """Multigrid for one matrix. `iterations`: the most that a solve has taken so far."""
 
+    iterative = True
+    warning = ""
+
     def __init__(self, matrix: Symmetric, unknowns: Unknowns, shared: Shared | None = None):
         """Set up for a symmetric positive definite `matrix` (n, n).
 
