@@ -5,7 +5,6 @@ import sys
 import pytest
 
 from solver.studies.timing import run_compiled
-from solver.system.compiled import available
 from solver.system.process import cores_for
 
 _PROGRAM = """
@@ -40,7 +39,6 @@ def compiling(tmp_path, monkeypatch):
     return run
 
 
-@pytest.mark.skipif(not available(), reason="Numba is not installed")
 def test_a_run_that_compiled_functions_is_not_measured(compiling):
     runs, done = compiling()
     assert (runs, done.status, done.output) == (2, 0, "sum 10.0\n")
@@ -49,7 +47,6 @@ def test_a_run_that_compiled_functions_is_not_measured(compiling):
     assert (runs, done.status, done.output) == (1, 0, "sum 10.0\n")
 
 
-@pytest.mark.skipif(not available(), reason="Numba is not installed")
 def test_a_run_that_failed_is_not_repeated(compiling):
     runs, done = compiling(status=3)
     assert (runs, done.reason) == (1, "the process died with exit status 3: sum 10.0")

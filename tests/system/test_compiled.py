@@ -5,12 +5,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 
-import pytest
-
-from solver.system import compiled as module
-from solver.system.compiled import available, compiled
-
-numba = pytest.mark.skipif(not available(), reason="Numba is not installed")
+from solver.system.compiled import compiled
 
 
 @compiled
@@ -20,7 +15,6 @@ def add(numbers, out):
         out[0] += number
 
 
-@numba
 def test_the_function_is_compiled_and_keeps_its_name():
     import numpy as np
 
@@ -30,7 +24,6 @@ def test_the_function_is_compiled_and_keeps_its_name():
     assert (add.__name__, add.__doc__) == ("add", "The sum.")
 
 
-@numba
 def test_without_a_folder_for_the_cache_it_is_compiled_all_the_same(monkeypatch):
     import numba
     import numpy as np
@@ -48,7 +41,6 @@ def test_without_a_folder_for_the_cache_it_is_compiled_all_the_same(monkeypatch)
     assert out == [3.0]
 
 
-@numba
 def test_several_threads_compile_once(monkeypatch):
     import numba
     import numpy as np
@@ -66,17 +58,6 @@ def test_several_threads_compile_once(monkeypatch):
         list(pool.map(once, [np.ones(3)] * 4, out))
     assert len(made) == 1
     assert np.concatenate(out).tolist() == [3.0] * 4
-
-
-def test_numba_is_loaded_for_large_matrices_alone(monkeypatch):
-    monkeypatch.delitem(sys.modules, "numba", raising=False)
-    monkeypatch.setattr(module, "available", lambda: True)
-    assert not module.worthwhile(100_000)
-    assert module.worthwhile(10_000_000)
-    monkeypatch.setitem(sys.modules, "numba", None)
-    assert module.worthwhile(100_000)
-    monkeypatch.setattr(module, "available", lambda: False)
-    assert not module.worthwhile(10_000_000)
 
 
 def test_small_cases_import_no_numba():

@@ -70,9 +70,9 @@ def test_iterations_of_a_large_system_are_told(caplog):
 
     from solver.mechanics.linear.krylov import conjugate_gradients
 
-    values = np.linspace(1, 300, 400)[:, None]
+    values = np.linspace(1, 300, 400)
     with caplog.at_level(logging.INFO, "solver"):
-        conjugate_gradients(lambda x: values * x, lambda x: x.copy(), np.ones((400, 1)), 1e-8, 300)
+        conjugate_gradients(lambda x: values * x, lambda x: x.copy(), np.ones(400), 1e-8, 300)
     told = [record.getMessage() for record in caplog.records]
     assert len(told) > 3
     assert re.fullmatch(r"conjugate gradients: iteration 10, residual \d\.\de-\d\d", told[0])

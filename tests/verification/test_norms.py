@@ -15,7 +15,6 @@ from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.mechanics.fem import cell_loops
 from solver.mesh import generate
 from solver.simulation.results.solution import ZoneResult
-from solver.system.compiled import available
 from solver.verification.norms import errors
 from tests.handmade import plane
 
@@ -132,7 +131,6 @@ def test_interpolants_show_the_order_of_their_cells(handmade, order, cells):
     assert fine["stress_max"] == 0  # exact at the nodes
 
 
-@pytest.mark.skipif(not available(), reason="Numba is not installed")
 @pytest.mark.parametrize("cells", ["TETRA4", "HEXA8", "PENTA6", "PYRA5", "TETRA10"])
 def test_compiled_loops_find_the_same_errors(handmade, monkeypatch, cells):
     """Two materials, a displacement that is far from exact, cells of both parts in turn."""

@@ -13,7 +13,6 @@ from ...lac.cells.catalogue import CellType
 from ...lac.cells.shape import shape_functions
 from ...lac.errors import SolveError
 from ...lac.threads import prefetch, workers
-from ...system.compiled import available
 from . import cell_kernels
 from .block import Block
 
@@ -22,8 +21,8 @@ _LEAST = 20_000
 
 
 def is_worthwhile(n_nodes: int) -> bool:
-    """Whether a mesh is large enough to load Numba, and Numba is installed."""
-    return available() and n_nodes >= _LEAST
+    """Whether a mesh is large enough to load Numba."""
+    return n_nodes >= _LEAST
 
 
 def serve(n_nodes: int, blocks: Sequence[Block]) -> bool:

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix, diags
 
-from ...system.compiled import compiled, part_of_compiled, worthwhile
+from ...lac.threads import prefetch
+from ...system.compiled import compiled, part_of_compiled
 from .galerkin import smoothed
-from .products import chosen_rows, in_pieces, scale_blocks, share_rows
+from .products import chosen_rows, ranges, scale_blocks, share_rows
 from .unknowns import LevelNodes
 
 # A share of the diagonal before: less is left where much is dropped.
@@ -68,7 +69,8 @@ def filtered(matrix: bsr_matrix, kept: np.ndarray, motions: np.ndarray) -> bsr_m
     moved = motions.reshape(count, height, -1)[:, :, :3]
     data = np.empty((starts[-1], height, height), dtype=np.float32)
 
-    def fill(first: int, last: int) -> None:
+    def fill(some: tuple[int, int]) -> None:
+        first, last = some
         mine = slice(*matrix.indptr[[first, last]])
         rows = np.repeat(np.arange(last - first), np.diff(matrix.indptr[first : last + 1]))
         columns, blocks, stay = matrix.indices[mine], matrix.data[mine], kept[mine]
@@ -84,7 +86,9 @@ def filtered(matrix: bsr_matrix, kept: np.ndarray, motions: np.ndarray) -> bsr_m
         lumped = np.matmul(total.reshape(-1, height, 3)[nodes], _inverses(moved[first + nodes]))
         out[own] += lumped.astype(np.float32)
 
-    in_pieces(fill, matrix)
+    # Ranges of rows so small that the arrays of each stay small.
+    for _ in prefetch(fill, ranges(matrix.indptr, matrix.data[:1].size, 1 << 30)):
+        pass
     arrays = data, matrix.indices[kept], starts[matrix.indptr]
     return bsr_matrix(arrays, shape=matrix.shape)
 
@@ -179,7 +183,7 @@ def _graph(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[csr_matrix, Near | No
     Where cells are slender, near ones only: a smooth error is smooth along the short edges alone.
     A node that has none joins its nearest neighbour.
     """
-    joined, slender = (_joined_by_loops if worthwhile(matrix.data.size) else _joined)(matrix, nodes)
+    joined, slender = _joined(matrix, nodes)
     near = None
     if slender:
         rows = np.repeat(np.arange(len(nodes.body)), np.diff(matrix.indptr))
@@ -208,8 +212,8 @@ def _nearest(
     return np.asarray(entries[np.diff(rows[entries], prepend=-1) > 0])
 
 
-def _joined_by_loops(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[np.ndarray, bool]:
-    """What `_joined` returns, by compiled loops."""
+def _joined(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[np.ndarray, bool]:
+    """Which pairs of neighbours (nnz,) may share an aggregate, and whether cells are slender."""
     joined, limit = np.empty(len(matrix.indices), dtype=bool), np.full(len(nodes.body), np.inf)
     points = np.zeros((len(limit), 3)) if nodes.points is None else nodes.points
     arrays = matrix.indptr, matrix.indices, nodes.body, np.ascontiguousarray(points), limit
@@ -248,42 +252,6 @@ def _between(points, i, j):  # type: ignore[no-untyped-def]
     """The squared distance of two points."""
     x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
     return x * x + y * y + z * z
-
-
-def _joined(matrix: bsr_matrix, nodes: LevelNodes) -> tuple[np.ndarray, bool]:
-    """Which pairs of neighbours (nnz,) may share an aggregate, and whether cells are slender."""
-    body, count = nodes.body, len(nodes.body)
-    joined = np.empty(len(matrix.indices), dtype=bool)
-    nearest, furthest = np.full(count, np.inf), np.zeros(count)
-
-    def join(first: int, last: int) -> None:
-        some, rows, columns = _pairs(matrix, first, last)
-        joined[some] = (body[rows] == body[columns]) & (body[rows] >= 0)
-        if nodes.points is not None:
-            rows, columns = rows[joined[some]], columns[joined[some]]
-            distance, others = _distance(nodes.points, rows, columns), rows != columns
-            np.minimum.at(nearest, rows[others], distance[others])
-            np.maximum.at(furthest, rows, distance)
-
-    in_pieces(join, matrix)
-    slender = furthest > _SLENDER * nearest
-    if nodes.points is not None and slender.any():
-        limit = np.where(slender, _NEAR * nearest, np.inf)
-
-        def part(first: int, last: int) -> None:
-            some, rows, columns = _pairs(matrix, first, last)
-            within = np.minimum(limit[rows], limit[columns])
-            joined[some] &= _distance(nodes.points, rows, columns) <= within
-
-        in_pieces(part, matrix)
-    return joined, bool(slender.any())
-
-
-def _pairs(matrix: bsr_matrix, first: int, last: int) -> tuple[slice, np.ndarray, np.ndarray]:
-    """The entries in some rows of blocks, and the row and column of each."""
-    starts = matrix.indptr[first : last + 1]
-    some = slice(starts[0], starts[-1])
-    return some, np.repeat(np.arange(first, last), np.diff(starts)), matrix.indices[some]
 
 
 def _distance(points: np.ndarray | None, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:

@@ -1,7 +1,6 @@
 """The matrices that smoothed aggregation forms: the smoothed prolongation and Pᵀ A P.
 
-With Numba one pass over the rows of A forms each of them: A P is never stored. Without it SciPy
-multiplies some rows at a time, each in a thread.
+One pass over the rows of A forms each of them: A P is never stored.
 """
 
 from collections.abc import Callable
@@ -11,20 +10,16 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...lac.threads import prefetch
-from ...system.compiled import compiled, worthwhile
-from .products import pattern, ranges, rows_of, share_rows
+from ...system.compiled import compiled
+from .products import pattern, ranges, share_rows
 
-_PARTS = 8  # of a product that SciPy forms in parts
+_PARTS = 8  # in which threads find a pattern
 _MARKS = 30  # neighbours that an entry of a pattern adds, as multiplications
 
 
 def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_matrix:
     """T − `weight` · A T for `matrix` A (n, n) and `tentative` T (n, c) in single precision."""
     sizes = matrix.blocksize[0], tentative.blocksize[1]
-    if not worthwhile(matrix.data.size):
-        change = matrix @ tentative
-        change.data *= -np.float32(weight)
-        return (tentative + change).tobsr(sizes)
     own = pattern(tentative)
     near = pattern(matrix)
     total = _empty(lambda some: near[some] @ own + own[some], matrix.indptr, tentative)
@@ -37,17 +32,6 @@ def smoothed(matrix: bsr_matrix, tentative: bsr_matrix, weight: float) -> bsr_ma
 def coarse(matrix: bsr_matrix, prolongation: bsr_matrix) -> bsr_matrix:
     """Pᵀ A P for a symmetric `matrix` A (n, n) and `prolongation` P (n, c) in single precision."""
     width = prolongation.blocksize[1]
-    if not worthwhile(matrix.data.size):
-        count = matrix.shape[0] // matrix.blocksize[0]
-        step = -(-count // _PARTS)
-
-        def part(first: int) -> bsr_matrix:
-            some, fine = (
-                rows_of(m, first, min(first + step, count)) for m in (matrix, prolongation)
-            )
-            return (fine.T @ (some @ prolongation)).tobsr((width, width))
-
-        return sum(prefetch(part, range(step, count, step)), part(0))
     ways = pattern(prolongation)
     near, felt = pattern(matrix), ways.T.tocsr()
     total = _empty(lambda some: felt[some] @ near @ ways, felt.indptr, prolongation, width)

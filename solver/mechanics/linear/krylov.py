@@ -1,20 +1,25 @@
-"""Conjugate gradients in double precision around a preconditioner in single precision."""
+"""Conjugate gradients in double precision around a preconditioner in single precision.
+
+The steps on long vectors are compiled passes, shared out among the threads. Scalar products are
+added up by parts of the vectors, and these in their order: the number of threads changes no digit.
+"""
 
 import logging
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ...lac.errors import SolveError
-from ...lac.threads import prefetch
-from ...system.compiled import worthwhile
-from . import vectors
+from ...lac.threads import prefetch, workers
+from ...system.compiled import compiled, part_of_compiled
 
 _LOG = logging.getLogger(__name__)
-_ROWS = 1 << 16  # of vectors at once
 _LOGGED = 10  # iterations from one line of the log to the next
 _SAFETY = 1.05  # of a bound from below
+_PART = 1 << 13  # of a vector
+_PARTS = 8  # of them from which another thread pays for its start
 
 Operator = Callable[[np.ndarray], np.ndarray]
 
@@ -31,7 +36,7 @@ def conjugate_gradients(
     most: int,
     watch: Callable[[int, float], None] = lambda *_: None,
 ) -> tuple[np.ndarray, int]:
-    """Solve for the columns of `right` (n, k) at once; return the solution and the iterations.
+    """Solve for `right` (n,); return the solution and the iterations.
 
     `accuracy` is residual over right-hand side, in 2-norms. Raises SolveError where `most`
     iterations do not reach it, or where one third (two thirds) of them reach less than one third
@@ -40,22 +45,35 @@ def conjugate_gradients(
     each number of iterations and the residual reached, and may change the preconditioner.
     """
     solution, residual = np.zeros_like(right), right.copy()
-    start = np.sqrt(_total(lambda some: _dot(right[some], right[some]), len(right)))
     improved = precondition(residual)
     direction = improved.copy()
-    energy = _total(lambda some: _dot(residual[some], improved[some]), len(right))
-    iteration, reached = 0, float(start.any())
+    start, energy = product(right, right) ** 0.5, product(residual, improved)
+    iteration, reached, thirds = 0, float(start != 0), (most // 3, 2 * most // 3, most)
     while reached > accuracy:
-        _give_up("conjugate gradients", iteration, reached, accuracy, most)
-        left = _advance(solution, residual, direction, multiply(direction), energy)
+        if iteration in thirds and reached > accuracy ** (iteration / most):
+            text = (
+                f"conjugate gradients leave a residual of {reached:.0e} in {iteration} iterations"
+            )
+            raise SolveError(text)
+        image = multiply(direction)
+        step = _ratio(energy, product(direction, image))
+        left = _summed(_advance, 1, solution, residual, direction, image, step)[0]
         iteration += 1
-        reached = float(_ratio(left, start).max())
-        _log_progress("conjugate gradients", iteration, reached)
+        reached = _ratio(float(left) ** 0.5, start)
+        if iteration % _LOGGED == 0:
+            _LOG.info("conjugate gradients: iteration %d, residual %.1e", iteration, reached)
         watch(iteration, reached)
         if reached > accuracy:
             previous, improved = improved, precondition(residual)
-            energy = _turn(direction, residual, improved, previous, energy)
+            change, following = _summed(_of_change, 2, residual, improved, previous)
+            _shared(_turn, direction, _ratio(change, energy), improved)
+            energy = following
     return solution, iteration
+
+
+def _ratio(numerator: float, denominator: float) -> float:
+    # What is solved exactly has a denominator of zero.
+    return float(numerator / denominator) if denominator > 0 else 0.0
 
 
 def two_steps(precondition: Operator, multiply: Operator, residual: np.ndarray) -> np.ndarray:
@@ -84,128 +102,14 @@ def _inner(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.sum(one * other, dtype=float))
 
 
-def _advance(
-    solution: np.ndarray,
-    residual: np.ndarray,
-    direction: np.ndarray,
-    image: np.ndarray,
-    energy: np.ndarray,
-) -> np.ndarray:
-    """One step along a direction, in place; the norms (k,) of the residual."""
-    if _compiled(solution):
-        step = _ratio(energy, vectors.product(direction[:, 0], image[:, 0]))
-        about = (each[:, 0] for each in (solution, residual, direction, image))
-        return np.sqrt(vectors.advance(float(step[0]), *about))
-    step = _ratio(energy, _total(lambda some: _dot(direction[some], image[some]), len(image)))
+def in_single(solve: Operator, right: np.ndarray) -> np.ndarray:
+    """A linear `solve` in single precision of `right` (n,) in double precision.
 
-    def part(some: slice) -> np.ndarray:
-        solution[some] += step * direction[some]
-        residual[some] -= step * image[some]
-        return _dot(residual[some], residual[some])
-
-    return np.sqrt(_total(part, len(image)))
-
-
-def _turn(
-    direction: np.ndarray,
-    residual: np.ndarray,
-    improved: np.ndarray,
-    previous: np.ndarray,
-    energy: np.ndarray,
-) -> np.ndarray:
-    """The next direction, in place, and its energy (k,)."""
-    if _compiled(direction):
-        about = (each[:, 0] for each in (residual, improved, previous))
-        change, following = vectors.products_of_change(*about)[:, None]
-        vectors.turn(float(_ratio(change, energy)[0]), direction[:, 0], improved[:, 0])
-        return following
-
-    def part(some: slice) -> np.ndarray:
-        change = improved[some] - previous[some]
-        return np.stack([_dot(residual[some], change), _dot(residual[some], improved[some])])
-
-    change, following = _total(part, len(residual))
-    share = _ratio(change, energy)
-
-    def turn(some: slice) -> None:
-        direction[some] *= share
-        direction[some] += improved[some]
-
-    _in_parts(turn, len(direction))
-    return following
-
-
-def _compiled(columns: np.ndarray) -> bool:
-    """Whether compiled loops serve: for a single column."""
-    return columns.shape[1] == 1 and worthwhile(columns.size)
-
-
-def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """The products (k,) of the columns of both."""
-    return np.asarray(np.sum(one * other, axis=0))
-
-
-def _total(found: Callable[[slice], Any], size: int) -> np.ndarray:
-    """The sum of what is `found` for some rows at a time, few enough for the processor's cache.
-
-    Threads find it; the sum is in the order of the rows.
+    Single precision has a small range of exponents: the vector is scaled to order one.
     """
-    return np.asarray(sum(_in_parts(found, size), 0.0))
-
-
-def _in_parts(work: Callable[[slice], Any], size: int) -> list[Any]:
-    """What `work` returns for some rows at a time, in their order; threads do it."""
-    parts = (slice(first, first + _ROWS) for first in range(0, size, _ROWS))
-    return list(prefetch(work, parts))
-
-
-def by_columns(function: Operator, x: np.ndarray) -> np.ndarray:
-    """What `function` makes of each column of x (n, k); a single one is not copied."""
-    if x.shape[1] == 1:
-        return function(x[:, 0])[:, None]
-    return np.stack([function(np.ascontiguousarray(column)) for column in x.T], axis=1)
-
-
-def in_single(solve: Operator) -> Operator:
-    """A linear `solve` of float32 columns as one of float64 columns, each scaled to order one.
-
-    Single precision has a small range of exponents.
-    """
-
-    def lifted(right: np.ndarray) -> np.ndarray:
-        single, result = np.empty(right.shape, np.float32), np.empty_like(right)
-
-        def largest(some: slice) -> np.ndarray:
-            return np.maximum(right[some].max(axis=0), -right[some].min(axis=0))
-
-        size = np.max(_in_parts(largest, len(right)), axis=0)
-        size[size == 0] = 1.0
-
-        def lower(some: slice) -> None:
-            np.divide(right[some], size, out=single[some], casting="same_kind")
-
-        _in_parts(lower, len(right))
-        found = solve(single)
-        _in_parts(lambda some: np.multiply(found[some], size, out=result[some]), len(right))
-        return result
-
-    return lifted
-
-
-def _give_up(method: str, iteration: int, reached: float, accuracy: float, most: int) -> None:
-    thirds = most // 3, 2 * most // 3, most
-    if iteration in thirds and reached > accuracy ** (iteration / most):
-        raise SolveError(f"{method} leave a residual of {reached:.0e} in {iteration} iterations")
-
-
-def _log_progress(method: str, iteration: int, reached: float) -> None:
-    if iteration % _LOGGED == 0:
-        _LOG.info("%s: iteration %d, residual %.1e", method, iteration, reached)
-
-
-def _ratio(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
-    # A column that is solved exactly has a denominator of zero.
-    return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > 0)
+    size = max(right.max(initial=0.0), -right.min(initial=0.0)) or 1.0
+    single = np.divide(right, size, out=np.empty(right.shape, np.float32), casting="same_kind")
+    return np.multiply(solve(single), size, dtype=float)
 
 
 def eigenvalue_bound(
@@ -231,3 +135,79 @@ def eigenvalue_bound(
         previous, vector = vector, image / beside[-1]
     found = eigh_tridiagonal(diagonal, beside[1 : len(diagonal)], eigvals_only=True)
     return np.float32(_SAFETY * found[-1])
+
+
+def product(x: np.ndarray, y: np.ndarray) -> float:
+    """The scalar product of two vectors (n,) in double precision."""
+    return float(_summed(_multiply, 1, x, y)[0])
+
+
+def _summed(kernel: Callable[..., None], count: int, *about: Any) -> np.ndarray:
+    """The sums (count,) over all parts of what a kernel finds in each."""
+    found = np.zeros((-(-len(about[0]) // _PART), count))
+    _shared(kernel, *about, found)
+    return np.asarray(found.sum(axis=0))
+
+
+def _shared(kernel: Callable[..., None], *about: Any) -> None:
+    """Call a kernel for the parts of vectors; each thread has some of them."""
+    parts = -(-len(about[0]) // _PART)
+    count = min(workers(), 1 + parts // _PARTS)
+    cuts = [parts * k // count for k in range(count + 1)]
+    for _ in prefetch(lambda mine: kernel(*mine, _PART, *about), pairwise(cuts)):
+        pass
+
+
+@part_of_compiled
+def _dot(low, high, x, y):  # type: ignore[no-untyped-def]
+    """The product of entries from `low` to `high`, in four sums that do not wait for each other."""
+    a = b = c = d = 0.0
+    for i in range(low, high - 3, 4):
+        a += x[i] * y[i]
+        b += x[i + 1] * y[i + 1]
+        c += x[i + 2] * y[i + 2]
+        d += x[i + 3] * y[i + 3]
+    for i in range(high - (high - low) % 4, high):
+        a += x[i] * y[i]
+    return (a + b) + (c + d)
+
+
+@compiled
+def _multiply(first, last, size, x, y, found):  # type: ignore[no-untyped-def]
+    for part in range(first, last):
+        low, high = part * size, min((part + 1) * size, len(x))
+        found[part, 0] = _dot(low, high, x, y)
+
+
+@compiled
+def _advance(  # type: ignore[no-untyped-def]
+    first, last, size, solution, residual, direction, image, step, found
+):  # fmt: skip
+    for part in range(first, last):
+        low, high = part * size, min((part + 1) * size, len(solution))
+        for i in range(low, high):
+            solution[i] += step * direction[i]
+            residual[i] -= step * image[i]
+        found[part, 0] = _dot(low, high, residual, residual)
+
+
+@compiled
+def _of_change(first, last, size, residual, new, old, found):  # type: ignore[no-untyped-def]
+    for part in range(first, last):
+        a = b = c = d = 0.0
+        low, high = part * size, min((part + 1) * size, len(new))
+        for i in range(low, high - 1, 2):
+            a += residual[i] * (new[i] - old[i])
+            b += residual[i + 1] * (new[i + 1] - old[i + 1])
+            c += residual[i] * new[i]
+            d += residual[i + 1] * new[i + 1]
+        if (high - low) % 2:
+            a += residual[high - 1] * (new[high - 1] - old[high - 1])
+            c += residual[high - 1] * new[high - 1]
+        found[part, 0], found[part, 1] = a + b, c + d
+
+
+@compiled
+def _turn(first, last, size, direction, share, new):  # type: ignore[no-untyped-def]
+    for i in range(first * size, min(last * size, len(new))):
+        direction[i] = share * direction[i] + new[i]

@@ -27,7 +27,7 @@ from .choice import Shared
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .contact_levels import Correction, correction_of, scales_of
 from .hierarchy import Hierarchy, Level
-from .krylov import EPSILON, by_columns, conjugate_gradients, in_single, two_steps
+from .krylov import EPSILON, conjugate_gradients, in_single, two_steps
 from .products import multiply, multiply_transposed
 from .symmetric_blocks import NodalMatrix
 from .unknowns import Unknowns
@@ -71,33 +71,28 @@ class ScaledSystem:
         self._rows, self._added = self.place[rows], some
 
     def placed(self, x: np.ndarray) -> np.ndarray:
-        """Columns (n, k) in their rows (size, k)."""
-        found = np.zeros((self._size, x.shape[1]))
+        """A vector (n,) in its rows (size,)."""
+        found = np.zeros(self._size)
         found[self.place] = x
         return found
 
     def lifted(self, right: np.ndarray) -> np.ndarray:
-        """The right-hand side (size, k) of the scaled system for `right` (n, k)."""
-        return self.placed(self.scale[:, None] * right)
+        """The right-hand side (size,) of the scaled system for `right` (n,)."""
+        return self.placed(self.scale * right)
 
     def solution(self, found: np.ndarray) -> np.ndarray:
-        """The solution (n, k) of the system, from the scaled one (size, k)."""
-        return np.asarray(self.scale[:, None] * found[self.place])
+        """The solution (n,) of the system, from the scaled one (size,)."""
+        return np.asarray(self.scale * found[self.place])
 
     def without_idle(self, x: np.ndarray) -> np.ndarray:
-        """The same vectors (size, k), zero in idle rows from now on."""
+        """The same vector (size,), zero in idle rows from now on."""
         x[self._idle] = 0
         return x
 
     def multiply(self, x: np.ndarray) -> np.ndarray:
-        """The product with vectors (size, k)."""
+        """The product with a vector (size,), by the blocks of the stiffness where it has some."""
         if self._blocks is None:
             return self.lifted(self._matrix @ self.solution(x))
-        return by_columns(self._product, x)
-
-    def _product(self, x: np.ndarray) -> np.ndarray:
-        """The product with a vector (size,) by the blocks of the stiffness."""
-        assert self._blocks is not None
         bodies = x if self._around is None else self._around * x
         if len(self._springs):
             # The stiffness does not know what is in these rows.
@@ -193,8 +188,10 @@ class Multigrid:
         is asked of a matrix in single precision. Raises SolveError where `MAX_ITERATIONS` do not or
         will not suffice, and where the solution is not finite.
         """
-        columns = np.asarray(right, dtype=float)
-        columns = columns if columns.ndim == 2 else columns[:, None]
+        right = np.asarray(right, dtype=float)
+        if right.ndim == 2:
+            columns = [self.solve(column, accuracy) for column in right.T]
+            return np.array(columns).reshape(right.T.shape).T
         if self._single and accuracy < _LEAST_SINGLE:
             accuracy = _SINGLE
         system = self._system
@@ -204,31 +201,21 @@ class Multigrid:
                 _LOG.info("slow iterations: coarse levels take two steps each")
                 self._shared.slow = True
 
-        about = self._precondition, system.lifted(columns), accuracy, MAX_ITERATIONS, watch
+        about = self._precondition, system.lifted(right), accuracy, MAX_ITERATIONS, watch
         solution, iterations = conjugate_gradients(system.multiply, *about)
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         self.iterations = max(self.iterations, iterations)
-        return system.solution(solution).reshape(np.shape(right))
+        return system.solution(solution)
 
     def close(self) -> None:
         """Release the hierarchy; it solves no more."""
         self._levels = []
         self._shared.close()
 
-    @property
-    def scale(self) -> np.ndarray:
-        """The scale (n,) of the unknowns."""
-        return self._system.scale
-
-    def cycle(self, residual: np.ndarray) -> np.ndarray:
-        """The correction for a residual (n,), one cycle; both scaled."""
-        return self._precondition(self._system.placed(residual[:, None]))[self._system.place, 0]
-
     def _precondition(self, residual: np.ndarray) -> np.ndarray:
-        """The same for columns (size, k) in the rows of the first level."""
-        cycles = partial(by_columns, partial(self._descend, 0))
-        return self._system.without_idle(in_single(cycles)(residual))
+        """The correction for a residual (size,), one cycle; both scaled."""
+        return self._system.without_idle(in_single(partial(self._descend, 0), residual))
 
     def _descend(self, depth: int, residual: np.ndarray) -> np.ndarray:
         """One cycle from a level down; where that is slow two steps on each coarse level."""

@@ -1,8 +1,7 @@
 """Products of block-sparse matrices with vectors, their rows shared out among the threads.
 
-With Numba a kernel for each size of blocks runs at nearly the speed of memory; without it each
-thread runs SciPy on its rows. One thread sums up a row, always in the same order: the number of
-threads changes no digit.
+A compiled kernel for each size of blocks runs at nearly the speed of memory. One thread sums up a
+row, always in the same order: the number of threads changes no digit.
 """
 
 from collections.abc import Callable
@@ -11,7 +10,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...lac.threads import prefetch, workers
-from ...system.compiled import compiled, worthwhile
+from ...system.compiled import compiled
 
 _LEAST = 200_000  # multiplications from which another thread pays for its start
 _PARTS = 16  # of a transposed product
@@ -36,19 +35,9 @@ def multiply(
         out = np.zeros(matrix.shape[0], dtype=matrix.dtype) if base is None else base.copy()
     elif out is not base:
         out[:] = 0 if base is None else base
-    height = matrix.blocksize[0]
-    kernel = _PRODUCTS.get(matrix.blocksize) if worthwhile(matrix.data.size) else None
-    arrays = matrix.indptr, matrix.indices, matrix.data
-
-    def rows(first: int, last: int) -> None:
-        if kernel is not None:
-            kernel(first, last, *arrays, x, matrix.dtype.type(factor), out)
-        else:
-            product = rows_of(matrix, first, last) @ x
-            product *= matrix.dtype.type(factor)
-            out[height * first : height * last] += product
-
-    share_rows(rows, matrix.indptr, matrix.data[:1].size)
+    kernel, arrays = _PRODUCTS[matrix.blocksize], (matrix.indptr, matrix.indices, matrix.data)
+    more = *arrays, x, matrix.dtype.type(factor), out
+    share_rows(lambda *some: kernel(*some, *more), matrix.indptr, matrix.data[:1].size)
     return out
 
 
@@ -60,14 +49,9 @@ def multiply_transposed(matrix: bsr_matrix, x: np.ndarray) -> np.ndarray:
     >>> multiply_transposed(bsr_matrix(np.ones((9, 6)), blocksize=(3, 6)), np.ones(9))
     array([9., 9., 9., 9., 9., 9.])
     """
-    height = matrix.blocksize[0]
-    kernel = _TRANSPOSED.get(matrix.blocksize) if worthwhile(matrix.data.size) else None
-    arrays = matrix.indptr, matrix.indices, matrix.data
+    kernel, arrays = _TRANSPOSED[matrix.blocksize], (matrix.indptr, matrix.indices, matrix.data)
 
     def part(some: tuple[int, int]) -> np.ndarray:
-        if kernel is None:
-            found: np.ndarray = rows_of(matrix, *some).T @ x[height * some[0] : height * some[1]]
-            return found
         out = np.zeros(matrix.shape[1], dtype=matrix.dtype)
         kernel(*some, *arrays, x, out)
         return out
@@ -77,14 +61,6 @@ def multiply_transposed(matrix: bsr_matrix, x: np.ndarray) -> np.ndarray:
     for other in parts:
         total += other
     return total
-
-
-def rows_of(matrix: bsr_matrix, first: int, last: int) -> bsr_matrix:
-    """Some rows of blocks, without a copy of the blocks."""
-    starts = matrix.indptr[first : last + 1]
-    chosen = slice(starts[0], starts[-1])
-    arrays = matrix.data[chosen], matrix.indices[chosen], starts - starts[0]
-    return bsr_matrix(arrays, shape=(matrix.blocksize[0] * (len(starts) - 1), matrix.shape[1]))
 
 
 class InParts:
@@ -132,20 +108,8 @@ def scale_blocks(
     height, width = matrix.blocksize
     rows, columns = left.reshape(-1, height), right.reshape(-1, width)
     into = matrix.data if out is None else out
-    if worthwhile(matrix.data.size):
-        arrays = matrix.indptr, matrix.indices, matrix.data, rows, columns, into
-        share_rows(lambda *some: _scale(*some, *arrays), matrix.indptr, height * width)
-        return
-
-    def fill(first: int, last: int) -> None:
-        some = slice(*matrix.indptr[[first, last]])
-        counts = np.diff(matrix.indptr[first : last + 1])
-        # A product of both factors first: a symmetric matrix stays symmetric to the last digit.
-        factors = np.repeat(rows[first:last], counts, axis=0)[:, :, None]
-        factors = factors * columns[matrix.indices[some]][:, None, :]
-        into[some] = np.multiply(factors, matrix.data[some], out=factors)
-
-    in_pieces(fill, matrix)
+    arrays = matrix.indptr, matrix.indices, matrix.data, rows, columns, into
+    share_rows(lambda *some: _scale(*some, *arrays), matrix.indptr, height * width)
 
 
 def sums_of_sizes(matrix: bsr_matrix, weights: np.ndarray) -> np.ndarray:
@@ -156,21 +120,8 @@ def sums_of_sizes(matrix: bsr_matrix, weights: np.ndarray) -> np.ndarray:
     """
     height, width = matrix.blocksize
     sums, columns = np.zeros((matrix.shape[0] // height, height)), weights.reshape(-1, width)
-    if worthwhile(matrix.data.size):
-        arrays = matrix.indptr, matrix.indices, matrix.data, columns, sums
-        share_rows(lambda *some: _add_sizes(*some, *arrays), matrix.indptr, height * width)
-        return sums.ravel()
-
-    def add_up(first: int, last: int) -> None:
-        starts = matrix.indptr[first : last + 1]
-        some, filled = slice(starts[0], starts[-1]), np.diff(starts) > 0
-        if filled.any():
-            found = columns[matrix.indices[some], :, None]
-            inner = np.matmul(np.abs(matrix.data[some]), found)[:, :, 0]
-            starts = starts[:-1][filled] - starts[0]
-            sums[first:last][filled] = np.add.reduceat(inner, starts, axis=0)
-
-    in_pieces(add_up, matrix)
+    arrays = matrix.indptr, matrix.indices, matrix.data, columns, sums
+    share_rows(lambda *some: _add_sizes(*some, *arrays), matrix.indptr, height * width)
     return sums.ravel()
 
 
@@ -188,14 +139,6 @@ def ranges(starts: np.ndarray, weight: int, most: int) -> list[tuple[int, int]]:
 def share_rows(work: Callable[[int, int], None], starts: np.ndarray, weight: int = 1) -> None:
     """Call `work` on a range of rows in each thread; see `ranges`."""
     for _ in prefetch(lambda some: work(*some), ranges(starts, weight, workers())):
-        pass
-
-
-def in_pieces(work: Callable[[int, int], None], matrix: bsr_matrix) -> None:
-    """Call `work` on ranges of rows of blocks so small that its own arrays stay small."""
-    for _ in prefetch(
-        lambda some: work(*some), ranges(matrix.indptr, matrix.data[:1].size, 1 << 30)
-    ):
         pass
 
 

@@ -15,9 +15,8 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...lac.threads import prefetch
-from ...system.compiled import compiled, worthwhile
+from ...system.compiled import compiled
 from ..fem.assembly import selected
-from .krylov import by_columns
 from .products import chosen_rows, multiply, pattern, ranges, scale_blocks
 
 _SLABS = 8  # the most threads that share a product
@@ -129,11 +128,9 @@ class SymmetricBlocks:
 def halved(matrix: bsr_matrix) -> SymmetricBlocks:
     """A symmetric `matrix`: its blocks below the diagonal are not read where one above serves.
 
-    Everything stays where no compiled product is worthwhile; SciPy would copy blocks to transpose.
+    The blocks have an edge of three or six.
     """
     edge = matrix.blocksize[0]
-    if edge not in _PRODUCTS or not worthwhile(matrix.data.size):
-        return SymmetricBlocks(matrix)
     slabs = ranges(matrix.indptr, edge**2, _SLABS)
     counts = np.zeros((2, len(matrix.indptr)), dtype=matrix.indptr.dtype)
     given = matrix.indptr, matrix.indices
@@ -310,7 +307,7 @@ class NodalMatrix:
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """The product with x (n,) or its columns (n, k)."""
         if x.ndim > 1:
-            return by_columns(self.__matmul__, x)
+            return np.array([self @ column for column in x.T]).reshape(x.T.shape).T
         x = x if self.scale is None else x / self.scale
         # In double precision, whatever that of the blocks.
         found = self.blocks.multiply(self._on_all(np.asarray(x, dtype=float)))[self.free]

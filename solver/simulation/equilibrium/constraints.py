@@ -317,7 +317,7 @@ def free_stiffness(scene: Scene, unknowns: Unknowns, single: bool) -> tuple[Stif
     # Friction adds springs to the matrix.
     iterative = not (scene.case.frictional or against_multigrid(len(unknowns.node), unknowns))
     plain = free.selection is not None and not scene.springs.nnz
-    in_blocks = plain and iterative and not mean.size
+    in_blocks = plain and iterative and not mean.size and scene.points.shape[1] == 3
     blocks = stiffness(scene.points, scene.blocks, single and in_blocks)
     diagonal = blocks.diagonal().astype(float)
     if in_blocks and free.selection is not None:

@@ -10,10 +10,7 @@ from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepest
 from solver.mechanics.fem.elasticity import internal_force, stiffness
 from solver.mechanics.fem.stress import nodal_stress
-from solver.system.compiled import available
 from tests.scenes import block_mesh, grid
-
-pytestmark = pytest.mark.skipif(not available(), reason="Numba is not installed")
 
 SOLID = [name for name, kind in BY_NAME.items() if kind.dim == 3]
 

@@ -9,27 +9,25 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.products import _PRODUCTS, _TRANSPOSED, scale_blocks
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix
-from solver.system.compiled import available
 
 
-def example(seed, dim, share):
+def example(seed, share):
     """Symmetric blocks of six nodes, some pairs apart, one node with no cell; and free dofs."""
     rng, n = np.random.default_rng(seed), 6
     near = rng.random((n, n)) < 0.5
     near |= near.T | np.eye(n, dtype=bool)
     near[n - 1] = near[:, n - 1] = False
-    dense = rng.standard_normal((n * dim, n * dim)) * np.kron(near, np.ones((dim, dim)))
+    there = np.kron(near, np.ones((3, 3)))
+    dense = rng.standard_normal((3 * n, 3 * n)) * there
     dense += dense.T
-    blocks = bsr_matrix(dense, blocksize=(dim, dim))
-    free = np.flatnonzero(rng.random((n - 1) * dim) < share)
-    return NodalMatrix(blocks, free), dense[np.ix_(free, free)], np.kron(near, np.ones((dim, dim)))
+    free = np.flatnonzero(rng.random(3 * (n - 1)) < share)
+    matrix = NodalMatrix(bsr_matrix(dense, blocksize=(3, 3)), free)
+    return matrix, dense[np.ix_(free, free)], there
 
 
-@given(
-    seed=st.integers(0, 10**6), dim=st.sampled_from([2, 3]), share=st.sampled_from([0.3, 0.8, 1])
-)
-def test_all_operations_are_those_of_the_dense_matrix(seed, dim, share):
-    matrix, dense, there = example(seed, dim, share)
+@given(seed=st.integers(0, 10**6), share=st.sampled_from([0.3, 0.8, 1]))
+def test_all_operations_are_those_of_the_dense_matrix(seed, share):
+    matrix, dense, there = example(seed, share)
     rng, n = np.random.default_rng(seed), len(dense)
     assert matrix.shape == dense.shape
     x = rng.standard_normal((n, 2))
@@ -43,9 +41,8 @@ def test_all_operations_are_those_of_the_dense_matrix(seed, dim, share):
     assert matrix.nnz == there[np.ix_(matrix.free, matrix.free)].sum() == matrix.tocsr().nnz
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_condensed_matrix_of_blocks_is_that_of_entries(dim):
-    matrix, dense, _ = example(3, dim, 0.9)
+def test_a_condensed_matrix_of_blocks_is_that_of_entries():
+    matrix, dense, _ = example(3, 0.9)
     kept = np.arange(len(dense)) % 4 > 0
     added = csr_matrix(np.diag(np.arange(kept.sum(), dtype=float)))
     condensed = CondensedMatrix(matrix, np.flatnonzero(kept), added)
@@ -57,10 +54,9 @@ def test_a_condensed_matrix_of_blocks_is_that_of_entries(dim):
     np.testing.assert_allclose(condensed.tocsr().toarray(), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_blocks_scaled_in_place_are_still_the_matrix(dim):
+def test_blocks_scaled_in_place_are_still_the_matrix():
     """Also once the caller has scaled them further, and when they are scaled for a second time."""
-    matrix, dense, _ = example(3, dim, 0.8)
+    matrix, dense, _ = example(3, 0.8)
     single = NodalMatrix(matrix.blocks.tobsr().astype(np.float32), matrix.free)
     n, rng = len(dense), np.random.default_rng(1)
     nnz, close = single.nnz, {"rtol": 1e-6, "atol": 1e-6 * np.abs(dense).max()}
@@ -84,13 +80,12 @@ def test_blocks_scaled_in_place_are_still_the_matrix(dim):
 
 
 def test_blocks_in_double_precision_stay_as_they_are():
-    matrix, dense, _ = example(3, 3, 0.8)
+    matrix, dense, _ = example(3, 0.8)
     blocks = matrix.blocks.tobsr()
     assert not np.shares_memory(matrix.scaled(np.full(len(dense), 2.0)).data, blocks.data)
     np.testing.assert_array_equal(matrix.tocsr().toarray(), dense)
 
 
-@pytest.mark.skipif(not available(), reason="needs Numba")
 @pytest.mark.parametrize("transposed", [False, True])
 def test_kernels_reach_entries_past_two_to_the_31(transposed):
     """As ten million unknowns of HEXA20 have; only the last pages of the arrays are touched."""

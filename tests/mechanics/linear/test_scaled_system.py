@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from solver.mechanics.linear import contact_levels, products, symmetric_blocks
+from solver.mechanics.linear import contact_levels
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.multigrid import Multigrid, ScaledSystem
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix, halved
-from solver.system.compiled import available
 from tests.mechanics.linear.test_contact_levels import condensed, pressed
 from tests.mechanics.linear.test_symmetric_blocks import symmetric
 
@@ -44,30 +43,28 @@ def test_product_is_the_one_of_the_scaled_dense_matrix(kind, springs):
         dense = held + added + added.T
     system = ScaledSystem(matrix, scale, place, blocks.shape[0])
     exact = dense * np.outer(system.scale, system.scale)
-    x = rng.standard_normal((len(dense), 2))
+    x = rng.standard_normal(len(dense))
     padded = system.placed(x)
     before = padded.copy()
     found = system.multiply(padded)
     np.testing.assert_array_equal(padded, before)
     np.testing.assert_allclose(found[system.place], exact @ x, atol=close * 9 * np.abs(exact).max())
-    assert not np.delete(found, system.place, axis=0).any()
-    np.testing.assert_array_equal(system.solution(padded), x * system.scale[:, None])
-    np.testing.assert_array_equal(system.lifted(x), system.placed(x * system.scale[:, None]))
+    assert not np.delete(found, system.place).any()
+    np.testing.assert_array_equal(system.solution(padded), x * system.scale)
+    np.testing.assert_array_equal(system.lifted(x), system.placed(x * system.scale))
     ones = np.ones_like(padded)
     np.testing.assert_array_equal(system.without_idle(ones), system.placed(np.ones_like(x)))
 
 
-@pytest.mark.parametrize("compiled", [available(), False])
-def test_a_cycle_is_symmetric_and_positive(compiled, monkeypatch):
+def test_a_cycle_is_symmetric_and_positive():
     """With contact, an exact solve beside it, and pivots: to single precision."""
-    for module in (products, symmetric_blocks):
-        monkeypatch.setattr(module, "worthwhile", lambda numbers: compiled)
     matrix, gaps, own, unknowns = pressed(6, 5)
     solver = Multigrid(condensed(matrix, gaps, own, unknowns), unknowns)
     assert solver._levels[0].interface is not None
-    rng, n = np.random.default_rng(6), len(solver.scale)
-    some = rng.standard_normal((n, 6))
-    images = np.stack([solver.cycle(column) for column in some.T], axis=1)
+    system, rng = solver._system, np.random.default_rng(6)
+    some = rng.standard_normal((len(system.scale), 6))
+    cycles = [solver._precondition(system.placed(column)) for column in some.T]
+    images = np.stack([cycle[system.place] for cycle in cycles], axis=1)
     energy = some.T @ images
     np.testing.assert_allclose(energy, energy.T, rtol=0, atol=1e-4 * np.abs(energy).max())
     assert (np.linalg.eigvalsh(energy + energy.T) > 0).all()
@@ -127,12 +124,3 @@ def test_springs_are_scaled_to_one():
     found = contact_levels.scales_of(condensed, np.array([5.0, 6.0, 7.0, 8.0]))
     np.testing.assert_array_equal(found, [5.0, 7.0, 0.25])
     np.testing.assert_array_equal(condensed.places, [0, 2, 1])
-
-
-def test_a_column_is_not_copied():
-    from solver.mechanics.linear.krylov import by_columns
-
-    x = np.arange(6.0)[:, None]
-    assert np.shares_memory(by_columns(lambda column: column, x), x)
-    both = by_columns(lambda column: 2 * column, np.ones((3, 2)))
-    np.testing.assert_array_equal(both, np.full((3, 2), 2.0))

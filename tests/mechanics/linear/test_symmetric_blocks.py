@@ -7,17 +7,11 @@ from scipy.sparse import bsr_matrix
 from solver.lac import threads
 from solver.mechanics.linear import products, symmetric_blocks
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix, SymmetricBlocks, halved
-from solver.system import compiled
-
-NUMBA = pytest.param(True, marks=pytest.mark.skipif(not compiled.available(), reason="no Numba"))
 
 
-@pytest.fixture(params=[NUMBA, False])
-def with_numba(request, monkeypatch):
+@pytest.fixture(autouse=True)
+def _shared_out(monkeypatch):
     monkeypatch.setattr(products, "_LEAST", 1)
-    for module in (products, symmetric_blocks):
-        monkeypatch.setattr(module, "worthwhile", lambda numbers: request.param)
-    return request.param
 
 
 def symmetric(edge, precision=np.float32, nodes=41):
@@ -31,18 +25,14 @@ def symmetric(edge, precision=np.float32, nodes=41):
     return bsr_matrix((dense + dense.T).astype(precision), blocksize=(edge, edge))
 
 
-@pytest.mark.parametrize("edge", [2, 3, 6])
+@pytest.mark.parametrize("edge", [3, 6])
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
-def test_every_operation_is_the_one_of_the_dense_matrix(edge, precision, with_numba):
+def test_every_operation_is_the_one_of_the_dense_matrix(edge, precision):
     matrix = symmetric(edge, precision)
     half, dense, rng = halved(matrix), matrix.toarray(), np.random.default_rng(1)
-    if with_numba and edge != 2:
-        # Of pairs in one slab, one block of two.
-        assert half.upper is not None
-        assert len(half.slabs) == symmetric_blocks._SLABS
-        assert half.whole.nnz + 2 * half.upper.nnz == matrix.nnz
-    else:
-        assert half.upper is None
+    # Of pairs in one slab, one block of two.
+    assert len(half.slabs) == symmetric_blocks._SLABS
+    assert half.whole.nnz + 2 * half.upper.nnz == matrix.nnz
     assert (half.shape, half.dtype, half.blocksize) == (matrix.shape, precision, edge)
     np.testing.assert_array_equal(half.tobsr().toarray(), dense)
     assert half.tobsr().blocksize == (edge, edge)
@@ -54,9 +44,9 @@ def test_every_operation_is_the_one_of_the_dense_matrix(edge, precision, with_nu
         np.testing.assert_array_equal(half.chosen_rows(rows).toarray(), dense[rows])
 
 
-@pytest.mark.parametrize("edge", [2, 3, 6])
+@pytest.mark.parametrize("edge", [3, 6])
 @pytest.mark.parametrize("precisions", [(np.float32,) * 2, (np.float32, float), (float, float)])
-def test_product_is_the_dense_one(edge, precisions, with_numba, monkeypatch):
+def test_product_is_the_dense_one(edge, precisions, monkeypatch):
     matrix, rng = symmetric(edge, precisions[0]), np.random.default_rng(2)
     half, dense = halved(matrix), matrix.toarray().astype(float)
     x, base = (rng.standard_normal(len(dense)).astype(precisions[1]) for _ in range(2))
@@ -79,14 +69,14 @@ def test_product_is_the_dense_one(edge, precisions, with_numba, monkeypatch):
         np.testing.assert_array_equal(again.multiply(x, base, -1.5, 0.5, 0.25), found)
 
 
-def test_product_is_symmetric_to_round_off(with_numba):
+def test_product_is_symmetric_to_round_off():
     half, rng = halved(symmetric(3)), np.random.default_rng(3)
     one, other = (rng.standard_normal(half.shape[0]) for _ in range(2))
     assert abs(one @ half.multiply(other) - other @ half.multiply(one)) < 1e-12
 
 
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
-def test_nodal_matrix_of_one_half_is_still_the_matrix(precision, with_numba):
+def test_nodal_matrix_of_one_half_is_still_the_matrix(precision):
     """Also scaled for a second time, which needs both halves again."""
     blocks, rng = symmetric(3, precision), np.random.default_rng(4)
     free = np.flatnonzero(rng.random(blocks.shape[0]) < 0.8)
@@ -95,7 +85,7 @@ def test_nodal_matrix_of_one_half_is_still_the_matrix(precision, with_numba):
     for _ in range(2):
         scaled = matrix.scaled(rng.uniform(0.5, 2, len(free)))
         matrix.halve(halved(scaled))
-        assert (matrix.blocks.upper is not None) == with_numba
+        assert matrix.blocks.upper is not None
         assert matrix.nnz == nnz
         np.testing.assert_allclose(matrix @ np.eye(len(free)), dense, **close)
         np.testing.assert_allclose(matrix.diagonal(), dense.diagonal(), **close)
