@@ -15,7 +15,7 @@ from solver.commands.cli import main
 from solver.mesh.size import Size, check_memory
 from solver.system.errors import MachineError
 from solver.system.files import replacing
-from solver.system.memory import available, peak_mb
+from solver.system.process import available, peak_mb
 from solver.system.progress import report_outcomes
 from solver.verification.run import mesh_of
 from tests.machine import obeying_permissions, small_disk
@@ -133,7 +133,7 @@ def test_what_cannot_fit_is_refused_and_what_may_not_is_warned_of():
 
 def test_the_memory_there_is_heeds_the_limit_of_the_process():
     assert 0 < available() < 1e15
-    asked = "from solver.system.memory import available; print(available())"
+    asked = "from solver.system.process import available; print(available())"
     limited = subprocess.run(
         [sys.executable, "-c", asked],
         cwd=ROOT,

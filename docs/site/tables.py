@@ -17,14 +17,9 @@ from solver.case.file import CaseFile
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.typed import Section, described, is_section, titles_of
 from solver.case.typed import fields as keys_of
-from solver.verification import scales
+from solver.verification.checks import SCALES
 
-_RECIPES = (
-    "solver.mesh.recipes.blocks",
-    "solver.mesh.recipes.hybrid",
-    "solver.mesh.recipes.mapped",
-    "solver.mesh.recipes.bricks",
-)
+_RECIPES = ("solver.mesh.recipes.blocks", "solver.mesh.recipes.mapped")
 
 
 def case_keys() -> str:
@@ -62,7 +57,7 @@ def checks() -> str:
 
 
 def _check(check: Check) -> tuple[str, ...]:
-    scale = (getdoc(getattr(scales, check.scale)) or "").split("\n\n")[0].rstrip(".").lower()
+    scale = (getdoc(SCALES[check.scale]) or "").split("\n\n")[0].rstrip(".").lower()
     return (
         f"`{check.name}`" + (f"<br>{check.alias}" if check.alias else ""),
         check.what,
@@ -116,7 +111,7 @@ def _told(module: str) -> str:
             lines.append("```yaml" if inside else "```\n")
         fenced = inside
         lines.append(line.removeprefix("    ") if inside else line)
-    return "\n".join([*lines, *(["```"] if fenced else [])])
+    return "\n".join([*lines, *(["```"] if fenced else [])]).replace("\n\n```\n\n", "\n```\n\n")
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -20,7 +20,7 @@ class Check:
     feeds the check (None: always run), `sample` the function of `verification.samples` or
     `.numbers` that gives its values, and `of` what that is told, `tolerance` the default one (None:
     the relative one, which a case's single `tolerance` replaces), `scale` the measure of the
-    quantity (`verification.scales`), `fixed` whether that measure holds even where the reference is
+    quantity (`verification.checks`), `fixed` whether that measure holds even where the reference is
     not zero, `accepted` the tolerance against the accepted value, `like` the check whose tolerance
     holds where its own is not given. `needs`, of errors in norms: what an exact solution must have.
     """

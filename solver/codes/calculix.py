@@ -19,7 +19,7 @@ import numpy as np
 from ..lac.cells.catalogue import BY_NAME
 from ..lac.cells.faces import FaceBlock
 from ..lac.errors import SolveError
-from ..mesh.files.abaqus_writer import data_lines, face_number
+from ..mesh.files.abaqus import data_lines, face_number
 from ..system.errors import InputError
 from ..system.process import cores_for, run_in_subprocess
 from .deck import Deck, UnsupportedError, face_size

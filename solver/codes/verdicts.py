@@ -257,9 +257,8 @@ def _write_fields(path: Path, foreign: ForeignResult) -> None:
     """The fields of a result at the nodes of its own mesh, for ParaView."""
     import meshio
 
-    from ..mesh.files.vtkhdf import write_grid
+    from ..mesh.files.vtkhdf import new_file, write_grid
     from ..system.files import replacing
-    from ..system.hdf5 import new_file
 
     mesh = foreign.mesh
     assert mesh is not None

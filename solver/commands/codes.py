@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..system.errors import InputError
+from .cli import FAILED, PASSED, print_checks
 from .jobs import case_file
-from .options import FAILED, PASSED, print_checks
 
 if TYPE_CHECKING:
     import meshio

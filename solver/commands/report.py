@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from ..system.errors import InputError
-from .options import FAILED, PASSED
+from .cli import FAILED, PASSED
 
 
 def add_report(command: argparse.ArgumentParser) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..system.errors import InputError
 from . import jobs
-from .options import FAILED, PASSED, add_threads, print_checks
+from .cli import FAILED, PASSED, add_threads, print_checks
 
 if TYPE_CHECKING:
     from ..simulation.results.solution import Solution
@@ -141,8 +141,7 @@ def add_accept(command: argparse.ArgumentParser) -> None:
 
 
 def run_accept(options: argparse.Namespace) -> int:
-    from ..verification.checks import run_checks
-    from ..verification.regression import accept, accepted_values, regression_file
+    from ..verification.checks import accept, accepted_values, regression_file, run_checks
     from ..verification.results import read_result
 
     for path in (result for given in options.results for result in jobs.results_of(given)):

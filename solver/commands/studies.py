@@ -10,8 +10,8 @@ from pathlib import Path
 
 from ..system.errors import InputError
 from ..system.progress import report_outcomes
+from .cli import add_threads
 from .jobs import case_file
-from .options import add_threads
 
 LEVELS = (1, 2, 4)
 

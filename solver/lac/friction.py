@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .closure import MASTER, SLAVE, Integrals
 from .facets import tangents_of
+from .multipliers import MASTER, SLAVE, Integrals
 from .segments import Segments
 
 # Normals that differ by less within a segment are one normal.

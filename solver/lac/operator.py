@@ -12,18 +12,21 @@ import numpy as np
 from scipy import sparse
 
 from .cells.catalogue import cell_type
-from .closure import MASTER, SLAVE, Integrals, close_faces, integrals
 from .facets import Facets, tangents_of
 from .friction import levers, turned_along
 from .multipliers import (
+    MASTER,
+    SLAVE,
+    Integrals,
     InterfaceData,
     Space,
+    close_faces,
     constants,
+    integrals,
 )
-from .partners import on_one_surface, uncovered
+from .partners import Samples, Surface, face_samples, on_one_surface, uncovered
 from .recovery import Recovery, RecoveryRequest, recovery
 from .segments import Segments, intersect
-from .surface_points import Samples, Surface, face_samples
 
 # Coefficients below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13

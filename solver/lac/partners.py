@@ -3,17 +3,75 @@
 Along the normal of a point the nearest visible master face counts (`pairing`, `segments`). What is
 left is decided here, from distances at the points of the segments: a macro-element beside a step
 of the master meets the nearer side alone, since one pressure cannot act on both.
+
+Whole slave surfaces: quadrature points on their faces, and their macro-elements.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .facets import Facets
+from .cells.quadrature import Rule, face_rule
+from .facets import Facets, measured
 from .segments import Segments
-from .surface_points import Samples
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """The m macro-elements of a slave surface.
+
+    `area`, `covered` (m,): whole and intersected area; `lost` (m,): opposite the master, but
+    without a partner, where it is measured; `centre`, `normal` (m, dim).
+    """
+
+    area: np.ndarray
+    covered: np.ndarray
+    centre: np.ndarray
+    normal: np.ndarray
+    lost: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Samples:
+    """Points on the n faces of one block, the same q places on each.
+
+    `values` (q, n_nodes) shape functions; `weight` (n, q) surface measure × quadrature weight;
+    `normal` (n, q, dim) the unit normals along which the faces meet the master.
+    """
+
+    values: np.ndarray
+    weight: np.ndarray
+    normal: np.ndarray
+
+
+def face_samples(slaves: list[Facets]) -> list[Samples]:
+    """Points that integrate shape functions over whole planar faces exactly, by block.
+
+    >>> (sample,) = face_samples([slave])
+    >>> round(float(sample.weight.sum()), 15)
+    2.0
+    """
+    return [sampled(block, face_rule(block.type.name)) for block in slaves]
+
+
+def sampled(block: Facets, rule: Rule) -> Samples:
+    """The points of a rule on the reference face.
+
+    >>> sample = sampled(slave, (np.array([[0.5]]), np.array([1.0])))
+    >>> sample.weight.tolist(), sample.values.tolist(), sample.normal.tolist()
+    ([[2.0]], [[0.5, 0.5]], [[[0.0, 1.0]]])
+    """
+    places, weights = rule
+    values, vectors = measured(block, places)
+    measure = np.linalg.norm(vectors, axis=2)
+    if block.directions is not None:
+        vectors = np.einsum("qa,fad->fqd", values, block.directions)
+    normal = vectors / np.linalg.norm(vectors, axis=2, keepdims=True)
+    return Samples(values=values, weight=measure * weights, normal=normal)
+
 
 # Parts of the master without common nodes are one surface for a macro-element where their
 # distances differ by less than this share of its size.

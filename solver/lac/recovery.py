@@ -23,9 +23,9 @@ from scipy import sparse
 from .cells.faces import circumference
 from .facets import tangents_of
 from .friction import along_faces, levers
+from .partners import Surface
 from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
-from .surface_points import Surface
 
 # The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
 _RELAXATION = 0.87

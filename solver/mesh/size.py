@@ -21,7 +21,7 @@ from typing import Any
 
 from ..lac.cells.catalogue import BY_NAME, CellType
 from ..system.errors import MachineError
-from ..system.memory import available
+from ..system.process import available
 from ..system.progress import OUTCOME
 
 _LOG = logging.getLogger(__name__)

@@ -31,7 +31,7 @@ def write_report(
     from . import tables
     from .bench import write_bench
     from .charts import write_script
-    from .html import PAGE
+    from .formats import PAGE
     from .page import family_page, main_page
     from .pictures import write_viewer
     from .rows import read_rows

@@ -35,7 +35,7 @@ from .charts import (
     series_chart,
 )
 from .families import page_name
-from .html import TEMPLATES, render
+from .formats import TEMPLATES, render
 from .profile import PRESSED, expected, position
 from .rows import Row, natural
 from .tables import as_csv, to_junit

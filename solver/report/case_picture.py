@@ -19,9 +19,11 @@ from .layout import (
     PRESSURE,
     RELATIVE,
     STATUS,
+    Drawing,
     color_map,
     macro_edges,
     mean_normal,
+    mixed,
     normals,
     outlines,
     plan_axes,
@@ -29,7 +31,6 @@ from .layout import (
     shade,
 )
 from .parts import DrawnPart, parts, three, zone_fields
-from .svg import Drawing, mixed
 from .symbols import Symbols, body_label, draw_axes
 from .view import FLAT, Frame, View, axonometry, draw_labels, lit
 

@@ -18,7 +18,7 @@ from ..system.errors import InputError, hint
 from ..system.files import write_text
 from ..verification.verdict import WORDS, CheckResult, Verdict, typed
 from . import formats
-from .html import TEMPLATES, render
+from .formats import TEMPLATES, render
 from .rows import Row, natural
 from .tables import md, outcome
 

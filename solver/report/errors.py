@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 from urllib.parse import quote
 
-from . import formats, stages
+from . import formats
 from .charts import (
     BLUE,
     CROSS,
@@ -115,7 +115,7 @@ def mark(row: Row) -> dict[str, Any]:
         "error": max(error, EPSILON / 4),
         "check": check,
         "verdict": row.word,
-        "stages": stages.in_words(row.stages),
+        "stages": formats.in_words(row.stages),
         "family": row.group,
         "cells": " ".join(row.tags["cells"]),
         "url": address(row),

@@ -1,12 +1,24 @@
-"""Numbers and lists as the tables of the report show them."""
+"""Numbers and lists as the tables of the report show them.
+
+Common to all pages: templates, style, and the words for kinds and checks.
+
+The stages of a solve as every page shows them: order, colours, and times in words.
+"""
 
 import math
 import re
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from ..verification.verdict import Body
+from .charts import SCRIPT
+from .families import page_name, paragraphs
 
 NOTHING = "–"
 # Below this share of its scale a number is round-off, and shown as zero.
@@ -97,3 +109,98 @@ def symbols(text: str) -> Markup:
     """Text in which `_` and `^` after a single letter are set as in formulas: `c_n`, `a^(n+1)`."""
     parts = re.split(r"(?<!\w)([^\W\d_](?:_\w+|\^\w+|\^\([^)]*\))+)(?!\w)", text)
     return Markup("").join(formula(part) if i % 2 else part for i, part in enumerate(parts))
+
+
+# In the order of the work, in colours that colour-blind readers can distinguish.
+COLORS = {
+    "read": "#999999",
+    "mesh": "#bbbbbb",
+    "cut": "#e69f00",
+    "pairing": "#56b4e9",
+    "assembly": "#009e73",
+    "solve": "#0072b2",
+    "recovery": "#cc79a7",
+    "checks": "#d55e00",
+    "write": "#f0e442",
+}
+_OTHER = "#777777"
+
+
+def colors(found: Iterable[str]) -> dict[str, str]:
+    """The stages found, each once, in the order of the work, with their colours."""
+    every = dict.fromkeys(found)
+    known = [stage for stage in COLORS if stage in every]
+    return {s: COLORS.get(s, _OTHER) for s in [*known, *(s for s in every if s not in COLORS)]}
+
+
+def in_words(seconds: Mapping[str, float]) -> str:
+    """The times of the stages in one line."""
+    return ", ".join(f"{stage} {seconds[stage]:.3f} s" for stage in colors(seconds))
+
+
+def bar(seconds: Mapping[str, float], total: float) -> Markup:
+    """The shares of the stages in the total time as a bar, their times under the pointer."""
+    parts, end = [], 0.0
+    for stage, color in colors(seconds).items():
+        end += 100 * seconds[stage] / total
+        parts.append(f"{color} 0 {end:.0f}%")
+    tag = '<span class=bar title="{}" style="background:linear-gradient(90deg,{},#0000 0)"></span>'
+    return Markup(tag).format(in_words(seconds), ",".join(parts))
+
+
+KINDS = {
+    "analytical": "an exact solution",
+    "manufactured": "a solution chosen first, with loads derived from it",
+    "refined": "our own result on a much finer mesh",
+    "other_code": "another code's result",
+}
+
+
+PAGE = "summary.html"
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def render(template: Path, **values: Any) -> str:
+    """A page from a study's own template, which may extend the report's templates."""
+    return environment(template.parent).get_template(template.name).render(values)
+
+
+@cache
+def environment(*folders: Path) -> Environment:
+    """Where templates come from (`folders`, then the report's own), with the formats of numbers."""
+    templates = Environment(
+        loader=FileSystemLoader([*folders, TEMPLATES]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters |= {
+        "error": error,
+        "number": number,
+        "seconds": seconds,
+        "duration": duration,
+        "gigabytes": gigabytes,
+        "count": count,
+    }
+    templates.globals |= {
+        "formats": sys.modules[__name__],
+        "bar": bar,
+        "kinds": KINDS,
+        "main_page": PAGE,
+        "page_name": page_name,
+        "paragraphs": paragraphs,
+        "style": style(),
+        "script": _template("sort.js"),
+        "chart_script": SCRIPT,
+    }
+    return templates
+
+
+def style() -> Markup:
+    """The style sheet of all pages."""
+    return _template("style.css")
+
+
+def _template(name: str) -> Markup:
+    return Markup((TEMPLATES / name).read_text(encoding="utf-8"))

@@ -11,13 +11,12 @@ from markupsafe import Markup
 from ..lac.cells.catalogue import BY_MESHIO
 from ..lac.facets import facets
 from ..lac.operator import meet_in_segments
-from ..lac.surface_points import face_samples
+from ..lac.partners import face_samples
 from ..mechanics.fem.faces import FaceError, boundary_faces
 from ..system.errors import InputError, hint
 from .charts import MUTED, PAPER
-from .layout import outlines
+from .layout import Drawing, mixed, outlines
 from .parts import outside, three
-from .svg import Drawing, mixed
 from .view import FLAT, View, axonometry, lit
 
 

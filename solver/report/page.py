@@ -12,7 +12,7 @@ from typing import Any
 
 from ..case.checks import BY_NAME, ERRORS
 from ..verification.savings import Savings, read_savings
-from . import formats, stages
+from . import formats
 from .charts import (
     BLUE,
     EPSILON,
@@ -29,7 +29,7 @@ from .charts import (
     tooltip,
 )
 from .errors import address, against_time, drawn, mark, unknowns
-from .html import TEMPLATES, render
+from .formats import TEMPLATES, render
 from .pictures import VIEWER, picture, profile
 from .rows import Row, causes, choices, families, ours
 from .sections import FamilySection, grouped
@@ -340,4 +340,4 @@ def _order(name: str) -> tuple[int, str]:
 
 def _stages(rows: Sequence[Row]) -> dict[str, str]:
     """The stages that occur, in their order, with their colours."""
-    return stages.colors(stage for row in rows for stage in row.stages)
+    return formats.colors(stage for row in rows for stage in row.stages)

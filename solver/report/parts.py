@@ -16,9 +16,8 @@ from ..simulation.results.solution import Solution, ZoneResult
 from ..simulation.scene.rigid import quadric_of
 from ..verification.units import with_unit
 from .charts import BLUE, PAPER
-from .layout import RELATIVE, STATUS, edge_color, tint, ways_apart
+from .layout import RELATIVE, STATUS, edge_color, mixed, tint, ways_apart
 from .profile import expected
-from .svg import mixed
 
 # A rigid surface is drawn this much larger than the slave opposite to it.
 _MORE = 1.3

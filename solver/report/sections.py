@@ -13,7 +13,7 @@ from . import formats
 from .charts import Chart
 from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
-from .html import KINDS
+from .formats import KINDS
 from .pictures import draw_all, name_of, picture, profile
 from .rows import Row, counted, families, ours
 from .tables import outcome

@@ -12,10 +12,9 @@ from ..mechanics.fem.stress import traction
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution
 from .charts import GREEN, INK, MUTED, RED
-from .layout import edge_color
+from .layout import Drawing, edge_color
 from .parts import three
 from .profile import mathematics
-from .svg import Drawing
 from .view import Label, View
 
 # Arrows of a load and symbols of a support, at most; lengths in pixels.

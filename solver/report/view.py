@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .charts import INK, MUTED
-from .layout import normals
-from .svg import Drawing, Style, mixed
+from .layout import Drawing, Style, mixed, normals
 
 Frame = tuple[float, ...]  # x, y, width, height in pixels
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(24)

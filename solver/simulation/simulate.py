@@ -11,7 +11,7 @@ import numpy as np
 
 from ..case.model import STATE, Case, Step
 from ..lac.errors import SolveError
-from ..system.memory import peak_mb
+from ..system.process import peak_mb
 from ..system.progress import OUTCOME, Clock, processor_time, stage
 from .equilibrium.problem import ContactProblem
 from .equilibrium.recovery import Recovered, recovered

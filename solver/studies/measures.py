@@ -31,8 +31,7 @@ from scipy import sparse
 from ..case.model import Case
 from ..lac.cells.shape import shape_functions
 from ..lac.errors import SolveError
-from ..mechanics.fem.assembly import CellSum
-from ..mechanics.fem.block import Block
+from ..mechanics.fem.block import Block, CellSum
 from ..mechanics.fem.elasticity import physical_gradients, stiffness
 from ..mechanics.linear.choice import factorise, force_solver
 from ..simulation.equilibrium.problem import ContactProblem
@@ -41,9 +40,8 @@ from ..simulation.results.solution import Solution
 from ..simulation.scene.scene import Scene, build_scene
 from ..simulation.simulate import simulate
 from ..system.errors import InputError
-from ..system.memory import available
 from ..system.package import COMMAND
-from ..system.process import run_in_subprocess, used_since
+from ..system.process import available, run_in_subprocess, used_since
 from ..system.progress import SOLVING, Clock
 from ..verification.norms import errors
 from ..verification.run import mesh_of

@@ -10,7 +10,7 @@ from typing import Any
 from markupsafe import Markup
 
 from ..report.charts import Chart, write_script
-from ..report.html import render
+from ..report.formats import render
 from ..report.tables import as_csv
 from ..system.files import write_text
 from .description import FULL, Study, StudyGroup

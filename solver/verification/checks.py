@@ -5,22 +5,89 @@ load steps. `error` is the largest deviation over the check's scale: the largest
 of the reference, or, where the reference is zero everywhere, the quantity's own measure (load for
 stresses, load / stiffness × size for displacements). A gap is always measured against the block
 size, status, coverage and balance against one. A value that is not a number fails.
+
+Accepted values: the last results that a person has reviewed, kept under version control.
+
+They are kept beside the case file, in `regression/JOB.json`, one line a check, apart from the
+reference: a reference is the right value, an accepted value a computed one. Both extremes of a
+check may move by 1e-9 of its scale; a value below 1e-12 of the scale is kept as zero, and digits
+past the twelfth are dropped, so that round-off never shows as a difference.
+
+What errors are relative to where the reference is zero: the measures of quantities.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from ..case.checks import CHECKS, Check
 from ..case.model import Exact
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
-from . import numbers, samples, scales
+from ..system.errors import InputError
+from ..system.files import write_text
+from . import numbers, samples
 from .verdict import CheckResult, Regression
+
+
+def unit(_: Solution) -> float:
+    """One."""
+    return 1.0
+
+
+def block_size(solution: Solution) -> float:
+    """The extent of the smallest body."""
+    bodies = [solution.mesh.points[solution.body == b] for b in range(len(solution.bodies))]
+    return min(float(np.ptp(points, axis=0).max()) for points in bodies if len(points))
+
+
+def load(solution: Solution) -> float:
+    """The load; without loads the stress that the displacement would cause, if that is larger.
+
+    If bodies only move, the stress itself is round-off.
+    """
+    if solution.case.loads:
+        return float(solution.load_scale)
+    stiffness = min(m.young for m in solution.case.materials.values())
+    moved = float(np.abs(solution.displacement).max(initial=0.0))
+    return max(float(solution.load_scale), stiffness * moved / solution.length)
+
+
+def elongation(solution: Solution) -> float:
+    """Load / stiffness × size."""
+    stiffness = min(m.young for m in solution.case.materials.values())
+    return float(solution.load_scale / stiffness * block_size(solution))
+
+
+def total_force(solution: Solution) -> float:
+    """The largest reaction or contact force of any step; one where nothing acts."""
+    forces = [one.force for step in solution.steps for one in step.reactions]
+    forces += [one.force for step in solution.steps for one in step.resultants.values()]
+    return max((float(np.abs(force).max()) for force in forces), default=0.0) or 1.0
+
+
+def total_moment(solution: Solution) -> float:
+    """The largest force times the extent of the smallest body."""
+    return total_force(solution) * block_size(solution)
+
+
+SCALES: dict[str, Callable[[Solution], float]] = {
+    "unit": unit,
+    "block_size": block_size,
+    "load": load,
+    "elongation": elongation,
+    "total_force": total_force,
+    "total_moment": total_moment,
+}
+"""What errors are relative to where the reference is zero."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +147,7 @@ def _judge(
 ) -> CheckResult:
     name = zone.name if zone else None
     magnitude = float(np.abs(sample.reference).max(initial=0.0))
-    measure = getattr(scales, check.scale)
+    measure = SCALES[check.scale]
     scale = measure(solution) if check.fixed or magnitude == 0 else magnitude
     deviation = np.abs(sample.values - sample.reference)
     if deviation.size:
@@ -136,3 +203,65 @@ def _over(deviation: float, scale: float) -> float:
     if scale == 0:
         return 0.0 if deviation == 0 else float("inf") if deviation > 0 else float("nan")
     return float(deviation / scale)
+
+
+def regression_file(solution: Solution) -> Path:
+    """The file of a solve's accepted values."""
+    return solution.case.path.parent / "regression" / f"{solution.job}.json"
+
+
+def accepted_values(solution: Solution) -> dict[str, Accepted]:
+    """The accepted values by check title; empty where none were accepted.
+
+    Raises `InputError` for a file that does not hold pairs of numbers.
+    """
+    path = regression_file(solution)
+    if not path.is_file():
+        return {}
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=dict[str, Accepted])
+    except (OSError, msgspec.DecodeError) as error:
+        allowed = f"must map checks to {{minimum: number, maximum: number}} ({error})"
+        raise InputError(path, "file", None, allowed) from None
+
+
+def accept(solution: Solution, checks: Sequence[CheckResult]) -> list[str]:
+    """Take the checks' extremes as accepted values; the differences, one line a check.
+
+    `checks` must have been made with the values accepted so far. Nothing is written when nothing
+    changed, and an entry that did not change keeps its digits. Raises `InputError` for a check that
+    has no number to accept.
+    """
+    path, old = regression_file(solution), accepted_values(solution)
+    gone = old.keys() - {check.title for check in checks}
+    new = {title: value for title, value in old.items() if title not in gone}
+    lines = [f"{title}: {_shown(old[title])} → none" for title in gone]
+    for check in checks:
+        if not all(map(math.isfinite, (check.minimum, check.maximum))):
+            raise InputError(path, check.title, check.minimum, "not a number: cannot be accepted")
+        if check.regression is None or not check.regression.passed:
+            new[check.title] = Accepted(
+                _rounded(check.minimum, check.scale), _rounded(check.maximum, check.scale)
+            )
+            lines.append(
+                f"{check.title}: {_shown(old.get(check.title))} → {_shown(new[check.title])}"
+            )
+    if lines:
+        _write(path, new)
+    return sorted(lines)
+
+
+def _rounded(value: float, scale: float) -> float:
+    return 0.0 if abs(value) < 1e-12 * scale else float(f"{value:.12g}")
+
+
+def _shown(accepted: Accepted | None) -> str:
+    return "none" if accepted is None else f"{accepted.minimum:.12g} … {accepted.maximum:.12g}"
+
+
+def _write(path: Path, values: Mapping[str, Accepted]) -> None:
+    lines = [
+        f'  {json.dumps(title)}: {{"minimum": {value.minimum!r}, "maximum": {value.maximum!r}}}'
+        for title, value in sorted(values.items())
+    ]
+    write_text(path, "{\n" + ",\n".join(lines) + "\n}\n")

@@ -42,12 +42,11 @@ import numpy as np
 from ..case.model import Case
 from ..case.reader import parse_case
 from ..lac.cells.catalogue import cell_type
-from ..mesh.files.vtkhdf import check_name, read_grid, write_grid
+from ..mesh.files.vtkhdf import check_name, new_file, read_grid, read_table, write_grid, write_table
 from ..simulation.judgement.consistency import inconsistency
 from ..simulation.results.solution import BodyInfo, Line, Solution, Validity, ZoneResult
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
-from ..system.hdf5 import new_file, read_table, write_table
 from .steps import read_probes, read_steps, read_zone, write_probes, write_steps, write_zone
 from .units import label_fields
 from .verdict import CheckResult

@@ -24,11 +24,10 @@ from ..simulation.simulate import simulate
 from ..system.errors import InputError, MachineError, of_machine
 from ..system.files import last_line
 from ..system.progress import OUTCOME, Clock, processor_time, stage
-from .checks import run_checks
+from .checks import accepted_values, run_checks
 from .judge import judge, without_result
 from .norms import errors
 from .provenance import gather
-from .regression import accepted_values
 from .results import read_result, write_result
 from .verdict import (
     CRASHED,

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 
 from ..mechanics.mortar.edge import Edges
+from ..mesh.files.vtkhdf import column, read_table, write_table
 from ..simulation.results.forces import ProbeResult, Reaction, Resultants, RigidMotion
 from ..simulation.results.solution import (
     NodalContact,
@@ -16,7 +17,6 @@ from ..simulation.results.solution import (
     ZoneFriction,
     ZoneResult,
 )
-from ..system.hdf5 import column, read_table, write_table
 
 _OF_STEP = (
     *("factor", "iterations", "status_changes", "residual", "complementarity"),

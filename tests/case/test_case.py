@@ -9,7 +9,7 @@ from solver.case.file import ObservationKeys
 from solver.case.material import Material
 from solver.case.model import Case, Load, Rigid, Support, Zone
 from solver.case.reader import check_mesh_file, load_case, parse_case
-from solver.case.solutions.uniform import Hydrostatic
+from solver.case.solutions.polynomial import Hydrostatic
 from solver.system.errors import InputError
 from tests.case.files import FULL, MINIMAL, PATH
 

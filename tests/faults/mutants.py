@@ -23,10 +23,9 @@ from solver.case.reader import load_case
 from solver.lac.errors import SolveError
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
-from solver.verification.checks import run_checks
+from solver.verification.checks import accepted_values, run_checks
 from solver.verification.judge import judge
 from solver.verification.norms import errors
-from solver.verification.regression import accepted_values
 from solver.verification.run import mesh_of
 from solver.verification.verdict import CheckResult
 from tests.faults.patches import (
@@ -342,7 +341,7 @@ MUTANTS = (
            "simulation.scene.rigid:turned",
            changed(lambda faces: {name: nodes[:, ::-1] for name, nodes in faces.items()})),
     Mutant("stabilisation-lost", "stabilised contact does not give way", STIFF,
-           "mechanics.mortar.stabilisation:Stabilisation.scatter",
+           "mechanics.mortar.treatments:Stabilisation.scatter",
            changed(lambda scatter: 0 * scatter)),
     Mutant("normal-of-slave", "contact follows the slave's normals, not the master's", OBSTACLE,
            "simulation.scene.operators:with_master_normals",

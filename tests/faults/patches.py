@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import diags_array
 
 from solver.case.material import Material
-from solver.lac.closure import integrals
+from solver.lac.multipliers import integrals
 
 # A segment below this share of the largest is round-off of the intersection.
 _SLIVER = 1e-6
@@ -44,7 +44,8 @@ def last_cell_lost(loops: Any) -> Any:
     def stress(points: np.ndarray, block: Any, *more: Any) -> None:
         loops.add_nodal_stress(points, block.of(slice(len(block.cells) - 1)), *more)
 
-    return SimpleNamespace(serve=lambda *_: True, add_nodal_stress=stress)
+    own = {"serve": lambda *_: True, "add_nodal_stress": stress}
+    return SimpleNamespace(**vars(loops) | own)
 
 
 def one_dropped(parts: list) -> list:

@@ -16,7 +16,7 @@ from solver.mechanics.fem.loads import body_forces
 from solver.mechanics.linear.choice import factorise
 from solver.mesh import read_mesh
 from solver.system.errors import InputError
-from solver.verification.regression import accepted_values, regression_file
+from solver.verification.checks import accepted_values, regression_file
 from tests.handmade import plane
 from tests.mesh.one_cell import write_by_gmsh
 from tests.scenes import block_case, block_mesh

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver.lac.cells.catalogue import BY_NAME
-from solver.lac.closure import shape_integrals
 from solver.lac.facets import facets, with_nodal_normals
+from solver.lac.multipliers import shape_integrals
 from solver.lac.operator import LAC, _reaches, gap_operator
 from solver.lac.pairing import candidate_pairs
 from tests.patches import segment_pair, square_pair

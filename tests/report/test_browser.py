@@ -7,7 +7,7 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 import pytest
 
-from solver.report import stages, write_report
+from solver.report import formats, write_report
 from solver.verification.results import write_result
 from tests import handmade
 from tests.browser import MISSING, browser
@@ -305,7 +305,7 @@ def thousand(tmp_path_factory):
     folder = tmp_path_factory.mktemp("thousand")
     good = CHECK | {"error": 1e-5, "passed": True}
     checks = [good | {"name": name} for name in ("multiplier", "nodal_stress", "coverage")] * 4
-    seconds = dict.fromkeys(stages.COLORS, 0.123) | {"total": 1.234}
+    seconds = dict.fromkeys(formats.COLORS, 0.123) | {"total": 1.234}
     files = []
     for number in range(1000):
         family, name = f"family {number % 20}", f"long-name-of-a-block-{number}"

@@ -14,10 +14,18 @@ from solver.mechanics.fem.faces import outer_faces
 from solver.report import pictures, write_report
 from solver.report.case_picture import draw_case
 from solver.report.charts import BLUE, GREEN, ORANGE, RED
-from solver.report.layout import DEVIATION, macro_edges, normals, outlines, pressed_box, shade
+from solver.report.layout import (
+    DEVIATION,
+    Drawing,
+    macro_edges,
+    mixed,
+    normals,
+    outlines,
+    pressed_box,
+    shade,
+)
 from solver.report.pictures import draw, picture
 from solver.report.rows import Row
-from solver.report.svg import Drawing, mixed
 from solver.verification.results import write_result
 from tests import handmade
 from tests.report.test_surfaces import with_rigid
@@ -234,11 +242,11 @@ def test_a_result_too_large_to_be_drawn_or_turned_says_so(tmp_path, monkeypatch)
     result = tmp_path / "job" / "result.vtkhdf"
     write_result(result, handmade.plane(tmp_path), [], {})
     row = Row(record({"result": result.name}), result.parent)
-    monkeypatch.setattr("solver.report.surfaces.MOST_POINTS", 28)
+    monkeypatch.setattr("solver.report.pictures.MOST_POINTS", 28)
     found = picture(row, tmp_path / "pictures")
     assert "<img" in found
     assert "No view to turn: ValueError: 29 points on surfaces; 28 at most are allowed" in found
-    monkeypatch.setattr("solver.report.surfaces.MOST_POINTS", 29)
+    monkeypatch.setattr("solver.report.pictures.MOST_POINTS", 29)
     monkeypatch.setattr("solver.report.case_picture.MOST_FACES", 14)
     found = picture(row, tmp_path / "others")
     assert "No picture: ValueError: 15 faces are too many to draw; 14 at most are allowed" in found

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from solver.report.html import KINDS
+from solver.report.formats import KINDS
 from solver.report.rows import Row
 from tests.report.verdicts import record
 

@@ -10,7 +10,7 @@ from solver.case.reader import load_case
 from solver.lac.cells.catalogue import cell_type
 from solver.report.layout import ways_apart
 from solver.report.parts import rigid_surface
-from solver.report.surfaces import magnification, split, surfaces
+from solver.report.pictures import magnification, split, surfaces
 from solver.simulation.results.solution import BodyInfo
 from tests import handmade
 

@@ -13,7 +13,7 @@ from solver.case.expressions import Expression
 from solver.case.model import Cyclic, Support
 from solver.report.case_picture import draw_case
 from solver.report.charts import GREEN, INK
-from solver.report.svg import Drawing
+from solver.report.layout import Drawing
 from solver.report.view import Label, draw_labels
 from tests import handmade
 

@@ -9,7 +9,7 @@ import pytest
 from solver.case.reader import load_case
 from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
-from solver.mechanics.fem.cell_sizes import largest_strain
+from solver.mechanics.fem.stress import largest_strain
 from solver.mesh import generate, transform
 from solver.simulation.equilibrium.state import Accuracy
 from solver.simulation.simulate import simulate

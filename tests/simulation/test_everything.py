@@ -127,7 +127,6 @@ def test_a_plane_solve_imports_nothing_of_three_dimensions_or_friction(tmp_path)
     assert "solver.lac.cells.shape" in loaded
     of_space = {
         "solver.lac.cells.extra_elements",
-        "solver.mesh.recipes.hybrid",
         "solver.simulation.equilibrium.friction",
         "solver.report.case_picture",
     }

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from solver.lac.cells.catalogue import BY_NAME
-from solver.mechanics.mortar.overlap import inside_others
 from solver.simulation.judgement import plan as validity
+from solver.simulation.judgement.plan import inside_others
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from tests import scenes

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 PROGRAM = """
-from solver.system.memory import release
+from solver.system.process import release
 def used():
     return int(open("/proc/self/statm").read().split()[1]) * 4096
 blocks = [b"x" * 100_000 for _ in range(1000)]

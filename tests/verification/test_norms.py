@@ -11,7 +11,7 @@ import solver.verification.norms
 from solver.case.model import Material, Rigid
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
-from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
+from solver.case.solutions.polynomial import Parabola2d, Paraboloid3d
 from solver.mechanics.fem import cell_loops
 from solver.mesh import generate
 from solver.simulation.results.solution import ZoneResult

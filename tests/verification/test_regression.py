@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.system.errors import InputError
-from solver.verification.checks import run_checks
-from solver.verification.regression import accept, accepted_values, regression_file
+from solver.verification.checks import accept, accepted_values, regression_file, run_checks
 from tests.handmade import PLANE, plane, solid
 
 

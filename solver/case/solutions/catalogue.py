@@ -20,23 +20,31 @@ from .base import (
     ExactSolution,
     ParameterError,
 )
-from .bending import Bending
 from .frictional import Sheared, ShearedBlocks
-from .half_planes import ContactEdge
-from .hertz import HertzApproach, HertzCylinder, HertzSphere
-from .indenter import Indenter
-from .manufactured import Parabola2d, Paraboloid3d
+from .hertz import HertzApproach, HertzCylinder, HertzSphere, Indenter
 from .meridian import Meridian
-from .nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes, PulledTubes
-from .oval import OvalCylinders
-from .polynomial import PolynomialPressure2d, PolynomialPressure3d
-from .pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
+from .nested import (
+    CompoundTube,
+    NestedCylinders,
+    NestedSpheres,
+    NestedTubes,
+    OvalCylinders,
+    PulledTubes,
+)
+from .polynomial import (
+    Bending,
+    Hydrostatic,
+    Parabola2d,
+    Paraboloid3d,
+    PolynomialPressure2d,
+    PolynomialPressure3d,
+    UniformCompression,
+)
+from .pressed import ContactEdge, HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
 from .receding import RecedingLayer
 from .sheared_sphere import ShearedSphere
 from .sliding_rigid import SlidingCylinder, SlidingPunch
-from .sliding_waves import SlidingWaves
-from .uniform import Hydrostatic, UniformCompression
-from .waves import Waves2d, Waves3d
+from .waves import SlidingWaves, Waves2d, Waves3d
 
 _CLASSES: tuple[type[ExactSolution], ...] = (
     UniformCompression,

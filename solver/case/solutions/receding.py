@@ -24,7 +24,7 @@ import numpy as np
 
 from ..material import Material
 from .base import parameter
-from .contact_area import ContactArea
+from .hertz import ContactArea
 
 # Beyond this k h the layer is a half-plane: S and A differ from 1 by less than round-off.
 _LARGEST = 45.0

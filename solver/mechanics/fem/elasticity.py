@@ -20,8 +20,7 @@ from ...lac.cells.shape import invert, shape_functions
 from ...lac.errors import SolveError
 from ...lac.threads import prefetch
 from . import cell_loops
-from .assembly import CellSum
-from .block import Block
+from .block import Block, CellSum
 
 # Bytes of gradients, and of matrices, handled at once: so few stay in the processor's cache.
 _CHUNK_BYTES, _MATRIX_BYTES = 1 << 20, 3 << 20

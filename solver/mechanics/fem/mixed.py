@@ -28,8 +28,7 @@ from scipy import sparse
 
 from ...lac.cells.catalogue import CellType
 from ...lac.cells.shape import shape_functions
-from .assembly import degrees_of_freedom
-from .block import Block
+from .block import Block, degrees_of_freedom
 from .elasticity import chunks, shapes_in
 
 AUTOMATIC_ABOVE = 0.499

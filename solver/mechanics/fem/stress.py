@@ -1,5 +1,10 @@
-"""Stress as six components xx, yy, zz, xy, yz, xz: along directions, and at nodes from cells."""
+"""Stress as six components xx, yy, zz, xy, yz, xz: along directions, and at nodes from cells.
 
+The sizes of stress, strain and gradients, taken in the middle of each cell.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -8,7 +13,7 @@ from ...lac.cells.catalogue import CellType
 from ...lac.cells.shape import shape_functions
 from . import cell_loops
 from .block import Block
-from .elasticity import by_part, in_precision, shapes_in, stress_in
+from .elasticity import Found, Shapes, by_part, in_precision, shapes_in, stress_in
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
@@ -89,3 +94,131 @@ def _voigt(stress: np.ndarray, lame: np.ndarray, shear: np.ndarray) -> np.ndarra
         poisson = (lame / (2 * (lame + shear)))[:, None]
         full[:, :, 2] = poisson * (full[:, :, 0] + full[:, :, 1])
     return full
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """How large stresses are, and the terms that forces and stresses are summed from.
+
+    `forces` (n_nodes,), `highest`: the sizes of what is summed up to forces, and to stresses at
+    most. A sum keeps no more digits than its largest term leaves: times the unit of rounding, these
+    are the errors of `internal_force` and of stresses. `slender`: the largest stress that these
+    forces correspond to, which is large on the small faces of a slender cell. `stress` (n_nodes,):
+    the largest norm of the stress itself in the cells around each node.
+    """
+
+    forces: np.ndarray
+    highest: float
+    slender: float
+    stress: np.ndarray
+
+
+def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> Sizes:
+    """Taken at the middle of each cell, from a displacement (n_nodes, dim) or several parts."""
+    force, largest = np.zeros((2, len(points)))
+    parts = displacement.reshape(-1, *points.shape)
+    highest = slender = 0.0
+    whole = None if cell_loops.serve(len(points), blocks) else parts.sum(axis=0)
+    for block in blocks:
+        if whole is None:
+            term, on_small_faces = cell_loops.add_sizes(points, block, parts, force, largest)
+            highest, slender = max(highest, term), max(slender, on_small_faces)
+            continue
+        seen = partial(_cell_sizes, points, block, whole)
+        for part, (forces, term, on_small_faces, norm) in _in_the_middle(points, block, seen):
+            nodes = block.cells[part].ravel()
+            np.add.at(force, nodes, forces.ravel())
+            np.maximum.at(largest, nodes, np.repeat(norm, block.type.n_nodes))
+            highest, slender = max(highest, term), max(slender, on_small_faces)
+    return Sizes(forces=force, highest=highest, slender=slender, stress=largest)
+
+
+def _cell_sizes(
+    points: np.ndarray,
+    block: Block,
+    displacement: np.ndarray,
+    part: slice,
+    found: Shapes,
+    volume: np.ndarray,
+) -> tuple[np.ndarray, float, float, np.ndarray]:
+    """By cell, for `sizes`: forces (n, n_nodes), the highest and slender stress, norms (n,)."""
+    cells = block.cells[part]
+    slope = np.linalg.norm(found.gradient[:, 0], axis=2)
+    nodal = displacement[cells]
+    apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
+    stiff = block.lame[part] + 2 * block.shear[part]
+    terms = stiff * np.einsum("ca,ca->c", slope, apart)
+    if found.hoop is not None:
+        around = np.abs(found.hoop[:, 0]) * np.abs(nodal[..., 0])
+        terms += stiff * around.sum(axis=1)
+    extent = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
+    on_small_faces = terms * extent * slope.max(axis=1)
+    norm = np.linalg.norm(stress_in(found, displacement, block, part), axis=(2, 3))[:, 0]
+    forces = (volume * terms)[:, None] * slope
+    return forces, float(terms.max(initial=0.0)), float(on_small_faces.max(initial=0.0)), norm
+
+
+def largest_strain(
+    points: np.ndarray, blocks: list[Block], displacement: np.ndarray
+) -> tuple[float, float]:
+    """The largest principal strain, by size, and rotation (radians) in the middle of the cells.
+
+    Of a displacement (n_nodes, dim). Both are small where linear elasticity holds.
+    """
+    largest = np.zeros(2)
+    compiled = cell_loops.serve(len(points), blocks)
+    for block in blocks:
+        if compiled:
+            found = cell_loops.largest_strain(points, block, displacement[None])
+            largest = np.maximum(largest, found)
+            continue
+        seen = partial(_cell_strain, block, displacement)
+        for _, of_part in _in_the_middle(points, block, seen):
+            largest = np.maximum(largest, of_part)
+    return float(largest[0]), float(largest[1])
+
+
+def _cell_strain(
+    block: Block, displacement: np.ndarray, part: slice, found: Shapes, _: np.ndarray
+) -> tuple[float, float]:
+    nodal = displacement[block.cells[part]]
+    slope = found.slopes(nodal - nodal[:, :1], nodal[..., 0])[:, 0]
+    turned = np.swapaxes(slope, 1, 2)
+    size = np.linalg.norm(slope + turned, axis=(1, 2))
+    # The largest principal value is at least this share of the norm.
+    near = size >= size.max() / np.sqrt(slope.shape[1])
+    principal = np.linalg.eigvalsh((slope + turned)[near]) / 2
+    angle = np.linalg.norm(slope - turned, axis=(1, 2)) / np.sqrt(8)
+    return float(np.abs(principal).max()), float(angle.max())
+
+
+def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
+    """The sizes of the gradients of the shape functions (n, n_nodes) in the middle of each cell."""
+
+    def seen(_: slice, shapes: Shapes, __: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(shapes.gradient[:, 0], axis=2)
+
+    return [
+        np.concatenate([found for _, found in _in_the_middle(points, block, seen)])
+        for block in blocks
+    ]
+
+
+def steepest(points: np.ndarray, blocks: list[Block]) -> float:
+    """The largest sum over a cell's nodes of the sizes of `steepness`."""
+    if cell_loops.serve(len(points), blocks):
+        return max(cell_loops.steepest(points, block) for block in blocks)
+    return max(float(found.sum(axis=1).max()) for found in steepness(points, blocks))
+
+
+def _in_the_middle(
+    points: np.ndarray, block: Block, found: Callable[[slice, Shapes, np.ndarray], Found]
+) -> Iterator[tuple[slice, Found]]:
+    """Parts of a block, and what is `found` in the middle (q = 1) of their cells of sizes (n,)."""
+    middle, weight = block.middle
+
+    def of(part: slice) -> Found:
+        shapes = shapes_in(points, block, block.cells[part], middle)
+        return found(part, shapes, shapes.measure[:, 0] * weight)
+
+    return by_part(block, points.shape[1], of)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from .assembly import selected
+from .block import selected
 
 DEPENDENT = 1e-8
 """Directions (unit vectors) whose part outside the others is smaller depend on them."""

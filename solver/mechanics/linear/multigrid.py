@@ -25,8 +25,7 @@ from ...lac.errors import SolveError
 from ...lac.threads import prefetch
 from .choice import Shared
 from .condensed_matrix import CondensedMatrix, Symmetric
-from .contact_levels import Correction, correction_of, scales_of
-from .hierarchy import Hierarchy, Level
+from .hierarchy import Correction, Hierarchy, Level, correction_of, scales_of
 from .krylov import EPSILON, conjugate_gradients, in_single, two_steps
 from .products import multiply, multiply_transposed
 from .symmetric_blocks import NodalMatrix

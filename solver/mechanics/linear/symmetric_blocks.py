@@ -16,7 +16,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...lac.threads import prefetch
 from ...system.compiled import compiled
-from ..fem.assembly import selected
+from ..fem.block import selected
 from .products import chosen_rows, multiply, pattern, ranges, scale_blocks
 
 _SLABS = 8  # the most threads that share a product

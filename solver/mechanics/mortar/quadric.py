@@ -11,8 +11,8 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_NAME
 from ...lac.facets import Facets
+from ...lac.partners import Samples
 from ...lac.segments import Segments, Side
-from ...lac.surface_points import Samples
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,7 +32,7 @@ def generate(content: Mapping[str, Any], where: str | Path) -> meshio.Mesh:
     """The mesh of a recipe, the same every time; raises as `read_recipe`."""
     recipe = read_recipe(content, where)
     name = content["recipe"]
-    module = import_module(f".{name if name in ('blocks', 'bricks') else 'mapped'}", __package__)
+    module = import_module(f".{'blocks' if name == 'blocks' else 'mapped'}", __package__)
     try:
         raw = getattr(module, name)(recipe)
     except FieldError as fault:

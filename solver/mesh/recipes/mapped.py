@@ -28,16 +28,33 @@ interface is the image of height 0, and all groups are as in `blocks`.
     top_size: [8, 2]
     gap: 0.1            # between them (0); negative: they overlap
     loaded: 0.25        # where this share of `press` along x ends (1): press_left, press_right
+
+The recipe `bricks`: bodies put together from rectangular blocks, anywhere.
+
+    recipe: bricks      # an L-shaped seat of three bricks, and a block in its corner
+    bricks:
+      - {name: seat, low: [-1, -1], high: [0, 0], block: {cells: QUAD4, divisions: [2, 2]}}
+      - {name: seat, low: [0, -1], high: [2, 0], block: {cells: QUAD4, divisions: [4, 2]}}
+      - {name: seat, low: [-1, 0], high: [0, 1], block: {cells: QUAD4, divisions: [2, 2]}}
+      - {name: block, low: [0, 0], high: [2, 1], block: {cells: TRIA6, divisions: [3, 2]}}
+
+`block` has the keys of a block in the recipe `blocks`. Bricks of one name are one body: where they
+touch, their nodes must be the same, and become one. Each name is a group of cells; the key `groups`
+of the case file selects faces. `refine` multiplies all divisions.
 """
 
 from collections.abc import Callable
+from itertools import combinations
 
 import meshio
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ...case.typed import FieldError
 from ...lac.cells.catalogue import cell_type
 from ..keys import (
+    BrickKeys,
+    BricksKeys,
     HertzKeys,
     ParabolaKeys,
     PunchKeys,
@@ -48,7 +65,7 @@ from ..keys import (
     each,
 )
 from ..transforms import nodes_of
-from .blocks import stacked
+from .blocks import block, joined, stacked
 
 # Nodes as near as this share of the side to the place where it is divided lie on it.
 _ON = 1e-9
@@ -156,9 +173,9 @@ def punch(recipe: PunchKeys) -> meshio.Mesh:
 def _divided(mesh: meshio.Mesh, share: float) -> dict[str, list[np.ndarray]]:
     """The sides `press_left` and `press_right` of the position x = `share`, without empty ones."""
     left, right = [], []
-    for block, ids in zip(mesh.cells, mesh.cell_sets["press"], strict=True):
+    for part, ids in zip(mesh.cells, mesh.cell_sets["press"], strict=True):
         members = np.asarray(ids, dtype=int)
-        x = mesh.points[block.data[members], 0] - share
+        x = mesh.points[part.data[members], 0] - share
         low, high = x.max(axis=1, initial=-1) <= _ON, x.min(axis=1, initial=1) >= -_ON
         if not (low | high).all():
             problem = "must be a share at which faces of press end"
@@ -190,8 +207,8 @@ def _bent(mesh: meshio.Mesh, bend: Bend, chosen: np.ndarray | None = None) -> me
 def _straightened(points: np.ndarray, cells: list[meshio.CellBlock]) -> np.ndarray:
     """The points with all nodes that are no vertices in the middle of their vertices."""
     points = points.copy()
-    for block in cells:
-        cell_type(block.type).put_between(points, block.data)
+    for part in cells:
+        cell_type(part.type).put_between(points, part.data)
     return points
 
 
@@ -203,3 +220,52 @@ def _radius(height: np.ndarray, radii: tuple[float, float, float]) -> np.ndarray
     bore, interface, rim = radii
     inner, outer = interface - bore, rim - interface
     return interface + height * np.where(height < 0, inner, outer)
+
+
+# Nodes nearer than this share of the extent of all bricks are at one place.
+_ONE_PLACE = 1e-9
+
+
+def bricks(recipe: BricksKeys) -> meshio.Mesh:
+    """The bodies; bodies of different names share no nodes."""
+    meshes = [_brick(brick, recipe.refine) for brick in recipe.bricks]
+    mesh, dim = joined(meshes), len(recipe.bricks[0].low)
+    owner = np.repeat(np.arange(len(meshes)), [len(m.points) for m in meshes])
+    near = _ONE_PLACE * float(np.ptp(mesh.points, axis=0).max())
+    number = np.arange(len(mesh.points))
+    for i, j in combinations(range(len(meshes)), 2):
+        one, other = recipe.bricks[i], recipe.bricks[j]
+        if one.name == other.name:
+            pair = _common(mesh.points[:, :dim], owner, (i, j), (one, other), near)
+            if pair is None:
+                problem = f"has other nodes than bricks[{i}] of the same body, where they touch"
+                raise FieldError(("bricks", j), problem)
+            number[pair[1]] = number[pair[0]]
+    cells = [(b.type, number[b.data]) for b in mesh.cells]
+    return meshio.Mesh(mesh.points, cells, cell_sets=mesh.cell_sets)
+
+
+def _brick(brick: BrickKeys, refine: int) -> meshio.Mesh:
+    low, high = np.array(brick.low, dtype=float), np.array(brick.high, dtype=float)
+    mesh = block("top", brick.block, low, high - low, refine)
+    mesh.cell_sets = {brick.name: mesh.cell_sets["top"]}
+    return mesh
+
+
+def _common(
+    points: np.ndarray,
+    owner: np.ndarray,
+    numbers: tuple[int, int],
+    pair: tuple[BrickKeys, BrickKeys],
+    near: float,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """The nodes (k,) of either brick that both hold, in one order; None where they differ."""
+    low, high = (np.array([getattr(b, key) for b in pair]) for key in ("low", "high"))
+    within = ((points >= low.max(axis=0) - near) & (points <= high.min(axis=0) + near)).all(axis=1)
+    both = [np.flatnonzero(within & (owner == number)) for number in numbers]
+    if len(both[0]) != len(both[1]):
+        return None
+    if not len(both[0]):
+        return both[0], both[1]
+    distance, nearest = cKDTree(points[both[0]]).query(points[both[1]])
+    return (both[0][nearest], both[1]) if distance.max() <= near else None

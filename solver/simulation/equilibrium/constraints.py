@@ -20,11 +20,10 @@ from ...mechanics.fem.bodies import (
     unheld_motion,
 )
 from ...mechanics.fem.elasticity import stiffness
-from ...mechanics.fem.vertices import from_vertices, linear_unknowns
 from ...mechanics.linear.choice import against_multigrid
 from ...mechanics.linear.condensation import choose_pivots
 from ...mechanics.linear.symmetric_blocks import NodalMatrix, Stiffness
-from ...mechanics.linear.unknowns import Unknowns
+from ...mechanics.linear.unknowns import Unknowns, from_vertices, linear_unknowns
 from ...system.errors import InputError
 from ..scene.bodies import body_names
 from ..scene.cut_groups import unit_springs

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ...mechanics.fem.cell_sizes import Sizes, sizes
 from ...mechanics.fem.elasticity import internal_force, stiffness
+from ...mechanics.fem.stress import Sizes, sizes
 from ..scene.scene import Scene
 from .constraints import ContactConstraints
 
@@ -108,7 +108,7 @@ class ContactIterate:
     """Displacement and mean stress (of cells in mixed form) under loads `force` (n, dim).
 
     The gaps of the multipliers `closed` (k,) are to vanish; see `condensation.Iterate`. `swelling`
-    (size,) of initial strains; see `mechanics.fem.initial`. `extended`: internal forces are summed
+    (size,) of initial strains; see `mechanics.fem.loads`. `extended`: internal forces are summed
     in extended precision.
     """
 

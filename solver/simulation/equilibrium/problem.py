@@ -12,11 +12,10 @@ from ...case.model import Step
 from ...lac.errors import SolveError
 from ...lac.status import StatusResult, Trial, find_status
 from ...mechanics.fem.bodies import rigid_motions, unsupported
-from ...mechanics.linear.augmented import Compliance
 from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.symmetric_blocks import Stiffness
-from ...mechanics.linear.systems import Systems, parts_of
-from ...system.memory import release
+from ...mechanics.linear.systems import Compliance, Systems, parts_of
+from ...system.process import release
 from ..scene.cut_groups import unit_springs
 from ..scene.scene import Scene
 from .constraints import (

@@ -34,7 +34,7 @@ from ...lac.cells.shape import shape_functions
 from ...lac.facets import FLAT
 from ...lac.status import StatusResult, Trial
 from ...mechanics.fem.block import Block
-from ...mechanics.fem.cell_sizes import steepest, steepness
+from ...mechanics.fem.stress import steepest, steepness
 from ..scene.scene import Scene
 from .iterate import ContactIterate
 

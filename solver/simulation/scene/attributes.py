@@ -18,8 +18,13 @@ from ...lac.cells.shape import has_straight_edges, shape_functions
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.elasticity import lame_parameters
 from ...mechanics.fem.faces import volume_cells
-from ...mechanics.fem.initial import StrainLoads, strain_loads
-from ...mechanics.fem.loads import body_forces, face_forces, stress_forces
+from ...mechanics.fem.loads import (
+    StrainLoads,
+    body_forces,
+    face_forces,
+    strain_loads,
+    stress_forces,
+)
 from ...mechanics.fem.mixed import MeanStress, in_mixed_form, split
 from ...mechanics.fem.stress import COMPONENTS
 from ...mechanics.fem.supports import (

@@ -19,14 +19,13 @@ from ...lac.cut import SubFaces
 from ...lac.facets import Facets, facets, with_directions, with_master_normals, with_nodal_normals
 from ...lac.multipliers import constants
 from ...lac.operator import GapOperator, Scheme, gap_operator, without_round_off
+from ...lac.partners import face_samples
 from ...lac.reconstruction import form_of, vertex_neighbours
 from ...lac.recovery import RecoveryRequest
-from ...lac.surface_points import face_samples
 from ...mechanics.fem.supports import FreeMotion
 from ...mechanics.mortar.points import gauss
 from ...mechanics.mortar.quadric import Quadric, frame, meet_quadric
-from ...mechanics.mortar.stabilisation import stabilisation
-from ...mechanics.mortar.treatments import scheme_of
+from ...mechanics.mortar.treatments import scheme_of, stabilisation
 from ...system.errors import InputError
 from ..options import Options
 from .attributes import Attributes

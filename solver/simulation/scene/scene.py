@@ -14,7 +14,7 @@ from ...lac.cut import CutMesh, SubFaces, cut
 from ...lac.operator import GapOperator
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.faces import volume_cells
-from ...mechanics.fem.initial import StrainLoads
+from ...mechanics.fem.loads import StrainLoads
 from ...mechanics.fem.mixed import MeanStress
 from ...mechanics.fem.supports import Fixed, FreeMotion
 from ...mechanics.mortar.treatments import TREATMENTS, Treatment, merge_fixed_multipliers

@@ -7,7 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from ...report import stages
+from ...report import formats
 from ...report.charts import (
     BLUE,
     GREEN,
@@ -110,7 +110,7 @@ def show(study: Study, groups: Sequence[MeasuredGroup]) -> Shown:
     }
     goals = [_goal(goal, groups, lines) for goal in study.goals]
     names = list(
-        stages.colors(s for line in lines.values() for p in line.points for s in stages_of(p))
+        formats.colors(s for line in lines.values() for p in line.points for s in stages_of(p))
     )
     sections = (
         [PageSection("goals", "Goals", tables=[_goals_table(study.goals, goals)])] if goals else []

@@ -8,7 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from ...case.checks import ERRORS as WORDS
-from ...report import stages
+from ...report import formats
 from ...report.charts import (
     EPSILON,
     RED,
@@ -282,7 +282,7 @@ def _levels(panel: Panel) -> Table:
 def _costs(group: MeasuredGroup) -> Table:
     """Where the time goes, on the finest meshes."""
     finest = [points[-1] for points in grouped(group.solved, lambda p: p["line"]).values()]
-    names = [n for n in stages.colors(s for p in finest for s in p["times"]) if n != TOTAL]
+    names = [n for n in formats.colors(s for p in finest for s in p["times"]) if n != TOTAL]
     rows = []
     for point in finest:
         kind = "cpu" if point["threads"] == 1 else "wall"
@@ -298,7 +298,7 @@ def _costs(group: MeasuredGroup) -> Table:
                         duration(time.median),
                     ),
                     *(f"{duration(time.low)} … {duration(time.high)}", *cells),
-                    stages.bar({n: spent[n] for n in names if n in spent}, time.median),
+                    formats.bar({n: spent[n] for n in names if n in spent}, time.median),
                     f"{point['process']['peak_memory_mb']:.0f} MB",
                 ]
             )

@@ -4,11 +4,14 @@ import numpy as np
 
 from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution
-from solver.case.solutions.bending import Bending
-from solver.case.solutions.manufactured import Parabola2d
 from solver.case.solutions.nested import NestedCylinders
-from solver.case.solutions.polynomial import PolynomialPressure2d
-from solver.case.solutions.uniform import Hydrostatic, UniformCompression
+from solver.case.solutions.polynomial import (
+    Bending,
+    Hydrostatic,
+    Parabola2d,
+    PolynomialPressure2d,
+    UniformCompression,
+)
 from solver.case.solutions.waves import Waves2d
 
 SOFT, HARD = Material(2000.0, 0.3), Material(70000.0, 0.2)

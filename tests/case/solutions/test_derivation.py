@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 from solver.case.material import Material
-from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
+from solver.case.solutions.polynomial import Parabola2d, Paraboloid3d
 
 E, KAPPA, C = sp.symbols("E kappa c", positive=True)
 HALF = sp.Rational(1, 2)

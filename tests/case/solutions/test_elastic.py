@@ -5,13 +5,17 @@ import pytest
 
 from solver.case.material import Material
 from solver.case.solutions.base import ElasticSolution, ParameterError
-from solver.case.solutions.bending import Bending
-from solver.case.solutions.manufactured import Parabola2d, Paraboloid3d
 from solver.case.solutions.meridian import Meridian
-from solver.case.solutions.nested import NestedCylinders, NestedSpheres, NestedTubes
-from solver.case.solutions.oval import OvalCylinders
-from solver.case.solutions.polynomial import PolynomialPressure2d, PolynomialPressure3d
-from solver.case.solutions.uniform import Hydrostatic, UniformCompression
+from solver.case.solutions.nested import NestedCylinders, NestedSpheres, NestedTubes, OvalCylinders
+from solver.case.solutions.polynomial import (
+    Bending,
+    Hydrostatic,
+    Parabola2d,
+    Paraboloid3d,
+    PolynomialPressure2d,
+    PolynomialPressure3d,
+    UniformCompression,
+)
 from solver.case.solutions.waves import Waves2d, Waves3d
 from solver.mechanics.fem.stress import traction
 from tests.case.solutions.elastic import HARD, RADII, SOFT, WAVE, interface_of, nested, points_of

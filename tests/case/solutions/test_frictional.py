@@ -11,7 +11,7 @@ from solver.case.solutions.nested import PulledTubes
 from solver.case.solutions.pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
 from solver.case.solutions.sheared_sphere import ShearedSphere
 from solver.case.solutions.sliding_rigid import SlidingCylinder, SlidingPunch
-from solver.case.solutions.sliding_waves import SlidingWaves
+from solver.case.solutions.waves import SlidingWaves
 from solver.mechanics.fem.stress import traction
 from tests.case.solutions.test_elastic import derivative
 

@@ -8,9 +8,14 @@ from scipy.integrate import quad
 
 from solver.case.material import Material
 from solver.case.solutions.base import ParameterError
-from solver.case.solutions.half_planes import ContactEdge
 from solver.case.solutions.hertz import HertzCylinder
-from solver.case.solutions.pressed import HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
+from solver.case.solutions.pressed import (
+    ContactEdge,
+    HertzHalfPlanes,
+    PartialWaves,
+    RoundedPunch,
+    Wedge,
+)
 from tests.case.solutions.test_elastic import derivative
 
 SOFT, HARD = Material(2000.0, 0.3), Material(70000.0, 0.2)

@@ -7,8 +7,7 @@ import pytest
 
 from solver.case.material import Material
 from solver.case.solutions.base import ParameterError
-from solver.case.solutions.hertz import HertzSphere
-from solver.case.solutions.indenter import Indenter
+from solver.case.solutions.hertz import HertzSphere, Indenter
 
 SOFT, HARD = Material(2000.0, 0.3), Material(70000.0, 0.2)
 CONE = Indenter(power=1, factor=0.1, force=100.0, lower=SOFT, upper=HARD)

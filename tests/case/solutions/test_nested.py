@@ -5,8 +5,13 @@ import pytest
 
 from solver.case.material import Material
 from solver.case.solutions.base import ParameterError
-from solver.case.solutions.nested import CompoundTube, NestedCylinders, NestedSpheres, NestedTubes
-from solver.case.solutions.oval import OvalCylinders
+from solver.case.solutions.nested import (
+    CompoundTube,
+    NestedCylinders,
+    NestedSpheres,
+    NestedTubes,
+    OvalCylinders,
+)
 from solver.mechanics.fem.stress import traction
 from tests.case.solutions.elastic import HARD, RADII, SOFT, interface_of, nested, points_of
 

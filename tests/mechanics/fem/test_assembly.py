@@ -8,11 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import solver.lac.threads
-import solver.mechanics.fem.assembly
+import solver.mechanics.fem.block
 import solver.mechanics.fem.elasticity
 from solver.lac.cells.catalogue import BY_NAME
-from solver.mechanics.fem.assembly import CellSum, degrees_of_freedom, selected
-from solver.mechanics.fem.block import Block
+from solver.mechanics.fem.block import Block, CellSum, degrees_of_freedom, selected
 from solver.mechanics.fem.elasticity import stiffness
 from tests.scenes import grid
 
@@ -65,7 +64,7 @@ def test_cells_and_nodes_in_parts_of_any_size_by_any_threads(monkeypatch, size, 
     whole = stiffness(points, [block])
     monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     monkeypatch.setattr(solver.mechanics.fem.elasticity, "_MATRIX_BYTES", size)
-    monkeypatch.setattr(solver.mechanics.fem.assembly, "_NODES_AT_ONCE", max(1, size // 1000))
+    monkeypatch.setattr(solver.mechanics.fem.block, "_NODES_AT_ONCE", max(1, size // 1000))
     parts = stiffness(points, [block])
     assert (parts.indices == whole.indices).all()
     assert (parts.indptr == whole.indptr).all()

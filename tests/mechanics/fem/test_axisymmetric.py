@@ -11,7 +11,6 @@ from solver.lac.operator import gap_operator
 from solver.lac.reconstruction import FORMS, vertex_neighbours
 from solver.lac.recovery import RecoveryRequest
 from solver.mechanics.fem.bodies import rigid_motions, support_resistance, unheld_motion
-from solver.mechanics.fem.cell_sizes import largest_strain, sizes
 from solver.mechanics.fem.elasticity import (
     Block,
     internal_force,
@@ -20,7 +19,7 @@ from solver.mechanics.fem.elasticity import (
 from solver.mechanics.fem.faces import face_integrals
 from solver.mechanics.fem.loads import body_forces, face_forces, stress_forces
 from solver.mechanics.fem.mixed import split
-from solver.mechanics.fem.stress import nodal_stress
+from solver.mechanics.fem.stress import largest_strain, nodal_stress, sizes
 from solver.mechanics.fem.supports import free_motion
 from solver.mechanics.mortar.edge import contact_edges
 

@@ -7,9 +7,8 @@ from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME
 from solver.lac.errors import SolveError
 from solver.mechanics.fem import cell_loops
 from solver.mechanics.fem.block import Block
-from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepest
 from solver.mechanics.fem.elasticity import internal_force, stiffness
-from solver.mechanics.fem.stress import nodal_stress
+from solver.mechanics.fem.stress import largest_strain, nodal_stress, sizes, steepest
 from tests.scenes import block_mesh, grid
 
 SOLID = [name for name, kind in BY_NAME.items() if kind.dim == 3]

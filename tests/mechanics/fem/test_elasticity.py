@@ -11,7 +11,6 @@ import solver.mechanics.fem.elasticity
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.cells.shape import shape_functions
 from solver.mechanics.fem.block import volume_rule
-from solver.mechanics.fem.cell_sizes import largest_strain, sizes, steepness
 from solver.mechanics.fem.elasticity import (
     Block,
     element_matrices,
@@ -19,7 +18,7 @@ from solver.mechanics.fem.elasticity import (
     lame_parameters,
     stiffness,
 )
-from solver.mechanics.fem.stress import nodal_stress
+from solver.mechanics.fem.stress import largest_strain, nodal_stress, sizes, steepness
 from tests.scenes import block_mesh
 
 VOLUMES = [n for n, t in BY_NAME.items() if t.dim > 1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.mechanics.fem.elasticity import internal_force
-from solver.mechanics.fem.initial import strain_loads
+from solver.mechanics.fem.loads import strain_loads
 from solver.mechanics.fem.mixed import split
 from solver.mechanics.fem.stress import COMPONENTS, nodal_stress
 from tests.mechanics.fem.test_mixed import VOLUMES, one_cell

@@ -6,7 +6,7 @@ from scipy import sparse
 
 from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
-from solver.mechanics.fem.vertices import from_vertices, linear_unknowns
+from solver.mechanics.linear.unknowns import from_vertices, linear_unknowns
 
 QUADRATIC = [name for name, kind in BY_NAME.items() if kind.order == 2 and kind.dim > 1]
 

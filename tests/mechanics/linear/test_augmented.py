@@ -6,9 +6,8 @@ from scipy import sparse
 
 from solver.lac.errors import SolveError
 from solver.mechanics.linear import multigrid
-from solver.mechanics.linear.augmented import augment
 from solver.mechanics.linear.choice import force_solver
-from solver.mechanics.linear.systems import Part, Systems
+from solver.mechanics.linear.systems import Part, Systems, augment
 from tests.mechanics.linear.test_contact_levels import pressed
 
 COUNT = 30

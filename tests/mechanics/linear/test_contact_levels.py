@@ -9,8 +9,7 @@ from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.choice import force_solver
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
-from solver.mechanics.linear.contact_levels import Correction, correction_of
-from solver.mechanics.linear.hierarchy import Hierarchy, Level
+from solver.mechanics.linear.hierarchy import Correction, Hierarchy, Level, correction_of
 from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.symmetric_blocks import halved
 from solver.mechanics.linear.systems import Part, Systems

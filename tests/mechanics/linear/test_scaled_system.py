@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from solver.mechanics.linear import contact_levels
+from solver.mechanics.linear import hierarchy
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.multigrid import Multigrid, ScaledSystem
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix, halved
@@ -121,6 +121,6 @@ def test_solve_beside_contact_is_the_exact_one():
 def test_springs_are_scaled_to_one():
     added = csr_matrix(np.diag([2.0, 3.0, 16.0]))
     condensed = CondensedMatrix(csr_matrix(np.eye(4)), np.array([0, 2]), added)
-    found = contact_levels.scales_of(condensed, np.array([5.0, 6.0, 7.0, 8.0]))
+    found = hierarchy.scales_of(condensed, np.array([5.0, 6.0, 7.0, 8.0]))
     np.testing.assert_array_equal(found, [5.0, 7.0, 0.25])
     np.testing.assert_array_equal(condensed.places, [0, 2, 1])

@@ -8,10 +8,9 @@ import pytest
 from scipy.sparse import bsr_matrix
 
 from solver.lac.cells.catalogue import BY_NAME
-from solver.mechanics.fem import vertices
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
-from solver.mechanics.linear import aggregation, multigrid
+from solver.mechanics.linear import aggregation, multigrid, unknowns
 from solver.mechanics.linear import aggregation as slender
 from solver.mechanics.linear.aggregation import Near, filtered, smoothed_along
 from solver.mechanics.linear.choice import force_solver
@@ -70,7 +69,7 @@ def iterations_on_a_sphere(cells: str = "HEXA20") -> int:
 def test_graded_quadratic_cells_take_few_iterations(monkeypatch):
     """And too many where nodes in the middle of long edges follow the vertices, a planted fault."""
     assert iterations_on_a_sphere() < 60
-    monkeypatch.setattr(vertices, "_LONG", np.inf)
+    monkeypatch.setattr(unknowns, "_LONG", np.inf)
     assert iterations_on_a_sphere() == 150
 
 

@@ -6,11 +6,10 @@ from scipy import sparse
 
 from solver.lac.errors import SolveError
 from solver.mechanics.linear import multigrid
-from solver.mechanics.linear.augmented import Compliance, StabilisedSystem, stabilise
 from solver.mechanics.linear.choice import force_solver
-from solver.mechanics.linear.contact_levels import Interface
-from solver.mechanics.linear.hierarchy import Level
+from solver.mechanics.linear.hierarchy import Interface, Level
 from solver.mechanics.linear.multigrid import Multigrid
+from solver.mechanics.linear.systems import Compliance, StabilisedSystem, stabilise
 from tests.mechanics.linear.test_contact_levels import pressed
 
 K = sparse.csr_matrix(np.diag([2.0, 1.0]))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import solver.lac.threads
-import solver.mechanics.mortar.overlap
-from solver.mechanics.mortar.overlap import inside_others
+import solver.simulation.judgement.plan
+from solver.simulation.judgement.plan import inside_others
 from tests.scenes import grid
 
 
@@ -14,7 +14,7 @@ from tests.scenes import grid
 @pytest.mark.parametrize("layers", [0, 1, 2])
 def test_layers_of_cells_in_one_another(monkeypatch, many, layers, threads):
     """Two cubes of 3³ cells: of so many layers of each, the middles are in the other one."""
-    monkeypatch.setattr(solver.mechanics.mortar.overlap, "_AT_ONCE", many)
+    monkeypatch.setattr(solver.simulation.judgement.plan, "_AT_ONCE", many)
     monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     points, cells = grid(3)
     depth = np.ptp(points[:, 0]) * (layers + 0.1) / 3

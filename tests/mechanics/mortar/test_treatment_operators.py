@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.lac.closure import shape_integrals
+from solver.lac.multipliers import shape_integrals
 from solver.lac.operator import gap_operator
 from solver.mechanics.mortar.treatments import TREATMENTS, scheme_of
 from tests.patches import segment_pair, square_pair

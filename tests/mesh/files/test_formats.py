@@ -12,7 +12,7 @@ import pytest
 import vtk
 
 from solver.mesh import read_mesh
-from solver.mesh.files.apart import read_apart
+from solver.mesh.files.formats import read_apart
 from solver.mesh.recipes.gmsh_session import session
 from solver.system.errors import InputError
 from tests.mesh.curved import Curved
@@ -212,7 +212,7 @@ def never_ends(_):
     ("reader", "message"), [(dies, "the reader died of it"), (never_ends, "takes too long to read")]
 )
 def test_what_kills_a_reader_is_a_refusal(reader, message, tmp_path, monkeypatch):
-    monkeypatch.setattr("solver.mesh.files.apart._SECONDS", 0.3)
+    monkeypatch.setattr("solver.mesh.files.formats._SECONDS", 0.3)
     path = tmp_path / "m.msh"
     path.write_text("$MeshFormat")
     with pytest.raises(InputError, match=rf"m\.msh: mesh: cannot be read \({message}"):
