@@ -31,12 +31,13 @@ from .mesh.size import check_memory
 from .mesh.tidy import tidy
 from .simulation.options import Options
 from .simulation.results.solution import Solution, ZoneResult
+from .simulation.simulate import simulate
 from .system.errors import InputError, key_path
 from .system.progress import report_outcomes
 from .verification.judge import judge
 from .verification.provenance import gather
 from .verification.results import write_result
-from .verification.run import mesh_of, solve_checked
+from .verification.run import checked, mesh_of
 from .verification.verdict import CheckResult, Verdict
 
 CaseLike: TypeAlias = Case | Mapping[str, Any] | str | os.PathLike[str]
@@ -88,7 +89,8 @@ def solve_case(
     with report_outcomes(log):
         if memory_check:
             check_memory(len(made.points), made.points.shape[1], given.path)
-        solution, checks = solve_checked(given, made, options, accepted)
+        solution = simulate(given, made, options)
+        checks = checked(solution, accepted)
     file = given.mesh.get("path") if mesh is None else mesh
     provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
     return Solved(solution, checks, provenance)

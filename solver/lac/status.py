@@ -183,80 +183,72 @@ def find_status(
         if begin is None:
             break
         changes += [0] * number
-        begun = begin() & eligible
+        closed = begin() & eligible
+        search = _Search(len(closed))
         try:
-            closed = _quick(solve, begun, eligible, changes, confirm)
+            while not search.ended:
+                violation = np.where(eligible, solve(closed).violation(closed), 0.0)
+                wrong = violation > 1
+                _log(len(changes) + 1, closed, wrong)
+                if wrong.any():
+                    following = search.following(closed, wrong, violation)
+                    if not search.ended:
+                        changes.append(int((following ^ closed).sum()))
+                        closed = following
+                elif confirm and not search.confirmed:
+                    search.confirmed = True
+                else:
+                    return StatusResult(closed, len(changes) + 1 + confirm, changes)
         except SolveError as error:
             if not changes:
                 raise
             failure = error
-            continue
-        if closed is not None:
-            return StatusResult(closed, len(changes) + 1 + confirm, changes)
     return _solve_complementarity(solve, eligible, area, stiffness, changes, failure)
 
 
-def _quick(
-    solve: Solve, closed: np.ndarray, eligible: np.ndarray, changes: list[int], confirm: bool
-) -> np.ndarray | None:
-    """The status (k,) that Newton's steps find from `closed` (k,), None where they find none.
+class _Search:
+    """A search among `count` multipliers: statuses seen, fewest and most closed, least wrong.
 
-    They are added to the `changes`. Raises the SolveError of a solve.
-    """
-    seen, single = set(), False
-    progress = _Progress(len(closed))
-    while not progress.ended:
-        violation = np.where(eligible, solve(closed).violation(closed), 0.0)
-        wrong = violation > 1
-        _log(len(changes) + 1, closed, wrong)
-        if not wrong.any():
-            if not confirm:
-                return closed
-            confirm = False
-            continue
-        progress.note(int(wrong.sum()), int(closed.sum()))
-        seen.add(closed.tobytes())
-        following = closed ^ _first_changes(closed, wrong, violation)
-        # A cycle is broken by changing the worst offender alone from then on.
-        single = single or following.tobytes() in seen
-        if single:
-            following = closed.copy()
-            following[violation.argmax()] ^= True
-        if not progress.ended:
-            changes.append(int((following ^ closed).sum()))
-            closed = following
-    return None
-
-
-class _Progress:
-    """Records of a search among `count` multipliers: wrong statuses, fewest and most closed.
-
-    >>> progress = _Progress(100)
+    >>> search = _Search(100)
+    >>> def note(wrong, closed):
+    ...     one, other = np.arange(100) < closed, np.arange(100) < wrong
+    ...     search.following(one, other, np.arange(100.0))
     >>> for closed in range(90, 50, -1):
-    ...     progress.note(16, closed)
-    >>> progress.ended
+    ...     note(16, closed)
+    >>> search.ended
     False
     >>> for _ in range(8):
-    ...     progress.note(16, 60)
-    >>> progress.ended
+    ...     note(16, 60)
+    >>> search.ended
     True
     """
 
     def __init__(self, count: int):
         self._wrong, self._fewest, self._most = count + 1, count + 1, -1
-        self._without = 0
-
-    def note(self, wrong: int, closed: int) -> None:
-        """Note a solve with so many wrong statuses and closed multipliers."""
-        record = wrong < self._wrong or closed < self._fewest or closed > self._most
-        self._without = 0 if record else self._without + 1
-        self._wrong = min(self._wrong, wrong)
-        self._fewest, self._most = min(self._fewest, closed), max(self._most, closed)
+        self._without, self._single = 0, False
+        self._seen: set[bytes] = set()
+        self.confirmed = False
 
     @property
     def ended(self) -> bool:
         """Whether too many solves set no record."""
         return self._without >= _PATIENCE
+
+    def following(self, closed: np.ndarray, wrong: np.ndarray, violation: np.ndarray) -> np.ndarray:
+        """The status (k,) after one with `wrong` (k,) entries; see the module."""
+        few, many = int(wrong.sum()), int(closed.sum())
+        record = few < self._wrong or many < self._fewest or many > self._most
+        self._without = 0 if record else self._without + 1
+        self._wrong = min(self._wrong, few)
+        self._fewest, self._most = min(self._fewest, many), max(self._most, many)
+        self._seen.add(closed.tobytes())
+        found = closed ^ _first_changes(closed, wrong, violation)
+        # A cycle is broken by changing the worst offender alone from then on.
+        self._single = self._single or found.tobytes() in self._seen
+        if self._single:
+            found = closed.copy()
+            found[violation.argmax()] ^= True
+        return found
 
 
 def _first_changes(closed: np.ndarray, wrong: np.ndarray, violation: np.ndarray) -> np.ndarray:

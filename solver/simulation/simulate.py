@@ -22,7 +22,7 @@ from .options import LEAN, Options
 from .results.results import solution_of
 from .results.solution import Solution
 from .scene.bodies import check_geometry, without_unloaded
-from .scene.scene import Scene, build_scene
+from .scene.scene import build_scene
 
 _LOG = logging.getLogger(__name__)
 # Forces below this fraction of the largest one are shown as zero.
@@ -34,39 +34,22 @@ def simulate(
     mesh: meshio.Mesh,
     options: Options = LEAN,
     clock: Clock | None = None,
+    problem: ContactProblem | None = None,
 ) -> Solution:
     """Solve a case on its mesh; the case may be swapped (see `Case.as_solved`).
 
-    The time of every stage is added to `clock`, where one is given. Raises InputError where the
-    case and its mesh do not fit, SolveError where no solution is found.
+    Step by step, each from the status of the one before. The time of every stage is added to
+    `clock`, where one is given; `problem`, where it is assembled already. Raises InputError where
+    the case and its mesh do not fit, SolveError where no solution is found.
     """
     started = processor_time()
     clock = clock or Clock()
-    scene = build_scene(case, mesh, options, clock)
-    check_geometry(scene)
-    if options.shortcuts.unloaded:
-        with stage(clock, "assembly"):
-            scene = without_unloaded(scene)
-    macro_elements = sum(zone.count for zone in scene.zones)
-    _LOG.log(OUTCOME, "%d unknowns, %d macro-elements", scene.n_dofs, macro_elements)
-    _log_gaps(scene)
-    with stage(clock, "assembly"):
-        problem = ContactProblem(scene)
-    solution = solve_problem(problem, clock)
-    solution.cpu_seconds = processor_time() - started
-    solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
-    return solution
-
-
-def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
-    """Solve an assembled problem step by step, each from the status of the one before.
-
-    How it was assembled goes on record.
-    """
+    problem = problem or assembled(case, mesh, options, clock)
+    scene, case = problem.scene, problem.scene.case
     plan = list(decided(problem))
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
-    case, states, fields = problem.scene.case, list[Equilibrium](), list[Recovered]()
+    states, fields = list[Equilibrium](), list[Recovered]()
     with stage(clock, "solve"):
         for factor, step in zip(case.factors, case.steps, strict=True):
             last = states[-1] if states else None
@@ -83,30 +66,41 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
                 state, field = recovered(problem, state, step)
             states.append(state)
             fields.append(field)
-            closed = int(state.status.closed[: problem.scene.n_multipliers].sum())
+            closed = int(state.status.closed[: scene.n_multipliers].sum())
             count = state.status.iterations
             values = _called(step, factor), count, "s" * (count != 1), closed, state.residual
             _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *values)
     plan += plan_notes(problem, states)
     with stage(clock, "recovery"):
         solution = solution_of(problem, states, fields, plan)
-        solution.validity = validity(problem.scene, states)
+        solution.validity = validity(scene, states)
     _log_forces(solution)
     solution.plan += [*estimated(solution), *remarks(solution.validity), *softness_notes(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
+    solution.cpu_seconds = processor_time() - started
+    solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
 
 
-def _log_gaps(scene: Scene) -> None:
-    """Log the initial gaps of zones whose surfaces do not touch everywhere."""
-    for zone in scene.zones:
+def assembled(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> ContactProblem:
+    """The contact problem of a case; raises InputError where it does not fit its mesh."""
+    scene = build_scene(case, mesh, options, clock)
+    check_geometry(scene)
+    if options.shortcuts.unloaded:
+        with stage(clock, "assembly"):
+            scene = without_unloaded(scene)
+    macro_elements = sum(zone.count for zone in scene.zones)
+    _LOG.log(OUTCOME, "%d unknowns, %d macro-elements", scene.n_dofs, macro_elements)
+    for zone in scene.zones:  # those whose surfaces do not touch everywhere
         met = zone.operator.covered > 0
         gaps = zone.operator.initial[met] / zone.operator.covered[met]
         if gaps.any():
             text = "zone %s: initial gap %.4g to %.4g" + ", an overlap" * bool(gaps.min() < 0)
             _LOG.log(OUTCOME, text, zone.zone.name, gaps.min(), gaps.max())
+    with stage(clock, "assembly"):
+        return ContactProblem(scene)
 
 
 def _log_forces(solution: Solution) -> None:

@@ -129,9 +129,9 @@ def solve(
             check_name(output)
             output.parent.mkdir(parents=True, exist_ok=True)
         mesh = _mesh_of(job, case, clock)
-        options = Options.everything() if job.everything else Options()
-        # Accepted values belong to the case's own mesh.
-        solution, checks = solve_checked(case, mesh, options, job.refine == 1, clock)
+        solution = simulate(case, mesh, Options.everything() if job.everything else LEAN, clock)
+        with stage(clock, "checks"):  # accepted values belong to the case's own mesh
+            checks = checked(solution, job.refine == 1)
         solution.cpu_seconds = processor_time() - started
         provenance = gather(job.case, job.mesh or case.mesh.get("path"))
         if output:
@@ -162,30 +162,16 @@ def _mesh_of(job: Job, case: Case, clock: Clock) -> meshio.Mesh:
     return mesh
 
 
-def solve_checked(
-    case: Case,
-    mesh: meshio.Mesh,
-    options: Options = LEAN,
-    accepted: bool = True,
-    clock: Clock | None = None,
-) -> tuple[Solution, list[CheckResult]]:
-    """Solve a case on its mesh and run its checks, those of `accepted` values too if asked.
-
-    The time of every stage is added to `clock`, where one is given.
-    """
-    clock = clock or Clock()
-    solution = simulate(case, mesh, options, clock)
-    with stage(clock, "checks"):
-        solution.errors = errors(solution)
-        checks = run_checks(solution, accepted_values(solution) if accepted else {})
-    return solution, checks
+def checked(solution: Solution, accepted: bool = True) -> list[CheckResult]:
+    """The checks of a solution, those of `accepted` values too if asked; its errors are found."""
+    solution.errors = errors(solution)
+    return run_checks(solution, accepted_values(solution) if accepted else {})
 
 
 def check(result_file: Path) -> Verdict:
     """The verdict of a stored result, its checks run again on the stored fields."""
     result = read_result(result_file)
-    result.solution.errors = errors(result.solution)
-    checks = run_checks(result.solution, accepted_values(result.solution))
+    checks = checked(result.solution)
     return judge(result.solution, checks, result_file.name, result.provenance, result.sha256)
 
 

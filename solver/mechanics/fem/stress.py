@@ -3,7 +3,6 @@
 The sizes of stress, strain and gradients, taken in the middle of each cell.
 """
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,7 +12,7 @@ from ...lac.cells.catalogue import CellType
 from ...lac.cells.shape import shape_functions
 from . import cell_loops
 from .block import Block
-from .elasticity import Found, Shapes, by_part, in_precision, shapes_in, stress_in
+from .elasticity import Shapes, by_part, in_precision, shapes_in, stress_in
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
@@ -125,7 +124,7 @@ def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> 
             highest, slender = max(highest, term), max(slender, on_small_faces)
             continue
         seen = partial(_cell_sizes, points, block, whole)
-        for part, (forces, term, on_small_faces, norm) in _in_the_middle(points, block, seen):
+        for part, (forces, term, on_small_faces, norm) in by_part(block, points.shape[1], seen):
             nodes = block.cells[part].ravel()
             np.add.at(force, nodes, forces.ravel())
             np.maximum.at(largest, nodes, np.repeat(norm, block.type.n_nodes))
@@ -134,15 +133,11 @@ def sizes(points: np.ndarray, blocks: list[Block], displacement: np.ndarray) -> 
 
 
 def _cell_sizes(
-    points: np.ndarray,
-    block: Block,
-    displacement: np.ndarray,
-    part: slice,
-    found: Shapes,
-    volume: np.ndarray,
+    points: np.ndarray, block: Block, displacement: np.ndarray, part: slice
 ) -> tuple[np.ndarray, float, float, np.ndarray]:
     """By cell, for `sizes`: forces (n, n_nodes), the highest and slender stress, norms (n,)."""
     cells = block.cells[part]
+    found, volume = _in_the_middle(points, block, part)
     slope = np.linalg.norm(found.gradient[:, 0], axis=2)
     nodal = displacement[cells]
     apart = np.linalg.norm(nodal - nodal[:, :1], axis=2)
@@ -172,15 +167,16 @@ def largest_strain(
             found = cell_loops.largest_strain(points, block, displacement[None])
             largest = np.maximum(largest, found)
             continue
-        seen = partial(_cell_strain, block, displacement)
-        for _, of_part in _in_the_middle(points, block, seen):
+        seen = partial(_cell_strain, points, block, displacement)
+        for _, of_part in by_part(block, points.shape[1], seen):
             largest = np.maximum(largest, of_part)
     return float(largest[0]), float(largest[1])
 
 
 def _cell_strain(
-    block: Block, displacement: np.ndarray, part: slice, found: Shapes, _: np.ndarray
+    points: np.ndarray, block: Block, displacement: np.ndarray, part: slice
 ) -> tuple[float, float]:
+    found, _ = _in_the_middle(points, block, part)
     nodal = displacement[block.cells[part]]
     slope = found.slopes(nodal - nodal[:, :1], nodal[..., 0])[:, 0]
     turned = np.swapaxes(slope, 1, 2)
@@ -195,11 +191,12 @@ def _cell_strain(
 def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
     """The sizes of the gradients of the shape functions (n, n_nodes) in the middle of each cell."""
 
-    def seen(_: slice, shapes: Shapes, __: np.ndarray) -> np.ndarray:
-        return np.linalg.norm(shapes.gradient[:, 0], axis=2)
+    def seen(block: Block, part: slice) -> np.ndarray:
+        return np.linalg.norm(_in_the_middle(points, block, part)[0].gradient[:, 0], axis=2)
 
+    dim = points.shape[1]
     return [
-        np.concatenate([found for _, found in _in_the_middle(points, block, seen)])
+        np.concatenate([found for _, found in by_part(block, dim, partial(seen, block))])
         for block in blocks
     ]
 
@@ -211,14 +208,8 @@ def steepest(points: np.ndarray, blocks: list[Block]) -> float:
     return max(float(found.sum(axis=1).max()) for found in steepness(points, blocks))
 
 
-def _in_the_middle(
-    points: np.ndarray, block: Block, found: Callable[[slice, Shapes, np.ndarray], Found]
-) -> Iterator[tuple[slice, Found]]:
-    """Parts of a block, and what is `found` in the middle (q = 1) of their cells of sizes (n,)."""
+def _in_the_middle(points: np.ndarray, block: Block, part: slice) -> tuple[Shapes, np.ndarray]:
+    """The shapes in the middle (q = 1) of a part of a block's cells, and their sizes (n,)."""
     middle, weight = block.middle
-
-    def of(part: slice) -> Found:
-        shapes = shapes_in(points, block, block.cells[part], middle)
-        return found(part, shapes, shapes.measure[:, 0] * weight)
-
-    return by_part(block, points.shape[1], of)
+    shapes = shapes_in(points, block, block.cells[part], middle)
+    return shapes, shapes.measure[:, 0] * weight

@@ -184,14 +184,20 @@ def augment(
     compliance = 1 / matrix.diagonal()
     square = constraints.multiply(constraints) @ compliance
     size = np.sqrt(np.asarray(square).ravel())
-    if not size.all():
-        raise SolveError("a constraint holds no unknown")
-    scaled = (sparse.diags(1 / size) @ constraints).tocsr()
-    gram = factorise(scaled @ sparse.diags(compliance) @ scaled.T, least=_LEAST)
-    weight = max(_WEIGHT, _REDUCTION / gram.smallest)
-    factor = prepare(_augmented(matrix, scaled, weight), unknowns, gave_up, shared)
-    if factor.warning:
-        raise SolveError(factor.warning)
+    try:
+        if not size.all():
+            raise SolveError("a constraint holds no unknown")
+        scaled = (sparse.diags(1 / size) @ constraints).tocsr()
+        gram = factorise(scaled @ sparse.diags(compliance) @ scaled.T, least=_LEAST)
+        weight = max(_WEIGHT, _REDUCTION / gram.smallest)
+        factor = prepare(_augmented(matrix, scaled, weight), unknowns, gave_up, shared)
+        if factor.warning:
+            raise SolveError(factor.warning)
+    except SolveError as error:
+        raise SolveError(
+            f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
+            "another, as where they outnumber the slave nodes or supports hold these"
+        ) from None
     return AugmentedSystem(
         factor=factor,
         about=_NOTHING_OWN,
@@ -318,13 +324,36 @@ class Systems:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
         for number, part in enumerate(self._parts):
             mine = closed & part.multipliers
-            if number not in self._kept or self._kept[number][0] != mine.tobytes():
-                if number in self._kept:  # releases its memory first
-                    self._drop(number)
-                self._kept[number] = mine.tobytes(), self._factored(number, part, mine)
+            if number in self._kept and self._kept[number][0] != mine.tobytes():
+                self._drop(number)  # releases its memory first
+            if number in self._kept:
+                continue
+            matrix, constraints, own, unknowns = self._of(part, mine)
+            known = unknowns, self._gave_up.get(number, ""), self._shared[number]
+            system: ConstrainedSystem
+            if own is None:
+                system = augment(matrix, constraints, *known)
+            elif self._compliance and len((soft := self._compliance(mine)).weight):
+                system = stabilise(matrix, constraints, own, soft, *known)
+            else:
+                system = condense(matrix, constraints, own, *known)
+            self._kept[number] = mine.tobytes(), system
+        self.latest = self._kept[0][1] if len(self._parts) == 1 else self._together(closed)
+        return self.latest
+
+    def _of(
+        self, part: Part, closed: np.ndarray
+    ) -> tuple[Stiffness, sparse.csr_matrix, np.ndarray | None, Unknowns]:
+        """Matrix, `closed` constraints, own and all unknowns of a part."""
+        own, constraints = self._own, self._constraints[closed]
         if len(self._parts) == 1:
-            self.latest = self._kept[0][1]
-            return self.latest
+            return self._matrix, constraints, own, self._unknowns
+        chosen = np.flatnonzero(part.unknowns)
+        matrix, unknowns = self._matrix.tocsr()[chosen][:, chosen], self._unknowns.of(chosen)
+        return matrix, constraints[:, chosen], None if own is None else own[chosen], unknowns
+
+    def _together(self, closed: np.ndarray) -> "IndependentSystems":
+        """The systems of all parts as one."""
         kept = [self._kept[number][1] for number in range(len(self._parts))]
         largest = kept[int(np.argmax([part.unknowns.sum() for part in self._parts]))]
         about = filter(None, [largest.about, f"largest of {len(kept)} systems"])
@@ -332,13 +361,12 @@ class Systems:
             (np.flatnonzero(part.unknowns), np.flatnonzero(part.multipliers[closed]), system)
             for part, system in zip(self._parts, kept, strict=True)
         ]
-        self.latest = IndependentSystems(
+        return IndependentSystems(
             factor=largest.factor,
             about="; ".join(about),
             parts=parts,
             n_multipliers=int(closed.sum()),
         )
-        return self.latest
 
     def factored(self, closed: np.ndarray) -> ConstrainedSystem:
         """The same by a factor, which serves for many right-hand sides at once.
@@ -355,24 +383,3 @@ class Systems:
             finally:
                 self._gave_up = before
         return self.closed(closed)
-
-    def _factored(self, number: int, part: Part, closed: np.ndarray) -> ConstrainedSystem:
-        """The system of one part, factored."""
-        matrix, constraints = self._matrix, self._constraints[closed]
-        own, unknowns = self._own, self._unknowns
-        if len(self._parts) > 1:
-            chosen = np.flatnonzero(part.unknowns)
-            matrix, constraints = matrix.tocsr()[chosen][:, chosen], constraints[:, chosen]
-            own, unknowns = None if own is None else own[chosen], unknowns.of(chosen)
-        known = unknowns, self._gave_up.get(number, ""), self._shared[number]
-        if own is not None:
-            if self._compliance is not None and len((soft := self._compliance(closed)).weight):
-                return stabilise(matrix, constraints, own, soft, *known)
-            return condense(matrix, constraints, own, *known)
-        try:
-            return augment(matrix, constraints, *known)
-        except SolveError as error:
-            raise SolveError(
-                f"{error}: the {constraints.shape[0]} closed multipliers may depend on one "
-                "another, as where they outnumber the slave nodes or supports hold these"
-            ) from None

@@ -29,7 +29,7 @@ from .constraints import (
     refuse_unsolvable,
 )
 from .iterate import ContactIterate, Displacement
-from .state import Equilibrium, estimate, judged, roughness
+from .state import Equilibrium, estimate, judged, roughness, rounding
 
 _LOG = logging.getLogger(__name__)
 
@@ -277,7 +277,8 @@ class ContactProblem:
         found = start.advanced(system.correction(force, start.violation(), accuracy))
         pressure = np.zeros(len(start.closed))
         pressure[start.closed] = system.multiplier(found.residual())
-        trial, gaps = judged(found, pressure, self.diagonal), self.constraints.gaps
+        trial = judged(found, rounding(found), pressure, self.diagonal)
+        gaps = self.constraints.gaps
         covered = np.where(self.constraints.eligible, self.constraints.covered, np.inf)
         motion = abs(gaps) @ np.abs(found.displacement.total) / covered
         return found, replace(
@@ -315,14 +316,15 @@ class ContactProblem:
                 continue
             pressure = np.zeros(len(start.closed))
             pressure[start.closed] = multiplier
-            accuracy = estimate(iterate, pressure, self.diagonal, self._rough, residual, scale)
+            about = iterate, rounding(iterate), pressure, self.diagonal
+            accuracy = estimate(*about, self._rough, residual, scale)
             extends = refine and safeguards.extended and not start.extended
             if extends and accuracy.of_sums > _EXTEND:
                 start = replace(iterate, extended=True)
                 continue
             return Equilibrium(
                 iterate=iterate,
-                trial=judged(iterate, pressure, self.diagonal),
+                trial=judged(*about),
                 status=StatusResult(start.closed, 1, []),
                 residual=residual,
                 force_scale=scale,

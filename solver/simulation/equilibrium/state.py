@@ -183,8 +183,28 @@ def terms_of(blocks: Sequence[Block]) -> int:
     return max(2 * dim * block.type.n_nodes + len(block.rule[1]) for block in blocks)
 
 
+@dataclass(frozen=True)
+class Rounding:
+    """Errors by rounding: of the internal forces at nodes (n,), and of ∫ gap (k,)."""
+
+    forces: np.ndarray
+    gaps: np.ndarray
+
+
+def rounding(iterate: ContactIterate) -> Rounding:
+    """The errors by rounding in an iterate."""
+    scene, constraints = iterate.scene, iterate.constraints
+    mean_terms, _ = scene.mean.cancellation(iterate.mean_stress)
+    known = scene.rounding * constraints.covered * (constraints.initial != 0)
+    return Rounding(
+        forces=_unit(iterate) * iterate.sizes.forces + EPSILON * mean_terms,
+        gaps=known + EPSILON * iterate.opening_size,
+    )
+
+
 def estimate(
     iterate: ContactIterate,
+    rounded: Rounding,
     pressure: np.ndarray,
     diagonal: np.ndarray,
     rough: Roughness,
@@ -197,7 +217,7 @@ def estimate(
     `residual` relative to the size of the forces at work.
     """
     scene, constraints, closed = iterate.scene, iterate.constraints, iterate.closed
-    forces, unit = _rounding_of_forces(iterate), _unit(iterate)
+    forces, unit = rounded.forces, _unit(iterate)
     scale = float(np.abs(pressure).max(initial=0.0))
     moved = iterate.displacement.total.reshape(scene.points.shape)
     if scale == 0:
@@ -215,7 +235,7 @@ def estimate(
     mean_stress = scene.mean.cancellation(iterate.mean_stress)[1]
     errors = {
         "forces": pressure_of_forces(moving, noise),
-        "gap": pressure_of_gaps(moving, _rounding_of_gaps(iterate)[closed], diagonal),
+        "gap": pressure_of_gaps(moving, rounded.gaps[closed], diagonal),
         "coordinates": tilted + rough.stress(scene.blocks, moved),
         "stress": max(unit * iterate.sizes.highest, EPSILON * mean_stress),
         "slender": unit * iterate.sizes.slender,
@@ -233,7 +253,9 @@ def stress_of_motion(case: Case, length: float, displacement: np.ndarray) -> flo
     return young * float(np.abs(displacement).max(initial=0.0)) / length
 
 
-def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) -> Trial:
+def judged(
+    iterate: ContactIterate, rounded: Rounding, pressure: np.ndarray, diagonal: np.ndarray
+) -> Trial:
     """Pressure (k,) and gap of an iterate with what is round-off of each, zone by zone.
 
     The scale of pressures is the largest stress or pressure at the zone's own surfaces, the scale
@@ -242,7 +264,7 @@ def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) 
     scene, constraints, dim = iterate.scene, iterate.constraints, iterate.scene.points.shape[1]
     left = iterate.residual() + constraints.on_free.T @ pressure
     unbalanced = np.abs(scene.free.spread(left))
-    forces, known = np.repeat(_rounding_of_forces(iterate), dim), _rounding_of_gaps(iterate)
+    forces, known = np.repeat(rounded.forces, dim), rounded.gaps
     moving, limit = constraints.moving, np.zeros(len(pressure))
     for zone in scene.zones:
         mine = zone.numbers
@@ -267,19 +289,6 @@ def judged(iterate: ContactIterate, pressure: np.ndarray, diagonal: np.ndarray) 
 
 def _unit(iterate: ContactIterate) -> float:
     return EPSILON_EXTENDED if iterate.extended else EPSILON
-
-
-def _rounding_of_forces(iterate: ContactIterate) -> np.ndarray:
-    """Errors (n,) of the internal forces at nodes."""
-    mean_terms, _ = iterate.scene.mean.cancellation(iterate.mean_stress)
-    return _unit(iterate) * iterate.sizes.forces + EPSILON * mean_terms
-
-
-def _rounding_of_gaps(iterate: ContactIterate) -> np.ndarray:
-    """Errors (k,) of ∫ gap."""
-    scene, constraints = iterate.scene, iterate.constraints
-    known = scene.rounding * constraints.covered * (constraints.initial != 0)
-    return known + EPSILON * iterate.opening_size
 
 
 def _largest(gaps: sparse.csr_matrix) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
