@@ -14,6 +14,7 @@ segments; Abbas et al. (2018), §4.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from typing import Self
 
@@ -141,14 +142,7 @@ def intersect(
     ([0, 1], [1.0, 1.0], [0.5, 0.5])
     """
     pairs = face_pairs(slaves, index, masters, reach, among)
-    hidden, nearer = hidden_pairs(pairs)
-
-    def part(start: int) -> list[Segments]:
-        end = start + _PAIRS_AT_ONCE
-        low, high = np.searchsorted(hidden, [start, end])
-        behind = hidden[low:high] - start, pairs.j[nearer[low:high]]
-        return list(_segments(pairs.of(slice(start, end)), behind, reach, more))
-
+    part = partial(_segments, pairs, hidden_pairs(pairs), reach, more)
     return list(chain.from_iterable(prefetch(part, range(0, len(pairs.i), _PAIRS_AT_ONCE))))
 
 
@@ -157,8 +151,12 @@ def intersect(
 Behind = tuple[np.ndarray, np.ndarray]
 
 
-def _segments(pairs: Pairs, behind: Behind, reach: float, more: int) -> Iterator[Segments]:
-    degree = _degree(pairs) + more
+def _segments(pairs: Pairs, hidden: Behind, reach: float, more: int, start: int) -> list[Segments]:
+    """The segments of some pairs, from `start` on; `hidden` by number, and the nearer pair."""
+    low, high = np.searchsorted(hidden[0], [start, start + _PAIRS_AT_ONCE])
+    behind = hidden[0][low:high] - start, pairs.j[hidden[1][low:high]]
+    pairs = pairs.of(slice(start, start + _PAIRS_AT_ONCE))
+    degree, found = _degree(pairs) + more, list[Segments]()
     slave = pairs.slave
     plane, cut = (
         (slave.straight, _intervals) if slave.centre.shape[1] == 2 else (slave.flat, _areas)
@@ -168,7 +166,8 @@ def _segments(pairs: Pairs, behind: Behind, reach: float, more: int) -> Iterator
         if len(chosen):
             some = pairs.of(chosen)
             for pieces in cut(some, _among(behind, chosen, len(plane)), degree, curved):
-                yield from _with_master(some, pieces, reach, curved)
+                found += _with_master(some, pieces, reach, curved)
+    return found
 
 
 def _among(behind: Behind, chosen: np.ndarray, count: int) -> Behind:

@@ -34,17 +34,23 @@ def simulate(
     mesh: meshio.Mesh,
     options: Options = LEAN,
     clock: Clock | None = None,
-    problem: ContactProblem | None = None,
 ) -> Solution:
     """Solve a case on its mesh; the case may be swapped (see `Case.as_solved`).
 
-    Step by step, each from the status of the one before. The time of every stage is added to
-    `clock`, where one is given; `problem`, where it is assembled already. Raises InputError where
-    the case and its mesh do not fit, SolveError where no solution is found.
+    The time of every stage is added to `clock`, where one is given. Raises InputError where the
+    case and its mesh do not fit, SolveError where no solution is found.
     """
-    started = processor_time()
-    clock = clock or Clock()
-    problem = problem or assembled(case, mesh, options, clock)
+    started, clock = processor_time(), clock or Clock()
+    solution = solve_problem(assembled(case, mesh, options, clock), clock)
+    solution.cpu_seconds = processor_time() - started
+    return solution
+
+
+def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
+    """Solve an assembled problem step by step, each from the status of the one before.
+
+    How it was assembled goes on record. Raises SolveError where no solution is found.
+    """
     scene, case = problem.scene, problem.scene.case
     plan = list(decided(problem))
     for line in plan:
@@ -79,7 +85,6 @@ def simulate(
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
-    solution.cpu_seconds = processor_time() - started
     solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
 

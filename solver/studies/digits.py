@@ -40,7 +40,7 @@ from ..simulation.equilibrium.problem import ContactProblem
 from ..simulation.equilibrium.state import Accuracy
 from ..simulation.options import Options, Safeguards
 from ..simulation.scene.scene import Scene, build_scene, carried_over
-from ..simulation.simulate import simulate
+from ..simulation.simulate import solve_problem
 from ..system.errors import InputError
 from ..system.progress import Clock
 from ..verification.verdict import FAILED, PASSED, REFUSED, UNRELIABLE
@@ -267,10 +267,9 @@ def _measured(point: Point, safeguards: Safeguards) -> Record:
     mesh = transform(raw, case.transform, str(case.path)) if case.transform else raw
     state = exact_state(case, point.group.state, raw)
     clock = Clock()
-    options = Options(safeguards=safeguards)
-    scene = build_scene(case, mesh, options, clock)
+    scene = build_scene(case, mesh, Options(safeguards=safeguards), clock)
     problem = ContactProblem(scene)
-    solution = simulate(case, mesh, options, clock, problem)
+    solution = solve_problem(problem, clock)
     zones, balance = solution.zones, solution.balance
     # Of rounding alone: a sweep's points may have strains that no real body has.
     accuracy = Accuracy(solution.accuracy)

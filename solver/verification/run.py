@@ -20,7 +20,7 @@ from ..mesh.size import check_memory, of_mesh
 from ..mesh.tidy import tidy
 from ..simulation.options import LEAN, Options
 from ..simulation.results.solution import Solution
-from ..simulation.simulate import simulate
+from ..simulation.simulate import assembled, solve_problem
 from ..system.errors import InputError, MachineError, of_machine
 from ..system.files import last_line
 from ..system.progress import OUTCOME, Clock, processor_time, stage
@@ -129,7 +129,8 @@ def solve(
             check_name(output)
             output.parent.mkdir(parents=True, exist_ok=True)
         mesh = _mesh_of(job, case, clock)
-        solution = simulate(case, mesh, Options.everything() if job.everything else LEAN, clock)
+        options = Options.everything() if job.everything else LEAN
+        solution = solve_problem(assembled(case, mesh, options, clock), clock)
         with stage(clock, "checks"):  # accepted values belong to the case's own mesh
             checks = checked(solution, job.refine == 1)
         solution.cpu_seconds = processor_time() - started

@@ -42,20 +42,8 @@ def physical_gradients(
 
     Raises SolveError where a Jacobian is not positive, naming how many cells.
     """
-    gradients = shape_functions(kind.name).gradients(reference)
-    determinant, inverse = _inverse_jacobian(points, cells, kind, gradients)
-    return _physical(gradients, inverse), determinant
-
-
-def _inverse_jacobian(
-    points: np.ndarray, cells: np.ndarray, kind: CellType, gradients: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    corner = points[cells]
-    determinant, inverse = invert(_slopes(corner - corner[:, :1], gradients))
-    bad = (determinant <= 0).any(axis=1)
-    if bad.any():
-        raise SolveError(f"{int(bad.sum())} {kind.name} cells are inverted or degenerate")
-    return determinant, inverse
+    found = shapes_in(points, kind, cells, reference)
+    return found.gradient, found.measure
 
 
 def _slopes(nodal: np.ndarray, gradients: np.ndarray) -> np.ndarray:
@@ -65,10 +53,6 @@ def _slopes(nodal: np.ndarray, gradients: np.ndarray) -> np.ndarray:
     """
     by_component = np.ascontiguousarray(np.moveaxis(nodal, 2, 0))[:, None]
     return np.moveaxis(by_component @ np.ascontiguousarray(gradients.T), (0, 1), (2, 3))
-
-
-def _physical(gradients: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-    return np.matmul(gradients, np.ascontiguousarray(inverse))
 
 
 def hoop_values(
@@ -107,7 +91,7 @@ class Shapes:
     @cached_property
     def gradient(self) -> np.ndarray:
         """Gradients (n, q, n_nodes, dim) in the cells."""
-        return _physical(self.on_reference, self.inverse)
+        return np.matmul(self.on_reference, np.ascontiguousarray(self.inverse))
 
     def slopes(self, apart: np.ndarray, radial: np.ndarray) -> np.ndarray:
         """The gradients (n, q, dim, dim) of a displacement, (n, q, 3, 3) in axisymmetric cells.
@@ -131,13 +115,24 @@ class Shapes:
         return found
 
 
-def shapes_in(points: np.ndarray, block: Block, cells: np.ndarray, reference: np.ndarray) -> Shapes:
-    """The shapes of some cells (n, n_nodes) of a block at reference points (q, dim)."""
-    gradients = shape_functions(block.type.name).gradients(reference)
-    measure, inverse = _inverse_jacobian(points, cells, block.type, gradients)
-    if not block.axisymmetric:
+def shapes_in(
+    points: np.ndarray,
+    kind: CellType,
+    cells: np.ndarray,
+    reference: np.ndarray,
+    axisymmetric: bool = False,
+) -> Shapes:
+    """The shapes of cells (n, n_nodes) at reference points (q, dim).
+
+    Raises SolveError where a Jacobian is not positive, naming how many cells.
+    """
+    gradients, corner = shape_functions(kind.name).gradients(reference), points[cells]
+    measure, inverse = invert(_slopes(corner - corner[:, :1], gradients))
+    if (bad := (measure <= 0).any(axis=1)).any():
+        raise SolveError(f"{int(bad.sum())} {kind.name} cells are inverted or degenerate")
+    if not axisymmetric:
         return Shapes(gradients, inverse, measure, None)
-    hoop, around = hoop_values(points, cells, block.type, reference)
+    hoop, around = hoop_values(points, cells, kind, reference)
     return Shapes(gradients, inverse, measure * around, hoop)
 
 
@@ -165,7 +160,7 @@ def element_matrices(points: np.ndarray, block: Block, part: slice = _ALL) -> np
     """Stiffness matrices (n, dim · n_nodes, dim · n_nodes) of a part of a block's cells."""
     dim, nodes = points.shape[1], block.type.n_nodes
     reference, weights = block.rule
-    found = shapes_in(points, block, block.cells[part], reference)
+    found = shapes_in(points, block.type, block.cells[part], reference, block.axisymmetric)
     measure = weights * found.measure
     products = _products(found.gradient, measure)
     volume = products if found.hoop is None else _products(found.divergence, measure)
@@ -240,7 +235,7 @@ def _cell_forces(
 ) -> np.ndarray:
     """The forces (dim, n, n_nodes) of a displacement on the nodes of a part of a block's cells."""
     dim, (reference, weights) = points.shape[1], block.rule
-    found = shapes_in(points, block, block.cells[part], reference)
+    found = shapes_in(points, block.type, block.cells[part], reference, block.axisymmetric)
     stress = stress_in(found, displacement, block, part)
     stress *= (weights * found.measure)[:, :, None, None]
     pulled = np.einsum("cqij,cqkj->ikcq", stress[..., :dim, :dim], found.inverse)

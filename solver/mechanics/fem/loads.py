@@ -189,7 +189,7 @@ def strain_loads(
             strain = strains(some)
             if not strain.any():
                 continue
-            shapes = shapes_in(points, block, some.cells, reference)
+            shapes = shapes_in(points, block.type, some.cells, reference, block.axisymmetric)
             inner = _stress(some, strain)
             weighted = inner * (weights * shapes.measure)[..., None]
             tensor = weighted[..., _TENSOR[:dim, :dim]]

@@ -122,7 +122,12 @@ class MeanStress:
             for some in chunks(part.block, self._shape[1]):
                 block = part.block.of(some)
                 reference, weights = block.rule
-                measure = shapes_in(points, block, block.cells, reference).measure * weights
+                measure = (
+                    shapes_in(
+                        points, block.type, block.cells, reference, block.axisymmetric
+                    ).measure
+                    * weights
+                )
                 inside = _functions(points, block, block.cells, reference, measure)
                 opened = np.einsum("cq,cqk,lcq->lck", measure, inside, values(block), optimize=True)
                 for total, added in zip(found, opened, strict=True):
@@ -279,7 +284,7 @@ def _chunk(
     points: np.ndarray, block: Block, cells: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     reference, weights = block.rule
-    found = shapes_in(points, block, cells, reference)
+    found = shapes_in(points, block.type, cells, reference, block.axisymmetric)
     measure = found.measure * weights
     places = np.concatenate([reference, block.type.nodes])
     values = _functions(points, block, cells, places, measure)

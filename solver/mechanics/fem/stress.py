@@ -64,7 +64,7 @@ def _at_nodes(
 ) -> np.ndarray:
     """The stress (n, n_nodes, 6) at the nodes of a part of a block's cells, seen from each cell."""
     reference, _ = block.rule
-    found = shapes_in(points, block, block.cells[part], reference)
+    found = shapes_in(points, block.type, block.cells[part], reference, block.axisymmetric)
     stress = stress_in(found, displacement, block, part)
     full = _voigt(stress, block.lame[part], block.shear[part])
     fit = extrapolation(block.type, reference)
@@ -211,5 +211,5 @@ def steepest(points: np.ndarray, blocks: list[Block]) -> float:
 def _in_the_middle(points: np.ndarray, block: Block, part: slice) -> tuple[Shapes, np.ndarray]:
     """The shapes in the middle (q = 1) of a part of a block's cells, and their sizes (n,)."""
     middle, weight = block.middle
-    shapes = shapes_in(points, block, block.cells[part], middle)
+    shapes = shapes_in(points, block.type, block.cells[part], middle, block.axisymmetric)
     return shapes, shapes.measure[:, 0] * weight
