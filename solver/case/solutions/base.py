@@ -36,6 +36,10 @@ def parameter(doc: str, **options: Any) -> Any:
     return field(metadata={"doc": doc} | more, **options)
 
 
+SOLUTIONS: dict[str, "type[ExactSolution]"] = {}
+"""The classes that have a name; each enters itself."""
+
+
 class ExactSolution:
     """A documented solution of a contact problem.
 
@@ -49,6 +53,11 @@ class ExactSolution:
     parts: ClassVar[tuple[str, ...]] = ("body",)
     quantities: ClassVar[frozenset[str]] = frozenset({"contact_pressure"})
     dim: int
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "name" in vars(cls):
+            SOLUTIONS[cls.name] = cls
 
     def __post_init__(self) -> None:
         for one in fields(self):  # type: ignore[arg-type] # every solution with parameters is one

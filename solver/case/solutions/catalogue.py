@@ -16,70 +16,20 @@ from typing import Any
 
 from ...system.errors import InputError, hint
 from ..material import Material
-from .base import (
-    ExactSolution,
-    ParameterError,
+from . import (  # noqa: F401 -- the classes in them enter SOLUTIONS
+    frictional,
+    hertz,
+    nested,
+    polynomial,
+    pressed,
+    receding,
+    sheared_sphere,
+    sliding_rigid,
+    waves,
 )
-from .frictional import Sheared, ShearedBlocks
-from .hertz import HertzApproach, HertzCylinder, HertzSphere, Indenter
+from .base import SOLUTIONS, ExactSolution, ParameterError
 from .meridian import Meridian
-from .nested import (
-    CompoundTube,
-    NestedCylinders,
-    NestedSpheres,
-    NestedTubes,
-    OvalCylinders,
-    PulledTubes,
-)
-from .polynomial import (
-    Bending,
-    Hydrostatic,
-    Parabola2d,
-    Paraboloid3d,
-    PolynomialPressure2d,
-    PolynomialPressure3d,
-    UniformCompression,
-)
-from .pressed import ContactEdge, HertzHalfPlanes, PartialWaves, RoundedPunch, Wedge
-from .receding import RecedingLayer
-from .sheared_sphere import ShearedSphere
-from .sliding_rigid import SlidingCylinder, SlidingPunch
-from .waves import SlidingWaves, Waves2d, Waves3d
 
-_CLASSES: tuple[type[ExactSolution], ...] = (
-    UniformCompression,
-    Hydrostatic,
-    Bending,
-    NestedCylinders,
-    NestedTubes,
-    NestedSpheres,
-    CompoundTube,
-    OvalCylinders,
-    Parabola2d,
-    Paraboloid3d,
-    HertzCylinder,
-    HertzSphere,
-    HertzApproach,
-    Indenter,
-    Waves2d,
-    Waves3d,
-    PartialWaves,
-    ContactEdge,
-    HertzHalfPlanes,
-    RoundedPunch,
-    Wedge,
-    RecedingLayer,
-    PolynomialPressure2d,
-    PolynomialPressure3d,
-    ShearedBlocks,
-    Sheared,
-    PulledTubes,
-    SlidingWaves,
-    SlidingCylinder,
-    SlidingPunch,
-    ShearedSphere,
-)
-SOLUTIONS: dict[str, type[ExactSolution]] = {c.name: c for c in _CLASSES}
 _ALL, _RIGID = "all", "rigid"
 
 
