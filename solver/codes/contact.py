@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..case.expressions import evaluate
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import FACE_POINTS, right_side_out, surface_points, surface_vectors
-from ..lac.cells.quadrature import gauss_rule
+from ..lac.cells.shape import gauss_rule
 from ..mechanics.fem.faces import outer_faces
 from ..simulation.results.exact import ExactValues, computed_pressure
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult

@@ -6,12 +6,12 @@ scikit-fem, and nothing else of this program. Its files in the order of the meth
 
 - `contact`, `meshes`: the interface to scikit-fem; `cells`: cell types, shape functions, rules
 - `cut`: slave cells are cut, so that each macro-element has a node inside
-- `facets`, `master_normals`: geometry of faces, projection, directions of the gap
-- `pairing`, `clipping`, `regions`, `fans`, `segments`: mortar segments and points on them
-- `partners`, `surface_points`: the surface that a macro-element meets, and its area
-- `multipliers`, `closure`, `operator`: the gap operator B, its sums as exact as the area
-- `tangential`, `friction`: tangents of the slip operator, and Coulomb's law of each macro-element
-- `status`, `complementarity`: which macro-elements are closed
+- `facets`: geometry of faces, projection, directions of the gap
+- `pairing`, `clipping`, `regions`, `segments`: mortar segments and points on them
+- `partners`: the surface that a macro-element meets, and its area
+- `multipliers`, `operator`: the gap operator B, its sums as exact as the area
+- `friction`: Coulomb's law of each macro-element, and its slip
+- `status`: which macro-elements are closed
 - `reconstruction`, `recovery`: a pressure of second order
 
 Examples in it use its public names, NumPy as `np`, the catalogue `BY_NAME`, and two surfaces in the

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from .cells.quadrature import face_rule
+from .cells.shape import face_rule
 from .facets import Facets, measured
 from .partners import Samples
 from .segments import Segments

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .cells.quadrature import Rule, face_rule
+from .cells.shape import Rule, face_rule
 from .facets import Facets, measured
 from .segments import Segments
 

@@ -21,11 +21,9 @@ from typing import Self
 import numpy as np
 
 from .cells.faces import circumference
-from .cells.quadrature import simplex_rule
-from .cells.shape import invert, shape_functions
-from .clipping import clip, overlap
+from .cells.shape import invert, shape_functions, simplex_rule
+from .clipping import Image, Pieces, clip, overlap, quadrature
 from .facets import Facets, project_along
-from .fans import Image, Pieces, quadrature
 from .pairing import (
     Outlines,
     Pairs,

@@ -9,8 +9,7 @@ import numpy as np
 from ..case.solutions.base import ElasticSolution
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import circumference, surface_points
-from ..lac.cells.quadrature import gauss_rule
-from ..lac.cells.shape import shape_functions
+from ..lac.cells.shape import gauss_rule, shape_functions
 from ..mechanics.fem.elasticity import physical_gradients
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult

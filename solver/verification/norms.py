@@ -43,8 +43,7 @@ import numpy as np
 from ..case.solutions.base import ElasticSolution, ExactSolution, lame_of
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import SlaveFaces, surface_points
-from ..lac.cells.quadrature import gauss_rule
-from ..lac.cells.shape import shape_functions
+from ..lac.cells.shape import gauss_rule, shape_functions
 from ..lac.threads import prefetch
 from ..mechanics.fem import cell_loops
 from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop

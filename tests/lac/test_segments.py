@@ -9,10 +9,9 @@ import pytest
 from solver.lac import operator as operator_module
 from solver.lac import segments, threads
 from solver.lac.cells.catalogue import BY_NAME
-from solver.lac.cells.quadrature import gauss_rule
-from solver.lac.cells.shape import shape_functions
+from solver.lac.cells.shape import gauss_rule, shape_functions
+from solver.lac.clipping import quadrature
 from solver.lac.facets import facets, measured
-from solver.lac.fans import quadrature
 from solver.lac.operator import LAC, gap_operator
 from solver.lac.pairing import face_pairs, hidden_pairs
 from solver.lac.regions import Regions, clip_to_face, without_face

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..threads import prefetch
 from .catalogue import CellType, cell_type
-from .quadrature import gauss_rule
-from .shape import shape_functions
+from .shape import gauss_rule, shape_functions
 
 # Below this share of the product of the edges that span it, a corner counts as flat.
 _FLAT = 1e-12

@@ -22,7 +22,7 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.cells.catalogue import BY_NAME, CellType
-from ...lac.cells.quadrature import Rule, product_rule, simplex_rule
+from ...lac.cells.shape import Rule, product_rule, simplex_rule
 from ...lac.threads import prefetch
 
 # degree along each part of the cell: (linear, quadratic)

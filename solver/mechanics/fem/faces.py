@@ -8,7 +8,7 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_MESHIO, CellType, cell_type
 from ...lac.cells.faces import FACE_POINTS, FaceBlock, SlaveFaces, surface_points, surface_vectors
-from ...lac.cells.quadrature import face_rule
+from ...lac.cells.shape import face_rule
 from ...lac.threads import prefetch
 
 # Of points that are handled at once.

@@ -16,8 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.cells.faces import circumference, surface_vectors
-from ...lac.cells.quadrature import face_rule
-from ...lac.cells.shape import invert, shape_functions
+from ...lac.cells.shape import face_rule, invert, shape_functions
 from ...lac.errors import SolveError
 from .block import Block, volume_rule
 from .elasticity import chunks, shapes_in

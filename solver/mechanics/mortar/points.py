@@ -28,8 +28,7 @@ import numpy as np
 
 from ...lac.cells.catalogue import CellType
 from ...lac.cells.faces import nodal_normals
-from ...lac.cells.quadrature import gauss_rule
-from ...lac.cells.shape import shape_functions
+from ...lac.cells.shape import gauss_rule, shape_functions
 from ...lac.facets import Facets, project_along
 from ...lac.multipliers import InterfaceData, Multipliers
 from ...lac.pairing import facing_pairs, line_pairs

@@ -44,7 +44,7 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.cells.catalogue import BY_NAME
-from ...lac.cells.quadrature import gauss_rule
+from ...lac.cells.shape import gauss_rule
 from ...lac.facets import Facets
 from ...lac.operator import LAC, GapOperator, Scheme, meet_in_segments
 from ...lac.partners import MISSED, Samples, bare_faces, extents, missed_area, sampled

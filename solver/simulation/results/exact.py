@@ -10,8 +10,7 @@ import numpy as np
 from ...case.solutions.base import ExactSolution
 from ...lac.cells.catalogue import cell_type
 from ...lac.cells.faces import FACE_POINTS, SurfacePoints, nodal_normals
-from ...lac.cells.quadrature import gauss_rule
-from ...lac.cells.shape import shape_functions
+from ...lac.cells.shape import gauss_rule, shape_functions
 from ...mechanics.fem.faces import means_on_faces
 from ...mechanics.fem.stress import normal_stress
 from .solution import Solution, ZoneResult

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.lac.cells.catalogue import BY_NAME
-from solver.lac.cells.quadrature import gauss_rule
+from solver.lac.cells.shape import gauss_rule
 
 
 def integral(shape: str, powers: tuple[int, ...]) -> float:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from solver.lac.cells.catalogue import BY_NAME
-from solver.lac.cells.quadrature import simplex_rule
-from solver.lac.cells.shape import shape_functions
+from solver.lac.cells.shape import shape_functions, simplex_rule
 from solver.mechanics.fem.block import volume_rule
 
 TYPES = list(BY_NAME)

@@ -8,8 +8,7 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.lac.cells.catalogue import BY_NAME, cell_type
-from solver.lac.cells.quadrature import gauss_rule
-from solver.lac.cells.shape import shape_functions
+from solver.lac.cells.shape import gauss_rule, shape_functions
 from solver.mechanics.fem.refine import refined
 from solver.mesh import write_mesh
 from solver.mesh.tidy import tidy

@@ -15,8 +15,7 @@ import sympy
 from sympy.abc import x, y, z
 
 from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME
-from solver.lac.cells.quadrature import gauss_rule
-from solver.lac.cells.shape import shape_functions
+from solver.lac.cells.shape import gauss_rule, shape_functions
 from solver.mesh import read_mesh
 from tests.mesh.curved import Curved
 

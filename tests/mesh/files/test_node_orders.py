@@ -10,8 +10,7 @@ import vtk
 
 import solver.mechanics.fem  # noqa: F401 -- adds PENTA15 and the pyramids
 from solver.lac.cells.catalogue import BY_NAME, CellType
-from solver.lac.cells.quadrature import gauss_rule
-from solver.lac.cells.shape import shape_functions
+from solver.lac.cells.shape import gauss_rule, shape_functions
 from solver.mesh import read_mesh
 from tests.mesh.curved import KINDS, Curved, affine, inner_points
 from tests.mesh.one_cell import in_vtk_order, vtk_grid, with_masks, write_by_gmsh

@@ -7,8 +7,7 @@ import pytest
 
 from solver.lac.cells.catalogue import cell_type
 from solver.lac.cells.faces import area_vectors
-from solver.lac.cells.quadrature import face_rule
-from solver.lac.cells.shape import shape_functions
+from solver.lac.cells.shape import face_rule, shape_functions
 from solver.mechanics.fem.block import volume_rule
 from solver.mesh import generate
 from solver.system.errors import InputError
