@@ -34,6 +34,13 @@ STATE = "state "
 MARGIN = 1.5
 
 
+def job_name(
+    name: str, swapped: bool, hexahedra: str | None = None, recovery: str | None = None
+) -> str:
+    """The name of one solve of a case: direction and variant, where they are not the case's own."""
+    return "-".join(filter(None, [name, "swapped" * swapped, hexahedra, recovery]))
+
+
 @dataclass(frozen=True)
 class Selection:
     """A group that the case makes on the mesh, under `key` of the file.

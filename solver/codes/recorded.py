@@ -20,8 +20,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from ..case import job_name
 from ..case.checks import RELATIVE
+from ..case.model import job_name
 from ..case.typed import ONCE, Positive, Section, Text, Version, read_as
 from ..case.yaml import read_mapping
 from ..system.errors import InputError, hint

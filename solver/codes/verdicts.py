@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..case import job_name
+from ..case.model import job_name
 from ..lac.cells.catalogue import BY_MESHIO
 from ..system.files import seal, write_text
 from ..verification.checks import run_checks

@@ -66,7 +66,7 @@ def _validate_one(path: Path, with_mesh: bool) -> None:
     case = load_case(path)
     check_mesh_file(case)
     if "recipe" in case.mesh:
-        from ..mesh.recipes import read_recipe
+        from ..mesh import read_recipe
 
         read_recipe(case.mesh, path)
     if with_mesh:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..case import job_name
+from ..case.model import job_name
 from ..system.errors import InputError, hint
 from ..system.package import cases_folder
 
@@ -217,7 +217,10 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[BatchJob]:
         yield alone
         return
     mesh, size = _mesh_files(case), _size(case)
-    for cut in [None, _other_cut(case)] if variants and _may_hold_hexahedra(case) else [None]:
+    own = {zone.hexahedra for zone in case.zones}
+    other = "pyramids" if "hexahedra" in own else "hexahedra"
+    hexahedra = "path" in case.mesh or "HEXA" in str(case.mesh)
+    for cut in [None, other] if variants and hexahedra else [None]:
         for swap in [False, True] if case.directions == "both" else [False]:
             yield BatchJob(
                 family=alone.family,
@@ -242,15 +245,6 @@ def _second(job: BatchJob, owner: str, taken: dict[tuple[str, str], str]) -> Bat
         "each case of a family needs a name of its own"
     )
     return BatchJob(job.family, name, name, job.file, mesh=(), refusal=refusal)
-
-
-def _may_hold_hexahedra(case: Case) -> bool:
-    return "path" in case.mesh or "HEXA" in str(case.mesh)
-
-
-def _other_cut(case: Case) -> str:
-    own = {zone.hexahedra for zone in case.zones}
-    return "pyramids" if "hexahedra" in own else "hexahedra"
 
 
 def _mesh_files(case: Case) -> list[str] | None:

@@ -167,16 +167,13 @@ def close_faces(parts: Sequence[Integrals]) -> tuple[list[Integrals], int]:
         blocks = [part.segments.sides[side].index for part in closed]
         for block in sorted(set(blocks)):
             mine = [k for k, index in enumerate(blocks) if index == block]
-            if not all(_affine(closed[k].segments) for k in mine):
-                changed, number = _close_block([closed[k] for k in mine], side)
-                count += number
-                for k, part in zip(mine, changed, strict=True):
-                    closed[k] = part
+            sides = [side for k in mine for side in closed[k].segments.sides]
+        if not all(side.faces.affine[side.face].all() for side in sides):
+            changed, number = _close_block([closed[k] for k in mine], side)
+            count += number
+            for k, part in zip(mine, changed, strict=True):
+                closed[k] = part
     return closed, count
-
-
-def _affine(segments: Segments) -> bool:
-    return all(bool(side.faces.affine[side.face].all()) for side in segments.sides)
 
 
 def _close_block(parts: Sequence[Integrals], side: int) -> tuple[list[Integrals], int]:

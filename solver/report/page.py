@@ -268,7 +268,7 @@ def family_page(section: FamilySection, folder: Path) -> str:
         choices=choices(section.rows),
         orders=(folder / f"orders-{section.name}.html").is_file(),
         norms=ERRORS,
-        stages=_stages(section.rows),
+        stages=formats.colors(stage for row in section.rows for stage in row.stages),
         picture=lambda row: picture(row, section.pictures),
         pressure=lambda row: _pressure(row, section.pictures),
         left_out=left_out(section.rows),
@@ -336,8 +336,3 @@ def _costs(row: Row) -> tuple[float | None, float | None]:
 def _order(name: str) -> tuple[int, str]:
     known = list(BY_NAME)
     return (known.index(name) if name in BY_NAME else len(known), name)
-
-
-def _stages(rows: Sequence[Row]) -> dict[str, str]:
-    """The stages that occur, in their order, with their colours."""
-    return formats.colors(stage for row in rows for stage in row.stages)

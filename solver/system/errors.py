@@ -31,16 +31,12 @@ class MachineError(InputError):
 def of_machine(error: Exception) -> str:
     """One line for an error of the machine (memory, a file that cannot be used); else empty."""
     said = " ".join(str(error).split())
-    if isinstance(error, MemoryError) or _is_unmapped(error):
+    unmapped = isinstance(error, ImportError) and "failed to map segment" in said
+    if isinstance(error, MemoryError) or unmapped:
         return f"out of memory: {said or 'none left'}"
     if isinstance(error, OSError) and error.errno:
         return f"{error.filename or 'output'}: {error.strerror}"
     return ""
-
-
-def _is_unmapped(error: Exception) -> bool:
-    """Whether a library could not be loaded for want of memory."""
-    return isinstance(error, ImportError) and "failed to map segment" in str(error)
 
 
 def printable(name: object) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..case import job_name
+from ..case.model import job_name
 from ..simulation.equilibrium.state import Accuracy
 from ..simulation.judgement.plan import limits_passed
 from .scatter import oscillating
@@ -94,14 +94,16 @@ def judge(
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:
         word = UNRELIABLE if unreliable else FAILED
-    seconds = solution.seconds
-    zones = solution.zones
+    seconds, zones, case = solution.seconds, solution.zones, solution.case
+    # In 3D, and on the full circle, forces are whole ones.
+    spatial = solution.mesh.points.shape[1] == 3 or case.axisymmetric
+    unverified = NOT_JUDGED if case.reference_kind and not case.reference else NOT_VERIFIED
     return Verdict(
         **_identity(solution.case, (solution.swapped, solution.hexahedra, solution.case.recovery)),
         verdict=word,
         passed=word == PASSED,
         judged=_judged(checks) if word == PASSED else "",
-        reason=_first_of(reasons) or (_unverified(solution.case) if word == SOLVED else ""),
+        reason=_first_of(reasons) or (unverified if word == SOLVED else ""),
         result=result,
         result_sha256=sha256,
         **{name: getattr(solution, name) for name in _OF_SOLUTION},
@@ -117,24 +119,14 @@ def judge(
         bodies=_bodies(solution),
         plan=[list(entry) for entry in solution.plan],
         checks=list(checks),
-        units=derived(solution.case.units, _is_spatial(solution)),
+        units=derived(solution.case.units, spatial),
         forces=list(_forces(solution)),
-        dissipation=_dissipation(solution),
+        dissipation=[step.dissipation for step in solution.steps] if case.frictional else [],
         probes=list(_probes(solution)),
         largest_displacement=solution.largest_displacement[0],
         attainable=accuracy.estimate,
         provenance=dict(provenance or {}),
     )
-
-
-def _is_spatial(solution: Solution) -> bool:
-    """Whether forces are whole ones: in 3D, and on the full circle."""
-    return solution.mesh.points.shape[1] == 3 or solution.case.axisymmetric
-
-
-def _unverified(case: Case) -> str:
-    """Why a sound solve is compared with nothing: see `Case.as_solved`."""
-    return NOT_JUDGED if case.reference_kind and not case.reference else NOT_VERIFIED
 
 
 def without_result(
@@ -209,11 +201,6 @@ def _forces(solution: Solution) -> Iterator[Force]:
             given = ((key, getattr(one, key, None)) for key in keys)
             lists = {key: value.tolist() for key, value in given if value is not None}
             yield Force(step=number, factor=step.factor, name=name, **lists)
-
-
-def _dissipation(solution: Solution) -> list[float]:
-    """The work of friction in each step; empty without friction."""
-    return [step.dissipation for step in solution.steps] if solution.case.frictional else []
 
 
 def _probes(solution: Solution, most: int = 10) -> Iterator[Probed]:

@@ -87,11 +87,8 @@ def read_med(path: Path) -> Raw:
             components = tuple(text[i : i + 16].strip() for i in range(0, 16 * count, 16))
             if len(values) == len(mesh.points):
                 fields[name.strip()] = at_nodes(mesh.points, values, components)
-    return Raw(mesh, fields, "code_aster" if _is_aster(fields) else "")
-
-
-def _is_aster(fields: Mapping[str, Any]) -> bool:
-    return any(re.search(r"DEPL|SIEF|SIGM|CONT_NOEU", name) for name in fields)
+    aster = any(re.search(r"DEPL|SIEF|SIGM|CONT_NOEU", name) for name in fields)
+    return Raw(mesh, fields, "code_aster" if aster else "")
 
 
 # Exodus names cells by shape and number of nodes.

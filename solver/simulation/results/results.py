@@ -111,17 +111,13 @@ def body_infos(scene: Scene) -> list[BodyInfo]:
 
 
 def _output_mesh(scene: Scene) -> meshio.Mesh:
-    cells = [(_meshio_name(name), data) for name, data in scene.mesh.cells.items()]
+    cells = [(BY_NAME[name].meshio, data) for name, data in scene.mesh.cells.items()]
     sets = {
         group: [np.flatnonzero(scene.mesh.members(name, mask)) for name in scene.mesh.cells]
         for group, mask in scene.given.groups.items()
         if any(m.any() for m in mask.values())
     }
     return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)
-
-
-def _meshio_name(name: str) -> str:
-    return BY_NAME[name].meshio
 
 
 def _contact_direction(scene: Scene) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...case import job_name
+from ...case.model import job_name
 from .forces import ProbeResult, Reaction, Resultants, RigidMotion
 
 if TYPE_CHECKING:
