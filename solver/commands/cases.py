@@ -1,7 +1,4 @@
-"""The commands that write and check case files, and a folder of them.
-
-The case file that `new` writes: one that runs as it is, with a comment on every key.
-"""
+"""The commands that write and check case files, and the commented case file that `new` writes."""
 
 import argparse
 import re

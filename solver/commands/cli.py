@@ -1,10 +1,8 @@
-"""The command line: `python -m solver COMMAND …`.
+"""The command line: `python -m solver COMMAND …`, and what several commands share.
 
 Exit status: 0 all checks hold; 1 a check fails or the result is unreliable; 2 the input is refused;
 3 the solve failed; 70 an error of the program itself; 130 interrupted. Only the module of the
 command that is run is imported, and what it needs when it runs, so that help comes at once.
-
-The common parts of several commands.
 """
 
 import argparse

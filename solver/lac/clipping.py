@@ -1,9 +1,10 @@
-"""Intersections of convex polygons, many at once, and their triangles.
+"""Intersections of convex polygons, many at once, and quadrature on them.
 
 Polygons are padded arrays (n, v, 2) with vertex counts (n,), counter-clockwise. Nothing is dropped
 for being small: a lost sliver would be a lost piece of force.
 
-Quadrature on plane regions bounded by parabolic arcs, and on their images under smooth maps.
+Quadrature is on triangles, or on plane regions bounded by parabolic arcs, and on their images under
+smooth maps.
 """
 
 from collections.abc import Callable

@@ -3,12 +3,11 @@
 The contact pressure is Σ pᵢ φᵢ, with φᵢ = Σₐ Cₐᵢ Nₐ on each slave face. The LAC method has one
 multiplier for each macro-element, φ = 1 there.
 
-Closure: integrals over segments made to sum exactly to the integrals over whole faces.
-
-The patch test asks that the contact forces of a uniform pressure be those of that pressure on each
-whole face, ∫ N_a dS. Sums over segments miss it on faces that are no affine images of their
-reference face, since the place of a point on them is then no polynomial of its coordinates. The
-defect is returned to the segments such that gaps of linear displacement fields stay exact.
+Closure makes integrals over segments sum exactly to the integrals over whole faces. The patch test
+asks that the contact forces of a uniform pressure be those of that pressure on each whole face,
+∫ N_a dS. Sums over segments miss it on faces that are no affine images of their reference face,
+since the place of a point on them is then no polynomial of its coordinates. The defect is returned
+to the segments such that gaps of linear displacement fields stay exact.
 """
 
 from collections.abc import Callable, Sequence

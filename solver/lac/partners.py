@@ -2,9 +2,8 @@
 
 Along the normal of a point the nearest visible master face counts (`pairing`, `segments`). What is
 left is decided here, from distances at the points of the segments: a macro-element beside a step
-of the master meets the nearer side alone, since one pressure cannot act on both.
-
-Whole slave surfaces: quadrature points on their faces, and their macro-elements.
+of the master meets the nearer side alone, since one pressure cannot act on both. Whole slave
+surfaces have their quadrature points here, too.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,4 @@
-"""Numbers and lists as the tables of the report show them.
-
-Common to all pages: templates, style, and the words for kinds and checks.
-
-The stages of a solve as every page shows them: order, colours, and times in words.
-"""
+"""What all pages share: templates, style, numbers and times in words, names of kinds and stages."""
 
 import math
 import re

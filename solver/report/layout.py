@@ -1,8 +1,7 @@
-"""Common to all pictures: colours, where bodies go apart, what is pressed, outlines, normals.
+"""What all pictures share: colours, where bodies go apart, outlines, normals, and SVG text.
 
-Drawings as SVG text: integer tenths of a pixel, many polygons in one path, all text escaped.
-
-For pictures of meshes alone: a thousand faces cost some milliseconds and kilobytes.
+SVG: integer tenths of a pixel, many polygons in one path, all text escaped. For pictures of meshes
+alone: a thousand faces cost some milliseconds and kilobytes.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

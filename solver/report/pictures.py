@@ -1,9 +1,8 @@
-"""The pictures of the solves, drawn anew only where a result or the drawing has changed.
+"""The pictures of the solves: surfaces that a browser turns, drawn anew only where needed.
 
-A result as surfaces that a browser turns: triangles, edges of cells, displacement, maps.
-
-A map is a field at the points of some parts of the picture: a value, or its error where the case
-has a reference for it.
+A picture has triangles, edges of cells, displacement and maps. A map is a field at the points of
+some parts of the picture: a value, or its error where the case has a reference for it. It is drawn
+anew where a result or the drawing has changed.
 """
 
 import base64

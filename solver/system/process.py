@@ -1,7 +1,4 @@
-"""A command in a separate process: pinned to cores, stopped at a limit, its cost measured.
-
-Memory: what the machine has, and what a process has used.
-"""
+"""A command in a separate process: pinned to cores, stopped at a limit, measured; and memory."""
 
 import ctypes
 import os

@@ -3,17 +3,14 @@
 A check compares values with the reference at their own places: macro-element centres, nodes, or
 load steps. `error` is the largest deviation over the check's scale: the largest magnitude
 of the reference, or, where the reference is zero everywhere, the quantity's own measure (load for
-stresses, load / stiffness × size for displacements). A gap is always measured against the block
-size, status, coverage and balance against one. A value that is not a number fails.
+stresses, load / stiffness × size for displacements; `SCALES`). A gap is always measured against the
+block size, status, coverage and balance against one. A value that is not a number fails.
 
-Accepted values: the last results that a person has reviewed, kept under version control.
-
-They are kept beside the case file, in `regression/JOB.json`, one line a check, apart from the
-reference: a reference is the right value, an accepted value a computed one. Both extremes of a
-check may move by 1e-9 of its scale; a value below 1e-12 of the scale is kept as zero, and digits
-past the twelfth are dropped, so that round-off never shows as a difference.
-
-What errors are relative to where the reference is zero: the measures of quantities.
+Accepted values are the last results that a person has reviewed, kept under version control beside
+the case file, in `regression/JOB.json`, one line a check, apart from the reference: a reference is
+the right value, an accepted value a computed one. Both extremes of a check may move by 1e-9 of its
+scale; a value below 1e-12 of the scale is kept as zero, and digits past the twelfth are dropped, so
+that round-off never shows as a difference.
 """
 
 from __future__ import annotations

@@ -57,6 +57,14 @@ def test_links_lead_to_files_and_headings(page):
         assert not anchor or anchor in slugs(target), link
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_sources_that_pages_name_exist(page):
+    """By their path, in `docs/design/` by their name too; `code.py` is the user's own."""
+    text = page.read_text(encoding="utf-8")
+    for name in set(re.findall(r"`([\w/-]+\.py)`", text)) - {"code.py"}:
+        assert list(ROOT.glob(name) if "/" in name else (ROOT / "solver").rglob(name)), name
+
+
 def test_every_key_of_a_case_file_is_in_the_table(site):
     table = site("tables").case_keys()
     for kind in sections() - {Pick}:

@@ -1,7 +1,7 @@
 """Exact solutions with Coulomb friction.
 
 The twin of a contact of half-planes (Jäger, Ciavarella): the force P presses, then Q < μP shears
-the bodies. With Z(P) the function of `half_planes` for the contact that a force P presses,
+the bodies. With Z(P) the function Z of `pressed` for the contact that a force P presses,
 
     Z_q = μ [Z(P) − Z(P − Q/μ)]
     2 μ u = ± [2 (1 − ν) Im Ẑ_q + |y| Re Z_q],    2 μ v = −(1 − 2ν) Re Ẑ_q − |y| Im Z_q

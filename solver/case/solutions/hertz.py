@@ -1,16 +1,14 @@
-"""Hertz's contact of a cylinder or sphere with another or with a plane: pressure only.
+"""Contacts of which the pressure alone is known: Hertz's, and axisymmetric indenters.
 
-Two bodies of revolution of radii R₁, R₂ (∞: a plane) touch at `centre`, the common normal being
-the last axis: 1/R = 1/R₁ + 1/R₂, 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂. The bodies are taken as
-half-spaces, so the theory holds for a ≪ R only. Source: Johnson, Contact Mechanics, §4.2.
+Two bodies touch at `centre`, the common normal being the last axis. They are taken as half-spaces,
+so the theory holds for contacts that are small beside them: 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂.
 
-Contact areas: their half-width and peak, found in a computed pressure alone.
+Hertz: cylinders or spheres of radii R₁, R₂ (∞: a plane), 1/R = 1/R₁ + 1/R₂. Source: Johnson,
+Contact Mechanics, §4.2.
 
-Axisymmetric indenters of the shape A ρⁿ on an elastic half-space: cone, sphere, blunter ones.
-
-Two bodies touch at `centre`, the common normal being the last axis; their distance is A ρⁿ, and
-1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂. Each increment of contact from t to t + dt is a flat punch of
-radius t that sinks by δ'(t) dt, with δ(a) = A cₙ aⁿ and cₙ = √π Γ(n/2 + 1)/Γ(n/2 + ½). So
+Indenters (cone, sphere, blunter ones): the distance of the bodies is A ρⁿ. Each increment of
+contact from t to t + dt is a flat punch of radius t that sinks by δ'(t) dt, with δ(a) = A cₙ aⁿ and
+cₙ = √π Γ(n/2 + 1)/Γ(n/2 + ½). So
 
     F = 2 E* A cₙ n/(n + 1) aⁿ⁺¹,    p(ρ) = (E*/π) ∫_ρ^a δ'(t)/√(t² − ρ²) dt,
 

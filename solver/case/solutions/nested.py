@@ -1,19 +1,16 @@
-"""Lamé's nested cylinders (plane strain) and spheres: different materials, press fit, rotation.
+"""Nested cylinders and spheres: several materials, press fits, rotation, a pressure that varies.
 
-Any number of tubes: each pressure opens the interfaces on both sides of the two tubes that it acts
-on, which gives a linear system for all pressures.
+All of Lamé's states follow from u = (A + B/r^d − k r²) x, d being 2 around an axis (plane strain)
+and 3 around a centre: without body force k = 0 and σ_rr = (dλ + 2μ) A − 2μ (d − 1) B/r^d. The body
+force ρω² r of cylinders that rotate gives k = ρω²/(8 (λ + 2μ)), and takes (4λ + 6μ) k r² from σ_rr.
+A and B follow by the pressures on both walls of a shell. The contact pressure makes the outer
+shell's displacement at the interface exceed the inner one's by the interference. Of several tubes
+each pressure opens the interfaces on both sides of the two that it acts on: a linear system for all
+pressures. Source: Timoshenko, Goodier, Theory of Elasticity, §28 (cylinders, shrink fit), §32
+(rotating discs, here in plane strain) and §136 (spheres).
 
-All follow from u = (A + B/r^d − k r²) x, d being 2 around an axis and 3 around a centre: without
-body force k = 0 and σ_rr = (dλ + 2μ) A − 2μ (d − 1) B/r^d. The body force ρω² r of cylinders that
-rotate gives k = ρω²/(8 (λ + 2μ)), and takes (4λ + 6μ) k r² from σ_rr. A and B follow by the
-pressures on both walls of a shell. The contact pressure makes the outer shell's displacement at the
-interface exceed the inner one's by the interference. Source: Timoshenko, Goodier, Theory of
-Elasticity, §28 (cylinders, shrink fit), §32 (rotating discs, here in plane strain) and §136
-(spheres).
-
-Nested cylinders whose contact pressure varies round the interface: p = p₀ + c cos 2θ.
-
-To Lamé's state of nested cylinders each part adds the one of Muskhelishvili's potentials
+Round oval cylinders the contact pressure varies: p = p₀ + c cos 2θ. To Lamé's state each part adds
+the one of Muskhelishvili's potentials
 
     φ = α z³ + β / z,    ψ = γ z + δ / z³,    2 μ (u + i v) = κ φ − z φ̄′ − ψ̄,    κ = 3 − 4 ν.
 

@@ -1,20 +1,19 @@
-"""A polynomial contact pressure between two elastic blocks on a flat interface, without gap.
+"""Polynomial states: uniform ones, bending, a polynomial pressure, a block on a rigid paraboloid.
 
-Any harmonic φ that is even in the height gives a displacement u = ∇φ / (2 μ) without volume change,
-body force or shear stress on the interface, where its normal component vanishes. Here
-φ = Σₜ Re Z(xₜ + i x_n) over the axes t of the interface, with Z″(x) = Σⱼ aⱼ (x / L)ʲ, so that
+Uniform: the patch test's compression, and the hydrostatic state for curved interfaces.
+
+Polynomial pressure of two blocks on a flat interface without gap. Any harmonic φ that is even in
+the height gives a displacement u = ∇φ / (2 μ) without volume change, body force or shear stress on
+the interface, where its normal component vanishes. Here φ = Σₜ Re Z(xₜ + i x_n) over the axes t of
+the interface, with Z″(x) = Σⱼ aⱼ (x / L)ʲ, so that
 
     p = Σₜ Σⱼ aⱼ (xₜ / L)ʲ,    the same in both materials, whatever their shear moduli.
 
 The displacement has to be imposed on all faces but the interface.
 
-Uniform states: the patch test's compression, and the hydrostatic state for curved interfaces.
-
-Two blocks pressed together with a linear pressure: compression and bending, a linear stress.
-
-The lower block stands on rollers at the level `base`, all sides are free, and the top carries
-p = p₀ + Σₜ sₜ xₜ, positive where the blocks are. With ζ the height above the base, n the last axis,
-t the others,
+Bending: the lower of two blocks stands on rollers at the level `base`, all sides are free, and the
+top carries p = p₀ + Σₜ sₜ xₜ, positive where the blocks are. With ζ the height above the base, n
+the last axis, t the others,
 
     σ_nn = −p, all other stresses zero (in plane strain σ_zz = −ν p)
     E′ u_n = −p ζ,    E′ u_t = ν′ (p xₜ − sₜ |x_t|²/2) + sₜ ζ²/2
@@ -24,10 +23,8 @@ The interface stays plane and turns. The upper block has the same displacement w
 and the height above the interface, and moves with the interface as a rigid body. The stress
 balances without body force and is compatible because it is linear.
 
-Manufactured contact: a unit square or cube with ν = 0 pressed onto a rigid paraboloid.
-
-The obstacle is x_n = −κ ρ², with ρ the distance from the middle of the face x_n = 0 (n: the last
-axis). Chosen are
+Manufactured: a unit square or cube with ν = 0 is pressed onto the rigid paraboloid x_n = −κ ρ²,
+with ρ the distance from the middle of the face x_n = 0 (n: the last axis). Chosen are
 
     u_n = −κ ρ² (1 + x_n) − c x_n        on the face −κ ρ², the obstacle: closed everywhere
     u_t = −4 κ x_n³ X_t                  X_t: distance from the middle along each other axis

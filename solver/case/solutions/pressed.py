@@ -1,7 +1,19 @@
 """Contacts of half-planes that are symmetric about x = 0: waves, Hertz's, a punch, a wedge.
 
-The contact is |x| < a. With R = √(z − a) √(z + a) and L = ln((z + R)/(i a)) the functions of
-`half_planes` are
+The upper body fills y > 0, the lower one mirrors it. There is no friction. With z = x + i|y|,
+Westergaard's function Z, its integral Ẑ and derivative Z′, in plane strain and with v pointing away
+from the interface,
+
+    σ_x = Re Z − |y| Im Z′,    σ_y = Re Z + |y| Im Z′,    τ = −|y| Re Z′
+    2 μ u = (1 − 2ν) Re Ẑ − |y| Im Z,    2 μ v = 2 (1 − ν) Im Ẑ − |y| Re Z
+
+hold in each body with its own μ, ν. In 3D the last axis is y, and nothing changes along the one
+between. There is no shear at the interface, and the pressure −Re Z is the same from both sides.
+With 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂ and the initial gap g₀, the gap is g₀ + (2/E*) Im Ẑ; Ẑ is
+zero in the middle of the contact. With these fields as displacement and traction on the outside of
+two blocks, their contact is an exact problem of linear elasticity.
+
+The contact is |x| < a. With R = √(z − a) √(z + a) and L = ln((z + R)/(i a)) the functions are
 
     waves   Z = −2i p̄ cos ψ/(w + r),   Ẑ = −i (p̄ λ/π) (w/(w + r) + ln((w + r)/(i s)))
     Hertz   Z = −i p₀ a/(z + R),       Ẑ = −i (p₀ a/2) (z/(z + R) + L)
@@ -12,23 +24,11 @@ The contact is |x| < a. With R = √(z − a) √(z + a) and L = ln((z + R)/(i a
 with ψ = πz/λ, w = sin ψ, s = sin(πa/λ), r = √(w − s) √(w + s); p₀ = E* a/(2 R₁); K = E*/(π R₁),
 d = √(a² − b²), α = arccos(b/a), A = arctan(d/R), B = arctan(z d/(b R)). The waves are Hertz's
 contact in sin(πx/λ). The punch and the wedge are sums of flat punches of half-widths t, each of the
-load P′(t) dt: P′ = E* t arccos(b/t)/R₁ and E* m. Sources: `half_planes`.
+load P′(t) dt: P′ = E* t arccos(b/t)/R₁ and E* m.
 
-Two elastic half-planes in contact without friction: fields from one analytic function.
-
-The upper body fills y > 0, the lower one mirrors it. With z = x + i|y|, Westergaard's function Z,
-its integral Ẑ and derivative Z′, in plane strain and with v pointing away from the interface,
-
-    σ_x = Re Z − |y| Im Z′,    σ_y = Re Z + |y| Im Z′,    τ = −|y| Re Z′
-    2 μ u = (1 − 2ν) Re Ẑ − |y| Im Z,    2 μ v = 2 (1 − ν) Im Ẑ − |y| Re Z
-
-hold in each body with its own μ, ν. In 3D the last axis is y, and nothing changes along the one
-between. There is no shear at the interface, and the pressure −Re Z is the same from both sides.
-With 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂ and the initial gap g₀, the gap is g₀ + (2/E*) Im Ẑ; Ẑ is
-zero in the middle of the contact. With these fields as displacement and traction on the outside of
-two blocks, their contact is an exact problem of linear elasticity. Sources: H. M. Westergaard,
-J. Appl. Mech. 6 (1939) A49–A53; K. L. Johnson, Contact Mechanics (1985), §2.7, §5.2, §13.2; the
-punch: M. Ciavarella, D. A. Hills, G. Monno, Proc. IMechE C 212 (1998) 319–328.
+Sources: H. M. Westergaard, J. Appl. Mech. 6 (1939) A49–A53; K. L. Johnson, Contact Mechanics
+(1985), §2.7, §5.2, §13.2; the punch: M. Ciavarella, D. A. Hills, G. Monno, Proc. IMechE C 212
+(1998) 319–328.
 """
 
 from dataclasses import dataclass

@@ -15,12 +15,10 @@ p₁ = Δ / Σ 2 S / (E′ k), and everywhere if p̄ ≥ p₁. The far face of t
 its limit of high layers is in Johnson, Contact Mechanics (1985), §13.2, and Johnson, Greenwood,
 Higginson, Int. J. Mech. Sci. 27 (1985) 383–396.
 
-Waves in full contact that slide on each other: two layers with Coulomb friction and coupling.
-
-The layers are those of `waves` in the plane; the upper one slides to +x, so that every point has
-q = μp. With amplitudes of e^{ikx}, a layer of height H whose far face is on rollers moves its
-surface by C_nn/(Gk) out of itself per σ_nn and by i C_nt/(Gk) per τ; friction makes of the wave of
-pressure one of shear, and the gap closes with
+Sliding waves: the layers in the plane with Coulomb friction. The upper one slides to +x, so that
+every point has q = μp. With amplitudes of e^{ikx}, a layer of height H whose far face is on rollers
+moves its surface by C_nn/(Gk) out of itself per σ_nn and by i C_nt/(Gk) per τ; friction makes of
+the wave of pressure one of shear, and the gap closes with
 
     p = p̄ + Re(p₁ e^{ikx}),   p₁ = Δ/Σ [C_nn + i μ (±C_nt)]/(G k)
 

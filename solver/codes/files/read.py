@@ -1,7 +1,4 @@
-"""From files of results to a `ForeignResult`: by extension, known names and a map.
-
-The names and signs of the usual codes: which field of a file is which quantity of a check.
-"""
+"""From files of results to a `ForeignResult`: by extension, a map, or the names of usual codes."""
 
 from __future__ import annotations
 

@@ -1,14 +1,13 @@
-"""Shape functions by cell type, in the node order of the catalogue.
+"""Shape functions by cell type, in the node order of the catalogue, and quadrature.
 
-Those of edges and faces are products of a matrix and monomials, since contact evaluates them at
-many points; solid cells have scikit-fem's.
+Shape functions of edges and faces are products of a matrix and monomials, since contact evaluates
+them at many points; solid cells have scikit-fem's.
 
-Quadrature on faces: rules that integrate their shape functions exactly where they are planar.
-
-For other functions there is Gauss quadrature of any degree on every cell type: products of
-Gauss–Legendre points on lines, squares and cubes; on simplices and pyramids these are collapsed
-towards a vertex, with Gauss–Jacobi points for the shrinking cross-section (Stroud, Approximate
-Calculation of Multiple Integrals, 1971, §2.4–2.5). No weight is negative.
+Rules on faces integrate the shape functions exactly where faces are planar. For other functions
+there is Gauss quadrature of any degree on every cell type: products of Gauss–Legendre points on
+lines, squares and cubes; on simplices and pyramids these are collapsed towards a vertex, with
+Gauss–Jacobi points for the shrinking cross-section (Stroud, Approximate Calculation of Multiple
+Integrals, 1971, §2.4–2.5). No weight is negative.
 """
 
 from functools import cache, lru_cache

@@ -1,4 +1,4 @@
-"""Cells of one type with their material: what elasticity is assembled from.
+"""Cells of one type with their material, their quadrature, and the sparse sum of their matrices.
 
 Quadrature makes the patch test exact, which asks that the integrals of the shape functions'
 physical gradients be exact. The degrees below are the lowest found to suffice for straight-edged
@@ -6,12 +6,11 @@ cells; on pyramids a conical product of Gauss and Gauss–Jacobi points turns th
 rational gradients into polynomials (Stroud, Approximate Calculation of Multiple Integrals, 1971,
 §2.4–2.5).
 
-Sums of cell matrices, each block of entries added straight to its place in the sparse sum.
-
-Which nodes share a cell is known before any matrix is. So the sum's pattern is made first, and no
-list of all the entries of all cells is ever held: memory is for the sum and a few cells only.
-Every degree of freedom belongs to a node (`dof = dim · node + component`), and every pair of nodes
-that share a cell has a block: an index for dim² entries.
+Sums: each block of entries is added straight to its place. Which nodes share a cell is known before
+any matrix is, so the sum's pattern is made first, and no list of all the entries of all cells is
+ever held: memory is for the sum and a few cells only. Every degree of freedom belongs to a node
+(`dof = dim · node + component`), and every pair of nodes that share a cell has a block: an index
+for dim² entries.
 """
 
 from collections.abc import Callable, Iterable, Sequence

@@ -68,7 +68,7 @@ def add_sizes(
 ) -> tuple[float, float]:
     """Add the sizes of a block's forces to `force` (n_nodes,); the highest and slender stress.
 
-    `most` (n_nodes,): raised to the largest norm of stress around; see `cell_sizes.Sizes`.
+    `most` (n_nodes,): raised to the largest norm of stress around; see `stress.Sizes`.
     """
     highest = np.zeros((workers(), 2))
     _shared(cell_kernels.size_rows, points, block, displacement, force, most, highest, middle=True)
@@ -78,14 +78,14 @@ def add_sizes(
 def largest_strain(
     points: np.ndarray, block: Block, displacement: np.ndarray
 ) -> tuple[float, float]:
-    """The largest principal strain and rotation in a block; see `cell_sizes.largest_strain`."""
+    """The largest principal strain and rotation in a block; see `stress.largest_strain`."""
     largest = np.zeros((workers(), 2))
     _shared(cell_kernels.strain_rows, points, block, displacement, largest, middle=True)
     return float(largest[:, 0].max()), float(largest[:, 1].max())
 
 
 def steepest(points: np.ndarray, block: Block) -> float:
-    """The largest sum of the sizes of the gradients in a block; see `cell_sizes.steepest`."""
+    """The largest sum of the sizes of the gradients in a block; see `stress.steepest`."""
     largest = np.zeros(workers())
     _shared(cell_kernels.steep_rows, points, block, largest, middle=True)
     return float(largest.max())

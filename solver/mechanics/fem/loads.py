@@ -1,10 +1,9 @@
-"""Nodal forces of pressures, tractions and body forces; springs and elastic foundations.
+"""Nodal forces of pressures, tractions, body forces and initial strain; springs and foundations.
 
-Initial strain ε₀, such as thermal strain: σ = C (ε(u) − ε₀), so that C ε₀ acts as a load.
-
-The forces ∫ Bᵀ C ε₀ are integrated at the points of the stiffness: where a displacement has the
-strain ε₀ at these points, no stress is left. In mixed form (see `mixed`) the blocks have λ = 0, and
-the rest of C ε₀ is in ∫ q (div u − tr ε₀ − s/λ) = 0.
+Initial strain ε₀, such as thermal strain, is a load since σ = C (ε(u) − ε₀). Its forces ∫ Bᵀ C ε₀
+are integrated at the points of the stiffness: where a displacement has the strain ε₀ at these
+points, no stress is left. In mixed form (see `mixed`) the blocks have λ = 0, and the rest of C ε₀
+is in ∫ q (div u − tr ε₀ − s/λ) = 0.
 
 Source: Zienkiewicz, Taylor, Zhu, The Finite Element Method: Its Basis and Fundamentals, §2.2.
 """

@@ -93,7 +93,7 @@ class MeanStress:
         return (self.divergence.T @ stress).reshape(self._shape)
 
     def cancellation(self, stress: np.ndarray) -> tuple[np.ndarray, float]:
-        """As `cell_sizes.sizes`: the sizes of what `force` sums (n_nodes,), and of s."""
+        """As `stress.sizes`: the sizes of what `force` sums (n_nodes,), and of s."""
         if not self.size:
             return np.zeros(self._shape[0]), 0.0
         size = np.abs(stress)

@@ -1,6 +1,6 @@
-"""Stress as six components xx, yy, zz, xy, yz, xz: along directions, and at nodes from cells.
+"""Stress at nodes and along directions, as xx, yy, zz, xy, yz, xz; the sizes of what cells sum.
 
-The sizes of stress, strain and gradients, taken in the middle of each cell.
+The sizes of stress, strain and gradients are those in the middle of each cell.
 """
 
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ vertices first. Every level is scaled to a diagonal of at most one and kept in s
 smoother is a Chebyshev polynomial of the fourth kind (Lottes, Numer. Linear Algebra Appl. 30 (2023)
 e2518): products with the matrix alone.
 
-The levels of multigrid under contact: those of the bodies alone, and a small correction of each.
-
 With pivots p eliminated, a condensed system differs from the stiffness K near the closed contact
 alone: on all unknowns it is K + C, with rows and columns of p that are zero. Prolongations P are
 those of K. Coarse matrices are PᵀKP + PᵀCP, of which only the second part changes with the contact

@@ -1,9 +1,7 @@
 """Algebraic multigrid for large 3D elasticity: smoothed aggregation within conjugate gradients.
 
 Cycles through the levels of `hierarchy` are the preconditioner, in single precision. Conjugate
-gradients in double precision take the solution to round-off.
-
-The hierarchy is that of the bodies alone. Contact corrects its levels (`contact_levels`), and a
+gradients in double precision take the solution to round-off. Contact corrects the levels, and a
 factor of the unknowns beside it solves there exactly, before and after each cycle.
 
 Where iterations are slow, each coarse level takes two steps of conjugate gradients instead of one

@@ -2,7 +2,7 @@
 
 A product is as fast as memory is read, so half the blocks take about half the time.
 
-The stiffness has blocks of nodes, of which some degrees of freedom are free: an index for each pair
+The stiffness has blocks of nodes, of which some degrees of freedom are free. An index for each pair
 of nodes takes a ninth of the memory of one for each entry, and a product with blocks takes less
 time.
 """

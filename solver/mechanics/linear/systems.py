@@ -1,17 +1,16 @@
 """The systems that a contact problem solves: one for each group of bodies that contact joins.
 
 A group is factored again only when its own closed multipliers change. A body outside every zone is
-factored once, whatever the contact status of the others.
+factored once, whatever the contact status of the others. Most systems are condensed; two kinds are
+solved otherwise.
 
-Elasticity under constraints without unknowns of their own: a definite factor, no saddle point.
-
-Multipliers of slave vertices overlap, so that no unknown belongs to one of them alone. With the
-constraints added to the stiffness, A = K + Ĝᵀ w Ĝ, the solution does not change, A is positive
-definite, and the multipliers follow from A by few steps p ← p + w (b − Ĝ x). Sources: Fortin,
-Glowinski, Augmented Lagrangian methods, North-Holland 1983, ch. 1; Golub, Greif, On solving
+Augmented: multipliers of slave vertices overlap, so that no unknown belongs to one of them alone.
+With the constraints added to the stiffness, A = K + Ĝᵀ w Ĝ, the solution does not change, A is
+positive definite, and the multipliers follow from A by few steps p ← p + w (b − Ĝ x). Sources:
+Fortin, Glowinski, Augmented Lagrangian methods, North-Holland 1983, ch. 1; Golub, Greif, On solving
 block-structured indefinite linear systems, SIAM J. Sci. Comput. 24 (2003) 2076–2092.
 
-Stabilised constraints give way to pressures that scatter: K x = f + Gᵀ p, G x + S p = b with a
+Stabilised: constraints give way to pressures that scatter, K x = f + Gᵀ p, G x + S p = b with a
 compliance S = Lᵀ D L of the constraints. With s unknowns r = D L p more, those of springs of the
 stiffness D⁻¹, these are the constraints [G Lᵀ] (x, r) = b of the stiffness diag(K, D⁻¹): the second
 row of its equilibrium is D⁻¹ r = L p. They are condensed like any others, and the condensed matrix

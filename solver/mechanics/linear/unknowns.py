@@ -1,10 +1,9 @@
-"""The meaning of the unknowns of a system: what multigrid asks for beside the matrix.
+"""The unknowns as multigrid asks for them beside the matrix, and quadratic cells as linear ones.
 
-Quadratic cells as linear ones on the same vertices: interpolation of the other nodes.
-
-Where cells are slender, nodes in the middle of long edges stay beside the vertices. An error that
-alternates along such an edge and is smooth along the short ones has little energy: no smoother of
-single nodes reduces it, and linear cells do not have it.
+A level of linear cells on the same vertices interpolates the other nodes. Where cells are slender,
+nodes in the middle of long edges stay beside the vertices. An error that alternates along such an
+edge and is smooth along the short ones has little energy: no smoother of single nodes reduces it,
+and linear cells do not have it.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,12 +1,12 @@
-"""Points of the slave surface projected to the master: no intersections.
+"""Points of the slave surface projected to the master, and standard mortar's multipliers.
 
-Each point belongs to the one master face that the slave's normal through it meets. With Gauss
-points this is segment-free (element-based) integration of the mortar integrals: Fischer, Wriggers,
-Frictionless 2D contact formulations for finite deformations based on the mortar method, Comput.
-Mech. 36 (2005) 226–244; Farah, Popp, Wall, Segment-based vs. element-based integration for mortar
-methods, Comput. Mech. 55 (2015) 209–228. With the slave nodes, each weighted with its tributary
-area, it is the node-to-segment method: Hughes, Taylor, Sackman, Curnier, Kanoknukulchai, A finite
-element method for a class of contact-impact problems, CMAME 8 (1976) 249–276; Wriggers,
+A point belongs to the one master face that the slave's normal through it meets: no intersections.
+With Gauss points this is segment-free (element-based) integration of the mortar integrals: Fischer,
+Wriggers, Frictionless 2D contact formulations for finite deformations based on the mortar method,
+Comput. Mech. 36 (2005) 226–244; Farah, Popp, Wall, Segment-based vs. element-based integration for
+mortar methods, Comput. Mech. 55 (2015) 209–228. With the slave nodes, each weighted with its
+tributary area, it is the node-to-segment method: Hughes, Taylor, Sackman, Curnier, Kanoknukulchai,
+A finite element method for a class of contact-impact problems, CMAME 8 (1976) 249–276; Wriggers,
 Computational Contact Mechanics, 2006, §9.
 
 Standard mortar has multipliers at the slave vertices, standard or dual, on exact segments. On
@@ -16,8 +16,6 @@ vertices of TRIA6 and negative at those of QUAD8, so that a sign says nothing ab
 linear ones are stable. Sources: Puso, Laursen, A mortar segment-to-segment contact method for large
 deformation solid mechanics, CMAME 193 (2004) 601–629; Puso, Laursen, Solberg, A segment-to-segment
 mortar contact method for quadratic elements and large deformations, CMAME 197 (2008) 555–566.
-
-Lines from points of the slave, along its normals, and the master faces that they meet.
 """
 
 from collections.abc import Sequence

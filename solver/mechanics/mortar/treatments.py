@@ -16,9 +16,8 @@ mortar element method, in: Nonlinear Partial Differential Equations and Their Ap
 (elements at the ends of an interface, and points where several meet); Puso, Laursen, Mesh tying on
 curved interfaces in 3D, Eng. Comput. 20 (2003) 305–319.
 
-Contact that gives way to pressures that scatter, by a compliance S of the constraints.
-
-The average gap of a closed macro-element is zero in LAC. A slave that is finer than its master then
+Stabilised contact gives way to pressures that scatter, by a compliance S of the constraints. The
+average gap of a closed macro-element is zero in LAC. A slave that is finer than its master then
 has to follow the master's facets, and the forces that bend it scatter. With S the gap is
 
     |T| ḡ + S p = 0,    S = (I − R)ᵀ D (I − R),

@@ -1,9 +1,7 @@
-"""Abaqus input files (.inp), as CalculiX and mesh generators write them: nodes, cells, sets.
+"""Abaqus input files (.inp), read and written: nodes, cells, sets.
 
 Read here and not by meshio, which knows no *SURFACE, no plane strain quadrangles, and gives sets
-named in *ELEMENT to the wrong cells.
-
-Abaqus input files (.inp), written: nodes, cells, groups as *ELSET, *SURFACE and *NSET.
+named in *ELEMENT to the wrong cells. Groups are written as *ELSET, *SURFACE and *NSET.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Mesh files, by their extension.
+"""Mesh files, by their extension; foreign ones are read in a separate process.
 
 | extension | read by | groups |
 |---|---|---|
@@ -8,9 +8,8 @@
 | .vtu | meshio | each integer array of 0 and 1 on cells or points is a group of its name |
 | .vtkhdf | `vtkhdf` | as this program writes them |
 
-Readers of foreign files in a separate process: a crash of the reader does not end the solve.
-
-Some damaged files crash gmsh and HDF5, which are C++ and C libraries, or never end.
+Some damaged files crash gmsh and HDF5, which are C++ and C libraries, or never end. In a process of
+its own a reader that crashes does not end the solve.
 """
 
 import os

@@ -1,12 +1,11 @@
 """VTKHDF UnstructuredGrid 2.0, with plain h5py: what ParaView and PyVista open, and our groups.
 
 Beside the grid lies `mesh_groups`: `cells/<name>` and `nodes/<name>` hold the numbers of a group's
-cells and nodes in the grid. The same mesh gives the same bytes.
+cells and nodes in the grid. A table is a group with one data set for each column. The same mesh
+gives the same bytes.
 
-HDF5 files written from memory, and tables in them.
-
-They are made in memory because on a full disk HDF5 itself fails at any later place. A table is a
-group with one data set for each column.
+Files are made in memory and written in one piece: on a full disk HDF5 itself fails at any later
+place.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

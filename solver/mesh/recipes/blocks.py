@@ -11,7 +11,7 @@ TETRA cells are unstructured inside; there `far` (divisions of the lateral edges
 from the interface, by default as on it), `inner` (edge length that gmsh aims at inside, in the
 units of `size`; by default the edges of the block decide) and `algorithm` (for the surfaces) shape
 the mesh. Blocks of more than a million nodes are filled by HXT, which is ten times faster.
-Blocks of PENTA and PYRA cells are boxes cut in pieces (see `hybrid`).
+Blocks of PENTA and PYRA cells are boxes cut in pieces: see below.
 
 The interface lies in y = 0 (2D) or z = 0 (3D), the corner of both blocks at x = 0 (and y = 0).
 Groups: cells `bottom`, `top`; faces `bottom_contact`, `top_contact`, `base` (the lower side of the

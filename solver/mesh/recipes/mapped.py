@@ -1,8 +1,9 @@
-"""Recipes whose bodies are the two blocks of the recipe `blocks`, of edge 1, bent into shape.
+"""Recipes of blocks that are bent into shape, and of bricks that are put together.
 
-Every node is mapped, mid-edge nodes too, so that quadratic cells have their nodes on the true
-curve. `bottom` and `top` are sections as in `blocks`; `refine` multiplies all divisions. The
-interface is the image of height 0, and all groups are as in `blocks`.
+Bent: the bodies are the two blocks of the recipe `blocks`, of edge 1. Every node is mapped, on
+edges too, so that quadratic cells have their nodes on the true curve. `bottom` and `top` are
+sections as in `blocks`; `refine` multiplies all divisions. The interface is the image of height 0,
+and all groups are as in `blocks`.
 
     recipe: rings       # 2D, a quarter of two tubes: bottom inside, top outside
     radii: [20, 30, 40] # base is the bore, press the rim, symx lies on x = 0, farx on y = 0
@@ -29,7 +30,7 @@ interface is the image of height 0, and all groups are as in `blocks`.
     gap: 0.1            # between them (0); negative: they overlap
     loaded: 0.25        # where this share of `press` along x ends (1): press_left, press_right
 
-The recipe `bricks`: bodies put together from rectangular blocks, anywhere.
+Bricks: bodies are put together from rectangular blocks, anywhere.
 
     recipe: bricks      # an L-shaped seat of three bricks, and a block in its corner
     bricks:

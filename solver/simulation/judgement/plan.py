@@ -1,4 +1,4 @@
-"""The plan of a solve, what is left out and why, and the limits of what it takes for granted.
+"""The plan of a solve: what is left out and why, and the limits of what it takes for granted.
 
 Some lines are decided by the scene before the solve, others noted after it. They are read in the
 result file and in the report; `docs/plan.md` describes all of them, with the time saved.
@@ -7,8 +7,6 @@ Limits: linear theory has small strains and rotations. Pairs of faces are those 
 bodies, so that contact may slide by less than a face. Bodies without a contact zone between them,
 or beyond its reach, may come to lie in one another. A macro-element under the end of the master has
 the mean pressure of the part that is covered.
-
-Bodies that lie in one another.
 """
 
 from collections.abc import Iterator, Sequence
