@@ -268,6 +268,12 @@ def test_turn_keeps_the_sides_and_turns_the_middle(name, angle):
     assert_right_side_out(moved)
     # Half of the block's edge 2 is the largest arm.
     assert 0 < np.linalg.norm(step, axis=1).max() <= np.radians(angle)
+    if name == "solids":  # Vertices keep their distance from the axis.
+        vertices = np.unique(
+            np.concatenate([b.data[:, : cell_type(b.type).n_vertices].ravel() for b in mesh.cells])
+        )
+        arms = (np.linalg.norm(of.points[vertices, :2] - 1, axis=1) for of in (mesh, moved))
+        np.testing.assert_allclose(*arms, rtol=1e-15, atol=1e-15)
 
 
 def test_turn_is_refused_where_cells_fold():
