@@ -209,27 +209,6 @@ def following(
     return new, float(changed)
 
 
-def extrapolated(
-    bounds: tuple[np.ndarray, np.ndarray], before: tuple[np.ndarray, np.ndarray]
-) -> np.ndarray:
-    """Bounds (m,) nearer to the fixed point b = μp, from two iterations with the same status.
-
-    Of each, the bounds that it was solved with and those that its pressures yield: the secant
-    method for what is between them, Anderson's of depth one. Source: H. Walker, P. Ni, Anderson
-    acceleration for fixed-point iterations, SIAM J. Numer. Anal. 49 (2011) 1715–1735.
-
-    b ← 1 + b/2 has the fixed point 2:
-
-    >>> at = lambda b: (np.array([b]), np.array([1 + b / 2]))
-    >>> extrapolated(at(1.0), at(0.0)).tolist()
-    [2.0]
-    """
-    now, last = bounds[1] - bounds[0], before[1] - before[0]
-    turned = now - last
-    share = float(now @ turned / (turned @ turned)) if turned.any() else 0.0
-    return np.maximum(bounds[1] - share * (bounds[1] - before[1]), 0.0)
-
-
 def _moves(found: Response) -> np.ndarray:
     """Where the slip is more than round-off (m,)."""
     return np.asarray(np.linalg.norm(found.slip, axis=1) > found.slip_limit)

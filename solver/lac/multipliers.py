@@ -166,12 +166,12 @@ def close_faces(parts: Sequence[Integrals]) -> tuple[list[Integrals], int]:
         blocks = [part.segments.sides[side].index for part in closed]
         for block in sorted(set(blocks)):
             mine = [k for k, index in enumerate(blocks) if index == block]
-            sides = [side for k in mine for side in closed[k].segments.sides]
-        if not all(side.faces.affine[side.face].all() for side in sides):
-            changed, number = _close_block([closed[k] for k in mine], side)
-            count += number
-            for k, part in zip(mine, changed, strict=True):
-                closed[k] = part
+            seen = [one for k in mine for one in closed[k].segments.sides]
+            if not all(one.faces.affine[one.face].all() for one in seen):
+                changed, number = _close_block([closed[k] for k in mine], side)
+                count += number
+                for k, part in zip(mine, changed, strict=True):
+                    closed[k] = part
     return closed, count
 
 

@@ -67,11 +67,15 @@ def test_faces_that_look_the_same_way_do_not_meet():
 def test_skew_master_faces_get_their_exact_integrals(slave_type, master_type):
     points, slave, master = square_pair(slave_type, master_type)
     assert not master.affine.any()
-    operator = gap_operator([slave], [master], 1, len(points), 1.0)
-    entries = operator.matrix.toarray().reshape(-1, 3)[:, 2]
     exact = shape_integrals(master)
-    assert entries[master.nodes] == pytest.approx(exact, abs=1e-15)
-    assert -entries[slave.nodes] == pytest.approx(shape_integrals(slave), abs=1e-15)
+    parts = [
+        facets(points, master.type, master.nodes[k], master.number[k]) for k in ([0, 1], [2, 3])
+    ]
+    for blocks in ([master], parts):
+        operator = gap_operator([slave], blocks, 1, len(points), 1.0)
+        entries = operator.matrix.toarray().reshape(-1, 3)[:, 2]
+        assert entries[master.nodes] == pytest.approx(exact, abs=1e-15)
+        assert -entries[slave.nodes] == pytest.approx(shape_integrals(slave), abs=1e-15)
     # and without the closure they are missed by far more than round-off
     rough = gap_operator([slave], [master], 1, len(points), 1.0, replace(LAC, closure=False))
     missed = rough.matrix.toarray().reshape(-1, 3)[:, 2][master.nodes] - exact

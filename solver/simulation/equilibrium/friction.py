@@ -20,7 +20,6 @@ from ...lac.errors import SolveError
 from ...lac.friction import (
     Response,
     Slip,
-    extrapolated,
     following,
     sticking,
     violation,
@@ -170,9 +169,6 @@ class Search:
                 self._measure(bounds, earlier)
             if not count and settled:
                 return self._equilibrium(status, found, response, force)
-            if earlier and not count:
-                slip = replace(following.slip, bound=extrapolated(bounds, earlier))
-                following = replace(following, slip=slip)
             earlier = None if count else bounds
             self.changes.append(count)
             best, without = min(best, moved + count), 0 if moved + count < best else without + 1
