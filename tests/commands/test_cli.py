@@ -222,6 +222,10 @@ def test_check_judges_a_stored_result_again(small, capsys):
     assert len(lines) == 1 + len(verdict["checks"])
     assert main(["check", str(small / "c.yaml")]) == 2
     assert "must be a result written by `solve`" in capsys.readouterr().err
+    assert main(["check", str(small / "none.vtkhdf")]) == 2
+    assert "none.vtkhdf: file: must be a result written by `solve` (there is no such file)" in (
+        capsys.readouterr().err
+    )
 
 
 def test_a_result_is_named_as_what_it_is(small, capsys):

@@ -41,6 +41,7 @@ from tests.faults.patches import (
     first_system_kept,
     given,
     integrals_of,
+    last_block_closed,
     last_cell_lost,
     last_opened,
     lower_half_softer,
@@ -63,6 +64,7 @@ PLANE, SOLID = "ssnp170/c", "opening/overlap-tetra10-hexa8"
 CLOSING, OPEN = "opening/closing-quad4", "opening/staying-open"
 TILTED, TILTED_SOLID = "hydrostatic/tilted-tria3-quad8", "hydrostatic/tilted-hexa20-tetra10"
 BENT, PARTLY, VARYING = "hydrostatic/coincident-quad8", "hertz/cylinder-tria3", "manufactured/quad4"
+MIXED_FACES = "hydrostatic/mixed-faces"
 LAYERS, SPHERES = "lame/cylinders-two-materials", "lame/spheres-hexa20"
 HEATED = "loads/heated"
 FORCES, FOUNDATION, PLATEN = "loads/selected-groups", "loads/foundation", "loads/platen"
@@ -180,6 +182,8 @@ MUTANTS = (
     Mutant("segment-weight", "one quadrature weight of the segments is 10 % off", TILTED,
            "lac.segments:simplex_rule",
            changed(lambda rule: (rule[0], first_scaled(rule[1], 1.1)))),
+    Mutant("closure-of-one-block", "of several blocks of faces one alone has closed integrals",
+           MIXED_FACES, "lac.operator:close_faces", last_block_closed),
     Mutant("segment-arc", "the slopes of arcs in the reference face are 0.1 % too large", SPHERES,
            "lac.segments:_into_reference",
            changed(lambda image: lambda *arcs: (image(*arcs)[0], 1.001 * image(*arcs)[1]))),

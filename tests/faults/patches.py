@@ -48,6 +48,18 @@ def last_cell_lost(loops: Any) -> Any:
     return SimpleNamespace(**vars(loops) | own)
 
 
+def last_block_closed(true: Wrapped) -> Wrapped:
+    """Closed integrals for the last block of master faces, those of the others as they were."""
+
+    def close(parts: list) -> tuple[list, int]:
+        blocks = [part.segments.sides[1].index for part in parts]
+        closed, count = true(parts)
+        found = zip(blocks, parts, closed, strict=True)
+        return [new if block == max(blocks) else old for block, old, new in found], count
+
+    return close
+
+
 def one_dropped(parts: list) -> list:
     """Without the smallest segment that is more than round-off."""
     sizes = [part.area for part in parts]
