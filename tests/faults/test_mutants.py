@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.mutants import MUTANTS, checks, planted, reason, verdict
+from tests.faults.mutants import MUTANTS
+from tests.faults.planted import checks, planted, reason, verdict
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "design" / "faults.md"
 

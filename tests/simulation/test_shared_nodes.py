@@ -14,7 +14,7 @@ from solver.simulation.simulate import simulate
 from solver.studies.measures import inf_sup_constant
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
-from tests.faults.mutants import CASES
+from tests.faults.planted import CASES
 from tests.scenes import block_mesh, changed_case, solved
 
 CORNER = (CASES / "shared/corner-quad4-tria6.yaml").read_text(encoding="utf-8")
