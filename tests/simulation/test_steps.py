@@ -47,6 +47,19 @@ def test_each_named_load_has_its_own_factors():
     assert solution.zones[0].multiplier == pytest.approx(42, rel=1e-11)
 
 
+@pytest.mark.parametrize("moved", [0.0, 7.0])
+def test_the_macro_element_that_is_nearest_to_the_place_is_observed(moved):
+    mesh = block_mesh("QUAD8", "QUAD4", (3, 2))
+    mesh = scenes.with_points(mesh, mesh.points + np.array([moved, 0]))
+    for side in (0, 1):
+        text = CASE.replace("nearest: [0, 0]", f"nearest: [{moved + side}, 0]")
+        solution = scenes.solved(text + "steps: [{press: 1, weight: 1}]\n", mesh)
+        seen = solution.steps[0].observations[0]["macro_element"]
+        along = np.abs(solution.zones[0].centre[:, 0] - (moved + side))
+        assert seen == along.argmin()
+        assert along[seen] < 0.25
+
+
 def test_factors_in_any_order_unload():
     text = CASE.replace(", name: press", "").replace(", name: weight", "")
     solution, pressure = solved(text + "steps: [0.5, 1, 0, 0.25]\n")
