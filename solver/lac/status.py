@@ -183,22 +183,22 @@ def find_status(
         if begin is None:
             break
         changes += [0] * number
-        closed = begin() & eligible
+        closed, confirmed = begin() & eligible, not confirm
         search = _Search(len(closed))
         try:
             while not search.ended:
                 violation = np.where(eligible, solve(closed).violation(closed), 0.0)
                 wrong = violation > 1
                 _log(len(changes) + 1, closed, wrong)
-                if wrong.any():
-                    following = search.following(closed, wrong, violation)
-                    if not search.ended:
-                        changes.append(int((following ^ closed).sum()))
-                        closed = following
-                elif confirm and not search.confirmed:
-                    search.confirmed = True
-                else:
-                    return StatusResult(closed, len(changes) + 1 + confirm, changes)
+                if not wrong.any():
+                    if confirmed:
+                        return StatusResult(closed, len(changes) + 1 + confirm, changes)
+                    confirmed = True
+                    continue
+                following = search.following(closed, wrong, violation)
+                if not search.ended:
+                    changes.append(int((following ^ closed).sum()))
+                    closed = following
         except SolveError as error:
             if not changes:
                 raise
@@ -227,7 +227,6 @@ class _Search:
         self._wrong, self._fewest, self._most = count + 1, count + 1, -1
         self._without, self._single = 0, False
         self._seen: set[bytes] = set()
-        self.confirmed = False
 
     @property
     def ended(self) -> bool:
@@ -235,7 +234,7 @@ class _Search:
         return self._without >= _PATIENCE
 
     def following(self, closed: np.ndarray, wrong: np.ndarray, violation: np.ndarray) -> np.ndarray:
-        """The status (k,) after one with `wrong` (k,) entries; see the module."""
+        """Note a solve with `wrong` (k,) statuses; the status (k,) after it, see the module."""
         few, many = int(wrong.sum()), int(closed.sum())
         record = few < self._wrong or many < self._fewest or many > self._most
         self._without = 0 if record else self._without + 1

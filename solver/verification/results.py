@@ -132,7 +132,7 @@ def _write(
 
 def read_result(path: str | Path) -> Result:
     """Read a result file back; `InputError` for another kind of file, or a changed one."""
-    if not Path(path).is_file():
+    if not Path(path).exists():
         raise _no_result(path, "there is no such file")
     if not (sha256 := seal_of(path)):
         raise _no_result(path, "damaged, of another version, or another kind of file")

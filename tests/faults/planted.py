@@ -17,10 +17,9 @@ from solver.case.reader import load_case
 from solver.lac.errors import SolveError
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
-from solver.verification.checks import accepted_values, run_checks
+from solver.verification.checks import run_checks
 from solver.verification.judge import judge
-from solver.verification.norms import errors
-from solver.verification.run import mesh_of
+from solver.verification.run import checked, mesh_of
 from solver.verification.verdict import CheckResult
 from tests.faults.patches import Wrapped
 
@@ -52,8 +51,7 @@ def verdict(case: str) -> dict[str, Any]:
     loaded, mesh = _case(case)
     try:
         solution = simulate(loaded, mesh)
-        solution.errors = errors(solution)
-        found = judge(solution, run_checks(solution, accepted_values(solution)))
+        found = judge(solution, checked(solution))
         return {"passed": found.passed, "reason": found.reason}
     except (InputError, SolveError) as error:
         return {"passed": False, "reason": str(error)}
