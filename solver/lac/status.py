@@ -12,17 +12,15 @@ The search goes on while it makes progress: fewer wrong statuses than ever befor
 closed macro-elements. Contact that peels off opens row by row and makes progress in each step. None
 of the three can go on for ever. The search may also open so much that a body moves freely. Then it
 is repeated from another start, if there is one. Where that fails too, the linear complementarity
-problem |T| p = W ḡ + q of all macro-elements is formed on the factor that has them
-all closed, and solved by a method that ends after finitely many steps (`complementarity`). A solve
-with the set found yields accurate p and ḡ, from which q is corrected until no status is wrong.
+problem |T| p = W ḡ + q of all macro-elements is formed on the factor that has them all closed, and
+solved by a method that ends after finitely many steps. A solve with the set found yields accurate p
+and ḡ, from which q is corrected until no status is wrong.
 
 Linear complementarity: x ≥ 0, W x + q ≥ 0, xᵀ (W x + q) = 0, W positive semidefinite.
 
-These are the conditions of the least of ½ xᵀ W x + qᵀ x over x ≥ 0. An active set of free
-unknowns grows where W x + q is negative, and shrinks where an unknown of the free minimum would be
-negative: the step then ends at the first unknown that becomes zero. The function falls in every
-step and no set comes twice, so the method ends. Source: Lawson, Hanson, Solving Least Squares
-Problems, §23.3 (there for W = AᵀA).
+These are the conditions of the least of ½ xᵀ W x + qᵀ x over x ≥ 0. With Cholesky's factor L of W
+it is the least of |Lᵀ x + L⁻¹ q|², which SciPy's active set finds: it ends, as no set comes twice
+(Lawson, Hanson, Solving Least Squares Problems, §23.3).
 """
 
 import logging
@@ -36,8 +34,6 @@ from .errors import SolveError
 # Added to the scaled diagonal of one: motions that nothing resists stay finite. The next ones serve
 # where W as given is not semidefinite.
 _SHIFTS = 1e-13, 1e-11, 1e-9
-# Negative entries of W x + q above this share of their terms are round-off.
-_ROUND_OFF = 1e-12
 
 
 def complementary(matrix: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -48,59 +44,20 @@ def complementary(matrix: np.ndarray, force: np.ndarray) -> np.ndarray:
     >>> complementary(np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-2.0, 0.0])).round(9)
     array([1., 0.])
     """
+    from scipy.linalg import solve_triangular
+    from scipy.optimize import nnls
+
     scale = 1 / np.sqrt(np.diag(matrix))
     matrix = (matrix + matrix.T) / 2 * np.outer(scale, scale)
     for shift in _SHIFTS:
         try:
-            return scale * _least(matrix + shift * np.eye(len(force)), force * scale)
-        except np.linalg.LinAlgError:
+            root = np.linalg.cholesky(matrix + shift * np.eye(len(force)))
+            goal = solve_triangular(root, -force * scale, lower=True)
+            found: np.ndarray = nnls(root.T, goal, maxiter=10 * len(force) + 10)[0]
+        except (np.linalg.LinAlgError, RuntimeError):  # of nnls: too many steps
             continue
+        return scale * found
     raise SolveError("the stiffness that the gaps see is not positive semidefinite")
-
-
-def _least(matrix: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Where ½ xᵀ W x + qᵀ x is least, W positive definite with a diagonal of one."""
-    x, free = np.zeros(len(force)), np.zeros(len(force), dtype=bool)
-    for _ in range(10 * len(force) + 10):
-        slope = matrix @ x + force
-        size = np.abs(matrix) @ x + np.abs(force)
-        falls = ~free & (slope < -_ROUND_OFF * size)
-        if not falls.any():
-            break
-        # All at once if the function falls by that, else the steepest alone, which never fails.
-        moved, kept = _free_minimum(matrix, force, x, free | falls)
-        if not _value(matrix, force, moved) < _value(matrix, force, x):
-            worst = np.arange(len(x)) == np.where(falls, slope, 0.0).argmin()
-            moved, kept = _free_minimum(matrix, force, x, free | worst)
-            if not _value(matrix, force, moved) < _value(matrix, force, x):
-                break
-        x, free = moved, kept
-    return x
-
-
-def _value(matrix: np.ndarray, force: np.ndarray, x: np.ndarray) -> float:
-    return float(x @ (matrix @ x) / 2 + force @ x)
-
-
-def _free_minimum(
-    matrix: np.ndarray, force: np.ndarray, x: np.ndarray, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """From x (k,) ≥ 0 to the minimum over unknowns that stay `free` (k,); both at the end."""
-    from scipy.linalg import cho_factor, cho_solve
-
-    x, free = x.copy(), free.copy()
-    while free.any():
-        target = np.zeros(len(x))
-        block = matrix[np.ix_(free, free)]
-        target[free] = cho_solve(cho_factor(block), -force[free])
-        blocked = free & (target <= 0)
-        if not blocked.any():
-            return target, free
-        step = x[blocked] / (x[blocked] - target[blocked] + np.finfo(float).tiny)
-        x += step.min() * (target - x)
-        free[np.flatnonzero(blocked)[step <= step.min()]] = False
-        x[~free] = 0.0
-    return x, free
 
 
 _LOG = logging.getLogger(__name__)

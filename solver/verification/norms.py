@@ -45,7 +45,6 @@ from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import SlaveFaces, surface_points
 from ..lac.cells.shape import gauss_rule, shape_functions
 from ..lac.threads import prefetch
-from ..mechanics.fem import cell_loops
 from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop
 from ..mechanics.fem.faces import pieces
 from ..simulation.results.exact import ExactValues, computed_pressure, computed_traction
@@ -113,10 +112,6 @@ def _squares_in(
     part, place = parts[cells[:, 0]], (values @ points[cells]).reshape(-1, kind.dim)
     at = np.repeat(part, len(weights))
     u, gradient = exact.displacement(place, at), exact.gradient(place, at)
-    if kind.dim == 3 and mixed is None and cell_loops.is_worthwhile(len(points)):
-        lame, shear = np.array([lame_of(material) for material in exact.materials])[part].T
-        moved = solution.displacement
-        return cell_loops.squares(points, kind, cells, moved, rule, (lame, shear), (u, gradient))
     # In a linear simplex gradients are constant.
     affine = kind.n_nodes == kind.dim + 1
     somewhere = reference[:1] if affine else reference

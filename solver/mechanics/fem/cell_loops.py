@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...lac.cells.catalogue import CellType
 from ...lac.cells.shape import shape_functions
 from ...lac.errors import SolveError
 from ...lac.threads import prefetch, workers
@@ -20,14 +19,9 @@ from .block import Block
 _LEAST = 20_000
 
 
-def is_worthwhile(n_nodes: int) -> bool:
-    """Whether a mesh is large enough to load Numba."""
-    return n_nodes >= _LEAST
-
-
 def serve(n_nodes: int, blocks: Sequence[Block]) -> bool:
     """Whether these loops serve a mesh: a large one of solid cells."""
-    return is_worthwhile(n_nodes) and all(block.type.dim == 3 for block in blocks)
+    return n_nodes >= _LEAST and all(block.type.dim == 3 for block in blocks)
 
 
 def add_stiffness(
@@ -75,46 +69,6 @@ def add_sizes(
     return float(highest[:, 0].max()), float(highest[:, 1].max())
 
 
-def largest_strain(
-    points: np.ndarray, block: Block, displacement: np.ndarray
-) -> tuple[float, float]:
-    """The largest principal strain and rotation in a block; see `stress.largest_strain`."""
-    largest = np.zeros((workers(), 2))
-    _shared(cell_kernels.strain_rows, points, block, displacement, largest, middle=True)
-    return float(largest[:, 0].max()), float(largest[:, 1].max())
-
-
-def steepest(points: np.ndarray, block: Block) -> float:
-    """The largest sum of the sizes of the gradients in a block; see `stress.steepest`."""
-    largest = np.zeros(workers())
-    _shared(cell_kernels.steep_rows, points, block, largest, middle=True)
-    return float(largest.max())
-
-
-def squares(
-    points: np.ndarray,
-    kind: CellType,
-    cells: np.ndarray,
-    displacement: np.ndarray,
-    rule: tuple[np.ndarray, np.ndarray],
-    moduli: tuple[np.ndarray, np.ndarray],
-    exact: tuple[np.ndarray, np.ndarray],
-) -> np.ndarray:
-    """∫ of the squares (3, 2) of error and exact value, for u, ∇u, σ, over cells (c, n_nodes).
-
-    `displacement` (n_nodes, 3); `moduli` λ and μ (c,); `exact` u (c · q, 3) and ∇u (c · q, 3, 3) at
-    the points (q, 3) of a quadrature `rule` in each cell. In this thread.
-    """
-    reference, weights = rule
-    values, slopes = shape_functions(kind.name).both(reference)
-    total, bad = np.zeros((3, 2)), np.zeros(1, dtype=bool)
-    known = cells, displacement[None], slopes, values, weights, *moduli, *exact
-    about = [np.ascontiguousarray(array) for array in (points, *known)]
-    cell_kernels.squares(bad, *about, total)
-    _refuse_if(bad, kind)
-    return total
-
-
 def _shared(
     loop: Callable[..., None],
     points: np.ndarray,
@@ -137,9 +91,5 @@ def _shared(
     about = [np.ascontiguousarray(array) for array in known]
     for _ in prefetch(lambda mine: loop(mine, owner, bad, *about, *more), range(count)):
         pass
-    _refuse_if(bad, block.type)
-
-
-def _refuse_if(bad: np.ndarray, kind: CellType) -> None:
     if bad[0]:
-        raise SolveError(f"{kind.name} cells are inverted or degenerate")
+        raise SolveError(f"{block.type.name} cells are inverted or degenerate")

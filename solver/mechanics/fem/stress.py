@@ -161,12 +161,7 @@ def largest_strain(
     Of a displacement (n_nodes, dim). Both are small where linear elasticity holds.
     """
     largest = np.zeros(2)
-    compiled = cell_loops.serve(len(points), blocks)
     for block in blocks:
-        if compiled:
-            found = cell_loops.largest_strain(points, block, displacement[None])
-            largest = np.maximum(largest, found)
-            continue
         seen = partial(_cell_strain, points, block, displacement)
         for _, of_part in by_part(block, points.shape[1], seen):
             largest = np.maximum(largest, of_part)
@@ -203,8 +198,6 @@ def steepness(points: np.ndarray, blocks: list[Block]) -> list[np.ndarray]:
 
 def steepest(points: np.ndarray, blocks: list[Block]) -> float:
     """The largest sum over a cell's nodes of the sizes of `steepness`."""
-    if cell_loops.serve(len(points), blocks):
-        return max(cell_loops.steepest(points, block) for block in blocks)
     return max(float(found.sum(axis=1).max()) for found in steepness(points, blocks))
 
 

@@ -38,9 +38,8 @@ def scattered(name):
 def found(points, blocks, field):
     matrix = stiffness(points, blocks)
     force, stress = internal_force(points, blocks, field), nodal_stress(points, blocks, field)
-    size, strain = sizes(points, blocks, field), largest_strain(points, blocks, field[0])
-    steep = np.array([steepest(points, blocks)])
-    largest = np.array([size.highest]), np.array([size.slender]), np.array(strain), steep
+    size = sizes(points, blocks, field)
+    largest = np.array([size.highest]), np.array([size.slender])
     single = stiffness(points, blocks, single=True)
     return matrix.data, single.data, force, stress, size.forces, size.stress, *largest
 
@@ -103,22 +102,19 @@ def test_the_sizes_of_a_stretched_cube_by_hand(monkeypatch):
 
 
 @pytest.mark.parametrize("values", [(3, -2, 1), (-4, -4, 1), (2, 2, -1), (0, 0, -5), (1, 1, 1)])
-def test_the_largest_principal_strain_and_rotation_are_known(values, monkeypatch):
+def test_the_largest_principal_strain_and_rotation_are_known(values):
     """Equal principal values too; the gradient of u is the strain plus a turn by 0.2."""
-    choose(True, monkeypatch)
     points, cells = grid(2)
     axes = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
     turn = 0.2 * np.cross(np.eye(3), axes[1])
     gradient = axes @ np.diag(values) @ axes.T + turn
     block = Block(BY_NAME["HEXA8"], cells, np.ones(8), np.ones(8))
     found = largest_strain(points, [block], points @ gradient.T)
-    assert found == pytest.approx((np.abs(values).max(), 0.2), rel=1e-14)
+    assert found == pytest.approx((np.abs(values).max(), 0.2), rel=1e-13)
 
 
-@pytest.mark.parametrize("loops", [True, False])
-def test_the_steepest_cell_is_the_smallest_cube(loops, monkeypatch):
+def test_the_steepest_cell_is_the_smallest_cube():
     """The gradient of each of eight nodes is (±1, ±1, ±1) / (4 h) in the middle."""
-    choose(loops, monkeypatch, 2)
     points, cells = grid(2)
     points = np.vstack([points, points / 4])
     cells = np.vstack([cells, cells + len(points) // 2])
