@@ -26,9 +26,6 @@ def add_report(command: argparse.ArgumentParser) -> None:
         metavar="FAMILY.yaml",
         help="descriptions of families; default: those in cases/",
     )
-    command.add_argument(
-        "--processes", type=int, metavar="N", help="to draw pictures; default: one for each core"
-    )
 
 
 def run_report(options: argparse.Namespace) -> int:
@@ -48,7 +45,7 @@ def run_report(options: argparse.Namespace) -> int:
     verdicts, older = (
         [folder / "verdict.json" for folder in sorted(folders)] for folders in (run, found - run)
     )
-    print(write_report(verdicts, options.output, families, options.processes, older))
+    print(write_report(verdicts, options.output, families, older))
     return FAILED if (options.output / "failures.txt").stat().st_size else PASSED
 
 

@@ -39,90 +39,48 @@ _BUG = 70
 
 
 def serve(listener: socket.socket) -> None:
-    """Run the commands of all clients, each in a fork, until standard input ends.
+    """Attend to all clients, each in a fork, until standard input ends.
 
-    Forks that are at work then come to their end. Ctrl-C is for them, not for their server, which
-    passes on what a client heard before its fork existed.
+    Forks that are at work then come to their end. Ctrl-C is for commands, not for their server.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     load()
-    ended = _watch_forks()
-    asking: set[socket.socket] = set()
-    running: dict[int, socket.socket] = {}
-    undisturbed: dict[socket.socket, int] = {}
-    while True:
-        waiting: list[int | socket.socket] = [_INPUT, ended, listener, *asking, *undisturbed]
-        ready = select.select(waiting, [], [])[0]
-        for client in [client for client in undisturbed if client in ready]:
-            os.kill(undisturbed.pop(client), signal.SIGINT)
-        if ended in ready:
-            os.read(ended, LIMIT)
-            _report_ends(running, os.WNOHANG)
-            undisturbed = {c: process for c, process in undisturbed.items() if process in running}
-        if _INPUT in ready:
-            break
-        for client in asking.intersection(ready):
-            asking.remove(client)
-            if process := _start(client, [listener, *asking, *running.values()]):
-                running[process], undisturbed[client] = client, process
-            else:
-                client.close()
-        if listener in ready:
-            asking.add(_greet(listener))
-    listener.close()
-    for client in asking:
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # forks leave nothing to be collected
+    while _INPUT not in select.select([_INPUT, listener], [], [])[0]:
+        client, _ = listener.accept()
+        if os.fork() == 0:
+            listener.close()
+            _end(partial(_attend, client))
         client.close()
-    _report_ends(running)
+    listener.close()
+    with suppress(ChildProcessError):
+        os.wait()  # for all of them
 
 
-def _watch_forks() -> int:
-    """The end of a pipe that can be read whenever a fork has ended."""
-    signal.signal(signal.SIGCHLD, lambda *_: None)
-    inward, outward = os.pipe()
-    os.set_blocking(outward, False)
-    signal.set_wakeup_fd(outward, warn_on_full_buffer=False)
-    return inward
+def _attend(client: socket.socket) -> int:
+    """Run the command of a client in a further fork, and report to it how that ended.
 
-
-def _greet(listener: socket.socket) -> socket.socket:
-    client, _ = listener.accept()
-    with suppress(OSError):
-        client.send(GREETING)
-    return client
-
-
-def _start(client: socket.socket, others: Sequence[socket.socket]) -> int:
-    """Start the client's command in a fork: its process, or 0 where it is not started.
-
-    Libraries read the number of threads when they are loaded: no answer for another number. The
-    fork keeps the client's connection, so that a client whose server is killed waits for the end of
-    its command; it closes all `others`.
+    Libraries read the number of threads when they are loaded: no answer for another number, nor for
+    a message that was cut off. A client whose server is killed still gets its answer. What a client
+    hears of Ctrl-C is passed on, also where it came before its command existed.
     """
-    message, streams = b"", list[int]()
-    with suppress(OSError):
-        message, streams, *_ = socket.recv_fds(client, LIMIT, 2)
-    command, process = words(message, os.environ.get(THREADS, "")), 0
-    if command and len(streams) == 2:
-        process = os.fork()
-        if process == 0:
-            for other in others:
-                other.close()
-            _end(partial(_run, command, streams))
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    client.send(GREETING)
+    message, streams, *_ = socket.recv_fds(client, LIMIT, 2)
+    command = words(message, os.environ.get(THREADS, ""))
+    if not command or len(streams) != 2:
+        return 0
+    process = os.fork()
+    if process == 0:
+        client.close()
+        _end(partial(_run, command, streams))
     for stream in streams:
         os.close(stream)
-    return process
-
-
-def _report_ends(running: dict[int, socket.socket], options: int = 0) -> None:
-    """Report to its client how each fork ended that has ended, or wait for all."""
-    while running:
-        process, status, used = os.wait4(-1, options)
-        if not process:
-            return
-        client = running.pop(process)
-        with suppress(OSError):
-            client.send(answer(status, used))
-        client.close()
+    waiting: list[socket.socket | int] = [client, os.pidfd_open(process)]
+    if client in select.select(waiting, [], [])[0]:
+        os.kill(process, signal.SIGINT)
+    client.send(answer(*os.wait4(process, 0)[1:]))
+    return 0
 
 
 def load() -> None:
@@ -145,8 +103,6 @@ def load() -> None:
 
 def _run(command: Sequence[str], streams: Sequence[int]) -> int:
     """Run a command as `python -m solver` does; its exit status."""
-    signal.set_wakeup_fd(-1)
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.signal(signal.SIGINT, _interrupted)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     nothing = os.open(os.devnull, os.O_RDONLY)

@@ -9,7 +9,6 @@ def write_report(
     verdicts: Sequence[Path],
     folder: Path,
     families: Sequence[Path] = (),
-    processes: int | None = None,
     older: Sequence[Path] = (),
 ) -> str:
     """Write the report of the verdict files into `folder`; returns what it found.
@@ -19,15 +18,10 @@ def write_report(
     the verdicts of solves that the batch did not ask for: all these files show them too, but
     failures.txt does not. It lists what did not pass, and is empty when all passed; results of
     other codes are no failures of a batch. `families` are files `family.yaml`, each in the folder
-    of its family. Pictures are drawn by so many `processes`, one for each core where None is given.
-    Returned are the processor time by family, a line for each solve that did not pass, and the
-    outcome.
+    of its family. Returned are the processor time by family, a line for each solve that did not
+    pass, and the outcome.
     """
-    from functools import partial
-
-    from ..lac.threads import workers
     from ..system.files import write_text
-    from ..system.process import in_forks
     from . import tables
     from .bench import write_bench
     from .charts import write_script
@@ -45,17 +39,15 @@ def write_report(
     earlier = {verdict.parent for verdict in older}
     asked = [row for row in rows if row.folder not in earlier]
     folders = [file.resolve().parent for file in families]
-    drawings = [partial(part.draw, row) for part in parts for row in part.drawn]
-    with in_forks([partial(write_script, folder), *drawings], processes or workers()):
-        write_bench(rows, folder, folders)
-        contents = {
-            PAGE: main_page(parts, folder),
-            "summary.json": tables.to_json(rows),
-            "summary.csv": tables.to_csv(rows),
-            "summary.md": tables.to_markdown(rows),
-            "junit.xml": to_junit([row for row in rows if not row.verdict.code]),
-            "failures.txt": tables.to_failures([row for row in asked if not row.verdict.code]),
-        }
+    write_bench(rows, folder, folders)
+    contents = {
+        PAGE: main_page(parts, folder),
+        "summary.json": tables.to_json(rows),
+        "summary.csv": tables.to_csv(rows),
+        "summary.md": tables.to_markdown(rows),
+        "junit.xml": to_junit([row for row in rows if not row.verdict.code]),
+        "failures.txt": tables.to_failures([row for row in asked if not row.verdict.code]),
+    }
     contents |= {part.page: family_page(part, folder) for part in parts}
     for name, content in contents.items():
         write_text(folder / name, content)

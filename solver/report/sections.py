@@ -14,7 +14,7 @@ from .charts import Chart
 from .errors import draw_errors, drawn, floor
 from .families import Family, Figure, page_name, read_family
 from .formats import KINDS
-from .pictures import draw_all, name_of, picture, profile
+from .pictures import name_of, picture, profile
 from .rows import Row, counted, families, ours
 from .tables import outcome
 
@@ -144,19 +144,6 @@ class FamilySection:
     def thumbnail(self) -> str:
         """The file of that picture, from the folder of the pages; empty without a result."""
         return f"{self.pictures.name}/{quote(name_of(self.model))}.svg" if self.model else ""
-
-    @property
-    def drawn(self) -> list[Row]:
-        """The solves with a picture, the largest first."""
-        found = [row for row in self.rows if row.result_file]
-        return sorted(found, key=lambda row: -(row.verdict.dofs or 0))
-
-    def draw(self, row: Row) -> None:
-        """Draw all that the page shows of a solve, and keep it for the page."""
-        draw_all(row, self.pictures)
-        for shown, figure in self._figures:
-            if shown is row:
-                profile(row, self.pictures, figure.expression)
 
     @cached_property
     def _figures(self) -> list[tuple[Row, Figure]]:

@@ -5,11 +5,10 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
@@ -96,36 +95,6 @@ def fork() -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # of threads beside a fork
         return os.fork()
-
-
-@contextmanager
-def in_forks(tasks: Sequence[Callable[[], object]], count: int) -> Iterator[None]:
-    """While the block runs, `count` forks do the tasks; the block ends when they have ended.
-
-    Each fork does every `count`-th task. It leaves its results in files. A fork that dies, or whose
-    task raises, leaves its remaining tasks undone and says nothing. With a `count` of 1, and on
-    systems where libraries do not survive a fork, nothing is done.
-    """
-    forks = []
-    if count > 1 and sys.platform == "linux":
-        shares = [tasks[first::count] for first in range(min(count, len(tasks)))]
-        forks = [_start(share) for share in shares]
-    try:
-        yield
-    finally:
-        for process in forks:
-            os.waitpid(process, 0)
-
-
-def _start(tasks: Sequence[Callable[[], object]]) -> int:
-    process = fork()
-    if process == 0:
-        try:
-            for task in tasks:
-                task()
-        finally:
-            os._exit(0)
-    return process
 
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")

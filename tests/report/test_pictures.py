@@ -1,7 +1,6 @@
 """What the pictures draw, counted on solutions written by hand."""
 
 import os
-import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
@@ -11,7 +10,6 @@ import pytest
 
 from solver.case.expressions import Expression
 from solver.mechanics.fem.faces import outer_faces
-from solver.report import pictures, write_report
 from solver.report.case_picture import draw_case
 from solver.report.charts import BLUE, GREEN, ORANGE, RED
 from solver.report.layout import (
@@ -24,12 +22,12 @@ from solver.report.layout import (
     pressed_box,
     shade,
 )
-from solver.report.pictures import draw, picture
+from solver.report.pictures import picture
 from solver.report.rows import Row
 from solver.verification.results import write_result
 from tests import handmade
 from tests.report.test_surfaces import with_rigid
-from tests.report.verdicts import put, record
+from tests.report.verdicts import record
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -207,29 +205,6 @@ def test_picture_is_drawn_again_only_for_a_newer_result(tmp_path):
     os.utime(result, (later, later))
     picture(row, tmp_path / "pictures")
     assert ">slave<" in kept.read_text()
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="forks are for Linux")
-def test_forks_draw_the_same_pages_and_leave_nothing_to_be_drawn(tmp_path, monkeypatch):
-    results = tmp_path / "results" / "fam"
-    for job, solution in (("flat", handmade.plane(tmp_path)), ("solid", handmade.solid(tmp_path))):
-        (results / job).mkdir(parents=True)
-        seal = write_result(results / job / "result.vtkhdf", solution, [], {})
-        bodies = [vars(body) for body in solution.bodies]
-        told = {"job": job, "result": "result.vtkhdf", "result_sha256": seal, "bodies": bodies}
-        put(results / job / "verdict.json", told)
-    verdicts = sorted(results.glob("*/verdict.json"))
-    write_report(verdicts, tmp_path / "alone", processes=1)
-    drawn = []
-    monkeypatch.setattr(pictures, "draw", lambda *told: drawn.append(told) or draw(*told))
-    write_report(verdicts, tmp_path / "shared", processes=2)
-    assert not drawn
-    alone, shared = (
-        {file.name: file.read_bytes() for file in (tmp_path / name).rglob("[!j]*.*")}
-        for name in ("alone", "shared")
-    )
-    assert alone == shared
-    assert {"fam-flat.svg", "fam-solid.js", "fam-flat-profile.json"} <= alone.keys()
 
 
 def test_a_result_that_cannot_be_read_is_said_in_place_of_its_picture(tmp_path):

@@ -60,7 +60,6 @@ rule report:
         benchmark="results/report/benchmark",
     log:
         "results/report/log",
-    threads: workflow.resource_settings.cores or 1
     params:
         run=sorted(job.folder for job in RUN.values()),
         others=hash_of(OTHERS),
@@ -72,7 +71,7 @@ rule report:
     shell:
         # Cases that did not pass (status 1) are for the gate: the report is there.
         f"{{{{ OMP_NUM_THREADS=1 warm {{output.benchmark:q}} report --run {RUN_LIST}"
-        " --processes {threads} -o results/report"
+        " -o results/report"
         " --families {params.families:q} || test $? = 1; }} 2>&1 | tee {log:q}"
 
 
