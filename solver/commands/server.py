@@ -46,7 +46,8 @@ def serve(listener: socket.socket) -> None:
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     load()
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # forks leave nothing to be collected
-    while _INPUT not in select.select([_INPUT, listener], [], [])[0]:
+    sources: list[int | socket.socket] = [_INPUT, listener]
+    while _INPUT not in select.select(sources, [], [])[0]:
         client, _ = listener.accept()
         if os.fork() == 0:
             listener.close()
@@ -76,8 +77,8 @@ def _attend(client: socket.socket) -> int:
         _end(partial(_run, command, streams))
     for stream in streams:
         os.close(stream)
-    waiting: list[socket.socket | int] = [client, os.pidfd_open(process)]
-    if client in select.select(waiting, [], [])[0]:
+    sources: list[int | socket.socket] = [client, os.pidfd_open(process)]
+    if client in select.select(sources, [], [])[0]:
         os.kill(process, signal.SIGINT)
     client.send(answer(*os.wait4(process, 0)[1:]))
     return 0
