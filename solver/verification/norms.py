@@ -45,13 +45,13 @@ from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import SlaveFaces, surface_points
 from ..lac.cells.shape import gauss_rule, shape_functions
 from ..lac.threads import prefetch
-from ..mechanics.fem.elasticity import hoop_values, physical_gradients, with_hoop
+from ..mechanics.fem.elasticity import shapes_in
 from ..mechanics.fem.faces import pieces
 from ..simulation.results.exact import ExactValues, computed_pressure, computed_traction
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult
 
-# Numbers of gradients handled at once: small enough to stay in the processor's cache.
-_CHUNK = 1 << 17
+# Numbers of gradients handled at once.
+_CHUNK = 1 << 19
 # Off-diagonal components count twice in a square.
 _WHOLE = np.sqrt([1, 1, 1, 2, 2, 2])
 
@@ -112,40 +112,22 @@ def _squares_in(
     part, place = parts[cells[:, 0]], (values @ points[cells]).reshape(-1, kind.dim)
     at = np.repeat(part, len(weights))
     u, gradient = exact.displacement(place, at), exact.gradient(place, at)
-    # In a linear simplex gradients are constant.
-    affine = kind.n_nodes == kind.dim + 1
-    somewhere = reference[:1] if affine else reference
-    own, determinant = physical_gradients(points, cells, kind, somewhere)
+    shapes = shapes_in(points, kind, cells, reference, solution.case.axisymmetric)
     nodal = solution.displacement[cells]
-    slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ own
-    if affine:
-        slope, determinant = (np.repeat(a, len(weights), axis=1) for a in (slope, determinant))
-    if solution.case.axisymmetric:
-        hoop, around = hoop_values(points, cells, kind, reference)
-        slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
-        determinant = determinant * around
-    slope = slope.reshape(len(place), *slope.shape[2:])
-    mean = None if mixed is None else (mixed[chosen] @ values.T).ravel()
-    stress, expected = _hooke(exact, slope, at, mean), exact.hooke(gradient, at)
+    slope = shapes.slopes(nodal - nodal[:, :1], nodal[..., 0])
+    error = slope.reshape(gradient.shape) - gradient
+    stress = exact.hooke(error, at)
+    if mixed is not None:  # there the mean stress stands for λ div u
+        lame = np.array([lame_of(material)[0] for material in exact.materials])[at]
+        mean = (mixed[chosen] @ values.T).ravel()
+        stress[:, :3] += np.nan_to_num(mean - lame * np.einsum("nii->n", error + gradient))[:, None]
     pairs = (
         ((values @ nodal).reshape(place.shape) - u, u),
-        (slope - gradient, gradient),
-        ((stress - expected) * _WHOLE, expected * _WHOLE),
+        (error, gradient),
+        (stress * _WHOLE, exact.hooke(gradient, at) * _WHOLE),
     )
-    weight = (determinant * weights).ravel()
-    return np.array([[_integral(weight, error), _integral(weight, u)] for error, u in pairs])
-
-
-def _hooke(
-    exact: ElasticSolution, slope: np.ndarray, part: np.ndarray, mean: np.ndarray | None
-) -> np.ndarray:
-    """Stress (n, 6) by Hooke's law; where there is a mean stress (n,), it stands for λ div u."""
-    stress = exact.hooke(slope, part)
-    if mean is None:
-        return stress
-    lame = np.array([lame_of(material)[0] for material in exact.materials])[part]
-    stress[:, :3] += np.nan_to_num(mean - lame * np.einsum("nii->n", slope))[:, None]
-    return stress
+    weight = (shapes.measure * weights).ravel()
+    return np.array([[_integral(weight, each) for each in pair] for pair in pairs])
 
 
 def _integral(weight: np.ndarray, values: np.ndarray) -> float:

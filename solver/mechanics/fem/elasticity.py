@@ -23,7 +23,7 @@ from . import cell_loops
 from .block import Block, CellSum
 
 # Bytes of gradients, and of matrices, handled at once: so few stay in the processor's cache.
-_CHUNK_BYTES, _MATRIX_BYTES = 1 << 20, 3 << 20
+_CHUNK_BYTES, _MATRIX_BYTES = 1 << 22, 3 << 20
 _ALL = slice(None)
 
 Found = TypeVar("Found")
