@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver import solve_case
 from solver.case.reader import load_case
 from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
@@ -122,3 +123,56 @@ def test_strain_and_rotation_of_a_known_motion():
     assert largest_strain(points, [block], shear) == pytest.approx((0.15, 0.15), rel=1e-13)
     turn = np.array([[0.0, -0.2], [0.2, 0.0]])
     assert largest_strain(points, [block], points @ turn.T) == pytest.approx((0, 0.2), abs=1e-15)
+
+
+# Bodies on which no force acts: nothing is a share of nothing, in any unit of length.
+
+
+HEIGHT = 50.0
+
+
+def blocks(scale, supports, **more):
+    """Two blocks of QUAD4 and TRIA3, of edge 50 times `scale`, the upper one on the lower one."""
+    return {
+        "name": "unforced",
+        "mesh": {
+            "recipe": "blocks", "size": HEIGHT,
+            "bottom": {"cells": "QUAD4", "divisions": [4, 3]},
+            "top": {"cells": "TRIA3", "divisions": [3, 3]},
+        },
+        "transform": {"scale": scale},
+        "plane": "strain",
+        "materials": {"all": {"young": 2000.0, "poisson": 0.3}},
+        "supports": [{"group": group, "fix": fix} for group, fix in supports.items()],
+        "contact": [{"slave": "bottom_contact", "master": "top_contact"}],
+        **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
+@pytest.mark.parametrize(
+    ("base", "press"),
+    [((0.3, -1.0), (0.1, 2.0)), ((0.3, -1.0), (0.1, -1.0)), ((0.0, 0.0), (0.0, 0.0))],
+    ids=["apart", "together", "at rest"],
+)
+def test_bodies_that_only_move(scale, base, press):
+    moved = {
+        name: {"x": scale * x, "y": scale * y}
+        for name, (x, y) in {"base": base, "press": press}.items()
+    }
+    found = solve_case(blocks(scale, moved))
+    assert found.verdict == "solved", found.reason
+    assert found.pressure.max() <= 1e-12 * 2000.0
+    assert found.outcome.attainable < 1e-10
+    assert max(found.solution.balance.values()) < 1e-12
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
+def test_bodies_that_expand_freely(scale):
+    supports = {"base": ["y"], "symx": ["x"]}
+    heat = [{"group": g, "expansion": 1.3e-5, "temperature": 70} for g in ("top", "bottom")]
+    case = blocks(scale, supports, loads=heat)
+    case["supports"].append({"group": "press", "spring": {"y": 1e-9 / scale}})
+    found = solve_case(case)
+    assert found.verdict == "solved", found.reason
+    assert found.outcome.attainable < 1e-4

@@ -16,8 +16,8 @@ from solver.simulation.results.solution import Solution
 from solver.simulation.simulate import simulate
 from solver.verification.norms import errors
 from tests.scenes import block_mesh
+from tests.simulation.test_balance import hertz
 from tests.simulation.test_recovery import blocks, solved, waves
-from tests.simulation.test_resultants import hertz
 from tests.simulation.test_unloaded import SCENE, side_by_side
 
 STUDY = Path(__file__).parents[2] / "cases/studies/study"

@@ -2,12 +2,16 @@
 
 import logging
 import re
+import resource
+import subprocess
+import sys
 from threading import Thread
 
 import pytest
 
 from solver.commands.cli import main
 from solver.system import progress
+from solver.system.progress import Clock
 from tests.commands.test_cli import PLANE
 
 LINE = re.compile(r"\d\d:\d\d:\d\d \S.*")
@@ -76,3 +80,21 @@ def test_iterations_of_a_large_system_are_told(caplog):
     told = [record.getMessage() for record in caplog.records]
     assert len(told) > 3
     assert re.fullmatch(r"conjugate gradients: iteration 10, residual \d\.\de-\d\d", told[0])
+
+
+# What the clock of stages counts.
+
+
+def processor_time_of_children() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def test_a_stage_counts_the_processes_that_it_waited_for():
+    clock, before = Clock(), processor_time_of_children()
+    for _ in range(2):
+        with clock.stage("read"):
+            subprocess.run([sys.executable, "-c", "sum(range(10**6))"], check=True)
+    spent = processor_time_of_children() - before
+    assert 0 < spent <= clock.cpu_seconds["read"]
+    assert list(clock.seconds) == ["read"]

@@ -8,7 +8,7 @@ from solver.mechanics.linear import hierarchy
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.multigrid import Multigrid, ScaledSystem
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix, halved
-from tests.mechanics.linear.test_contact_levels import condensed, pressed
+from tests.mechanics.linear.test_hierarchy import condensed, pressed
 from tests.mechanics.linear.test_symmetric_blocks import symmetric
 
 PLAIN, DOUBLE, SINGLE, OTHER = "entries", "blocks", "blocks scaled in place", "scaled otherwise"

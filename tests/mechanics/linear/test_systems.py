@@ -1,4 +1,4 @@
-"""Constraints that overlap, solved on a definite factor, compared with dense elimination."""
+"""Constrained systems: overlapping constraints on a definite factor, against dense elimination."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,17 @@ from scipy import sparse
 from solver.lac.errors import SolveError
 from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.choice import force_solver
-from solver.mechanics.linear.systems import Part, Systems, augment
-from tests.mechanics.linear.test_contact_levels import pressed
+from solver.mechanics.linear.hierarchy import Interface, Level
+from solver.mechanics.linear.multigrid import Multigrid
+from solver.mechanics.linear.systems import (
+    Compliance,
+    Part,
+    StabilisedSystem,
+    Systems,
+    augment,
+    stabilise,
+)
+from tests.mechanics.linear.test_hierarchy import pressed
 
 COUNT = 30
 
@@ -139,3 +148,140 @@ def test_multigrid_that_gave_up_is_not_tried_for_another_status(gave_up):
             np.testing.assert_allclose(constraints[closed] @ change, 0.0, atol=1e-12)
             assert system.imbalance(force - matrix @ change, np.zeros(1)) < 1e-9
     assert len(gave_up) == 1
+
+
+# The stabilised system against both equations solved by hand and by elimination.
+
+
+K = sparse.csr_matrix(np.diag([2.0, 1.0]))
+G = sparse.csr_matrix([[1.0, 0.0]])
+OWN = np.array([True, True])
+SPRING = Compliance(sparse.csr_matrix([[0.5]]), np.array([1.0]))
+"""S = ¼."""
+
+
+def neighbours(slave: int, stiffness: float) -> Compliance:
+    """Of (slave + 1)² nodes: the pressure less its mean over the next ones, 0 if uniform."""
+    line = sparse.diags([1.0, 1.0], [-1, 1], shape=(slave + 1,) * 2)
+    near = sparse.kronsum(line, line).tocsr()
+    mean = sparse.diags(1 / np.asarray(near.sum(axis=1)).ravel()) @ near
+    scatter = sparse.csr_matrix(sparse.identity(near.shape[0]) - mean)
+    return Compliance(scatter, np.linspace(1.0, 2.0, near.shape[0]) / stiffness)
+
+
+def solved(matrix, gaps, compliance: Compliance, force, violation):
+    """Displacement and pressure by elimination of the whole system."""
+    soft = compliance.scatter.T @ sparse.diags(compliance.weight) @ compliance.scatter
+    whole = sparse.bmat([[matrix, -gaps.T], [gaps, soft]]).tocsc()
+    found = sparse.linalg.splu(whole).solve(np.concatenate([force, violation]))
+    return found[: len(force)], found[len(force) :]
+
+
+def test_one_spring():
+    """2 x = f + p with x + s p = b: for f = 0, b = 3, s = 1/4, p = 3 / (1/2 + 1/4) = 4, x = 2."""
+    system = stabilise(K, G, OWN, SPRING)
+    x = system.correction(np.zeros(2), np.array([3.0]))
+    assert x == pytest.approx([2.0, 0.0])
+    left = -K @ x
+    assert system.multiplier(left) == pytest.approx([4.0])
+    assert system.imbalance(left, np.array([1.0])) == pytest.approx(0, abs=1e-15)
+    assert system.imbalance(left + np.array([0.0, 0.5]), np.array([1.0])) == pytest.approx(0.5)
+
+
+def test_gaps_that_do_not_fit_the_pressure_are_an_imbalance():
+    """p = 4 opens by s p = 1: a gap of 1.5 is 0.5 too large, which pulls (0, 0.5) on the other."""
+    system = stabilise(sparse.csr_matrix([[2.0, -1.0], [-1.0, 1.0]]), G, OWN, SPRING)
+    assert system.imbalance(np.array([-4.0, 0.0]), np.array([1.5])) == pytest.approx(0.5)
+
+
+def test_without_compliance_the_constraint_holds():
+    system = stabilise(K, G, OWN, Compliance(sparse.csr_matrix((0, 1)), np.empty(0)))
+    assert system.correction(np.array([1.0, 1.0]), np.array([3.0])) == pytest.approx([3.0, 1.0])
+
+
+def test_a_constraint_without_an_unknown_of_its_own():
+    with pytest.raises(SolveError, match="1 closed macro-elements have no unknown of their own"):
+        stabilise(K, G, np.array([False, True]), SPRING)
+
+
+def system_of(slave: int, master: int, stiffness: float, kind: str) -> tuple:
+    """A stabilised system solved by a `kind`, with the matrices behind it."""
+    matrix, gaps, own, unknowns = pressed(slave, master)
+    compliance = neighbours(slave, stiffness)
+    with force_solver(kind):
+        system = stabilise(matrix, gaps, own, compliance, unknowns)
+    return system, matrix, gaps, compliance
+
+
+def assert_solves(system: StabilisedSystem, matrix, gaps, compliance) -> None:
+    rng = np.random.default_rng(0)
+    force, violation = rng.standard_normal(matrix.shape[0]), rng.standard_normal(gaps.shape[0])
+    exact, pressure = solved(matrix, gaps, compliance, force, violation)
+    found = system.correction(force, violation)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-10 * np.abs(exact).max())
+    left = force - matrix @ found
+    scale = np.abs(pressure).max()
+    np.testing.assert_allclose(system.multiplier(left), pressure, rtol=0, atol=1e-9 * scale)
+    assert system.imbalance(left, violation - gaps @ found) < 1e-9 * scale
+
+
+@pytest.mark.parametrize("stiffness", [1e1, 1e3, 1e5])
+@pytest.mark.parametrize(
+    ("slave", "master", "kind"),
+    [(6, 4, "cholmod"), (6, 4, "multigrid"), (2, 1, "multigrid"), (12, 6, "multigrid")],
+)
+def test_both_equations(slave, master, kind, stiffness):
+    """From constraints that hardly hold to nearly rigid ones; (2, 1) has one level alone."""
+    parts = system_of(slave, master, stiffness, kind)
+    assert_solves(*parts)
+    assert ("multigrid" in parts[0].factor.name) == (kind == "multigrid")
+    assert parts[0].factor.iterations <= 40
+
+
+def test_a_rough_correction_is_corrected_further():
+    """From each solution the next solves for what is left, not for the whole compliance again."""
+    system, matrix, gaps, compliance = system_of(8, 6, 1e2, "multigrid")
+    rng = np.random.default_rng(1)
+    force, violation = rng.standard_normal(matrix.shape[0]), rng.standard_normal(gaps.shape[0])
+    exact, _ = solved(matrix, gaps, compliance, force, violation)
+    found, errors = np.zeros(len(force)), []
+    for _ in range(5):
+        found = found + system.correction(force - matrix @ found, violation - gaps @ found, 1e-3)
+        errors.append(np.abs(found - exact).max() / np.abs(exact).max())
+    assert errors[-1] < 1e-9
+    assert "multigrid" in system.factor.name
+
+
+def test_springs_missing_beside_contact_cost_iterations(monkeypatch):
+    """The exact solve there is all that moves them."""
+    iterations = []
+    for springs in (True, False):
+        if not springs:
+            monkeypatch.setattr(Level, "corrected", without_springs)
+        system = system_of(8, 6, 1e2, "multigrid")[0]
+        solver = system.factor._solver
+        assert isinstance(solver, Multigrid)
+        try:
+            solver.solve(np.ones(system.factor._matrix.shape[0]), 1e-8)
+            iterations.append(solver.iterations)
+        except SolveError:
+            iterations.append(multigrid.MAX_ITERATIONS)
+    assert iterations[0] <= 25
+    assert iterations[1] > 2 * iterations[0]
+
+
+corrected = Level.corrected
+
+
+def without_springs(self, correction, most, beside=None):
+    return corrected(self, correction, most)
+
+
+def test_a_factor_takes_over(monkeypatch):
+    def fail(*_):
+        raise SolveError("a part of the matrix is not positive definite")
+
+    monkeypatch.setattr(Interface, "__init__", fail)
+    parts = system_of(6, 4, 1e2, "multigrid")
+    assert_solves(*parts)
+    assert "multigrid" not in parts[0].factor.name
