@@ -204,15 +204,3 @@ def test_in_3d_the_area_has_the_bounds_of_whole_macro_elements():
     area, low, high = zone.resultants.area
     assert area == pytest.approx(zone.area[zone.closed].sum())
     assert low < np.pi / 4 * case.solution.half_width**2 < high
-
-
-def test_they_are_read_back(tmp_path):
-    solution, _ = hertz("quad4", 1.0, "smooth")
-    write_result(tmp_path / "r.vtkhdf", solution, [], {})
-    [zone], [back] = solution.zones, read_result(tmp_path / "r.vtkhdf").solution.zones
-    for name in ("area", "force", "moment"):
-        assert (getattr(back.resultants, name) == getattr(zone.resultants, name)).all()
-    for name in ("position", "lower", "upper", "macro", "better", "lengths"):
-        one, other = (getattr(z.resultants.edges, name) for z in (zone, back))
-        assert (one == other).all()
-    assert "edge at" in str(back.resultants)

@@ -16,11 +16,9 @@ from solver.simulation.results.exact import computed_pressure
 from solver.simulation.results.solution import NodalContact
 from solver.simulation.simulate import simulate
 from solver.verification.norms import errors
-from solver.verification.provenance import gather
-from solver.verification.results import read_result, write_result
 from solver.verification.run import mesh_of, refined
 from tests.handmade import plane
-from tests.scenes import block_case, block_mesh, changed_case
+from tests.scenes import block_mesh, changed_case
 
 CASES = Path(__file__).parents[3] / "cases"
 HALF = 'press, pressure: "12.5*(1 - (x - 0.5)/sqrt((x - 0.5)*(x - 0.5)))"'
@@ -64,17 +62,6 @@ def test_a_pressure_that_alternates_from_node_to_node_shows(tmp_path):
     # ∫ of the square of a line from −1 to 1 is a third of its length
     assert found["pressure_l2"] == pytest.approx(np.sqrt(1 / 3) / 25)
     assert found["pressure_means"] < 1e-14
-
-
-def test_nodal_multipliers_come_back_from_the_result(tmp_path):
-    solution = simulate(block_case(2, zone=", treatment: nodal"), block_mesh("QUAD8", "QUAD4"))
-    path = tmp_path / "result.vtkhdf"
-    write_result(path, solution, [], gather(solution.case.path, None))
-    before, after = solution.zones[0].nodal, read_result(path).solution.zones[0].nodal
-    assert after.nodes.tolist() == before.nodes.tolist()
-    assert after.multiplier == pytest.approx(25.0, rel=1e-12)
-    assert after.closed.tolist() == [True] * 4
-    assert np.array_equal(after.gap, before.gap)
 
 
 def second_difference(treatment, mesh):
