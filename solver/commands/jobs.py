@@ -35,7 +35,7 @@ class BatchJob:
 
     `mesh` holds the files of the user's own mesh, the one named in the case first, then those it
     includes; None where a recipe makes it, none at all where the case is refused. `points` and
-    `dim` estimate its size. `refusal` is the reason where no solve is to be started.
+    `dim` estimate its size.
     """
 
     family: str
@@ -47,7 +47,6 @@ class BatchJob:
     hexahedra: str | None = None
     points: float = 0.0
     dim: int = 3
-    refusal: str = ""
 
     @property
     def key(self) -> tuple[str, str]:
@@ -145,24 +144,21 @@ def check_names(folder: Path) -> None:
 def list_jobs(folders: Sequence[Path], variants: bool = False) -> list[BatchJob]:
     """The jobs of all case files in the folders, file by file.
 
-    `variants`: where there may be hexahedra, once more with the other cut. A file that
-    names its case as another file of the family does is refused, under a free name. Raises
-    InputError as `check_names`.
+    `variants`: where there may be hexahedra, once more with the other cut. Raises InputError as
+    `check_names`, and for a file that names its case as another file of the family does.
     """
     if not folders:
         raise InputError("config", "cases", None, "no folder with case files (*.yaml) in it")
     for folder in folders:
         check_names(folder)
-    listed = [list(jobs_of(file, variants)) for folder in folders for file in case_files(folder)]
-    taken: dict[tuple[str, str], str] = {}
-    jobs: list[BatchJob] = []
-    # A file that is called as its case goes before one that took a copied name.
-    for found in sorted(listed, key=lambda found: found[0].case != Path(found[0].file).stem):
-        owner = next((taken[job.key] for job in found if job.key in taken), None)
-        mine = [_second(found[0], owner, taken)] if owner else found
-        jobs += mine
-        taken |= {job.key: job.file for job in mine}
-    return jobs
+    jobs: dict[tuple[str, str], BatchJob] = {}
+    for file in (file for folder in folders for file in case_files(folder)):
+        for job in jobs_of(file, variants):
+            if other := jobs.get(job.key):
+                allowed = f"already taken by {other.file}; each case of a family needs its own"
+                raise InputError(file, "name", job.case, allowed)
+            jobs[job.key] = job
+    return list(jobs.values())
 
 
 def families_in(cases: Path) -> dict[str, Path]:
@@ -233,18 +229,6 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[BatchJob]:
                 points=size.points,
                 dim=size.dim,
             )
-
-
-def _second(job: BatchJob, owner: str, taken: dict[tuple[str, str], str]) -> BatchJob:
-    """The refused job of a file whose case has the name of another file's."""
-    stem = Path(job.file).stem[:60]
-    names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
-    name = next(name for name in names if (job.family, name) not in taken)
-    refusal = (
-        f"{job.file}: name = {job.case!r}: already taken by {owner}; "
-        "each case of a family needs a name of its own"
-    )
-    return BatchJob(job.family, name, name, job.file, mesh=(), refusal=refusal)
 
 
 def _mesh_files(case: Case) -> list[str] | None:

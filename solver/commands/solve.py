@@ -103,15 +103,11 @@ def add_crashed(command: argparse.ArgumentParser) -> None:
     command.add_argument("--verdict", type=Path, required=True, metavar="VERDICT.json")
     command.add_argument("--log", type=Path, help="its last line is the reason")
     command.add_argument("--status", type=int, metavar="N", help="its exit status")
-    command.add_argument("--refusal", help="it was not started, for this reason: refused")
 
 
 def run_crashed(options: argparse.Namespace) -> int:
-    from ..verification.run import record_crash, record_refusal
+    from ..verification.run import record_crash
 
-    if options.refusal:
-        print(record_refusal(options.case, options.verdict, options.refusal).summary)
-        return PASSED
     print(record_crash(_job(options), options.verdict, options.log, options.status).summary)
     return PASSED
 

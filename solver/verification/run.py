@@ -197,17 +197,6 @@ def record_crash(
     return verdict
 
 
-def record_refusal(case: Path, verdict_file: Path, reason: str) -> Verdict:
-    """Write the verdict of a case that is refused before any solve, and return it.
-
-    Its job is called as the folder of the verdict.
-    """
-    known_as = case.with_name(f"{verdict_file.resolve().parent.name}.yaml")
-    verdict = without_result(REFUSED, reason, known_as)
-    write_verdict(verdict_file, verdict)
-    return verdict
-
-
 def _death(status: int) -> str:
     """The meaning of an exit status; shells add 128 to a signal's number."""
     died = f"died with exit status {status}"

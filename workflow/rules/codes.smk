@@ -12,7 +12,7 @@ def codes():
 
 def foreign_runs():
     """The folders of all runs of other codes: both directions, the case's own cut."""
-    jobs = [job for job in RUN.values() if not job.hexahedra and not job.refusal]
+    jobs = [job for job in RUN.values() if not job.hexahedra]
     return [f"{job.folder}@{code}" for code in codes() for job in jobs]
 
 

@@ -45,19 +45,17 @@ rule solve:
         case=lambda w: batch(w).file,
         mesh=mesh_option,
         options=lambda w: batch(w).options,
-        refusal=lambda w: shlex.quote(batch(w).refusal),
         damaged=lambda w: batch(w).damaged,
         program=SOLVER_HASH,
     message:
         "solve {wildcards.job}"
     shell:
         "died=0; set -- {params.case:q} {params.options} {params.mesh};"
-        " if test -z {params.refusal}; then"
         ' warm {output:q}/benchmark solve "$@" $memory_check --verbose'
         " -o {output:q}/result.vtkhdf --verdict {output:q}/verdict.json"
-        " --pictures results/report/pictures > {log:q} 2>&1 || died=$?; fi;"
+        " --pictures results/report/pictures > {log:q} 2>&1 || died=$?;"
         # Ctrl-C: no verdict, so that the next run solves it.
         " test $died != 130 || exit 130;"
         " test -s {output:q}/verdict.json"
-        ' || program crashed "$@" --status $died --refusal {params.refusal}'
+        ' || program crashed "$@" --status $died'
         " --log {log:q} --verdict {output:q}/verdict.json >> {log:q}"
