@@ -1,0 +1,47 @@
+"""Results on meshes of their own: errors and forces are integrated there."""
+
+import meshio
+import numpy as np
+import pytest
+
+from solver.codes.foreign import Field, ForeignResult
+from solver.codes.verdicts import check_foreign
+from solver.mechanics.fem.bodies import body_numbers
+from tests.codes import results
+
+
+def test_norms_are_integrated_on_another_mesh():
+    """Half-width, peak and force of the exact ellipse on TRIA3, for the case on QUAD4."""
+    mesh, case = results.mesh_and_case("hertz/cylinder-tria3")
+    other, of_other = results.mesh_and_case("hertz/cylinder-quad4")
+    slave = results.slave_nodes(mesh, case)
+    pressure = np.zeros(len(mesh.points))
+    pressure[slave] = case.solution.contact_pressure(mesh.points[slave])
+    cells = [(b.type, b.data) for b in mesh.cells if b.dim == 2]
+    for turn in (slice(None), slice(None, None, -1)):  # cells of either orientation
+        given = ForeignResult(
+            code="mine",
+            mesh=meshio.Mesh(mesh.points, [(kind, data[:, turn]) for kind, data in cells]),
+            pressure=Field(places=mesh.points, values=pressure, nodes=np.arange(len(pressure))),
+        )
+        verdict = check_foreign(of_other, given, other)
+        assert verdict.errors["half_width"] < 0.01
+        assert verdict.errors["peak"] < 0.01
+        balance = next(c for c in verdict.checks if c.name == "balance")
+        assert balance.error < 0.01
+
+
+def test_the_error_of_a_displacement_is_integrated_on_another_mesh():
+    """The exact displacement on QUAD8 and QUAD9, a tenth too large, for the case on QUAD4."""
+    mesh, _ = results.mesh_and_case("polynomial/quad9")
+    other, case = results.mesh_and_case("polynomial/quad4")
+    cells = [(block.type, block.data) for block in mesh.cells if block.dim == 2]
+    body = body_numbers(len(mesh.points), dict(cells))
+    exact = case.solution.displacement(mesh.points, case.solution.node_parts(mesh.points, body))
+    numbers = np.arange(len(mesh.points))
+    given = Field(places=mesh.points, values=1.1 * exact, nodes=numbers)
+    plain = meshio.Mesh(mesh.points, cells)
+    found = check_foreign(
+        case, ForeignResult(code="mine", mesh=plain, displacement=given), other
+    ).errors
+    assert found["displacement_l2"] == pytest.approx(0.1, rel=1e-3)
