@@ -114,7 +114,7 @@ benchmark: environment ## time ratios: linear solvers, cut, safeguards, CalculiX
 	$(STUDY)
 
 test: test-environment ## run the tests
-	@$(ALONE) pytest -n auto $(ARGS)
+	@$(ALONE) pytest -n auto --dist worksteal $(ARGS)
 
 faults: test-environment ## read 1,000 (or COUNT=…) damaged files: none may pass unnoticed
 	@$(OURS) tests.faults $(or $(COUNT),1000)
