@@ -19,9 +19,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from threading import Thread
 from typing import NoReturn
 
 from ..system.package import PACKAGE
+from ..system.process import fork
 from ..verification.provenance import gather
 from .warm import GREETING, LIMIT, THREADS, answer, words
 
@@ -39,49 +41,46 @@ _BUG = 70
 
 
 def serve(listener: socket.socket) -> None:
-    """Attend to all clients, each in a fork, until standard input ends.
+    """Attend to all clients, each in a thread, until standard input ends.
 
-    Forks that are at work then come to their end. Ctrl-C is for commands, not for their server.
+    Commands that are at work then come to their end. Ctrl-C is for them, not for their server.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     load()
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # forks leave nothing to be collected
     sources: list[int | socket.socket] = [_INPUT, listener]
     while _INPUT not in select.select(sources, [], [])[0]:
         client, _ = listener.accept()
-        if os.fork() == 0:
-            listener.close()
-            _end(partial(_attend, client))
-        client.close()
+        Thread(target=_attend, args=(client, listener)).start()
     listener.close()
-    with suppress(ChildProcessError):
-        os.wait()  # for all of them
 
 
-def _attend(client: socket.socket) -> int:
-    """Run the command of a client in a further fork, and report to it how that ended.
+def _attend(client: socket.socket, listener: socket.socket) -> None:
+    """Run the command of a client in a fork, and report to it how that ended.
 
     Libraries read the number of threads when they are loaded: no answer for another number, nor for
-    a message that was cut off. A client whose server is killed still gets its answer. What a client
-    hears of Ctrl-C is passed on, also where it came before its command existed.
+    a message that was cut off. The fork keeps the connection, so that a client whose server is
+    killed waits for the end of its command. What a client hears of Ctrl-C is passed on, also where
+    it came before its command existed.
     """
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    client.send(GREETING)
-    message, streams, *_ = socket.recv_fds(client, LIMIT, 2)
-    command = words(message, os.environ.get(THREADS, ""))
-    if not command or len(streams) != 2:
-        return 0
-    process = os.fork()
-    if process == 0:
-        client.close()
-        _end(partial(_run, command, streams))
-    for stream in streams:
-        os.close(stream)
-    sources: list[int | socket.socket] = [client, os.pidfd_open(process)]
-    if client in select.select(sources, [], [])[0]:
-        os.kill(process, signal.SIGINT)
-    client.send(answer(*os.wait4(process, 0)[1:]))
-    return 0
+    with client, suppress(OSError):
+        client.send(GREETING)
+        message, streams, *_ = socket.recv_fds(client, LIMIT, 2)
+        command, process = words(message, os.environ.get(THREADS, "")), 0
+        if command and len(streams) == 2:
+            process = fork()
+            if process == 0:
+                listener.close()
+                _end(partial(_run, command, streams))
+        for stream in streams:
+            os.close(stream)
+        if not process:
+            return
+        end = os.pidfd_open(process)
+        sources: list[int | socket.socket] = [client, end]
+        if client in select.select(sources, [], [])[0]:
+            os.kill(process, signal.SIGINT)
+        os.close(end)
+        client.send(answer(*os.wait4(process, 0)[1:]))
 
 
 def load() -> None:
