@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from solver.lac import status as complementarity
+from solver.lac import status
 from solver.lac.errors import SolveError
 from solver.lac.status import Trial, complementary, find_status
 from solver.simulation.equilibrium.constraints import likely_closed
@@ -297,4 +297,4 @@ def test_a_stiffness_with_a_negative_motion_is_refused():
 
 
 def test_the_example_of_its_docstring():
-    assert doctest.testmod(complementarity).failed == 0
+    assert doctest.testmod(status).failed == 0

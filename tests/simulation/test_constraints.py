@@ -7,7 +7,7 @@ import pytest
 
 from solver.lac import operator
 from solver.lac.pairing import candidate_pairs
-from solver.simulation.equilibrium import constraints as first_status
+from solver.simulation.equilibrium import constraints
 from solver.simulation.equilibrium.constraints import first_guess, moved
 from solver.simulation.equilibrium.problem import ContactProblem
 from tests.simulation.test_rough_statuses import sphere
@@ -64,7 +64,7 @@ def test_load_steps_of_a_growing_contact_take_fewer_solves(problem, monkeypatch)
         return found.status
 
     near = solves()
-    monkeypatch.setattr(first_status, "_likely", lambda *more: problem.constraints.eligible)
+    monkeypatch.setattr(constraints, "_likely", lambda *more: problem.constraints.eligible)
     far = solves()
     np.testing.assert_array_equal(near.closed, far.closed)
     assert near.iterations < far.iterations

@@ -11,7 +11,6 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
 from solver.mechanics.linear import aggregation, multigrid, products, unknowns
-from solver.mechanics.linear import aggregation as slender
 from solver.mechanics.linear.aggregation import Near, _graph, filtered, smoothed_along
 from solver.mechanics.linear.choice import force_solver
 from solver.mechanics.linear.multigrid import Multigrid
@@ -81,7 +80,7 @@ def test_graded_cells_take_few_iterations():
 
 def test_a_filter_that_moves_no_force_to_the_diagonal_shows_in_the_iterations(monkeypatch):
     """A planted fault: translations are then not free of force."""
-    monkeypatch.setattr(slender, "_inverses", lambda moved: 0.0 * moved.transpose(0, 2, 1))
+    monkeypatch.setattr(aggregation, "_inverses", lambda moved: 0.0 * moved.transpose(0, 2, 1))
     assert iterations(18) > 30
 
 
@@ -112,7 +111,7 @@ def test_a_flat_cell_is_near_along_its_thickness_alone():
     corners = np.array([[x, y, z] for z in (0, 0.1) for y in (0, 10) for x in (0, 10)], dtype=float)
     points = np.vstack([corners, [5.0, 4.9, 0.1]])
     matrix = bsr_matrix(np.ones((27, 27), dtype=np.float32), blocksize=(3, 3))
-    graph, near = aggregation._graph(matrix, nodes_of(points))
+    graph, near = _graph(matrix, nodes_of(points))
     assert near is not None
     assert near.alone.tolist() == [8]
     expected = np.eye(9, dtype=bool)
@@ -129,12 +128,12 @@ def test_even_cells_are_not_filtered():
     points, _ = grid(3)
     lame, shear = lame_parameters(np.full(27, 2000.0), np.full(27, 0.3))
     matrix = stiffness(points, [Block(BY_NAME["HEXA8"], grid(3)[1], lame, shear)])
-    assert aggregation._graph(matrix, nodes_of(points))[1] is None
+    assert _graph(matrix, nodes_of(points))[1] is None
 
 
 def test_translations_stay_free_of_force():
     points, matrix = graded(6)
-    near = aggregation._graph(matrix, nodes_of(points))[1]
+    near = _graph(matrix, nodes_of(points))[1]
     assert near is not None
     assert 0 < near.kept.mean() < 0.8
     some = filtered(matrix, near.kept, motions(points))
