@@ -1,10 +1,19 @@
-"""The keys of a case file for groups, supports, loads, probes and rigid bodies."""
+"""Groups, supports, loads, probes and rigid bodies: keys of a case file, and objects of a solve.
 
-from typing import Annotated, Literal
+Types marked with `read` are read further (see `reader`): a `group` becomes the name of one group,
+text in a `value` or an `expression` a function of position, `solution` in a `value` `EXACT`.
+"""
 
-from msgspec import Meta
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
+from msgspec import Meta, field, structs
+from msgspec.structs import force_setattr
+
+from .expressions import Exact, Expression
 from .typed import FieldError, Number, Positive, Section, Text
+
+# A load factor, or the factors of named loads and supports.
+Step = float | dict[str, float]
 
 Name = Annotated[
     str,
@@ -18,7 +27,7 @@ _GROUP = "the name of a group of the mesh (in quotes if it is a number)"
 Group = Annotated[str, Meta(min_length=1, max_length=200, description=_GROUP)]
 _GROUPS = f"{_GROUP}, or a list of such names"
 GroupList = Annotated[tuple[Group, ...], Meta(min_length=1)]
-Groups = Annotated[Group | GroupList, Meta(description=_GROUPS)]
+GROUP, VALUE, EXPRESSION = ({"read": mark} for mark in ("group", "value", "expression"))
 _UNIT = "the name of a unit, 20 letters, digits, `/`, `*`, `^`, `²` and the like at most"
 Unit = Annotated[str, Meta(pattern=r"^[\w/*^·²³µ%()-]{1,20}$(?!\n)", description=_UNIT)]
 Whole = Annotated[int, Meta(ge=0, lt=2**31, description="a whole number, not negative, below 2^31")]
@@ -26,10 +35,18 @@ Angle = Annotated[Number, Meta(description="an angle in degrees")]
 _VECTOR = "a list of two (plane) or three numbers"
 Vector = Annotated[tuple[Number, ...], Meta(min_length=2, max_length=3, description=_VECTOR)]
 _SCALAR = "a number or an expression (numbers from -1e30 to 1e30)"
-Scalar = Annotated[Number | Text, Meta(description=_SCALAR)]
 _SCALARS = "a list of two (plane) or three numbers or expressions, or `solution`"
-_Scalars = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
-Scalars = Annotated[_Scalars | Literal["solution"], Meta(description=_SCALARS)]
+if TYPE_CHECKING:
+    Groups: TypeAlias = str
+    Scalar: TypeAlias = float | Expression
+    Value: TypeAlias = Scalar | Exact
+    Values: TypeAlias = tuple[Scalar, ...] | Exact
+else:
+    Groups = Annotated[Group | GroupList, Meta(description=_GROUPS, extra=GROUP)]
+    Scalar = Annotated[Number | Text, Meta(description=_SCALAR, extra=EXPRESSION)]
+    Value = Annotated[Number | Text, Meta(description=_SCALAR, extra=VALUE)]
+    _Several = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
+    Values = Annotated[_Several | Literal["solution"], Meta(description=_SCALARS, extra=VALUE)]
 
 
 class PlaneKeys(Section, frozen=True):
@@ -94,7 +111,7 @@ class SelectionKeys(Section, frozen=True):
             raise FieldError((), problem)
 
 
-class ProbeKeys(Section, frozen=True):
+class Probe(Section, frozen=True):
     """A place whose displacement and stress, or contact pressure, are results.
 
     at: this point
@@ -104,12 +121,12 @@ class ProbeKeys(Section, frozen=True):
     """
 
     at: Vector | None = None
-    group: Groups | None = None
-    within: Groups | None = None
-    zone: Name | None = None
+    group: Groups = ""
+    within: Groups = ""
+    zone: Name = ""
 
     def __post_init__(self) -> None:
-        if (self.at is None) == (self.group is None):
+        if (self.at is None) == (not self.group):
             raise FieldError((), "must be {exactly one of at, group; zone or within}")
         if self.within and (self.at is None or self.zone):
             raise FieldError(("within",), "only for a displacement and stress at a point")
@@ -120,21 +137,28 @@ _Fixed = Annotated[tuple[_Axis, ...], Meta(min_length=1)]
 _Imposed = Annotated[dict[_Axis, Scalar], Meta(min_length=1)]
 _SPRING = "a mapping of x, y, z, normal to positive numbers or expressions"
 _FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
-
-
-_Springs = Annotated[dict[_Axis, Scalar], Meta(min_length=1, description=_SPRING)]
-
-
 _STRAIN = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions"
-_Strain = Annotated[
-    dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar],
-    Meta(min_length=1, description=_STRAIN),
-]
-_Directions = Annotated[tuple[Literal["x", "y", "z"], ...], Meta(min_length=1)]
 _TOGETHER = "a list of x, y, z"
+_EACH_ONCE = {"uniqueItems": True}
+_Component = Literal["xx", "yy", "zz", "xy", "yz", "xz"]
+Components = Annotated[dict[_Component, Scalar], Meta(min_length=1)]
+if TYPE_CHECKING:
+    _Fix: TypeAlias = dict[str, Value]
+    _Springs: TypeAlias = dict[str, Scalar]
+else:
+    _Fix = Annotated[
+        _Fixed | _Imposed, Meta(description=_FIX, extra_json_schema=_EACH_ONCE, extra=VALUE)
+    ]
+    _Springs = Annotated[
+        dict[_Axis, Scalar], Meta(min_length=1, description=_SPRING, extra=EXPRESSION)
+    ]
+_Together = Annotated[
+    tuple[Literal["x", "y", "z"], ...],
+    Meta(min_length=1, description=_TOGETHER, extra_json_schema=_EACH_ONCE),
+]
 
 
-class CyclicKeys(Section, frozen=True):
+class Cyclic(Section, frozen=True):
     """The side of a sector, or of a period, that the group is the copy of.
 
     of: the group of the other side
@@ -155,7 +179,7 @@ class CyclicKeys(Section, frozen=True):
             raise FieldError(("axis",), "must have a direction")
 
 
-class SupportKeys(Section, frozen=True):
+class Support(Section, frozen=True):
     """Imposed displacements, springs to the ground, or nodes that move as others do.
 
     group: the nodes of this group, or of `all`
@@ -169,34 +193,34 @@ class SupportKeys(Section, frozen=True):
     name: the name that `steps` gives factors of the imposed values
     """
 
-    fix: Annotated[
-        _Fixed | _Imposed | None,
-        Meta(description=_FIX, extra_json_schema={"uniqueItems": True}),
-    ] = None
-    spring: _Springs | None = None
-    together: Annotated[
-        _Directions | None,
-        Meta(description=_TOGETHER, extra_json_schema={"uniqueItems": True}),
-    ] = None
-    cyclic: CyclicKeys | None = None
-    name: Name | None = None
-    group: Groups | None = None
+    fix: _Fix = field(default_factory=dict)
+    spring: _Springs = field(default_factory=dict)
+    together: _Together = ()
+    cyclic: Cyclic | None = None
+    name: Name = ""
+    group: Groups = ""
     at: Vector | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         kinds = (self.fix, self.spring, self.together, self.cyclic)
-        if (self.group is None) == (self.at is None):
+        if (not self.group) == (self.at is None):
             raise FieldError((), "must be {fix, spring or together, and exactly one of group, at}")
-        if sum(value is not None for value in kinds) != 1:
+        if sum(map(bool, kinds)) != 1:
             problem = "must be {group or at, and exactly one of fix, spring, together, cyclic}"
             raise FieldError((), problem)
         if self.at and (self.together or self.cyclic):
             kind = "together" if self.together else "cyclic"
             raise FieldError(("at",), f"{kind} needs a group")
+        fixed: Any = self.fix
+        if isinstance(fixed, tuple):
+            force_setattr(self, "fix", dict.fromkeys(fixed, 0.0))
 
 
-class LoadKeys(Section, frozen=True):
+LOAD_KINDS = ("pressure", "traction", "body_force", "force", "strain", "temperature")
+
+
+class Load(Section, frozen=True):
     """A load.
 
     group: the faces of this group; for a body force, a strain or a temperature, its cells
@@ -211,21 +235,19 @@ class LoadKeys(Section, frozen=True):
     name: the name that `steps` gives factors of the load
     """
 
-    group: Groups | None = None
+    group: Groups = ""
     at: Vector | None = None
-    pressure: Scalar | None = None
-    traction: Scalars | None = None
-    body_force: Scalars | None = None
+    pressure: Value | None = None
+    traction: Values | None = None
+    body_force: Values | None = None
     force: Vector | None = None
-    strain: _Strain | None = None
+    strain: Annotated[Components, Meta(description=_STRAIN, extra=EXPRESSION)] | None = None
     temperature: Scalar | None = None
     expansion: Scalar | None = None
-    name: Name | None = None
+    name: Name = ""
 
     def __post_init__(self) -> None:
-        of_faces = (self.pressure, self.traction, self.force)
-        given = (*of_faces, self.body_force, self.strain, self.temperature)
-        if sum(value is not None for value in given) != 1:
+        if sum(getattr(self, kind) is not None for kind in LOAD_KINDS) != 1:
             problem = (
                 "must be {group, and exactly one of pressure, traction, body_force, force, strain, "
                 "temperature (with expansion)}"
@@ -233,14 +255,43 @@ class LoadKeys(Section, frozen=True):
             raise FieldError((), problem)
         if (self.temperature is None) != (self.expansion is None):
             raise FieldError((), "must be {group, expansion, temperature}: one needs the other")
-        if (self.group is None) == (self.at is None) or (self.at and self.force is None):
+        if (not self.group) == (self.at is None) or (self.at and self.force is None):
             raise FieldError((), "must be {group} with its load, or {at, force}")
+
+    @property
+    def kind(self) -> str:
+        """The one of `LOAD_KINDS` that is given."""
+        return next(kind for kind in LOAD_KINDS if getattr(self, kind) is not None)
+
+    @property
+    def value(self) -> Any:
+        """Its value: by component of an initial strain; of a temperature with the expansion."""
+        if self.kind == "temperature":
+            return {"temperature": self.temperature, "expansion": self.expansion}
+        return getattr(self, self.kind)
+
+    @property
+    def of_cells(self) -> bool:
+        """Whether it acts on volume cells."""
+        return self.kind == "body_force" or self.strains
+
+    @property
+    def strains(self) -> bool:
+        """Whether it is an initial strain, which a temperature is too."""
+        return self.kind in ("strain", "temperature")
+
+    def factor(self, step: Step) -> float:
+        """Its factor in a step."""
+        return step.get(self.name, 1.0) if isinstance(step, dict) else step
 
 
 SURFACES = ("plane", "sphere", "cylinder", "parabola")
-_COMPONENTS = "a mapping of x, y, z, rx, ry, rz to numbers"
-_Component = Literal["x", "y", "z", "rx", "ry", "rz"]
-_Components = Annotated[dict[_Component, Number], Meta(min_length=1, description=_COMPONENTS)]
+_MOTION = "a mapping of x, y, z, rx, ry, rz to numbers"
+if TYPE_CHECKING:
+    _Motion: TypeAlias = dict[str, float]
+else:
+    _Axes = Literal["x", "y", "z", "rx", "ry", "rz"]
+    _Motion = Annotated[dict[_Axes, Number], Meta(min_length=1, description=_MOTION)]
 
 
 class RigidSphereKeys(SphereKeys, frozen=True):
@@ -286,7 +337,7 @@ class RigidParabolaKeys(PlaneKeys, frozen=True):
     hollow: bool = False
 
 
-class BodyKeys(Section, frozen=True):
+class Rigid(Section, frozen=True):
     """A body.
 
     rigid: the body does not deform; a rigid side is always master
@@ -306,23 +357,40 @@ class BodyKeys(Section, frozen=True):
     cylinder: RigidCylinderKeys | None = None
     parabola: RigidParabolaKeys | None = None
     reference: Vector | None = None
-    move: _Components | None = None
-    force: _Components | None = None
-    name: Name | None = None
+    move: _Motion = field(default_factory=dict)
+    force: _Motion = field(default_factory=dict)
+    name: Name = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if sum(getattr(self, kind) is not None for kind in SURFACES) > 1:
             raise FieldError((), f"must have at most one of {', '.join(SURFACES)}")
         for key in ("reference", "move", "force"):
-            if getattr(self, key) is not None and not (self.rigid or self.surface):
+            if getattr(self, key) and not (self.rigid or self.surface):
                 raise FieldError((key,), "only a rigid body has it: add `rigid: true`")
-        if self.name and not (self.move or self.force):
+        if self.name and not self.moves:
             raise FieldError(("name",), "only a body with `move` or `force` has a factor")
-        if both := sorted((self.move or {}).keys() & (self.force or {}).keys()):
+        if both := sorted(self.move.keys() & self.force.keys()):
             raise FieldError(("force", both[0]), "`move` gives this component too")
 
     @property
     def surface(self) -> str:
         """The kind of its surface without a mesh; empty where it has none."""
         return next((s for s in SURFACES if getattr(self, s)), "")
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The values of that surface by key."""
+        return structs.asdict(getattr(self, self.surface)) if self.surface else {}
+
+    @property
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        """Its points and directions by key."""
+        given = {"reference": self.reference}
+        given |= {f"{self.surface}.{key}": value for key, value in self.values.items()}
+        return [(key, value) for key, value in given.items() if isinstance(value, tuple)]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a motion, imposed or free; it is held in all other components."""
+        return bool(self.move or self.force)

@@ -9,6 +9,7 @@ import math
 import re
 import warnings
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import lru_cache, reduce
 from types import CodeType
 from typing import TYPE_CHECKING, Any
@@ -38,6 +39,15 @@ _FUNCTIONS: dict[str, tuple[str, int, int]] = {
     "min": ("minimum", 2, 32),
     "max": ("maximum", 2, 32),
 }
+
+
+class Exact(Enum):
+    """`solution` in place of a value: the value of the case's exact solution."""
+
+    VALUE = "solution"
+
+
+EXACT = Exact.VALUE
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,16 @@ from msgspec import Meta, field
 
 from .acting import (
     Angle,
-    BodyKeys,
     Group,
     GroupList,
     Groups,
-    LoadKeys,
+    Load,
     Name,
-    ProbeKeys,
+    Probe,
+    Rigid,
     Scalar,
     SelectionKeys,
-    SupportKeys,
+    Support,
     Unit,
     Vector,
     Whole,
@@ -175,7 +175,7 @@ class MaterialKeys(Section, frozen=True):
 Coefficient = Annotated[float, Meta(ge=0, le=10, description="a number from 0 to 10")]
 
 
-class ZoneKeys(Section, frozen=True):
+class Zone(Section, frozen=True):
     """A contact zone.
 
     name: the zone's name in the results
@@ -211,7 +211,7 @@ class ZoneKeys(Section, frozen=True):
     clearance: Scalar | None = None
 
 
-class ObservationKeys(Section, frozen=True):
+class Observation(Section, frozen=True):
     """A macro-element to report at every step.
 
     zone: its zone
@@ -301,22 +301,22 @@ class CaseFile(Section, frozen=True):
     name: Name
     mesh: Annotated[dict[str, Any], Meta(description=FORM)]
     materials: Annotated[dict[Group, MaterialKeys], Meta(min_length=1, description=_MATERIALS)]
-    supports: Annotated[tuple[SupportKeys, ...], Meta(min_length=1, description=_SUPPORTS)]
+    supports: Annotated[tuple[Support, ...], Meta(min_length=1, description=_SUPPORTS)]
     title: str = ""
     description: str = ""
     transform: Transform | None = None
     plane: Literal["strain", "stress", "axisymmetric"] | None = None
     units: Units | None = None
     groups: dict[Group, SelectionKeys | GroupList] = field(default_factory=dict)
-    loads: tuple[LoadKeys, ...] = ()
-    bodies: dict[Group, BodyKeys] = field(default_factory=dict)
-    contact: tuple[ZoneKeys, ...] = ()
+    loads: tuple[Load, ...] = ()
+    bodies: dict[Group, Rigid] = field(default_factory=dict)
+    contact: tuple[Zone, ...] = ()
     directions: Literal["first", "both"] = "first"
     steps: Annotated[tuple[_Step, ...], Meta(min_length=1, max_length=1000, description=_STEPS)] = (
         1.0,
     )
-    observe: tuple[ObservationKeys, ...] = ()
-    probes: dict[Name, ProbeKeys] = field(default_factory=dict)
+    observe: tuple[Observation, ...] = ()
+    probes: dict[Name, Probe] = field(default_factory=dict)
     reference: ReferenceKeys | None = None
     tolerance: (
         Annotated[_Tolerance | dict[CheckName, _Tolerance], Meta(description=_TOLERANCE)] | None

@@ -1,32 +1,19 @@
-"""A case as typed objects: supports, loads, contact zones, references."""
+"""A case: the objects of its file, with what follows from several keys."""
 
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
-from .expressions import Expression
-from .file import ObservationKeys, ZoneKeys
+from .acting import Load, Probe, Rigid, Step, Support
+from .file import Observation, Zone
 from .material import Material
 
 if TYPE_CHECKING:
     from .solutions.base import ExactSolution
 
 
-class Exact(Enum):
-    """`solution` in place of a value: the value of the case's exact solution."""
-
-    VALUE = "solution"
-
-
-EXACT = Exact.VALUE
-Scalar = float | Expression
-Vector = tuple[Scalar, ...]
-# A load factor, or the factors of named loads and supports.
-Step = float | dict[str, float]
-LOAD_KINDS = ("pressure", "traction", "body_force", "force", "strain", "temperature")
 SWAPPED = "-swapped"
 STATE = "state "
 """How the names of the states of an exact solution begin; no name in a file has a space."""
@@ -58,111 +45,6 @@ class Selection:
 
 
 @dataclass(frozen=True)
-class Cyclic:
-    """The side `of` a sector that another side is the copy of, turned (degrees) or shifted."""
-
-    of: str
-    angle: float | None = None
-    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
-    shift: tuple[float, ...] | None = None
-
-
-@dataclass(frozen=True)
-class Support:
-    """Imposed displacements of a group, or the stiffness of its springs: direction to value.
-
-    `together`: the directions in which all of its nodes have one displacement; `cyclic`: the side
-    whose displacement the group has, turned or shifted with it.
-    """
-
-    group: str
-    fix: dict[str, Scalar | Exact]
-    spring: dict[str, Scalar] = field(default_factory=dict)
-    together: tuple[str, ...] = ()
-    cyclic: Cyclic | None = None
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Load:
-    """A load on a group: `kind` is one of LOAD_KINDS; a pressure is a scalar, positive inwards.
-
-    An initial strain has values by component, a temperature its own value and the expansion.
-    """
-
-    group: str
-    kind: str
-    value: Scalar | Vector | Exact | dict[str, Scalar]
-    name: str = ""
-
-    @property
-    def of_cells(self) -> bool:
-        """Whether it acts on volume cells."""
-        return self.kind == "body_force" or self.strains
-
-    @property
-    def strains(self) -> bool:
-        """Whether it is an initial strain, which a temperature is too."""
-        return self.kind in ("strain", "temperature")
-
-    def factor(self, step: Step) -> float:
-        """Its factor in a step."""
-        return step.get(self.name, 1.0) if isinstance(step, dict) else step
-
-
-class Zone(ZoneKeys, frozen=True):
-    """A contact zone as the file has it, each side one group, the clearance evaluated."""
-
-    slave: str
-    master: str
-    clearance: float | Expression | None = None  # type: ignore[assignment]
-
-
-@dataclass(frozen=True)
-class Rigid:
-    """A rigid body: its motion about a reference point, and its surface if it has no cells.
-
-    `surface`: plane, sphere, cylinder or parabola, with its `values` by key; empty: as meshed.
-    `move`: the imposed displacement by component, x … rz; `force`: force or moment by component,
-    in which the body is free to move. It is held in all others.
-    """
-
-    surface: str = ""
-    values: dict[str, Any] = field(default_factory=dict)
-    reference: tuple[float, ...] | None = None
-    move: dict[str, float] = field(default_factory=dict)
-    force: dict[str, float] = field(default_factory=dict)
-    name: str = ""
-
-    @property
-    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
-        """Its points and directions by key."""
-        given = {"reference": self.reference}
-        given |= {f"{self.surface}.{key}": value for key, value in self.values.items()}
-        return [(key, value) for key, value in given.items() if isinstance(value, tuple)]
-
-    @property
-    def moves(self) -> bool:
-        """Whether it has a motion, imposed or free."""
-        return bool(self.move or self.force)
-
-
-@dataclass(frozen=True)
-class Probe:
-    """A place whose displacement and stress are results; of a `zone`, its contact pressure.
-
-    A point `at` a place (dim,), of several bodies there the one with the cells `within`; or the
-    nodes of a `group`.
-    """
-
-    name: str
-    at: tuple[float, ...] = ()
-    group: str = ""
-    within: str = ""
-    zone: str = ""
-
-
-@dataclass(frozen=True)
 class Case:
     """A case: one file, ready to be solved once its mesh is there.
 
@@ -190,9 +72,9 @@ class Case:
     plane: str | None = None
     directions: str = "first"
     steps: tuple[Step, ...] = (1.0,)
-    observe: tuple[ObservationKeys, ...] = ()
-    probes: tuple[Probe, ...] = ()
-    reference: dict[str, Scalar | Vector | dict[str, Scalar] | Exact] = field(default_factory=dict)
+    observe: tuple[Observation, ...] = ()
+    probes: dict[str, Probe] = field(default_factory=dict)
+    reference: dict[str, Any] = field(default_factory=dict)
     reference_kind: str | None = None
     reference_uncertainty: float | None = None
     reference_code: dict[str, str] | None = None

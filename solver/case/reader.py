@@ -8,38 +8,25 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from msgspec import structs
 
 from ..system.errors import InputError, key_path
-from .acting import BodyKeys
-from .expressions import Expression
+from .acting import Load, Step, Support
+from .expressions import EXACT, Expression
 from .file import CaseFile
 from .material import Material
-from .model import (
-    EXACT,
-    LOAD_KINDS,
-    MARGIN,
-    STATE,
-    Case,
-    Cyclic,
-    Load,
-    Probe,
-    Rigid,
-    Selection,
-    Step,
-    Support,
-    Zone,
-)
+from .model import MARGIN, STATE, Case, Selection
 from .rules import check_rules
-from .typed import read_as
+from .typed import Keys, read_as, read_marked
 from .yaml import parse_mapping, read_text
 
 if TYPE_CHECKING:
     from .solutions.base import ExactSolution
 
-# The quantity of an exact solution that `solution` means under a key; in supports, displacement.
+Acting = TypeVar("Acting", Support, Load)
+# The quantity of an exact solution that `solution` means under a key.
 _QUANTITY = {
     "contact_pressure": "contact_pressure",
     "normal_stress": "stress",
@@ -53,12 +40,9 @@ _QUANTITY = {
     "pressure": "stress",
     "traction": "stress",
     "body_force": "body_force",
-}
-# Other keys of the reference, which no solution gives.
-_OTHERS = (
-    *("force", "contact_area", "reaction", "moment", "strain_energy", "coverage"),
-    *("displacement_at", "stress_at", "pressure_at"),
-)
+} | dict.fromkeys(("x", "y", "z", "normal"), "displacement")
+# The keys of the reference that are no values.
+_ORIGIN = {"kind", "uncertainty", "code", "remark", "solution"}
 
 
 def load_case(path: str | Path) -> Case:
@@ -95,7 +79,6 @@ class _Reader:
             self.select(name)
         if file.plane == "stress":
             self.materials = {g: self.thin(g, m) for g, m in self.materials.items()}
-        self.zones = tuple(map(self.zone, range(len(file.contact))))
         self.solution = self.exact_solution()
 
     def case(self, source: str) -> Case:
@@ -112,23 +95,22 @@ class _Reader:
             source=source,
             mesh=mesh,
             materials=self.materials,
-            supports=tuple(map(self.support, range(len(file.supports)))),
-            loads=tuple(map(self.load, range(len(file.loads)))),
-            zones=self.zones,
-            rigid={
-                g: _rigid(body) for g, body in file.bodies.items() if body.rigid or body.surface
-            },
+            supports=self.acting("supports", file.supports),
+            loads=self.acting("loads", file.loads),
+            zones=tuple(
+                read_marked(zone, ("contact", i), self.read) for i, zone in enumerate(file.contact)
+            ),
+            rigid={g: body for g, body in file.bodies.items() if body.rigid or body.surface},
             transform=self.content.get("transform"),
             plane=file.plane,
             directions=file.directions,
             steps=self.steps(),
-            probes=tuple(map(self.probe, file.probes)),
-            observe=file.observe,
-            reference={
-                key: self.value_or_exact("reference", key)
-                for key in self.content.get("reference", ())
-                if key in (*_QUANTITY, *_OTHERS)
+            probes={
+                name: read_marked(probe, ("probes", name), self.read)
+                for name, probe in file.probes.items()
             },
+            observe=file.observe,
+            reference=self.compared(),
             reference_kind=reference.kind if reference else None,
             reference_uncertainty=reference.uncertainty if reference else None,
             reference_code=structs.asdict(reference.code) if reference and reference.code else None,
@@ -140,6 +122,13 @@ class _Reader:
             units=self.content.get("units", {}),
             selections=tuple(self.selections.values()),
         )
+
+    def compared(self) -> dict[str, Any]:
+        """The values of the reference by key."""
+        if self.file.reference is None:
+            return {}
+        values = structs.asdict(read_marked(self.file.reference, ("reference",), self.read))
+        return {k: v for k, v in values.items() if k not in _ORIGIN and v is not None}
 
     def steps(self) -> tuple[Step, ...]:
         """The load steps; those of an exact solution with a state for each."""
@@ -178,10 +167,11 @@ class _Reader:
         if isinstance(item, tuple):
             self.selections[name] = Selection(name, key_path(keys), "groups", item)
             return
-        within = () if item.within is None else item.within
+        within: Any = item.within or ()
         shape = next(s for s in ("plane", "sphere", "box", "where") if getattr(item, s))
         given = getattr(item, shape)
-        values = (self.value(*keys, shape),) if shape == "where" else tuple(structs.astuple(given))
+        where = shape == "where"
+        values = (self.expression((*keys, shape), given),) if where else structs.astuple(given)
         self.selections[name] = Selection(
             name,
             key_path(keys),
@@ -191,7 +181,7 @@ class _Reader:
             values,
         )
 
-    def group(self, keys: tuple[str | int, ...], given: Any, at: Any = None) -> str:
+    def group(self, keys: Keys, given: Any, at: Any = None) -> str:
         """The name of a group, of a list of them, or of the node at a point."""
         if isinstance(given, str):
             return given
@@ -208,44 +198,14 @@ class _Reader:
             raise InputError(self.path, made.key, made.name, allowed)
         return made.name
 
-    def support(self, index: int) -> Support:
-        item, keys = self.file.supports[index], ("supports", index)
-        group = self.group((*keys, "group"), item.group, item.at)
-        if item.cyclic is not None:
-            of = self.group((*keys, "cyclic", "of"), item.cyclic.of)
-            return Support(group, {}, cyclic=Cyclic(**structs.asdict(item.cyclic) | {"of": of}))
-        if item.together is not None:
-            return Support(group, {}, together=item.together, name=item.name or "")
-        if item.spring is not None:
-            return Support(group, {}, self.value(*keys, "spring"), name=item.name or "")
-        if isinstance(item.fix, tuple):
-            return Support(group, dict.fromkeys(item.fix, 0.0), name=item.name or "")
-        fix: dict[str, Any] = {a: self.value_or_exact(*keys, "fix", a) for a in item.fix or ()}
-        return Support(group, fix, name=item.name or "")
-
-    def zone(self, index: int) -> Zone:
-        keys = structs.asdict(self.file.contact[index])
-        if keys["clearance"] is not None:
-            keys["clearance"] = self.value("contact", index, "clearance")
-        for side in ("slave", "master"):
-            keys[side] = self.group(("contact", index, side), keys[side])
-        return Zone(**keys)
-
-    def load(self, index: int) -> Load:
-        item, keys = self.file.loads[index], ("loads", index)
-        kind = next(kind for kind in LOAD_KINDS if getattr(item, kind) is not None)
-        group = self.group((*keys, "group"), item.group, item.at)
-        if kind == "temperature":
-            value: Any = {key: self.value(*keys, key) for key in ("temperature", "expansion")}
-        else:
-            value = (self.value if kind == "strain" else self.value_or_exact)(*keys, kind)
-        return Load(group, kind, value, item.name or "")
-
-    def probe(self, name: str) -> Probe:
-        item = self.file.probes[name]
-        given = {key: getattr(item, key) for key in ("group", "within")}
-        groups = {k: self.group(("probes", name, k), v) if v else "" for k, v in given.items()}
-        return Probe(name, item.at or (), **groups, zone=item.zone or "")
+    def acting(self, key: str, items: tuple[Acting, ...]) -> tuple[Acting, ...]:
+        """Supports or loads; a node at a point becomes a group."""
+        found = [read_marked(item, (key, i), self.read) for i, item in enumerate(items)]
+        for i, item in enumerate(found):
+            if item.at is not None:
+                group = self.group((key, i, "group"), None, item.at)
+                found[i] = structs.replace(item, group=group, at=None)
+        return tuple(found)
 
     def exact_solution(self) -> ExactSolution | None:
         """The solution that the reference names, made with what the case says already."""
@@ -261,51 +221,34 @@ class _Reader:
             plane_stress=self.file.plane == "stress",
             axisymmetric=self.file.plane == "axisymmetric",
             pressure=_only(load.pressure for load in self.file.loads),
-            interference=_only(zone.interference for zone in self.zones),
-            friction=_only(zone.friction for zone in self.zones),
+            interference=_only(zone.interference for zone in self.file.contact),
+            friction=_only(zone.friction for zone in self.file.contact),
         )
         return build(given, known)
 
-    def value_or_exact(self, *keys: str | int) -> Any:
-        """The value of a key, or EXACT for `solution`; refused where the solution has none."""
-        if self.given(*keys) != EXACT.value:
-            return self.value(*keys)
-        quantity = _QUANTITY.get(str(keys[-1]), "displacement")
+    def read(self, mark: str, value: Any, keys: Keys) -> Any:
+        """What stands for a value by the mark of its type; see `acting`."""
+        if mark == "group":
+            return self.group(keys, value)
+        if isinstance(value, dict):
+            return {str(key): self.read(mark, item, (*keys, key)) for key, item in value.items()}
+        if isinstance(value, tuple):
+            return tuple(self.read(mark, item, (*keys, i)) for i, item in enumerate(value))
+        if not isinstance(value, str):
+            return value
+        quantity = _QUANTITY.get(str(keys[-1])) if mark == "value" else None
+        if quantity is None or value != EXACT.value:
+            return self.expression(keys, value)
         if self.solution is not None and quantity in self.solution.quantities:
             return EXACT
         name = self.solution.name if self.solution else None
         allowed = f"{name} has no {quantity}" if name else "reference.solution names none"
-        raise InputError(self.path, key_path(keys), EXACT.value, allowed)
+        raise InputError(self.path, key_path(keys), value, allowed)
 
-    def given(self, *keys: str | int) -> Any:
-        """The content of a key."""
-        value: Any = self.content
-        for key in keys:
-            value = value[key]
-        return value
-
-    def value(self, *keys: str | int) -> Any:
-        """The number, expression, tuple or mapping of them that a key holds."""
-        value = self.given(*keys)
-        if isinstance(value, list):
-            return tuple(self.value(*keys, i) for i in range(len(value)))
-        if isinstance(value, dict):
-            return {key: self.value(*keys, key) for key in value}
-        if isinstance(value, str):
-            around = self.file.plane == "axisymmetric"
-            return Expression(value, str(self.path), key_path(keys), axisymmetric=around)
-        return float(value)
-
-
-def _rigid(body: BodyKeys) -> Rigid:
-    return Rigid(
-        surface=body.surface,
-        values=structs.asdict(getattr(body, body.surface)) if body.surface else {},
-        reference=body.reference,
-        move={str(key): value for key, value in (body.move or {}).items()},
-        force={str(key): value for key, value in (body.force or {}).items()},
-        name=body.name or "",
-    )
+    def expression(self, keys: Keys, text: str) -> Expression:
+        """The function of position that a text is."""
+        around = self.file.plane == "axisymmetric"
+        return Expression(text, str(self.path), key_path(keys), axisymmetric=around)
 
 
 def _only(values: Iterable[Any]) -> float | None:

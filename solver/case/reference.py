@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from .acting import Group, Name, Scalar, Scalars, Vector
+from .acting import EXPRESSION, VALUE, Components, Group, Name, Scalar, Value, Values, Vector
 from .typed import FieldError, Number, Section, Text, Version
 
 
@@ -26,7 +26,9 @@ _MOMENT = "a number (plane) or a list of three numbers"
 _Three = Annotated[tuple[Number, ...], Meta(min_length=3, max_length=3)]
 _Moment = Annotated[Number | _Three, Meta(description=_MOMENT)]
 _Components = Annotated[tuple[Scalar, ...], Meta(min_length=2, max_length=3)]
-_Stress = Annotated[dict[Literal["xx", "yy", "zz", "xy", "yz", "xz"], Scalar], Meta(min_length=1)]
+_Areas = Annotated[Number | Literal["solution"], Meta(extra=VALUE)]
+_Works = Annotated[tuple[Number, ...], Meta(min_length=1)] | Literal["solution"]
+_At = Meta(min_length=1, extra=EXPRESSION)
 
 
 class ReferenceKeys(Section, frozen=True):
@@ -65,26 +67,26 @@ class ReferenceKeys(Section, frozen=True):
     code: CodeKeys | None = None
     remark: str = ""
     solution: Annotated[Text | dict[str, Any], Meta(description=_SOLUTION)] | None = None
-    contact_pressure: Scalar | None = None
-    normal_stress: Scalar | None = None
-    gap: Scalar | None = None
-    displacement: Scalars | None = None
+    contact_pressure: Value | None = None
+    normal_stress: Value | None = None
+    gap: Value | None = None
+    displacement: Values | None = None
     force: Vector | None = None
     contact_area: Number | None = None
-    friction_traction: Scalars | None = None
-    slip: Scalars | None = None
-    stick_area: Number | Literal["solution"] | None = None
-    dissipation: Annotated[tuple[Number, ...], Meta(min_length=1)] | Literal["solution"] | None = (
-        None
-    )
+    friction_traction: Values | None = None
+    slip: Values | None = None
+    stick_area: _Areas | None = None
+    dissipation: Annotated[_Works, Meta(extra=VALUE)] | None = None
     coverage: Scalar | None = None
     reaction: Annotated[dict[Group, Vector], Meta(min_length=1)] | None = None
     moment: Annotated[dict[Group, _Moment], Meta(min_length=1)] | None = None
     strain_energy: Number | None = None
-    displacement_at: Annotated[dict[Name, _Components], Meta(min_length=1)] | None = None
-    stress_at: Annotated[dict[Name, _Stress], Meta(min_length=1)] | None = None
-    pressure_at: Annotated[dict[Name, Scalar], Meta(min_length=1)] | None = None
-    stress: Annotated[_Stress | Literal["solution"], Meta(description=_STRESS)] | None = None
+    displacement_at: Annotated[dict[Name, _Components], _At] | None = None
+    stress_at: Annotated[dict[Name, Components], _At] | None = None
+    pressure_at: Annotated[dict[Name, Scalar], _At] | None = None
+    stress: (
+        Annotated[Components | Literal["solution"], Meta(description=_STRESS, extra=VALUE)] | None
+    ) = None
 
     def __post_init__(self) -> None:
         needed = {"refined": "uncertainty", "other_code": "code"}.get(self.kind)

@@ -7,9 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..system.errors import InputError, hint
+from .acting import Load, Rigid, Scalar, Support
 from .checks import BY_NAME, ERRORS
 from .expressions import Expression
-from .model import SWAPPED, Case, Load, Rigid, Scalar, Support, Zone
+from .file import Zone
+from .model import SWAPPED, Case
 
 Fault = tuple[str, object, str]
 # Keys of the reference that need contact.
@@ -120,12 +122,12 @@ def _in_zone(key: str, zone: Zone) -> Iterator[Fault]:
 def _in_probes(case: Case) -> Iterator[Fault]:
     """A probe's zone is one of the case; a reference names a probe that has such a value."""
     zones = {zone.name for zone in case.zones}
-    for probe in case.probes:
+    for name, probe in case.probes.items():
         if probe.zone and probe.zone not in zones:
             allowed = f"no such zone; {hint(probe.zone, zones)}"
-            yield f"probes.{probe.name}.zone", probe.zone, allowed
+            yield f"probes.{name}.zone", probe.zone, allowed
     for key in PROBED:
-        names = {p.name for p in case.probes if bool(p.zone) == (key == "pressure_at")}
+        names = {n for n, p in case.probes.items() if bool(p.zone) == (key == "pressure_at")}
         given = case.reference.get(key)
         for name in given if isinstance(given, dict) else ():
             if name not in names:
@@ -279,9 +281,9 @@ def _placed(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
     for i, support in enumerate(case.supports):
         if support.cyclic and support.cyclic.shift:
             yield f"supports[{i}].cyclic.shift", support.cyclic.shift
-    for probe in case.probes:
+    for name, probe in case.probes.items():
         if probe.at:
-            yield f"probes.{probe.name}.at", probe.at
+            yield f"probes.{name}.at", probe.at
     for made in case.selections:
         if made.shape == "at":
             yield made.key, made.values

@@ -135,10 +135,12 @@ def json_schema(kind: type[Section], **alternatives: Collection[type[Section]]) 
     for part in schema["$defs"].values():
         part["description"], titles = _headed(part.get("description", ""))
         for name, key in part["properties"].items():
-            if "default" in key and key["default"] is None:  # the key may be left out
-                others = [one for one in key.pop("anyOf") if one != {"type": "null"}]
-                key.update(others[0] if len(others) == 1 else {"anyOf": others})
+            if key.get("default", 0) in (None, "", [], (), {}):  # the key may be left out
                 del key["default"]
+            others = [one for one in key.get("anyOf", ()) if one != {"type": "null"}]
+            if len(others) < len(key.get("anyOf", ())):
+                del key["anyOf"]
+                key.update(others[0] if len(others) == 1 else {"anyOf": others})
             if name in titles:
                 key["title"] = titles[name]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
@@ -160,6 +162,34 @@ def _headed(text: str) -> tuple[str, dict[str, str]]:
 def fields(kind: type[Section]) -> dict[str, Any]:
     """The keys of a class, with their types and defaults."""
     return {field.encode_name: field for field in msgspec.structs.fields(kind)}
+
+
+Read = Callable[[str, Any, Keys], Any]
+
+
+def read_marked(section: AnySection, keys: Keys, read: Read) -> AnySection:
+    """The section with those values read further whose type is marked.
+
+    The mark is `extra={"read": MARK}` in its `Meta`; `read` takes the mark, the value, its keys.
+    """
+    changed = {}
+    for name, field in fields(type(section)).items():
+        value = getattr(section, field.name)
+        if isinstance(value, Section):
+            changed[field.name] = read_marked(value, (*keys, name), read)
+        elif value is not None and (mark := _mark(field.type)):
+            changed[field.name] = read(mark, value, (*keys, name))
+    return msgspec.structs.replace(section, **changed)
+
+
+def _mark(kind: Any) -> str:
+    """The outermost mark of a type, also of a type that may be left out."""
+    if get_origin(kind) is Annotated:
+        marks = (meta.extra["read"] for meta in reversed(kind.__metadata__) if meta.extra)
+        return next(marks, "") or _mark(kind.__origin__)
+    if get_origin(kind) in (Union, UnionType):
+        return next(filter(None, map(_mark, get_args(kind))), "")
+    return ""
 
 
 def described(kind: Any) -> str:

@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 import meshio
 import numpy as np
 
+from ..case.acting import Load
 from ..case.expressions import evaluate
+from ..case.file import Zone
 from ..case.material import Material
-from ..case.model import Case, Load, Zone
+from ..case.model import Case
 from ..lac.cells.faces import FaceBlock, nodal_normals
 from ..lac.cut import cut
 from ..mechanics.fem.bodies import body_numbers

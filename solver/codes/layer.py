@@ -9,8 +9,10 @@ from functools import cache
 
 import meshio
 import numpy as np
+from msgspec import structs
 
-from ..case.model import Case, Load, Support
+from ..case.acting import Load, Support
+from ..case.model import Case
 from ..case.solutions.base import ExactSolution, Part
 from ..lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
 
@@ -49,7 +51,7 @@ def as_layer(case: Case, mesh: meshio.Mesh) -> tuple[Case, meshio.Mesh]:
 
 
 def _in_space(case: Case, thickness: float) -> Case:
-    held = (*case.supports, Support(LAYER, {"z": 0.0}))
+    held = (*case.supports, Support(group=LAYER, fix={"z": 0.0}))
     solution = case.solution and _Plane(case.solution)
     loads = tuple(_lifted(load, thickness) for load in case.loads)
     return replace(case, plane=None, supports=held, loads=loads, solution=solution)
@@ -61,7 +63,7 @@ def _lifted(load: Load, thickness: float) -> Load:
     # A force is one per unit of depth.
     depth = thickness if load.kind == "force" else 1.0
     value = tuple(v * depth if isinstance(v, float) else v for v in load.value)
-    return replace(load, value=(*value, 0.0))
+    return structs.replace(load, **{load.kind: (*value, 0.0)})
 
 
 class _Plane(ExactSolution):

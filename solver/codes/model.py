@@ -104,7 +104,7 @@ class Model:
         centre = zone.operator.surface.centre + self.scene.origin
         if exact is not None and "contact_pressure" in exact.quantities:
             return exact.contact_pressure(centre)
-        return None if given is None else evaluate(given, centre)  # type: ignore[arg-type]
+        return None if given is None else evaluate(given, centre)
 
     def _zone(self, zone: ZoneScene) -> ZoneResult:
         surface, m = zone.operator.surface, zone.count

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..case.expressions import Expression, evaluate
-from ..case.model import EXACT
+from ..case.expressions import EXACT, Expression, evaluate
 from ..lac.cells.faces import surface_points
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult

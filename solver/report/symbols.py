@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.expressions import Expression, evaluate
-from ..case.model import EXACT, Load, Support
+from ..case.acting import Load, Support
+from ..case.expressions import EXACT, Expression, evaluate
 from ..lac.cells.faces import nodal_normals
 from ..mechanics.fem.stress import traction
 from ..simulation.results.exact import ExactValues

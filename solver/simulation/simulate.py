@@ -9,7 +9,8 @@ from typing import Any
 import meshio
 import numpy as np
 
-from ..case.model import STATE, Case, Step
+from ..case.acting import Step
+from ..case.model import STATE, Case
 from ..lac.errors import SolveError
 from ..system.process import peak_mb
 from ..system.progress import OUTCOME, Clock, processor_time, stage

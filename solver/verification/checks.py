@@ -26,7 +26,7 @@ import msgspec
 import numpy as np
 
 from ..case.checks import CHECKS, Check
-from ..case.model import Exact
+from ..case.expressions import Exact
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from solver.case.acting import Load, Rigid, Support
 from solver.case.expressions import Expression
-from solver.case.file import ObservationKeys
+from solver.case.file import Observation, Zone
 from solver.case.material import Material
-from solver.case.model import Case, Load, Rigid, Support, Zone
+from solver.case.model import Case
 from solver.case.reader import check_mesh_file, load_case, parse_case
 from solver.case.solutions.polynomial import Hydrostatic
 from solver.system.errors import InputError
@@ -25,25 +26,25 @@ def test_every_key_arrives():
         mesh={"path": Path("family/meshes/c.med")},
         materials={"lower": Material(2000.0, 0.3), "upper": Material(1000.0, -0.5)},
         supports=(
-            Support("Sym", {"x": 0.0}),
-            Support("Base", {"y": 0.0, "x": Expression("1e-3*x")}),
-            Support("Slope", {"normal": 0.0}),
+            Support({"x": 0.0}, group="Sym"),
+            Support({"y": 0.0, "x": Expression("1e-3*x")}, group="Base"),
+            Support({"normal": 0.0}, group="Slope"),
         ),
         loads=(
-            Load("Top", "pressure", 25.0),
-            Load("Side", "traction", (0.0, Expression("2*y"))),
-            Load("all", "body_force", (0.0, -1.0)),
+            Load("Top", pressure=25.0),
+            Load("Side", traction=(0.0, Expression("2*y"))),
+            Load("all", body_force=(0.0, -1.0)),
         ),
         zones=(
             Zone("S", "M", "interface", "hexahedra", "lac", "element", interference=1.0),
             Zone("S2", "M2", "second"),
         ),
-        rigid={"die": Rigid()},
+        rigid={"die": Rigid(rigid=True)},
         transform={"scale": 2.0},
         plane="strain",
         directions="first",
         steps=(0.5, 1.0),
-        observe=(ObservationKeys("interface", (25.0, 0.0)),),
+        observe=(Observation("interface", (25.0, 0.0)),),
         reference={
             "contact_pressure": 25.0,
             "gap": Expression("x*0"),

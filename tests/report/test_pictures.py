@@ -8,6 +8,7 @@ import meshio
 import numpy as np
 import pytest
 
+from solver.case.acting import Load
 from solver.case.expressions import Expression
 from solver.mechanics.fem.faces import outer_faces
 from solver.report.case_picture import draw_case
@@ -70,7 +71,7 @@ def test_loads_and_supports_of_a_plane_picture(tmp_path):
 
 def test_arrows_follow_the_load(tmp_path):
     solution = handmade.plane(tmp_path)
-    load = replace(solution.case.loads[0], kind="traction", value=(Expression("x"), 0.0))
+    load = Load("press", traction=(Expression("x"), 0.0))
     solution.case = replace(solution.case, loads=(load,))
     svg = draw_case(solution, "two blocks")
     shafts = {"stroke": RED, "stroke-width": "13"}
@@ -83,7 +84,7 @@ def test_arrows_follow_the_load(tmp_path):
     # No arrow is at x = 0, where the load is zero; the longest has 30 pixels.
     assert np.array(steps) == pytest.approx(np.array([(100, 0), (200, 0), (300, 0)]), abs=1)
     assert "traction (x, 0)" in svg
-    long = replace(load, value=(Expression("sin(x) * sin(x) + cos(x) * cos(x)"), 0.0))
+    long = Load("press", traction=(Expression("sin(x) * sin(x) + cos(x) * cos(x)"), 0.0))
     acted = solution.acted["loads[0].group"]
     solution.acted |= {f"loads[{i}].group": acted for i in (1, 2)}
     solution.case = replace(solution.case, loads=(load, long, load))

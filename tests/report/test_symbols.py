@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from solver import solve_case
+from solver.case.acting import Cyclic, Support
 from solver.case.expressions import Expression
-from solver.case.model import Cyclic, Support
 from solver.report.case_picture import draw_case
 from solver.report.charts import GREEN, INK
 from solver.report.layout import Drawing
@@ -109,7 +109,7 @@ def with_support(folder, support):
 
 
 def test_springs_do_not_look_like_supports(tmp_path):
-    solution = with_support(tmp_path, Support("press", {}, spring={"y": 12.5}))
+    solution = with_support(tmp_path, Support(group="press", spring={"y": 12.5}))
     svg = draw_case(solution, "")
     assert shapes(svg, 3, stroke=GREEN, fill="#ffffff") == [], "no triangle"
     tips = shapes(svg, 8, stroke=GREEN)
@@ -119,19 +119,19 @@ def test_springs_do_not_look_like_supports(tmp_path):
 
 
 def test_imposed_displacements_are_written(tmp_path):
-    held = Support("press", {"x": 0.0, "y": -0.5})
+    held = Support({"x": 0.0, "y": -0.5}, group="press")
     solution = with_support(tmp_path, held)
     solution.case = replace(solution.case, units={"length": "mm"})
     svg = draw_case(solution, "")
     assert len(shapes(svg, 3, stroke=GREEN, fill="#ffffff")) == 8
     assert "moved y -0.5 mm" in svg
-    assert "moved" not in draw_case(with_support(tmp_path, Support("press", {"y": 0.0})), "")
-    turned = with_support(tmp_path, Support("press", {"x": Expression("y**2")}))
+    assert "moved" not in draw_case(with_support(tmp_path, Support({"y": 0.0}, group="press")), "")
+    turned = with_support(tmp_path, Support({"x": Expression("y**2")}, group="press"))
     assert "moved x y²" in draw_case(turned, "")
 
 
 def test_nodes_that_move_together_have_one_hub(tmp_path):
-    svg = draw_case(with_support(tmp_path, Support("press", {}, together=("y",))), "")
+    svg = draw_case(with_support(tmp_path, Support(group="press", together=("y",))), "")
     lines = [
         path.get("d").split("M")[1:]
         for path in ET.fromstring(svg).iter(f"{SVG}path")
@@ -151,7 +151,7 @@ def test_nodes_that_move_together_have_one_hub(tmp_path):
 
 def test_both_sides_of_a_sector_are_marked(tmp_path):
     cyclic = Cyclic("sym", shift=(50.0, 0.0))
-    solution = with_support(tmp_path, Support("far", {}, cyclic=cyclic))
+    solution = with_support(tmp_path, Support(group="far", cyclic=cyclic))
     right, left = np.array([6, 13, 17, 21]), np.array([0, 7, 14, 18])
     solution.acted = {"supports[0].group": right, "supports[0].cyclic.of": left}
     svg = draw_case(solution, "")
@@ -159,7 +159,7 @@ def test_both_sides_of_a_sector_are_marked(tmp_path):
     assert len(shapes(svg, 4, fill=GREEN)) == 8
     assert len(marks) == 2
     assert "cyclic (50, 0)" in svg
-    turned = replace(solution.case.supports[0], cyclic=Cyclic("sym", angle=90.0))
+    turned = Support(group="far", cyclic=Cyclic("sym", angle=90.0))
     solution.case = replace(solution.case, supports=(turned,))
     assert "cyclic 90°" in draw_case(solution, "")
     assert solution.case.acting["supports[0].cyclic.of"] == "sym"

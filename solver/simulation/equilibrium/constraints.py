@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ...case.model import Step
+from ...case.acting import Step
 from ...lac.operator import without_round_off
 from ...mechanics.fem.bodies import (
     motion_fields,

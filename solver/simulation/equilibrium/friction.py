@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from ...case.model import Step
+from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.friction import (
     Response,

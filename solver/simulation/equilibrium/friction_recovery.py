@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ...case.model import Step
+from ...case.acting import Step
 from ...lac.recovery import settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search, solve_with_friction, status_of

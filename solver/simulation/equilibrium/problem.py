@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from ...case.model import Step
+from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.status import StatusResult, Trial, find_status
 from ...mechanics.fem.bodies import rigid_motions, unsupported

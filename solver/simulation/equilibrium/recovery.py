@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...case.model import Step
+from ...case.acting import Step
 from ...lac.reconstruction import Reconstruction
 from ...lac.recovery import Recovery, settled_means
 from ..scene.scene import ZoneScene

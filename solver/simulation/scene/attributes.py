@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ...case.expressions import evaluate
+from ...case.acting import Load, Step
+from ...case.expressions import Exact, evaluate
 from ...case.material import Material
-from ...case.model import Case, Exact, Load, Step
+from ...case.model import Case
 from ...case.solutions.base import ExactSolution
 from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import FaceBlock, nodal_normals
@@ -237,7 +238,6 @@ class Attributes(CutGroups):
         if isinstance(load.value, dict):
             return total  # see `initial`
         if load.kind == "force":
-            assert isinstance(load.value, tuple)
             return self._share(load, key)[:, None] * self.field(load.value)(self.points[:1])
         for name, nodes in self._loaded(load, key):
             if isinstance(load.value, Exact):

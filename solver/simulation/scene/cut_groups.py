@@ -15,8 +15,10 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ...case.acting import Scalar
 from ...case.expressions import evaluate
-from ...case.model import Case, Scalar, Zone
+from ...case.file import Zone
+from ...case.model import Case
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...lac.cells.faces import FaceBlock
 from ...lac.cut import CutMesh, SubFaces

@@ -8,7 +8,10 @@ from collections.abc import Iterable, Sequence
 import meshio
 import numpy as np
 
-from ...case.model import Case, Exact, Load, Zone
+from ...case.acting import Load
+from ...case.expressions import Exact
+from ...case.file import Zone
+from ...case.model import Case
 from ...case.rules import check_dimension
 from ...lac.cells.catalogue import BY_MESHIO
 from ...system.errors import InputError, hint
@@ -96,7 +99,7 @@ def _named(case: Case) -> set[str]:
     held = [support.group for support in case.supports]
     held += [support.cyclic.of for support in case.supports if support.cyclic]
     loaded = [load.group for load in case.loads]
-    probed = [name for probe in case.probes for name in (probe.group, probe.within)]
+    probed = [name for probe in case.probes.values() for name in (probe.group, probe.within)]
     return {*case.materials, *case.rigid, *case.counts, *sides, *held, *loaded, *probed}
 
 
@@ -258,11 +261,11 @@ class _Groups:
             self.cells(f"counts.{group}", group, self.dim)
 
     def check_probes(self) -> None:
-        for probe in self.case.probes:
+        for name, probe in self.case.probes.items():
             if probe.group and probe.group != ALL:
-                self.require(f"probes.{probe.name}.group", probe.group)
+                self.require(f"probes.{name}.group", probe.group)
             if probe.within:
-                self.cells(f"probes.{probe.name}.within", probe.within, self.dim)
+                self.cells(f"probes.{name}.within", probe.within, self.dim)
 
     def check_zone(self, number: int, zone: Zone) -> None:
         """Two surfaces without a common face, the slave's not on a rigid body."""

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from ...case.model import Zone
+from ...case.file import Zone
 from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import FACE_POINTS, FaceBlock, nodal_normals, surface_points
 from ...lac.cut import SubFaces

@@ -8,7 +8,9 @@ import meshio
 import numpy as np
 from scipy import sparse
 
-from ...case.model import Case, Step, Zone
+from ...case.acting import Step
+from ...case.file import Zone
+from ...case.model import Case
 from ...lac.cells.faces import FaceBlock
 from ...lac.cut import CutMesh, SubFaces, cut
 from ...lac.operator import GapOperator
@@ -249,7 +251,7 @@ def build_scene(
         force=force,
         initial=initial,
         springs=springs,
-        probed={p.name: groups.nodes(p.group, "probes") for p in case.probes if p.group},
+        probed={n: groups.nodes(p.group, "probes") for n, p in case.probes.items() if p.group},
         acted={key: groups.nodes(group, key) for key, group in case.acting.items()},
         histories=groups.histories(),
         zones=zones,

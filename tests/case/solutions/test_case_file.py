@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from solver.case.expressions import EXACT
 from solver.case.material import Material
-from solver.case.model import EXACT
 from solver.case.reader import parse_case
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
