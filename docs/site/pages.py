@@ -13,6 +13,8 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from tables import TABLES
 
+from solver.case.typed import is_section, titles_of
+
 # A link to a table, alone on its line: the site has the table there.
 _TABLE = re.compile(r"^\[.*\]\(design/tables/(.*)\.md\)$", re.MULTILINE)
 _SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
@@ -29,7 +31,15 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("source-read", _tables)
     app.connect("source-read", _menu)
     app.connect("build-finished", _first_page)
+    app.connect("autodoc-process-docstring", _keys)
     return {"parallel_read_safe": True}
+
+
+def _keys(_: Sphinx, __: str, ___: str, kind: object, ____: object, lines: list[str]) -> None:
+    """The keys of a file as a list."""
+    if is_section(kind):
+        head = lines[: lines.index("")] if "" in lines else lines
+        lines[:] = [*head, "", *(f"- ``{key}``: {title}" for key, title in titles_of(kind).items())]
 
 
 def _tables(_: Sphinx, page: str, source: list[str]) -> None:
