@@ -11,9 +11,15 @@ from scipy.spatial import cKDTree
 
 from ..case.expressions import evaluate
 from ..lac.cells.catalogue import cell_type
-from ..lac.cells.faces import FACE_POINTS, right_side_out, surface_points, surface_vectors
+from ..lac.cells.faces import (
+    FACE_POINTS,
+    outer_faces,
+    right_side_out,
+    surface_points,
+    surface_vectors,
+)
 from ..lac.cells.shape import gauss_rule
-from ..mechanics.fem.faces import outer_faces
+from ..mechanics.fem.faces import volume_cells
 from ..simulation.results.exact import ExactValues, computed_pressure
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult
 from ..system.errors import InputError
@@ -213,7 +219,7 @@ def own_solution(
     turned = [(name, right_side_out(points, data, cell_type(name))[0]) for name, data in blocks]
     cells = meshio.Mesh(points, turned)
     frame, n = model.solution, len(points)
-    faces = list(outer_faces(cells))
+    faces = list(outer_faces(volume_cells(cells)))
     zones = [zone for s in pressures if (zone := _zone(points, faces, s, model)) is not None]
     fields = {"displacement": np.full((n, dim), np.nan), "stress": np.full((n, 6), np.nan)}
     for name, values in fields.items():

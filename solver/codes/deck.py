@@ -11,7 +11,7 @@ from ..case.expressions import evaluate
 from ..case.file import Zone
 from ..case.material import Material
 from ..case.model import Case
-from ..lac.cells.faces import FaceBlock, nodal_normals
+from ..lac.cells.faces import FaceBlock, nodes_of, normals_of
 from ..lac.cut import cut
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.faces import volume_cells
@@ -123,14 +123,9 @@ def closing(
     return start
 
 
-def _nodes(faces: list[FaceBlock]) -> np.ndarray:
-    return np.unique(np.concatenate([block.nodes.ravel() for block in faces]))
-
-
 def _mean_normal(points: np.ndarray, faces: list[FaceBlock]) -> np.ndarray:
     """The direction of the sum of normals at nodes; zero for a closed surface."""
-    normals = nodal_normals(points, [(b.type.name, b.nodes) for b in faces])[_nodes(faces)]
-    total = normals.mean(axis=0)
+    total = normals_of(points, faces)[nodes_of(faces)].mean(axis=0)
     length = float(np.linalg.norm(total))
     return total / length if length > _ALONG else np.zeros_like(total)
 
@@ -141,10 +136,10 @@ def _gaps(
     """About the initial gap at the nodes of one side: to the plane at the other's nearest node."""
     from scipy.spatial import cKDTree
 
-    nodes, others = _nodes(mine), _nodes(other)
+    nodes, others = nodes_of(mine), nodes_of(other)
     if zone.clearance is not None:
         return evaluate(zone.clearance, points[nodes]) - zone.interference
-    normals = nodal_normals(points, [(b.type.name, b.nodes) for b in other])[others]
+    normals = normals_of(points, other)[others]
     near = cKDTree(points[others]).query(points[nodes])[1]
     offset = points[nodes] - points[others][near]
     return np.einsum("nd,nd->n", offset, normals[near]) - zone.interference
@@ -323,7 +318,7 @@ def _paired(case: Case, mesh: meshio.Mesh, number: int, flat: int) -> PairedFace
     gap = None
     if zone.clearance is not None:
         gap = np.full(len(mesh.points), np.nan)
-        nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
+        nodes = nodes_of(slave)
         gap[nodes] = evaluate(zone.clearance, mesh.points[nodes, :flat]) - zone.interference
     return PairedFaces(zone=zone, slave=slave, master=master, gap=gap)
 

@@ -15,7 +15,7 @@ from msgspec import structs
 from scipy.spatial import cKDTree
 
 from ..case.material import Material
-from ..lac.cells.faces import FaceBlock, nodal_normals
+from ..lac.cells.faces import FaceBlock, nodes_of, normals_of
 from .deck import Deck, PairedFaces, UnsupportedError
 from .layer import columns
 
@@ -68,17 +68,18 @@ def _meshed_gap(deck: Deck, pair: PairedFaces) -> np.ndarray:
     The nearest node of the master is at an offset along the surface. On a circle, an offset is
     across the mean of the normals at its two ends.
     """
-    nodes, others = _nodes(pair.slave), _nodes(pair.master)
+    nodes, others = nodes_of(pair.slave), nodes_of(pair.master)
     _, near = cKDTree(deck.points[others]).query(deck.points[nodes])
     facing = others[near]
-    normals = (_normals(deck, pair.master)[facing] - _normals(deck, pair.slave)[nodes]) / 2
+    outward, inward = (normals_of(deck.points, side) for side in (pair.master, pair.slave))
+    normals = (outward[facing] - inward[nodes]) / 2
     return np.einsum("nd,nd->n", deck.points[nodes] - deck.points[facing], normals)
 
 
 def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
     pair, size = deck.pairs[number], len(deck.points)
-    nodes = _nodes(pair.slave)
-    normals = _normals(deck, pair.slave)[nodes]
+    nodes = nodes_of(pair.slave)
+    normals = normals_of(deck.points, pair.slave)[nodes]
     shift = _shift(deck, pair, nodes)
     thick = _THIN * np.ptp(deck.points, axis=0).max()
     heights = np.array([-thick, 0.0, -thick / 2])[:, None] + shift
@@ -131,18 +132,10 @@ def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
     return longer, new
 
 
-def _nodes(faces: list[FaceBlock]) -> np.ndarray:
-    return np.unique(np.concatenate([block.nodes.ravel() for block in faces]))
-
-
-def _normals(deck: Deck, faces: list[FaceBlock]) -> np.ndarray:
-    return nodal_normals(deck.points, [(block.type.name, block.nodes) for block in faces])
-
-
 def _are_flat(deck: Deck, pair: PairedFaces) -> bool:
     """Whether the normals of both sides agree everywhere."""
-    outward = _normals(deck, pair.slave)[_nodes(pair.slave)]
-    facing = _normals(deck, pair.master)[_nodes(pair.master)]
+    outward = normals_of(deck.points, pair.slave)[nodes_of(pair.slave)]
+    facing = normals_of(deck.points, pair.master)[nodes_of(pair.master)]
     return bool(np.abs(np.concatenate([-outward, facing]) - facing[0]).max() < _FLAT)
 
 
@@ -152,8 +145,8 @@ def _shift(deck: Deck, pair: PairedFaces, nodes: np.ndarray) -> np.ndarray:
         return np.full(len(nodes), pair.zone.interference)
     if not _are_flat(deck, pair):
         raise UnsupportedError("initial gap by place on curved faces: CalculiX takes one number")
-    other = _nodes(pair.master)[0]
-    facing = _normals(deck, pair.master)[other]
+    other = nodes_of(pair.master)[0]
+    facing = normals_of(deck.points, pair.master)[other]
     return (deck.points[nodes] - deck.points[other]) @ facing - pair.gap[nodes]
 
 

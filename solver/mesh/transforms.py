@@ -27,7 +27,7 @@ import numpy as np
 from ..case.file import Perturbation, Pick, Renumbering, Rotation, Shift, Transform, Turn
 from ..case.typed import FieldError, read_as
 from ..lac.cells.catalogue import CellType, cell_type
-from ..lac.cells.faces import right_side_out
+from ..lac.cells.faces import outer_faces, right_side_out
 from ..system.errors import InputError, key_path
 from .keys import LARGEST
 
@@ -89,29 +89,13 @@ def _freedom(points: np.ndarray, volumes: _Volumes) -> np.ndarray:
     """For each node the projector (n, dim, dim) on the directions in which the sides let it go."""
     dim = points.shape[1]
     spread = np.zeros((len(points), dim, dim))
-    for corners in _outer_faces(volumes):
+    for kind, nodes in outer_faces({cell.name: nodes for cell, nodes in volumes}):
+        corners = nodes[:, : cell_type(kind).n_vertices]
         normals = _normals(points[corners])
         np.add.at(spread, corners, (normals[:, :, None] * normals[:, None, :])[:, None])
     strength, directions = np.linalg.eigh(spread)
     free = strength <= _ONE_PLANE * np.maximum(strength.max(axis=1, keepdims=True), 1)
     return np.einsum("nik,nk,njk->nij", directions, free, directions)
-
-
-def _outer_faces(volumes: _Volumes) -> list[np.ndarray]:
-    """Corner nodes (n_faces, n_corners) of the faces of one cell only, by number of corners."""
-    faces: dict[int, list[np.ndarray]] = {}
-    for cell, nodes in volumes:
-        for face in cell.faces:
-            corners = [i for i in face.nodes if i < cell.n_vertices]
-            faces.setdefault(len(corners), []).append(nodes[:, corners])
-    outer = []
-    for parts in faces.values():
-        every = np.concatenate(parts)
-        _, first, count = np.unique(
-            np.sort(every, axis=1), axis=0, return_index=True, return_counts=True
-        )
-        outer.append(every[first[count == 1]])
-    return outer
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ import numpy as np
 from markupsafe import Markup
 
 from ..lac.cells.catalogue import cell_type
-from ..mechanics.fem.faces import outer_faces
+from ..lac.cells.faces import outer_faces
+from ..mechanics.fem.faces import volume_cells
 from ..simulation.results.solution import Solution, ZoneResult
 from ..verification.units import with_unit
 from .charts import MUTED, PAPER
@@ -97,7 +98,7 @@ def _whole(
     points += share * np.stack([ways[number] for number in range(len(ways))])[solution.body]
     faces = [face[:2] for part in drawn if part.meshed for face in part.faces]
     seen = _seen(faces, points, view) if dim == 3 else np.ones(len(points), dtype=bool)
-    faces = faces if dim == 3 else list(outer_faces(solution.mesh))
+    faces = faces if dim == 3 else list(outer_faces(volume_cells(solution.mesh)))
     labels = Symbols(solution, view, points, seen, faces).draw()
     for part, places in zip(drawn, flat, strict=True):
         if part.zone is None:

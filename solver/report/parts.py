@@ -11,7 +11,8 @@ from functools import cached_property
 import meshio
 import numpy as np
 
-from ..mechanics.fem.faces import outer_faces, volume_cells
+from ..lac.cells.faces import outer_faces
+from ..mechanics.fem.faces import volume_cells
 from ..simulation.results.solution import Solution, ZoneResult
 from ..simulation.scene.rigid import quadric_of
 from ..verification.units import with_unit
@@ -78,7 +79,8 @@ def parts(solution: Solution) -> Iterator[DrawnPart]:
 
 def outside(mesh: meshio.Mesh) -> list[tuple[str, np.ndarray]]:
     """The faces that are seen, by type: cells in the plane, else the outer faces."""
-    return list(volume_cells(mesh).items() if mesh.points.shape[1] == 2 else outer_faces(mesh))
+    cells = volume_cells(mesh)
+    return list(cells.items() if mesh.points.shape[1] == 2 else outer_faces(cells))
 
 
 def rigid_surface(

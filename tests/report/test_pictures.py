@@ -10,7 +10,8 @@ import pytest
 
 from solver.case.acting import Load
 from solver.case.expressions import Expression
-from solver.mechanics.fem.faces import outer_faces
+from solver.lac.cells.faces import outer_faces
+from solver.mechanics.fem.faces import volume_cells
 from solver.report.case_picture import draw_case
 from solver.report.charts import BLUE, GREEN, ORANGE, RED
 from solver.report.layout import (
@@ -149,7 +150,7 @@ def test_boundary_of_two_cubes_on_each_other():
     points = np.array(layers, dtype=float)
     cubes = np.array([[0, 1, 2, 3, 4, 5, 6, 7], [4, 5, 6, 7, 8, 9, 10, 11]])
     mesh = meshio.Mesh(points, [("hexahedron", cubes)])
-    [(kind, faces)] = outer_faces(mesh)
+    [(kind, faces)] = outer_faces(volume_cells(mesh))
     assert kind == "QUAD4"
     assert len(faces) == 10
     centre = points[faces].mean(axis=1)

@@ -1,8 +1,8 @@
 """Faces of cells: who owns them, outward normals, quadrature points; cells right side out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -116,6 +116,30 @@ class FaceBlock:
         return mine, theirs
 
 
+def corner_sets(faces: list[np.ndarray]) -> np.ndarray:
+    """Sorted corner nodes of faces as rows (n, 4), filled up with −1."""
+    rows = [np.full((len(f), 4), -1) for f in faces]
+    for row, face in zip(rows, faces, strict=True):
+        row[:, : face.shape[1]] = np.sort(face, axis=1)
+    return np.concatenate(rows) if rows else np.empty((0, 4), dtype=int)
+
+
+def outer_faces(cells: Mapping[str, np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
+    """The faces that belong to one of the cells (by type) only, outward: (type, (n, nodes))."""
+    by_type: dict[str, list[np.ndarray]] = {}
+    for name, nodes in cells.items():
+        for face in cell_type(name).faces:
+            by_type.setdefault(face.type, []).append(nodes[:, list(face.nodes)])
+    faces = {kind: np.concatenate(parts) for kind, parts in by_type.items()}
+    keys = corner_sets([nodes[:, : cell_type(kind).n_vertices] for kind, nodes in faces.items()])
+    _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    alone = counts[inverse.ravel()] == 1
+    start = 0
+    for kind, nodes in faces.items():
+        yield kind, nodes[alone[start : start + len(nodes)]]
+        start += len(nodes)
+
+
 def area_vectors(points: np.ndarray, nodes: np.ndarray, tangents: np.ndarray) -> np.ndarray:
     """Outward normal × surface measure (n, q, dim) of faces, from shape gradients at q points.
 
@@ -154,6 +178,16 @@ def surface_vectors(
     if axisymmetric:
         vectors = vectors * circumference(values @ points[nodes])[..., None]
     return values, vectors
+
+
+def nodes_of(blocks: Sequence[Any]) -> np.ndarray:
+    """The nodes (k,) of blocks of faces, each once, ascending."""
+    return np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
+
+
+def normals_of(points: np.ndarray, blocks: Sequence[Any]) -> np.ndarray:
+    """The `nodal_normals` of blocks of faces."""
+    return nodal_normals(points, [(block.type.name, block.nodes) for block in blocks])
 
 
 def nodal_normals(points: np.ndarray, faces: list[tuple[str, np.ndarray]]) -> np.ndarray:

@@ -187,18 +187,17 @@ def gauss_rule(name: str, n: int) -> Rule:
     if shape == "SEG":
         return line
     if shape == "QUAD":
-        return _product(line, line)
+        return product_rule(line, line)
     if shape == "HEXA":
-        return _product(_product(line, line), line)
+        return product_rule(product_rule(line, line), line)
     triangle = _collapsed(line, _line(n, 1))
     if shape == "TRIA":
         return triangle
     if shape == "PENTA":
-        return _product(triangle, line)
+        return product_rule(triangle, line)
     if shape == "TETRA":
         return _collapsed(triangle, _line(n, 2))
-    points, weights = _product(line, line)
-    return _collapsed((2 * points - 1, 4 * weights), _line(n, 2))
+    return conical_rule(n, n)
 
 
 def _line(n: int, power: int) -> Rule:
@@ -212,7 +211,8 @@ def _line(n: int, power: int) -> Rule:
     return ((x + 1) / 2)[:, None], w / 2 ** (power + 1)
 
 
-def _product(first: Rule, second: Rule) -> Rule:
+def product_rule(first: Rule, second: Rule) -> Rule:
+    """The product of two rules, the first one fastest."""
     (p, v), (q, w) = first, second
     points = np.hstack([np.tile(p, (len(q), 1)), np.repeat(q, len(p), axis=0)])
     return points, np.outer(w, v).ravel()
@@ -220,9 +220,16 @@ def _product(first: Rule, second: Rule) -> Rule:
 
 def _collapsed(base: Rule, axis: Rule) -> Rule:
     """The product, its base shrunk towards the top of the axis."""
-    points, weights = _product(base, axis)
+    points, weights = product_rule(base, axis)
     points[:, :-1] *= 1 - points[:, -1:]
     return points, weights
+
+
+def conical_rule(base: int, axis: int) -> Rule:
+    """A pyramid: `base` points each way over the square [−1, 1]², `axis` points to the apex."""
+    line = _line(base, 0)
+    points, weights = product_rule(line, line)
+    return _collapsed((2 * points - 1, 4 * weights), _line(axis, 2))
 
 
 def face_rule(name: str) -> Rule:
@@ -245,10 +252,3 @@ def simplex_rule(dim: int, degree: int) -> Rule:
         raise ValueError(f"no exact tetrahedron rule of degree {degree}")
     points, weights = get_quadrature((RefLine, RefTri, RefTet)[dim - 1], max(degree, 1))
     return points.T.copy(), weights.copy()
-
-
-def product_rule(first: Rule, second: Rule) -> Rule:
-    """The product of two rules, the first one fastest."""
-    (p, v), (q, w) = first, second
-    points = [np.concatenate([a, b]) for b in q for a in p]
-    return np.array(points), np.outer(w, v).ravel()

@@ -21,7 +21,7 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.cells.catalogue import BY_NAME, CellType
-from ...lac.cells.shape import Rule, product_rule, simplex_rule
+from ...lac.cells.shape import Rule, conical_rule, product_rule, simplex_rule
 from ...lac.threads import prefetch
 
 # degree along each part of the cell: (linear, quadratic)
@@ -52,23 +52,12 @@ def volume_rule(name: str, straight: bool = True) -> Rule:
     if shape == "PENTA":
         return product_rule(simplex_rule(2, degrees[0]), simplex_rule(1, degrees[1]))
     if shape == "PYRA":
-        return _conical(*degrees)
+        return conical_rule(*degrees)
     line = simplex_rule(1, degrees[0])
     rule = line
     for _ in range(BY_NAME[name].dim - 1):
         rule = product_rule(rule, line)
     return rule
-
-
-def _conical(base: int, axis: int) -> Rule:
-    """`base` Gauss points each way over the square, `axis` Gauss–Jacobi points to the apex."""
-    from scipy.special import roots_jacobi
-
-    x, u = np.polynomial.legendre.leggauss(base)
-    t, v = roots_jacobi(axis, 2, 0)  # weight (1 − t)²: the shrinking cross-section
-    z = (t + 1) / 2
-    points = [[a * (1 - h), b * (1 - h), h] for h in z for b in x for a in x]
-    return np.array(points), np.einsum("k,j,i->kji", v / 8, u, u).ravel()
 
 
 @dataclass(frozen=True)

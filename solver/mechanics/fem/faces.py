@@ -1,13 +1,20 @@
 """Faces of a group on the boundary of the bodies, with the one cell behind each; means on them."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import meshio
 import numpy as np
 
 from ...lac.cells.catalogue import BY_MESHIO, CellType, cell_type
-from ...lac.cells.faces import FACE_POINTS, FaceBlock, SlaveFaces, surface_points, surface_vectors
+from ...lac.cells.faces import (
+    FACE_POINTS,
+    FaceBlock,
+    SlaveFaces,
+    corner_sets,
+    surface_points,
+    surface_vectors,
+)
 from ...lac.cells.shape import face_rule
 from ...lac.threads import prefetch
 
@@ -66,30 +73,6 @@ def _group_faces(mesh: meshio.Mesh, group: str) -> list[np.ndarray]:
         if kind.dim == dim - 1 and members is not None and len(members):
             found.append(block.data[np.asarray(members, dtype=int)][:, : kind.n_vertices])
     return found
-
-
-def corner_sets(faces: list[np.ndarray]) -> np.ndarray:
-    """Sorted corner nodes of faces as rows (n, 4), filled up with −1."""
-    rows = [np.full((len(f), 4), -1) for f in faces]
-    for row, face in zip(rows, faces, strict=True):
-        row[:, : face.shape[1]] = np.sort(face, axis=1)
-    return np.concatenate(rows) if rows else np.empty((0, 4), dtype=int)
-
-
-def outer_faces(mesh: meshio.Mesh) -> Iterator[tuple[str, np.ndarray]]:
-    """The faces that belong to one cell only, turned outward: (type, (n, nodes))."""
-    by_type: dict[str, list[np.ndarray]] = {}
-    for name, cells in volume_cells(mesh).items():
-        for face in cell_type(name).faces:
-            by_type.setdefault(face.type, []).append(cells[:, list(face.nodes)])
-    faces = {kind: np.concatenate(parts) for kind, parts in by_type.items()}
-    keys = corner_sets([nodes[:, : cell_type(kind).n_vertices] for kind, nodes in faces.items()])
-    _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-    alone = counts[inverse.ravel()] == 1
-    start = 0
-    for kind, nodes in faces.items():
-        yield kind, nodes[alone[start : start + len(nodes)]]
-        start += len(nodes)
 
 
 def _candidate_sides(mesh: meshio.Mesh, marked: np.ndarray) -> list[_Side]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...case.acting import Probe
 from ...lac.cells.catalogue import BY_NAME
-from ...lac.cells.faces import nodal_normals
+from ...lac.cells.faces import nodes_of, normals_of
 from ...lac.facets import tangents_of
 from ...mechanics.fem.locate import Located, locate
 from ...mechanics.fem.stress import nodal_stress, normal_stress
@@ -140,15 +140,13 @@ def _zone_result(
     step: StepResult,
 ) -> ZoneResult:
     surface = zone.operator.surface
-    slave_nodes, slave_normal = _nodal_normals(
-        scene, [(f.type.name, f.nodes) for f in zone.sub_faces]
-    )
-    master = [(b.type.name, b.nodes) for b in zone.master_faces]
-    master_nodes, master_normal = _nodal_normals(scene, master)
+    slave_nodes, master_nodes = nodes_of(zone.sub_faces), nodes_of(zone.master_faces)
+    slave_normal = normals_of(scene.points, zone.sub_faces)[slave_nodes]
+    master_normal = normals_of(scene.points, zone.master_faces)[master_nodes]
     return ZoneResult(
         name=zone.zone.name,
         faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
-        master_faces=master,
+        master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
         centre=surface.centre + scene.origin,
         normal=surface.normal,
         area=surface.area,
@@ -176,7 +174,7 @@ def _recovered_pressure(
     if field is None or field.name == "none":
         return None
     local, pressure = field.recovery.moments.local, state.pressure[zone.numbers]
-    nodes = np.unique(np.concatenate([f.nodes.ravel() for f in zone.sub_faces]))
+    nodes = nodes_of(zone.sub_faces)
     found = RecoveredPressure(
         form=field.name,
         coefficients=field.coefficients.reshape(len(pressure), -1),
@@ -202,15 +200,6 @@ def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
         return None
     closed = zone.at_nodes(state.status.closed.astype(float)) >= _HALF
     return NodalContact(nodes, zone.at_nodes(state.pressure), zone.at_nodes(state.gap), closed)
-
-
-def _nodal_normals(
-    scene: Scene, faces: list[tuple[str, np.ndarray]]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The nodes of a surface and its unit normals there, the mean over the faces around each."""
-    total = nodal_normals(scene.points, faces)
-    nodes = np.unique(np.concatenate([nodes.ravel() for _, nodes in faces]))
-    return nodes, total[nodes]
 
 
 def step_results(

@@ -10,7 +10,8 @@ import numpy as np
 from ...case.model import Case, Selection
 from ...case.rules import check_dimension
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
-from ...mechanics.fem.faces import corner_sets
+from ...lac.cells.faces import outer_faces
+from ...mechanics.fem.faces import volume_cells
 from ...system.errors import InputError, hint
 from .groups import ALL, with_cells
 from .rigid import with_rigid_surfaces
@@ -144,26 +145,16 @@ _OUTER = "\n"
 
 def _with_outer_faces(mesh: meshio.Mesh) -> meshio.Mesh:
     """The mesh with all faces that one volume cell alone has, in the group `_OUTER`."""
-    found: dict[str, list[np.ndarray]] = {}
-    for block in mesh.cells:
-        kind = BY_MESHIO[block.type]
-        for face in kind.faces if kind.dim == mesh.points.shape[1] else ():
-            found.setdefault(BY_NAME[face.type].meshio, []).append(block.data[:, face.nodes])
-    faces = {name: np.concatenate(parts) for name, parts in found.items()}
-    corners = corner_sets([f[:, : BY_MESHIO[name].n_vertices] for name, f in faces.items()])
-    _, label, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
-    alone, first = (count == 1)[label.ravel()], 0
     cells = {block.type: block.data for block in mesh.cells}
     sets = {name: list(parts) for name, parts in mesh.cell_sets.items()}
     outer = {name: np.empty(0, dtype=int) for name in cells}
-    for name, nodes in faces.items():
-        kept = nodes[alone[first : first + len(nodes)]]
-        first += len(nodes)
+    for kind, nodes in outer_faces(volume_cells(mesh)):
+        name = BY_NAME[kind].meshio
         if name not in cells:
             cells[name] = np.empty((0, nodes.shape[1]), dtype=nodes.dtype)
             for parts in sets.values():
                 parts.append(np.empty(0, dtype=int))
-        cells[name], outer[name] = _put(cells[name], kept)
+        cells[name], outer[name] = _put(cells[name], nodes)
     sets[_OUTER] = list(outer.values())
     return meshio.Mesh(mesh.points, list(cells.items()), cell_sets=sets, point_sets=mesh.point_sets)
 
