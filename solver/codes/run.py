@@ -1,9 +1,7 @@
 """Other codes as plug-ins, and their runs on a case, with a limit of time and of memory.
 
-A code is a folder with `code.yaml`, its commands, or `code.py`, one class.
-
-The folder's name is the code's name. The codes of this program (`kratos`, `ngsolve`, `getfem`) and
-those of users have the same form. `code.yaml`:
+A code is a folder, by whose name it is called, with a file of commands. The codes of this program
+(`kratos`, `ngsolve`, `getfem`) and those of users have the same form. `code.yaml`:
 
     command: ["{python}", "{code}/toy.py"]   # run in a folder that holds the input
     version: "1.0"                           # or a command that prints it
@@ -15,7 +13,6 @@ those of users have the same form. `code.yaml`:
     gave_up: "no convergence"                # a regular expression, of what it prints then
 """
 
-import importlib.util
 import re
 import shutil
 import sys
@@ -24,7 +21,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
 import meshio
 import numpy as np
@@ -41,16 +38,15 @@ from ..system.progress import now
 from ..verification.verdict import CRASHED, FAILED, REFUSED, Verdict, write_verdict
 from .compared import CHECKED_BY
 from .deck import Deck, UnsupportedError, deck_of
-from .files.map import CODE, Names, ResultMap
+from .files.map import CODE, Names
 from .files.read import read_result_files
 from .foreign import ForeignResult
 from .verdicts import LOG, VERDICT, store, without_foreign
 
-FILE, _CLASS = "code.yaml", "code.py"
+FILE = "code.yaml"
 _PROJECT = Path(__file__).resolve().parents[2]
 # How far from the middle of its edge, over the size of the mesh, a node is still in the middle.
 _STRAIGHT = 1e-9
-_NEEDED = ("layer", "install", "gave_up", "settings", "version", "write", "command", "read")
 
 
 class PluginFile(Section, frozen=True):
@@ -106,7 +102,7 @@ _HAS: dict[str, Callable[[Deck], bool]] = {
 class PluginCode:
     """A code whose commands are written down; `base` writes its input."""
 
-    def __init__(self, folder: Path, file: PluginFile, base: Any):
+    def __init__(self, folder: Path, file: PluginFile, base: "Code"):
         self.name, self.folder, self.file, self.base = folder.resolve().name, folder, file, base
         self.layer, self.install = file.layer or base.layer, file.install
         self.gave_up = file.gave_up or base.gave_up
@@ -146,27 +142,22 @@ class PluginCode:
         """Its files of results, or the files of the code whose input it takes."""
         if self.file.results is None:
             return replace(self.base.read(deck, folder), code=self.name)
-        mapping = ResultMap()
-        if self.file.map:
-            mapping = read_as(ResultMap, read_mapping(self.file.map), self.file.map)
         files = [folder / name for name in self.file.results]
         try:
-            return read_result_files(files, mapping, self.file.map or "", self.name)
+            return read_result_files(files, self.file.map, self.name)
         except InputError as error:
             raise SolveError(f"its results: {error}") from None
 
 
-def plugin(folder: Path, find: Any) -> Any:
-    """The code in a folder. `find` gives the code whose input it takes, by name.
+def plugin(folder: Path) -> PluginCode:
+    """The code in a folder.
 
-    Raises InputError for a folder that holds none, and for a file or class that does not fit.
+    Raises InputError for a folder that holds none, and for a file that does not fit.
     """
     if not re.fullmatch(CODE, name := folder.resolve().name):
         raise InputError(folder, "name", name, "must be letters, digits, -, _ and .")
-    if (path := folder / _CLASS).is_file():
-        return _of_class(path)
     if not (path := folder / FILE).is_file():
-        raise InputError(folder, "code", None, f"a folder with {FILE} or {_CLASS} is needed")
+        raise InputError(folder, "code", None, f"a folder with {FILE} is needed")
     file = read_as(PluginFile, read_mapping(path), path)
     try:
         re.compile(file.gave_up)
@@ -175,23 +166,6 @@ def plugin(folder: Path, find: Any) -> Any:
             path, "gave_up", file.gave_up, f"must be a regular expression: {error}"
         ) from None
     return PluginCode(folder, file, find(file.input))
-
-
-def _of_class(path: Path) -> Any:
-    """The class `Code` of a file, which needs what the protocol `Code` lists."""
-    spec = importlib.util.spec_from_file_location(f"own_code_{path.parent.name}", path)
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-        code = module.Code()
-    except Exception as error:  # noqa: BLE001 -- it is the user's
-        raise InputError(path, "Code", None, f"{type(error).__name__}: {error}") from None
-    code.name = path.resolve().parent.name
-    if missing := [name for name in _NEEDED if not hasattr(code, name)]:
-        raise InputError(path, "Code", None, f"it has no {', '.join(missing)}")
-    return code
 
 
 # The folders of plug-ins.
@@ -242,8 +216,7 @@ def names() -> list[str]:
 def find(name: str) -> Code:
     """The code of a name, or in a folder of the user; InputError for an unknown name."""
     if name in _PLUGINS or "/" in name or Path(name).is_dir():
-        found: Code = plugin(_PLUGINS.get(name, Path(name)), find)
-        return found
+        return plugin(_PLUGINS.get(name, Path(name)))
     if name not in _CODES:
         raise InputError("--code", "name", name, f"unknown; {hint(name, names())}")
     module, kind = _CODES[name]
@@ -311,7 +284,7 @@ def run_case(
             # What a code does not write is no fault of the result.
             only = [name for name in CHECKED_BY if getattr(found, name) is not None]
             return store(case, found, folder, mesh, only or None)
-        except Exception as error:  # noqa: BLE001 -- a user's own class may raise anything
+        except Exception as error:  # noqa: BLE001 -- a result of the user's may be anything
             known = [word for kind, word in _WORDS.items() if isinstance(error, kind)]
             verdict = without_foreign(
                 case,

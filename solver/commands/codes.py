@@ -109,20 +109,14 @@ def add_check_result(command: argparse.ArgumentParser) -> None:
 
 def run_check_result(options: argparse.Namespace) -> int:
     from ..case.reader import load_case
-    from ..case.typed import read_as
-    from ..case.yaml import read_mapping
-    from ..codes.files.map import ResultMap
     from ..codes.files.read import read_result_files
     from ..codes.verdicts import check_foreign, folder_of, store
     from ..mesh import read_mesh
     from ..verification.verdict import to_json
 
     case = load_case(case_file(options.case)).as_solved(options.swap)
-    mapping = ResultMap()
-    if options.map:
-        mapping = read_as(ResultMap, read_mapping(options.map), options.map)
     only = _fields(options.only)
-    foreign = read_result_files(options.results, mapping, options.map, options.code)
+    foreign = read_result_files(options.results, options.map, options.code)
     mesh = read_mesh(options.mesh) if options.mesh else None
     if options.output:
         verdict = store(case, foreign, folder_of(options.output, case, foreign.code), mesh, only)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy.io import netcdf_file
 
-from solver.case.typed import read_as
-from solver.codes.files.map import ResultMap
 from solver.codes.files.read import read_raw, read_result_files
 from solver.codes.placing import flattened
 from solver.codes.verdicts import check_foreign
@@ -69,8 +67,9 @@ def test_med(answer, tmp_path, capsys):
         folder = med["CHA/RESU____DEPL"]
         names = b"".join(name.ljust(16) for name in (b"DX", b"DY", b"LAGS_C"))
         folder.attrs["NOM"] = np.bytes_(names)
-    names = {"fields": {"displacement": {"name": ["RESU____DEPL DX", "RESU____DEPL DY"]}}}
-    found = read_result_files([file], read_as(ResultMap, names, file), file)
+    names = tmp_path / "map.yaml"
+    names.write_text("fields: {displacement: {name: [RESU____DEPL DX, RESU____DEPL DY]}}")
+    found = read_result_files([file], names)
     assert found.code == "code_aster"
     assert np.allclose(found.displacement.values, answer.displacement)
     assert np.nanmax(found.pressure.values) == 25.0
@@ -98,8 +97,8 @@ def test_a_scalar_with_a_component_in_the_map(answer, tmp_path):
     meshio.med.write(file, meshio.Mesh(answer.points, answer.cells, point_data=data))
     with h5py.File(file, "r+") as med:
         med["CHA/LAGR"].attrs["NOM"] = np.bytes_(b"LAGS_C".ljust(16))
-    names = {"fields": {"pressure": {"name": "LAGR"}}}
-    found = read_result_files([file], read_as(ResultMap, names, file), file)
+    (tmp_path / "map.yaml").write_text("fields: {pressure: {name: LAGR}}")
+    found = read_result_files([file], tmp_path / "map.yaml")
     assert found.pressure.values.max() == 25.0
 
 
@@ -275,8 +274,8 @@ def test_a_map_that_does_not_fit_is_refused(text, tmp_path, capsys):
 def test_a_map_names_the_columns_of_a_table(tmp_path):
     table = tmp_path / "a.csv"
     table.write_text("0 0 1 2\n1 0 3 4\n", encoding="utf-8")
-    mapping = read_as(ResultMap, {"columns": ["x", "y", "ux", "uy"], "length": 10.0}, table)
-    found = read_result_files([table], mapping)
+    (tmp_path / "map.yaml").write_text("columns: [x, y, ux, uy]\nlength: 10.0\n")
+    found = read_result_files([table], tmp_path / "map.yaml")
     assert found.displacement.values.tolist() == [[10.0, 20.0], [30.0, 40.0]]
     assert found.displacement.places.tolist() == [[0.0, 0.0], [10.0, 0.0]]
     with pytest.raises(InputError, match="no such file"):

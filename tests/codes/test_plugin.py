@@ -1,7 +1,6 @@
-"""A user's own code: a folder with commands or a class; the toy code of the documentation."""
+"""A user's own code: a folder with commands; the toy code of the documentation."""
 
 import json
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -51,15 +50,6 @@ def test_the_toy_of_the_documentation(tmp_path):
 def test_the_toy_has_no_quadratic_cells(tmp_path):
     verdict = run_case(find(str(TOY)), *case_of("QUAD8", "QUAD8"), tmp_path, Limits())
     assert (verdict.verdict, "KeyError: 'QUAD8'" in verdict.reason) == ("crashed", True)
-
-
-def test_the_class_of_the_documentation(tmp_path):
-    """The page's second example: a class that takes the place of commands."""
-    text = PAGE.read_text().split("```python\n")[1].split("```")[0]
-    folder = write(tmp_path, text, "mycode", "code.py")
-    shutil.copy(TOY / "toy.py", folder)
-    verdict = run_case(find(str(folder)), *matching("QUAD4", "QUAD4"), tmp_path / "out", Limits())
-    assert (verdict.verdict, verdict.code, verdict.code_version) == ("passed", "mycode", "1.0")
 
 
 @pytest.mark.parametrize(
@@ -137,9 +127,7 @@ def test_the_plain_input_balances(tmp_path):
         (FILE + "input: abaqus\n", "code.yaml", "input = 'abaqus': must be plain, calculix"),
         (FILE + "lacks: {friction: no}\n", "code.yaml", "lacks.friction"),
         (FILE + "gave_up: '('\n", "code.yaml", "gave_up = '(': must be a regular expression"),
-        ("class Code:\n    layer = False\n", "code.py", "Code: it has no install, gave_up"),
-        ("raise OSError('no licence')", "code.py", "Code: OSError: no licence"),
-        ("", "other.txt", "code: a folder with code.yaml or code.py is needed"),
+        ("", "other.txt", "code: a folder with code.yaml is needed"),
     ],
 )
 def test_what_is_refused(tmp_path, text, file, message):

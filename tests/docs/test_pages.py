@@ -59,9 +59,9 @@ def test_links_lead_to_files_and_headings(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_sources_that_pages_name_exist(page):
-    """By their path, in `docs/design/` by their name too; `code.py` is the user's own."""
+    """By their path, in `docs/design/` by their name too."""
     text = page.read_text(encoding="utf-8")
-    for name in set(re.findall(r"`([\w/-]+\.py)`", text)) - {"code.py"}:
+    for name in set(re.findall(r"`([\w/-]+\.py)`", text)):
         assert list(ROOT.glob(name) if "/" in name else (ROOT / "solver").rglob(name)), name
 
 

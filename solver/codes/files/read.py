@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import meshio
 import numpy as np
 
+from ...case.typed import read_as
+from ...case.yaml import read_mapping
 from ...mechanics.fem.stress import COMPONENTS
 from ...mesh.files.formats import read_apart
 from ...system.errors import InputError, hint
@@ -209,23 +211,23 @@ _READERS = {
     ".tab": ("tables", "read"),
 }
 QUANTITIES = ("displacement", "stress", "pressure", "gap")
-_NO_MAP = ResultMap()
 
 
 def read_result_files(
-    files: Sequence[Path], mapping: ResultMap = _NO_MAP, where: object = "", code: str = ""
+    files: Sequence[Path], names: Path | None = None, code: str = ""
 ) -> ForeignResult:
-    """What the files hold, each quantity once; `where` is the file of the map.
+    """What the files hold, each quantity once; `names` is the file of a map.
 
     Raises InputError for files that cannot be read, for a quantity that two fields may be, and for
     files without any.
     """
+    mapping = read_as(ResultMap, read_mapping(names), names) if names else ResultMap()
     raws = [(file, read_raw(file, mapping.columns)) for file in files]
     mesh = next((raw.mesh for _, raw in raws if raw.mesh is not None), None)
     found: dict[str, Field] = {}
     for file, raw in raws:
         for quantity in QUANTITIES:
-            field = _field(file, raw, quantity, mapping, where)
+            field = _field(file, raw, quantity, mapping, names)
             if field is None:
                 continue
             if quantity in found:
