@@ -18,7 +18,7 @@ an edge of the body along it, its corners and the nodes of curved sides stay, an
 the vertices they lie between.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import meshio
@@ -213,28 +213,26 @@ def _rotate(mesh: meshio.Mesh, turn: float | Rotation) -> meshio.Mesh:
     if mesh.points.shape[1] == 2:
         if isinstance(turn, Rotation):
             raise FieldError((), "must be a number in 2D: the angle in degrees")
-        cos, sin = _cos_sin(turn)
-        return _moved(mesh, mesh.points @ np.array([[cos, sin], [-sin, cos]]))
+        return _moved(mesh, mesh.points @ rotation(2, turn).T)
     if not isinstance(turn, Rotation):
         raise FieldError((), "must be {axis: [x, y, z], angle: degrees} in 3D", value=turn)
-    length = np.linalg.norm(turn.axis)
-    if length == 0:
+    if not any(turn.axis):
         raise FieldError(("axis",), "must not be zero", value=list(turn.axis))
-    cos, sin = _cos_sin(turn.angle)
-    axis = np.array(turn.axis) / length
-    # Rodrigues' formula.
-    across = np.cross(axis, mesh.points)
-    along = np.outer(mesh.points @ axis, axis)
-    return _moved(mesh, mesh.points * cos + across * sin + along * (1 - cos))
+    return _moved(mesh, mesh.points @ rotation(3, turn.angle, turn.axis).T)
 
 
-def _cos_sin(degrees: float) -> tuple[float, float]:
-    """Cosine and sine, exact for quarter turns."""
+def rotation(dim: int, degrees: float, axis: Sequence[float] = (0.0, 0.0, 1.0)) -> np.ndarray:
+    """The rotation (dim, dim) by an angle; in 3D about an axis, by Rodrigues' formula.
+
+    Quarter turns about the axes are exact.
+    """
     quarters, rest = divmod(degrees, 90)
     cos, sin = float(np.cos(np.radians(rest))), float(np.sin(np.radians(rest)))
     for _ in range(int(quarters) % 4):
         cos, sin = -sin, cos
-    return cos, sin
+    unit = np.array([0.0, 0.0, 1.0]) if dim == 2 else np.asarray(axis) / np.linalg.norm(axis)
+    whole = cos * np.eye(3) + sin * np.cross(np.eye(3), unit) + (1 - cos) * np.outer(unit, unit)
+    return whole[:dim, :dim]
 
 
 def _renumber(mesh: meshio.Mesh, seed: int | Renumbering) -> meshio.Mesh:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,10 @@ import h5py
 import meshio
 import numpy as np
 
-from ...lac.cells.catalogue import BY_NAME
 from ...mesh.files import med
+from ...mesh.files.vtkhdf import read_cells
 from ...system.errors import InputError
 from .raw import Raw, RawField, at_cells, at_nodes, plain_mesh
-
-_BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
 
 
 def read_vtu(path: Path) -> Raw:
@@ -46,20 +43,7 @@ def read_vtkhdf(path: Path) -> Raw:
             raise InputError(path, "grid", None, "not an unstructured grid of VTKHDF")
         if len(group["NumberOfPoints"]) != 1:
             raise InputError(path, "grid", None, "must be one piece at one time")
-        offsets, types = group["Offsets"][()], group["Types"][()]
-        nodes = group["Connectivity"][()]
-        if not set(types.tolist()) <= set(_BY_VTK):
-            unknown = min(set(types.tolist()) - set(_BY_VTK))
-            raise InputError(path, "cell type", int(unknown), f"allowed: {', '.join(BY_NAME)}")
-        breaks = [0, *(np.flatnonzero(np.diff(types)) + 1).tolist(), len(types)]
-        pieces = list(pairwise(breaks))
-        cells = [
-            (
-                _BY_VTK[int(types[start])].meshio,
-                nodes[offsets[start] : offsets[stop]].reshape(stop - start, -1),
-            )
-            for start, stop in pieces
-        ]
+        cells, pieces = read_cells(group)
         mesh = plain_mesh(group["Points"][()], cells)
         fields = {n: at_nodes(mesh.points, d[()]) for n, d in group.get("PointData", {}).items()}
         for name, data in group.get("CellData", {}).items():

@@ -106,11 +106,16 @@ def write_grid(
     _write_groups(group.parent.create_group(_GROUPS), mesh)
 
 
-def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
-    """The mesh of a grid that `write_grid` wrote, its point data and its cell data."""
-    dim = int(group.attrs["Dimension"])
+def read_cells(group: h5py.Group) -> tuple[list[tuple[str, np.ndarray]], list[tuple[int, int]]]:
+    """The blocks of cells (meshio's type, nodes) of a grid, and the first and last of each.
+
+    Raises InputError for a type that the catalogue has not.
+    """
     offsets, types = group["Offsets"][()], group["Types"][()]
     connectivity = group["Connectivity"][()]
+    if unknown := set(types.tolist()) - set(_BY_VTK):
+        allowed = f"allowed: {', '.join(BY_NAME)}"
+        raise InputError(group.file.filename, "cell type", min(unknown), allowed)
     breaks = np.flatnonzero(np.diff(types)) + 1
     bounds = list(pairwise([0, *breaks.tolist(), len(types)]))
     cells = []
@@ -118,6 +123,13 @@ def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
         cell = _BY_VTK[int(types[start])]
         nodes = connectivity[offsets[start] : offsets[stop]].reshape(-1, cell.n_nodes)
         cells.append((cell.meshio, nodes))
+    return cells, bounds
+
+
+def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
+    """The mesh of a grid that `write_grid` wrote, its point data and its cell data."""
+    dim = int(group.attrs["Dimension"])
+    cells, bounds = read_cells(group)
     cell_sets, point_sets = {}, {}
     groups = group.parent[_GROUPS]
     for name, numbers in groups["cells"].items():

@@ -27,6 +27,7 @@ from ...mechanics.fem.faces import FaceError, boundary_faces, volume_cells
 from ...mechanics.fem.loads import Field, at_nodes, foundation
 from ...mechanics.fem.supports import Copies
 from ...mechanics.mortar.treatments import TREATMENTS
+from ...mesh.transforms import rotation
 from ...system.errors import InputError
 from .groups import ALL
 
@@ -247,7 +248,7 @@ def copies_of(groups: CutGroups) -> dict[str, Copies]:
             continue
         key = f"supports[{i}].cyclic"
         of, copy = groups.nodes(given.of, f"{key}.of"), groups.nodes(support.group, key)
-        turn = np.eye(dim) if given.angle is None else _turn(dim, given.angle, given.axis)
+        turn = rotation(dim, given.angle or 0.0, given.axis)
         image = points[of] @ turn.T + (given.shift or np.zeros(dim))
         # Both surfaces of an interface are at the same place: bodies are apart by a further axis.
         apart = [np.c_[x, extent * groups.body[n]] for x, n in ((image, of), (points[copy], copy))]
@@ -260,17 +261,6 @@ def copies_of(groups: CutGroups) -> dict[str, Copies]:
             raise InputError(groups.case.path, key, support.group, allowed)
         found[key] = Copies(of, copy[nearest], turn)
     return found
-
-
-def _turn(dim: int, degrees: float, axis: Sequence[float]) -> np.ndarray:
-    """The rotation (dim, dim) by an angle, in 3D about an axis (Rodrigues' formula)."""
-    angle = np.radians(degrees)
-    if dim == 2:
-        axis = (0.0, 0.0, 1.0)
-    unit = np.asarray(axis) / np.linalg.norm(axis)
-    across = np.cross(np.eye(3), unit)
-    whole = np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
-    return whole[:dim, :dim]
 
 
 def springs_of(groups: CutGroups) -> sparse.csr_matrix:

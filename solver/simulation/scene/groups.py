@@ -93,6 +93,17 @@ def with_cells(mesh: meshio.Mesh, wanted: Sequence[np.ndarray]) -> meshio.Mesh:
     return meshio.Mesh(mesh.points, cells, cell_sets=sets, point_sets=mesh.point_sets)
 
 
+def nodes_of_volumes(mesh: meshio.Mesh, group: str | None = None) -> np.ndarray:
+    """The nodes (n,) of volume cells, of one group or all."""
+    touched = np.zeros(len(mesh.points), dtype=bool)
+    members = mesh.cell_sets.get(group, [[]] * len(mesh.cells)) if group else None
+    for i, block in enumerate(mesh.cells):
+        if BY_MESHIO[block.type].dim == mesh.points.shape[1]:
+            data = block.data if members is None else block.data[np.asarray(members[i], int)]
+            touched[data.ravel()] = True
+    return touched
+
+
 def _named(case: Case) -> set[str]:
     """All groups that a case names."""
     sides = [side for zone in case.zones for side in (zone.slave, zone.master)]

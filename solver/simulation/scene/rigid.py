@@ -12,12 +12,13 @@ import numpy as np
 from ...case.model import Case
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...lac.cells.faces import normals_of
-from ...mechanics.fem.faces import FaceError, boundary_faces, volume_cells
+from ...mechanics.fem.faces import FaceError, boundary_faces
 from ...mechanics.fem.layer import layer, turned
 from ...mechanics.fem.supports import SAME, Fixed
 from ...mechanics.mortar.quadric import Quadric, ball, cylinder, parabola, plane
 from ...system.errors import InputError
 from .cut_groups import CutGroups
+from .groups import nodes_of_volumes
 
 _SHAPES: dict[str, Callable[..., Quadric]] = {
     "plane": plane,
@@ -49,7 +50,7 @@ def with_rigid_surfaces(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
     on the surface, behind it, opposite to the middle of the slave, and as large. A group of faces
     without cells behind them gets a thin layer. All other faces without cells are left out.
     """
-    attached = _attached(mesh)
+    attached = nodes_of_volumes(mesh)
     for name, body in case.rigid.items():
         if body.surface:
             mesh = _with_simplex(case, mesh, name)
@@ -58,17 +59,9 @@ def with_rigid_surfaces(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
     return mesh if attached.all() else _without_loose(mesh)
 
 
-def _attached(mesh: meshio.Mesh) -> np.ndarray:
-    """The nodes (n,) of volume cells."""
-    found = np.zeros(len(mesh.points), dtype=bool)
-    for cells in volume_cells(mesh).values():
-        found[cells.ravel()] = True
-    return found
-
-
 def _without_loose(mesh: meshio.Mesh) -> meshio.Mesh:
     """The mesh without the nodes of no volume cell, and the faces and edges on them."""
-    attached = _attached(mesh)
+    attached = nodes_of_volumes(mesh)
     new = np.cumsum(attached) - 1
     kept = [attached[block.data].all(axis=1) for block in mesh.cells]
     place = [np.cumsum(k) - 1 for k in kept]

@@ -13,7 +13,7 @@ from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...lac.cells.faces import outer_faces
 from ...mechanics.fem.faces import volume_cells
 from ...system.errors import InputError, hint
-from .groups import ALL, with_cells
+from .groups import ALL, nodes_of_volumes, with_cells
 from .rigid import with_rigid_surfaces
 
 # A node is at a place where it is nearer than this share of the mesh's extent.
@@ -105,7 +105,7 @@ def _near(case: Case, mesh: meshio.Mesh, selection: Selection) -> np.ndarray:
         distance = np.linalg.norm(points - np.array(values), axis=1)
         near = distance <= small
         _refuse_other_than_one(case, mesh, selection, near, distance)
-    return near & _touched(mesh)
+    return near & nodes_of_volumes(mesh)
 
 
 def _refuse_other_than_one(
@@ -121,22 +121,11 @@ def _refuse_other_than_one(
     raise InputError(case.path, selection.key, list(selection.values), allowed)
 
 
-def _touched(mesh: meshio.Mesh, group: str | None = None) -> np.ndarray:
-    """The nodes (n,) of volume cells, of one group or all."""
-    touched = np.zeros(len(mesh.points), dtype=bool)
-    members = mesh.cell_sets.get(group, [[]] * len(mesh.cells)) if group else None
-    for i, block in enumerate(mesh.cells):
-        if BY_MESHIO[block.type].dim == mesh.points.shape[1]:
-            data = block.data if members is None else block.data[np.asarray(members[i], int)]
-            touched[data.ravel()] = True
-    return touched
-
-
 def _within(mesh: meshio.Mesh, groups: tuple[str, ...]) -> np.ndarray:
     """The nodes (n,) of the volume cells of any of the groups; all nodes without groups."""
     if not groups:
         return np.ones(len(mesh.points), dtype=bool)
-    return np.logical_or.reduce([_touched(mesh, group) for group in groups])
+    return np.logical_or.reduce([nodes_of_volumes(mesh, group) for group in groups])
 
 
 # No group of a mesh file has a name that is not printable.
