@@ -242,8 +242,7 @@ _STEP = "a factor from 0 to 1e30, or a mapping of names to factors"
 _Step = Annotated[_Factor | _Factors, Meta(description=_STEP)]
 _Tolerance = Annotated[float, Meta(gt=0, description="a positive number")]
 _TOLERANCE = (
-    "a positive number of at most 1, or a mapping of checks (`all`: the relative ones) to such "
-    "numbers"
+    "a positive number below 1, or a mapping of checks (`all`: the relative ones) to such numbers"
 )
 _OUT_OF_SCOPE = {
     "the coefficient of friction is the key friction of a contact zone": (

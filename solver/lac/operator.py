@@ -287,6 +287,8 @@ def without_round_off(rows: sparse.csr_matrix) -> sparse.csr_matrix:
     [[2.0, 0.0, 0.001]]
     """
     found = rows.copy()
+    if not found.nnz:
+        return found
     largest = abs(found).max(axis=1).toarray().ravel()
     found.data[np.abs(found.data) <= _ROUND_OFF * np.repeat(largest, np.diff(found.indptr))] = 0.0
     found.eliminate_zeros()

@@ -99,6 +99,15 @@ def test_the_cone_programs_find_the_state_of_the_search(monkeypatch):
     np.testing.assert_allclose(slow.displacement, quick.displacement, atol=1e-11)
 
 
+@pytest.mark.parametrize("along", [0.0, 1e-14])
+def test_the_cone_programs_settle_no_bounds_of_a_force_that_nothing_balances(along):
+    """Pressed by 2 and pulled by 5, μ = 0.1, and no stiffness along the face."""
+    of, friction = np.array([0]), np.array([0.1])
+    start = np.array([2.0, 5.0])
+    *_, settled = coulomb_by_cones(np.diag([1.0, along]), start, friction, of, 1)
+    assert not settled
+
+
 def test_recovery_raises_the_order_of_friction():
     """Sliding waves: constants have order 2, a recovered pressure and its friction more than 3."""
     found = {}
@@ -239,3 +248,8 @@ def test_what_friction_does_not_do_is_refused_by_name(change, key, why):
         solved(plate(0.3, 0.05, change=lambda text: text.replace(*change)))
     assert key in str(refused.value)
     assert why in str(refused.value)
+
+
+def test_contact_between_bodies_that_are_held_whole_is_refused():
+    with pytest.raises(InputError, match="supports: .* have no free unknown of their own"):
+        solved(plate(0.3, change=lambda text: text.replace("group: base,", "group: all,")))

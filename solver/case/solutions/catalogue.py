@@ -90,6 +90,10 @@ def build(
     return Meridian(solution) if known.axisymmetric else solution
 
 
+# Powers of smaller or larger numbers leave the range of double precision.
+_SMALLEST = 1e-30
+
+
 class _ParameterReader:
     """Turns what a case file gives for a parameter, or what the case knows, into a value."""
 
@@ -117,8 +121,10 @@ class _ParameterReader:
         return self.number(name, given)
 
     def number(self, name: str, given: Any) -> float:
-        if isinstance(given, bool) or not isinstance(given, int | float):
-            raise InputError(self.known.where, f"{self.key}.{name}", given, "must be a number")
+        fits = isinstance(given, int | float) and not isinstance(given, bool)
+        if not fits or not (given == 0 or _SMALLEST <= abs(given) <= 1 / _SMALLEST):
+            allowed = f"must be a number: 0, or from {_SMALLEST:g} to {1 / _SMALLEST:g} in size"
+            raise InputError(self.known.where, f"{self.key}.{name}", given, allowed)
         return float(given)
 
     def numbers(self, name: str, given: Any) -> tuple[float, ...]:

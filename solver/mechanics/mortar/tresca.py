@@ -19,7 +19,7 @@ _MOST, _SETTLED = 100, 1e-9
 def coulomb_by_cones(
     stiffness: np.ndarray, forces: np.ndarray, friction: np.ndarray, of: np.ndarray, k: int
 ) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Forces λ (r,), jumps z (r,), and whether the bounds settled.
+    """Forces λ (r,), jumps z (r,), and whether the bounds settled; they do not where none balance.
 
     `stiffness` S (r, r), `forces` λ₀ (r,): rows of m gaps, then of the slips of f macro-elements
     along the first of k tangents, and so on. `friction` μ (f,); `of` (f,): the gap each one has.
@@ -43,9 +43,13 @@ def coulomb_by_cones(
     whole[:r, :r] = s
     cones = _cones(m, f, k)
     bounds = friction * max(start[:m].mean(), 0.0)
+    z, found, settled = np.zeros(r), start, False
     for _ in range(_MOST):
         goal = np.concatenate([start, bounds])
-        z = _minimum(matrix(whole), matrix(goal), *cones)[:r]
+        try:
+            z = _minimum(matrix(whole), matrix(goal), *cones)[:r]
+        except ValueError:  # from inside CVXOPT: the program has no minimum
+            return found * size, z * size / unit, False
         found = start + s @ z
         fresh = friction * np.maximum(found[of], 0.0)
         settled = bool(np.abs(fresh - bounds).max(initial=0.0) <= _SETTLED)

@@ -107,6 +107,10 @@ def test_a_plane_state_fills_three_dimensions_but_is_not_around_an_axis():
         (TUBES.replace("bottom", "botom"), "reference.solution.inner = 'botom': must be a group"),
         (TUBES.replace("[20, 30, 40]", "[20, 30]"), "radii = (20.0, 30.0): must be three radii"),
         (TUBES.replace("[20, 30, 40]", "[20, a, 40]"), "radii[1] = 'a': must be a number"),
+        (
+            TUBES.replace("[20, 30, 40]", "[1.0e-300, 30, 40]"),
+            "radii[0] = 1e-300: must be a number: 0, or",
+        ),
         (TUBES.replace("[20, 30, 40]", "20"), "radii = 20: must be a list of numbers"),
         (TUBES.replace("[20, 30, 40]", "[20, 20, 40]"), "must be three radii that increase"),
         (TUBES.replace("radii: [20, 30, 40], ", ""), "radii: this parameter is needed: inner"),
