@@ -236,6 +236,12 @@ def test_what_is_refused(changes, said):
     assert said in str(refusal.value)
 
 
+def test_a_vector_of_the_plane_is_refused_in_space():
+    text = CASE.replace("plane: strain\n", "")
+    with pytest.raises(InputError, match="bodies.floor.plane.point = .* must have 3 components"):
+        simulate(parse_case(text, Path("case.yaml")), block_mesh("HEXA8", "HEXA8", (1, 1)))
+
+
 def test_moments_are_about_the_reference_point():
     solution = simulate(case(), block_mesh("QUAD4", "QUAD4", (1, 1)))
     assert judge(solution, []).forces[-1].name == "floor, about its reference point"

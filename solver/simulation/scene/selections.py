@@ -25,9 +25,9 @@ def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
 
     Raises InputError where one is empty.
     """
+    check_dimension(case, mesh.points.shape[1])
     if not case.selections:
         return with_rigid_surfaces(case, mesh)
-    check_dimension(case, mesh.points.shape[1])
     mesh = meshio.Mesh(
         mesh.points,
         [(block.type, block.data) for block in mesh.cells],
