@@ -273,6 +273,12 @@ def read_study(path: Path, level: str = FULL) -> Study:
     groups = [group for group in study.groups if getattr(group, level) is not None]
     if not groups:
         raise InputError(path, "groups", None, f"no group has a part `{level}`")
+    for group in groups:
+        known = [series.name for series in group.series]
+        for name in getattr(group, level).get("series", ()):
+            if name not in known:
+                key = f"groups.{group.name}.{level}.series"
+                raise InputError(path, key, name, f"no such series; {hint(str(name), known)}")
     return structs.replace(
         study, groups=tuple(_part(group, getattr(group, level)) for group in groups)
     )
@@ -287,10 +293,6 @@ def _part(group: StudyGroup, part: Vary) -> StudyGroup:
         for one in group.series
         if one.name in names
     )
-    if not series:
-        raise FieldError(
-            ("groups",), f"{group.name} has none of the series {', '.join(map(str, names))}"
-        )
     return structs.replace(group, vary=group.vary | vary, series=series)
 
 

@@ -67,6 +67,9 @@ def test_a_part_has_some_series_and_values(file):
     assert [p.name for g in quick.groups for p in quick.points(g)] == ["TRIA3/1"]
     with pytest.raises(InputError, match="no group has a part `large`"):
         read_study(file, "large")
+    file.write_text(TEXT.replace("series: [TRIA3]", "series: [TRIA4]"))
+    with pytest.raises(InputError, match=r"groups.one.quick.series = 'TRIA4': no such series; did"):
+        read_study(file, "quick")
 
 
 def test_mappings_are_merged_into_each_item_of_a_list():
