@@ -266,8 +266,8 @@ def read_study(path: Path, level: str = FULL) -> Study:
     study = read_as(Study, read_mapping(path), path)
     for axis, choices in study.axes.items():
         for name, choice in choices.items():
-            for group in choice.groups:
-                study.group(group, path, f"axes.{axis}.{name}.groups")
+            for wanted in choice.groups:
+                study.group(wanted, path, f"axes.{axis}.{name}.groups")
     if level == FULL:
         return study
     groups = [group for group in study.groups if getattr(group, level) is not None]
@@ -275,10 +275,10 @@ def read_study(path: Path, level: str = FULL) -> Study:
         raise InputError(path, "groups", None, f"no group has a part `{level}`")
     for group in groups:
         known = [series.name for series in group.series]
-        for name in getattr(group, level).get("series", ()):
-            if name not in known:
+        for wanted in getattr(group, level).get("series", ()):
+            if wanted not in known:
                 key = f"groups.{group.name}.{level}.series"
-                raise InputError(path, key, name, f"no such series; {hint(str(name), known)}")
+                raise InputError(path, key, wanted, f"no such series; {hint(str(wanted), known)}")
     return structs.replace(
         study, groups=tuple(_part(group, getattr(group, level)) for group in groups)
     )

@@ -251,5 +251,5 @@ def test_what_friction_does_not_do_is_refused_by_name(change, key, why):
 
 
 def test_contact_between_bodies_that_are_held_whole_is_refused():
-    with pytest.raises(InputError, match="supports: .* have no free unknown of their own"):
+    with pytest.raises(InputError, match=r"supports: .* have no free unknown of their own"):
         solved(plate(0.3, change=lambda text: text.replace("group: base,", "group: all,")))

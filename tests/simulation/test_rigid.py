@@ -238,7 +238,7 @@ def test_what_is_refused(changes, said):
 
 def test_a_vector_of_the_plane_is_refused_in_space():
     text = CASE.replace("plane: strain\n", "")
-    with pytest.raises(InputError, match="bodies.floor.plane.point = .* must have 3 components"):
+    with pytest.raises(InputError, match=r"bodies.floor.plane.point = .* must have 3 components"):
         simulate(parse_case(text, Path("case.yaml")), block_mesh("HEXA8", "HEXA8", (1, 1)))
 
 
