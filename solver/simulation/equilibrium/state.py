@@ -84,10 +84,8 @@ class Accuracy:
         if self.estimate <= 10.0**-LEAST_DIGITS:
             return ""
         cause = max(self.causes, key=lambda name: self.causes[name])
-        return (
-            f"rounding alone may change the result by {self.estimate:.0e} of itself: "
-            f"{_REASONS[cause]}"
-        )
+        share = f"{self.estimate:.0e} of itself" if self.estimate < 1 else "more than itself"
+        return f"rounding alone may change the result by {share}: {_REASONS[cause]}"
 
 
 def pressure_of_forces(gaps: sparse.csr_matrix, noise: np.ndarray) -> float:
