@@ -34,7 +34,11 @@ def run_report(options: argparse.Namespace) -> int:
     found = {file.parent for file in options.results.rglob("verdict.json")}
     run = found
     if options.asked:
-        run = {Path(line) for line in options.asked.read_text(encoding="utf-8").splitlines()}
+        lines = options.asked.read_text(encoding="utf-8", errors="replace").splitlines()
+        run = {Path(line) for line in lines}
+        if other := [folder for folder in run if not folder.is_relative_to(options.results)]:
+            allowed = f"each line must be a folder in {options.results}"
+            raise InputError(options.asked, "folder", str(min(other)), allowed)
         # What other codes made of a solve belongs to it.
         run |= {f for f in found if f.with_name(f.name.partition("@")[0]) in run}
     if not run:

@@ -357,3 +357,6 @@ def test_what_a_run_did_not_ask_for_is_older(tmp_path, capsys):
     )
     assert len(json.loads((tmp_path / "report" / "summary.json").read_text())) == 3
     assert main(command) == 1
+    (tmp_path / "run").write_bytes(b"\x89elsewhere\n")
+    assert main([*command, "--run", str(tmp_path / "run")]) == 2
+    assert "each line must be a folder in" in capsys.readouterr().err
