@@ -31,11 +31,11 @@ SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
 
 # The last lines of a run say how many passed and where the report is, also where nothing was to be
-# done; a report of failures is a failure.
+# done, but not of an older report where the run is refused; a report of failures is a failure.
 define RUN
 @mkdir -p .snakemake && touch .snakemake/begun; $(SNAKEMAKE) $(1); status=$$?; \
-test ! -f results/report/log || test results/report/log -nt .snakemake/begun \
-  || tail -n 1 results/report/log; \
+test $$status != 0 || test ! -f results/report/log \
+  || test results/report/log -nt .snakemake/begun || tail -n 1 results/report/log; \
 test $$status != 0 || ! test -s results/report/failures.txt || status=1; exit $$status
 endef
 

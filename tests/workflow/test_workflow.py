@@ -316,6 +316,9 @@ def test_settings_of_make(project):
     assert "solve tiny-a" not in chosen
     joined = make(project, "all-cases", dry, "CASES=my-cases", folder=project.parent)
     assert "solve good" in joined.stdout
+    older = project / "results/report/log"
+    older.parent.mkdir(parents=True, exist_ok=True)
+    older.write_text("All 3 solves passed.\n")
     for setting, told in [
         ("CASES=nowhere", f"{project}/nowhere: cases: no such folder"),
         ("CORES=0", "cores = 0: must be 1 or more"),
@@ -324,6 +327,7 @@ def test_settings_of_make(project):
         refused = make(project, "all-cases", setting)
         assert refused.returncode == 2
         assert told.replace(f"{project}/", "") in refused.stdout
+        assert "passed" not in refused.stdout
         assert "Error in" not in refused.stdout
         assert "Traceback" not in refused.stdout
 
