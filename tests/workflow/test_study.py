@@ -64,6 +64,12 @@ def test_a_wrong_level_is_refused(tmp_path):
     assert "'huge' is not one of" in refused.stdout
 
 
+def test_orders_of_no_family_are_refused(tmp_path):
+    refused = snakemake(new_project(tmp_path / "project"), "orders")
+    assert refused.returncode != 0
+    assert "orders: no family of this run has a file orders.yaml" in refused.stdout
+
+
 def write_ladder(project, least, levels):
     family = project / "cases" / "ladders"
     family.mkdir(exist_ok=True)

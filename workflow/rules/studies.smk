@@ -14,6 +14,8 @@ TARGETS["orders"] = sorted(
 @cache
 def studies(target):
     """The studies of a target by name, with their files."""
+    if not TARGETS[target]:
+        refuse(f"{target}: no family of this run has a file {target}.yaml")
     read = part("studies.description").read_study
     found = [(file, checked(read, Path(file), LEVEL)) for file in TARGETS[target]]
     return {study.name: (file, study) for file, study in found}
