@@ -262,19 +262,23 @@ class Search:
         problem.hold_across(None)
         rows = problem.constraints.eligible
         start = problem.equilibrium(self.step, rows, self.correction)
-        stiffness = problem.stiffness_of(rows)
+        stiffness, area = problem.stiffness_of(rows), problem.constraints.covered[rows]
         number = np.cumsum(rows) - 1
         there = rows[self.gaps]
-        found, jump, settled = coulomb_by_cones(
-            stiffness, start.pressure[rows], self.coefficient[there], number[self.gaps[there]], k
+        forces, jump, settled = coulomb_by_cones(
+            stiffness,
+            area * start.pressure[rows],
+            self.coefficient[there],
+            number[self.gaps[there]],
+            k,
         )
         if not settled:
             return None
-        forces, moved = np.zeros((2, len(rows)))
-        forces[rows], moved[rows] = found, jump
-        closed = problem.constraints.closable & (forces > 0)
-        far = np.linalg.norm(moved[self.rows], axis=0) / self.area
-        bound, traction = self._bounds(forces[self.gaps]), forces[self.rows].T
+        pressure, moved = np.zeros((2, len(rows)))
+        pressure[rows], moved[rows] = forces / area, jump
+        closed = problem.constraints.closable & (pressure > 0)
+        far = np.linalg.norm(moved[self.rows], axis=0)
+        bound, traction = self._bounds(pressure[self.gaps]), pressure[self.rows].T
         size = np.linalg.norm(traction, axis=1)
         slips = closed[self.gaps] & (far > 1e-7 * far.max(initial=0.0))
         slip = Slip(
