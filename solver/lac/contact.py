@@ -323,7 +323,7 @@ class _System:
         def change(force: np.ndarray) -> np.ndarray:
             return np.asarray(self.under(force).trial(closed).pressure - before)
 
-        return settled_means(before, np.zeros(len(self.force)), sweeps, loads.dot, change)
+        return settled_means(before, np.zeros(len(self.force)), sweeps, loads.dot, change)[0]
 
     def state(self, closed: np.ndarray, iterations: int) -> ContactState:
         """The state with these facets closed."""

@@ -205,27 +205,31 @@ def settled_means(
     sweeps: int,
     loads: Callable[[np.ndarray], np.ndarray],
     change: Callable[[np.ndarray], np.ndarray],
-) -> np.ndarray:
+) -> tuple[np.ndarray, float]:
     """The means (k,) whose reconstruction is applied in the last of the `sweeps`.
+
+    Also the largest change of a mean by the first sweep: a last one that changes more has diverged;
+    infinite where there is no other.
 
     `pressure` (k,) is the one under the loads `force` (n_dofs,) of a reconstruction; `loads` gives
     those of the reconstruction of any means, `change` by how much (k,) loads change the pressure.
 
     Here loads that are the means, and lower them by a third of their own, leave 3/4 of them:
 
-    >>> found = settled_means(np.ones(1), np.zeros(1), 3, lambda p: p, lambda f: -f / 3)
-    >>> found.round(12).tolist()
-    [0.75]
+    >>> found, first = settled_means(np.ones(1), np.zeros(1), 3, lambda p: p, lambda f: -f / 3)
+    >>> found.round(12).tolist(), round(first, 12)
+    ([0.75], 0.333333333333)
     """
-    last, left, moved = pressure, pressure, pressure
+    last, left, moved, first = pressure, pressure, pressure, np.inf
     for sweep in range(sweeps - 1):
         following = loads(pressure)
         last = last + change(following - force)
         before, left = left, last - pressure
+        first = first if sweep else float(np.abs(left).max(initial=0.0))
         step = _RELAXATION * left
         if sweep:
             fell = left - before
             share = np.linalg.lstsq(fell[:, None], left, rcond=None)[0]
             step -= share * (moved + _RELAXATION * fell)
         pressure, moved, force = pressure + step, step, following
-    return pressure
+    return pressure, first

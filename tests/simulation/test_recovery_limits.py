@@ -15,6 +15,7 @@ from solver.simulation.results.exact import computed_pressure
 from solver.simulation.results.solution import Solution
 from solver.simulation.simulate import simulate
 from solver.verification.norms import errors
+from solver.verification.run import mesh_of
 from tests.scenes import block_mesh
 from tests.simulation.test_balance import hertz
 from tests.simulation.test_recovery import blocks, solved, waves
@@ -142,6 +143,21 @@ def test_a_macro_element_covered_by_five_per_cent(form):
     # What the neighbours make of the others is of the size of what varies among these.
     whole = zone.coverage > 0.99
     assert np.abs(zone.multiplier - plain.multiplier)[whole].max() < np.ptp(plain.multiplier[whole])
+
+
+def test_a_body_that_is_all_but_free_to_turn_keeps_its_constants():
+    """Friction under one row of macro-elements holds it: from pressures that are rounded, a
+    reconstruction turns it, and each sweep turns it 100,000 times as far as the one before."""
+    content = yaml.safe_load((STUDY.parents[1] / "friction-patch/m-stick.yaml").read_text())
+    content["mesh"]["bottom"]["divisions"] = [3, 1, 1]
+    content["mesh"]["top"] |= {"cells": "HEXA20"}
+    content["transform"] = {"perturb": 0.05}
+    content["contact"][0]["recovery"] = "linear"
+    case = parse_case(yaml.safe_dump(content), Path("turning.yaml"))
+    solution = simulate(case, mesh_of(case))
+    assert solution.zones[0].recovered is None
+    assert "interface: pressure not recovered" in [line.what for line in solution.plan]
+    np.testing.assert_allclose(solution.zones[0].multiplier, 25.0, rtol=1e-8)
 
 
 def test_each_zone_has_its_own_form():

@@ -18,7 +18,7 @@ from ...lac.recovery import settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search, solve_with_friction, status_of
 from .problem import ContactProblem
-from .recovery import Recovered, RecoveredZone, ZoneFit, fit_of, recovered
+from .recovery import Recovered, RecoveredZone, ZoneFit, fit_of, recovered, settles
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
@@ -82,7 +82,7 @@ def solve_and_recover(
 ) -> tuple[Equilibrium, Recovered]:
     """Equilibrium at a step after the state `before`, and its recovered pressure by zone.
 
-    Where friction does not settle under the correction, the state stays as it is and no pressure is
+    Where the state does not settle under the correction, it stays as it is and no pressure is
     recovered. Raises SolveError where there is no equilibrium.
     """
     state = solve_with_friction(problem, step, before)
@@ -111,13 +111,17 @@ def solve_and_recover(
 
     nothing = np.zeros(state.force.size)
     try:
-        values = settled_means(state.pressure, nothing, sweeps, added, change)
+        values, first = settled_means(state.pressure, nothing, sweeps, added, change)
         loads = [_Loads.of(zone, latest) for zone in given]
         forces = [each.force(values) for each in loads]
         couples = (each.couple(values) for each in loads)
         found = replace(under(sum(forces, nothing)), couple=sum(couples, np.zeros(3)))
+        if not settles(first, values, found):
+            raise _UnsettledError
     except _UnsettledError:
-        _LOG.info("recovery: friction does not settle; pressure and traction stay constant by face")
+        _LOG.info(
+            "recovery: the state does not settle; pressure and traction stay constant by face"
+        )
         return state, {}
     return found, {
         each.zone.zone.name: RecoveredZone(
@@ -133,4 +137,4 @@ def solve_and_recover(
 
 
 class _UnsettledError(Exception):
-    """A sweep has no state."""
+    """A sweep has no state, or the sweeps diverge."""

@@ -20,6 +20,9 @@ from .state import Equilibrium
 _LOG = logging.getLogger(__name__)
 # How often a status that the correction changes is found anew.
 _ROUNDS = 3
+# Sweeps diverge where the last one changes so many times what the first did, and more than this
+# share of the pressure, which is rounding.
+_GROWTH, _ROUNDING = 10, 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +85,10 @@ def recovered(
     found = state
     for _ in range(_ROUNDS):
         zones = [fit_of(zone, found.status.closed) for zone in given]
-        found, read, forces = _corrected(problem, found, zones)
+        corrected = _corrected(problem, found, zones)
+        if corrected is None:
+            break
+        found, read, forces = corrected
         wrong = found.trial.violation(found.status.closed) > 1
         if not (wrong & problem.constraints.eligible).any():
             return found, {
@@ -96,8 +102,22 @@ def recovered(
                 for zone, fit, c, force in zip(given, zones, read, forces, strict=True)
             }
         found = problem.solve(step, found.status.closed, correction=found.correction)
-    _LOG.info("recovery: the contact status does not settle; the pressure stays constant by face")
+    _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
     return state, {}
+
+
+def settles(first: float, applied: np.ndarray, state: Equilibrium) -> bool:
+    """Whether the last sweep changed less than the `first` one, by a margin, or than rounding.
+
+    `applied` (k,): the pressures whose reconstruction is applied, those of the `state` are under
+    it. Where a body is all but free to turn, a reconstruction from rounded pressures turns it, and
+    the sweeps diverge.
+    """
+    left = np.abs(state.pressure - applied).max(initial=0.0)
+    limit = state.trial.pressure_limit
+    known = limit[np.isfinite(limit)].max(initial=0.0)
+    rounding = max(_ROUNDING * np.abs(applied).max(initial=0.0), known)
+    return bool(left <= max(_GROWTH * first, rounding))
 
 
 def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
@@ -110,8 +130,11 @@ def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
 
 def _corrected(
     problem: ContactProblem, state: Equilibrium, zones: list[ZoneFit]
-) -> tuple[Equilibrium, list[np.ndarray], list[np.ndarray]]:
-    """The state with the loads of its reconstruction; coefficients and loads (n_dofs,) by zone."""
+) -> tuple[Equilibrium, list[np.ndarray], list[np.ndarray]] | None:
+    """The state with the loads of its reconstruction; coefficients and loads (n_dofs,) by zone.
+
+    None where the sweeps diverge.
+    """
     size = state.correction.size
     sweeps = max(zone.recovery.form.sweeps for zone in zones)
     if not sweeps:
@@ -120,7 +143,7 @@ def _corrected(
     def loads(pressure: np.ndarray) -> list[np.ndarray]:
         return [z.recovery.loads.T @ z.coefficients(pressure) for z in zones]
 
-    pressure = settled_means(
+    pressure, first = settled_means(
         state.pressure,
         state.correction.ravel(),
         sweeps,
@@ -131,5 +154,7 @@ def _corrected(
     added = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
     correction = np.sum(added, axis=0).reshape(state.correction.shape)
     state = problem.corrected(state, correction)
+    if not settles(first, pressure, state):
+        return None
     read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
     return state, read, added

@@ -222,8 +222,10 @@ def _friction(states: Sequence[Equilibrium]) -> Iterator[Line]:
 
 
 def estimated(solution: Solution) -> Iterator[Line]:
-    """The estimated error of constant pressures, by a reconstruction."""
-    for zone in solution.zones:
+    """The estimated error of constant pressures, by a reconstruction, and what is not recovered."""
+    for given, zone in zip(solution.case.zones, solution.zones, strict=True):
+        if given.recovery != "none" and zone.recovered is None and zone.closed.any():
+            yield Line(f"{zone.name}: pressure not recovered", "no state settles under it")
         error = zone.relative_pressure_error
         if error is not None and error > _ROUNDING:
             how = f"a {zone.recovered.form} one" if zone.recovered else "a linear one"
