@@ -186,7 +186,7 @@ def nested(cells, poisson, form, n):
         + "loads: [{group: base, pressure: 25.0}]\n"
         + "contact: [{slave: bottom_contact, master: top_contact}]\n"
         + f"reference: {{kind: analytical, solution: {{name: {name}, radii: [20, 30, 40]}}}}\n"
-        + "tolerance: {displacement_l2: 1.0}\n"
+        + "tolerance: {displacement_l2: 0.9}\n"
     )
     sections = {
         side: {"cells": cells, "divisions": [2 * k] * (dim - 1) + [k]}
