@@ -62,9 +62,9 @@ def seconds(value: float | None) -> str:
 
 def duration(value: float) -> str:
     """Two digits: `12 ms`, `0.12 s`, `1.2 s`; from ten seconds on whole ones."""
-    if value < 0.0995:
+    if abs(value) < 0.0995:
         return f"{value * 1000:.2g} ms"
-    return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"
+    return f"{value:.2g} s" if abs(value) < 9.95 else f"{value:.0f} s"
 
 
 def gigabytes(value: float) -> str:

@@ -107,3 +107,11 @@ def test_extreme_cases_are_there_with_their_study(tmp_path):
     assert [record["quantity"] for record in records] == ["tiny pressure", "far"]
     assert [record["digits"] for record in records] == [9.0, -math.log10(2.0**-52)]
     assert records[0]["url"] == "stability.html#map-tiny-pressure"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.012, "12 ms"), (-0.012, "-12 ms"), (-0.44, "-0.44 s"), (-1.4, "-1.4 s"), (-14.2, "-14 s")],
+)
+def test_a_saving_may_be_a_loss(value, text):
+    assert formats.duration(value) == text
